@@ -1,0 +1,37 @@
+# Needs python3 (3.11 or newer) and make; everything else goes into .venv here.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test check bench build clean
+.DELETE_ON_ERROR:
+
+.venv/run.done: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hapticclay needs Python 3.11 or newer, this is %s" % sys.version.split()[0])'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+.venv/dev.done: .venv/run.done
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+demo: .venv/run.done  ## set up, run the constant cut, say where the plots are
+	$(BIN)/hapticclay run constant --out out/demo
+	@echo "plots: $(CURDIR)/out/demo/velocity.png $(CURDIR)/out/demo/force.png"
+
+test: .venv/dev.done  ## set up and run all tests
+	$(BIN)/python -m pytest
+
+check: .venv/dev.done  ## lint and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+bench: .venv/dev.done  ## speed against a bare engine loop
+	$(BIN)/python benchmarks/throughput.py
+
+build: .venv/dev.done  ## wheel and sdist into dist/
+	$(BIN)/python -m build --quiet
+
+clean:
+	rm -rf .venv out dist

@@ -1,0 +1,75 @@
+"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced at the elbow.
+
+Angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use the
+absolute angles theta1 = q1, theta2 = q1 + q2, in which the inertia matrix is diag(I1, I2),
+constant, without Coriolis terms. Derivations: docs/equations.md.
+"""
+
+from __future__ import annotations
+
+import math
+from math import cos, sin
+
+from .params import L1, L2, S
+
+I1 = L1 * L1 / S[0].gain  # [kg.m^2]; Sh at high frequency is 1/Lambda, so Lambda_x = 1/0.7919 kg (Eq. 17)
+I2 = L2 * L2 / S[1].gain  # [kg.m^2]; Lambda_y = 1/0.131 kg (Eq. 18)
+
+
+TRACE_W = L1 * L1 / I1 + L2 * L2 / I2  # trace of Lambda^-1 [1/kg], the same at every pose
+
+
+def columns(q1: float, q2: float) -> tuple[float, float, float, float]:
+    """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14).
+
+    Args:
+        q1, q2: joint angles [rad].
+
+    Returns:
+        (u1x, u1y, u2x, u2y) [m]. The handle lies at (u1y + u2y, -u1x - u2x) in the world.
+    """
+    a = q1 + q2
+    return -L1 * sin(q1), L1 * cos(q1), -L2 * sin(a), L2 * cos(a)
+
+
+def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float, float]:
+    """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987).
+
+    Args:
+        u1x, u1y, u2x, u2y: result of `columns` [m].
+
+    Returns:
+        (Wxx, Wxy, Wyy) [1/kg].
+    """
+    a = u1x / I1
+    b = u2x / I2
+    wxx = u1x * a + u2x * b
+    return wxx, u1y * a + u2y * b, TRACE_W - wxx
+
+
+def rates(
+    vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float
+) -> tuple[float, float]:
+    """Absolute link rates that move the handle with (vx, vy), divided by n.
+
+    Args:
+        vx, vy: handle velocity, or any vector of it. u1x, u1y, u2x, u2y: result of `columns` [m].
+        n: divisor; zero at the stretched or folded arm raises ZeroDivisionError.
+    """
+    det = n * (u1x * u2y - u2x * u1y)
+    return (vx * u2y - vy * u2x) / det, (vy * u1x - vx * u1y) / det
+
+
+def inverse(x: float, y: float) -> tuple[float, float]:
+    """Joint angles that put the handle at world (x, y), elbow on the left of the line to it (q2 < 0).
+
+    Args:
+        x, y: world position [m], within the reach.
+
+    Returns:
+        (q1, q2) [rad]; q1 in (-pi, pi].
+    """
+    c = (x * x + y * y - L1 * L1 - L2 * L2) / (2.0 * L1 * L2)
+    q2 = -math.acos(min(1.0, max(-1.0, c)))
+    q1 = math.atan2(y, x) - math.atan2(L2 * math.sin(q2), L1 + L2 * math.cos(q2))
+    return math.remainder(q1, 2.0 * math.pi), q2

@@ -1,0 +1,90 @@
+"""Virtual clay: position-dependent viscous damping, fe = b(p) v (Eqs. 3, 4)."""
+
+from __future__ import annotations
+
+import bisect
+
+from .params import AXES, Clay, Profile
+
+
+def kick(
+    b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float
+) -> tuple[float, ...]:
+    """Splits the clay's damping in one kick between the velocities before and after it.
+
+    Half and half in the interior (Crank-Nicolson, second order) while that is free of overshoot,
+    z = b H w <= 2; beyond, the least implicit split without overshoot (amplification 0), so that
+    no stiffness rings. Across a border each side keeps its own part of the kick: the total impulse
+    is then b times the distance travelled inside, exactly.
+
+    Args:
+        b0, b1: damping before and after the sample on each axis [N.s/m].
+        H: length of the kick [s]. L, R: its shares before and after the sample.
+        w: largest acceleration per unit of force over all directions [1/kg].
+
+    Returns:
+        (before x, after x, before y, after y [N.s/m], before, after [1]): fe = before v- + after v+,
+        and the weights of v- and v+ in the velocity that the clay feels at the sample.
+    """
+    z = max(b1) * H * w
+    if b0 == b1 and z > 2.0:
+        L, R = 1.0 / z, 1.0 - 1.0 / z
+        return L * b0[0], R * b1[0], L * b0[1], R * b1[1], L, R
+    return L * b0[0], R * b1[0], L * b0[1], R * b1[1], R, L
+
+
+def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:
+    """Damping b [N.s/m] for start <= coordinate < end [m], none elsewhere."""
+    return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
+
+
+def slab(b: float, start: float, end: float) -> Clay:
+    """A slab across the x axis that damps both axes alike (the constant cut, Sec. 4.1)."""
+    profile = constant_profile(b, start, end)
+    return Clay(x=profile, y=profile)
+
+
+class Regions:
+    """Which region of the clay the handle is in, and how far that region reaches.
+
+    Attributes:
+        low, high: borders of the present region on each coordinate [m].
+        b: damping of the present region on each axis [N.s/m].
+    """
+
+    def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
+        inf = float("inf")
+        self._profiles = (clay.x, clay.y) if clay else ()
+        self._edges = [sorted({e for f in self._profiles if f.along == axis for e in f.edges}) for axis in AXES]
+        self._end = length
+        if length is not None:
+            self._edges[0] = sorted({e for e in self._edges[0] if e < length} | {length})
+        self._index = [bisect.bisect_right(self._edges[i], p[i]) for i in (0, 1)]
+        self.low, self.high = [-inf, -inf], [inf, inf]
+        self.b = (0.0, 0.0)
+        self._settle()
+
+    def _settle(self) -> None:
+        for i in (0, 1):
+            edges, k = self._edges[i], self._index[i]
+            self.low[i] = edges[k - 1] if k else -float("inf")
+            self.high[i] = edges[k] if k < len(edges) else float("inf")
+        if self._profiles:
+            bx, by = (self._value(f) for f in self._profiles)
+            self.b = bx, by
+
+    def _value(self, profile: Profile) -> float:
+        i = AXES.index(profile.along)
+        low = self.low[i]
+        return profile.values[sum(1 for e in profile.edges if e <= low)]
+
+    def cross(self, i: int, up: bool) -> float:
+        """Steps over the border of coordinate i, upwards or downwards; returns its place [m]."""
+        border = self.high[i] if up else self.low[i]
+        self._index[i] += 1 if up else -1
+        self._settle()
+        return border
+
+    def at_end(self, i: int, up: bool) -> bool:
+        """True if the border ahead on coordinate i is the end of the path."""
+        return i == 0 and up and self._end is not None and self.high[0] == self._end

@@ -1,0 +1,199 @@
+"""The command line: `hapticclay`, or `python -m hapticclay`."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from .errors import ParameterError, choice
+from .experiments import SCENARIOS, constant_cut, free
+from .params import Scenario
+from .record import Record, atomic
+from .sim import simulate
+
+Experiment = (
+    Annotated[Scenario, tyro.conf.subcommand("constant", constructor=constant_cut)]
+    | Annotated[Scenario, tyro.conf.subcommand("free", constructor=free)]
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Run one experiment: print a table, write the record, its summary and two plots."""
+
+    scenario: Experiment
+    out: Path = Path("out")
+    """Folder for record.npz, summary.json, velocity.png and force.png."""
+    every: int = 1
+    """Keep every n-th sample in the record."""
+    plots: bool = True
+    """Draw the plots."""
+
+    def __call__(self) -> int:
+        writable(self.out)
+        record = simulate_with_progress(self.scenario, self.every)
+        record.save(self.out)
+        print(table(record))
+        if self.plots:
+            draw(record, self.out)
+        print(f"written to {self.out}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Version:
+    """Print the versions of hapticclay and of what it runs on."""
+
+    def __call__(self) -> int:
+        from .record import versions
+
+        print("  ".join(f"{name} {number}" for name, number in versions().items()))
+        return 0
+
+
+Command = Annotated[Run, tyro.conf.subcommand("run")] | Annotated[Version, tyro.conf.subcommand("version")]
+
+
+def writable(folder: Path) -> None:
+    """Refuses a folder that cannot be made or written, before any work is done.
+
+    Raises:
+        ParameterError: as said.
+    """
+    made = [p for p in (folder, *folder.parents) if not p.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
+    finally:
+        for p in made:  # left for the run itself to make
+            with contextlib.suppress(OSError):
+                p.rmdir()
+
+
+def simulate_with_progress(scenario: Scenario, every: int) -> Record:
+    """simulate() under a progress bar that shows itself after two seconds, on a terminal."""
+    from tqdm import tqdm
+
+    start, length = scenario.start[0], scenario.length
+    form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
+    with tqdm(total=1.0, desc=scenario.name, delay=2.0, bar_format=form, disable=None, leave=False) as bar:
+
+        def show(t: float, x: float) -> None:
+            way = (x - start) / (length - start) if length is not None else 0.0
+            bar.update(max(0.0, min(1.0, max(t / scenario.t_max, way)) - bar.n))
+
+        return simulate(scenario, every=every, progress=show)
+
+
+def table(record: Record) -> str:
+    """What a person wants to know of a run at once."""
+    from tabulate import tabulate
+
+    def cell(x, form: str) -> str:
+        return "-" if x is None else format(x, form)
+
+    s = record.scenario
+    way = s.clay.x.along if s.clay else "x"
+    if not s.clay and abs(s.force[1]) > abs(s.force[0]):
+        way = "y"
+    rows = []
+    pieces = record.regions()
+    for r in [piece[way] for piece in pieces[:6]]:
+        fe, fh = r["fe_over_v"], r["steady_fh_over_v"]
+        rows.append(
+            [
+                f"{100 * r['from_m']:.2f} - {100 * r['to_m']:.2f}",
+                format(r["b"], "g"),
+                cell(fe and fe["mean"], ".5g"),
+                cell(fh and fh["mean"], ".5g"),
+                cell(r["steady_speed"], ".6f"),
+                cell(r["expected_speed"], ".6f"),
+            ]
+        )
+    head = [f"{way} [cm]", "b [N.s/m]", "fe/v [N.s/m]", "fh/v [N.s/m]", "steady v [m/s]", "expected v [m/s]"]
+    lines = [tabulate(rows, head, colalign=("right",) * 6, disable_numparse=True), ""]
+    if len(pieces) > 6:
+        lines.insert(1, f"... and {len(pieces) - 6} more stretches")
+    for c in record.crossings[:6]:
+        lines.append(f"border {c.axis} = {100 * c.border:g} cm crossed at {c.time:.6f} s with {c.speed:.6f} m/s")
+    if len(record.crossings) > 6:
+        lines.append(f"... and {len(record.crossings) - 6} more crossings")
+    lines.append(f"status: {record.status}")
+    if record.outcome.advice:
+        lines.append(f"advice: {record.outcome.advice}")
+    speed = record.t[-1] / record.wall_time if len(record.t) and record.wall_time else 0.0
+    lines.append(f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time")
+    return "\n".join(lines)
+
+
+def draw(record: Record, folder: Path) -> None:
+    """Writes velocity.png and force.png."""
+    from . import plot
+
+    axis = "y" if abs(record.scenario.force[1]) > abs(record.scenario.force[0]) else "x"
+    for name, figure in (
+        ("velocity", plot.velocity_position(record, axis)),
+        ("force", plot.force_velocity(record, axis)),
+    ):
+        with atomic(folder / f"{name}.png") as f:
+            figure.savefig(f, format="png")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command line; returns its exit status: 0, 2 for bad input, 130 for Ctrl-C."""
+    complaint = io.StringIO()
+    try:
+        try:
+            with contextlib.redirect_stderr(complaint):
+                command = tyro.cli(
+                    Command,
+                    prog="hapticclay",
+                    description="Virtual clay, cut with a simulated haptic arm.",
+                    args=argv,
+                    config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs),
+                )
+        except SystemExit as stop:
+            if stop.code in (0, None):
+                return 0
+            _check_names(list(sys.argv[1:] if argv is None else argv))
+            raise ParameterError("arguments", "", _one_line(complaint.getvalue())) from None
+        return command()
+    except ParameterError as error:
+        text = error.bound if error.field == "arguments" else str(error)
+        print(f"hapticclay: {text}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("hapticclay: interrupted", file=sys.stderr)
+        return 130
+
+
+def _check_names(words: list[str]) -> None:
+    """Says which command or experiment was meant, where a word is none of them."""
+    if words and not words[0].startswith("-"):
+        choice("command", words[0], ("run", "version"))
+    if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
+        choice("experiment", words[1], tuple(SCENARIOS))
+
+
+def _one_line(box: str) -> str:
+    """The message of tyro's framed complaint, without frame and hints on help."""
+    lines = [re.sub(r"[\u2500-\u257f]+", " ", line).strip() for line in box.splitlines()]
+    text: list[str] = []
+    for line, raw in zip(lines[1:], box.splitlines()[1:], strict=False):
+        if "\u2500" * 5 in raw and text:
+            break
+        if line:
+            text.append(line)
+    return " ".join(text) or " ".join(filter(None, lines)) or "bad arguments"

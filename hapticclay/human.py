@@ -1,0 +1,35 @@
+"""The operator's arm: fh = uh - Th p, Th = m s^2 + d s + k (Eq. 19)."""
+
+from __future__ import annotations
+
+from .params import Operator
+
+
+def kick(operator: Operator | None, H: float, L: float, R: float) -> tuple[float, float, float, float]:
+    """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
+
+    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k H^2/4 to the
+    mass and keeps any spring stable at any step (Newmark, beta = 1/4).
+
+    Args:
+        operator: Th; None for Th = 0.
+        H: length of the kick [s]. L, R: its shares before and after the sample.
+
+    Returns:
+        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
+        -(spring p + mass J'q' + before v- + after v+).
+    """
+    if operator is None:
+        return 0.0, 0.0, 0.0, 0.0
+    mass = operator.mass + 0.25 * operator.spring * H * H
+    return operator.spring, mass, operator.damper * L - mass / H, operator.damper * R + mass / H
+
+
+def impedance(spring: float, mass: float, before: float, p: float, c: float, v: float) -> float:
+    """Resisting force of the operator's arm in a kick, less the part that depends on its outcome [N].
+
+    Args:
+        spring, mass, before: from `kick`.
+        p: handle position [m]. c: its centripetal acceleration [m/s^2]. v: velocity before [m/s].
+    """
+    return spring * p + mass * c + before * v

@@ -1,0 +1,190 @@
+"""One tick of the closed loop: measure -> clay -> operator -> compensator -> servo -> engine.
+
+The loop is stepped as a leapfrog: angles at the samples t(k), rates halfway between them, so that
+a plain step of the engine (rates first, then angles with the new rates) is of second order. A kick
+carries the rates across sample k; it lasts from the middle of the step before it to the middle
+of the step after it, and either step may be short, to end on a border of the clay.
+Derivation and error terms: docs/equations.md, section 4.
+"""
+
+from __future__ import annotations
+
+from . import arm, clay, human, lti, servo
+from .params import C_POLE, G, S, Scenario
+
+ROW = 14 * 8  # bytes of one row: q, qd, p, v, fh, tau, delta, two axes each
+AHEAD = 4.0  # steps that `advance` looks ahead for a border
+SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
+
+
+def initial_state(p: tuple[float, float]) -> tuple[float, ...]:
+    """State of a loop at rest with the handle at p [m]; see `tick`."""
+    return (*p, 0.0, 0.0, *p, 0.0, 0.0, 0.0, 0.0)
+
+
+def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
+    """What a tick needs of the scenario and of the two steps around its sample.
+
+    Args:
+        before, after: lengths of the steps [s]; before = 0 at the start, after = 0 at the end.
+    """
+    H = 0.5 * (before + after)
+    L, R = before / (before + after), after / (before + after)
+    keep, take = lti.kick(C_POLE, H, L, R)
+    return (
+        H, after, 0.5 * before,
+        *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
+        keep, take * scenario.gain[0], take * scenario.gain[1],
+        *scenario.force, scenario.origin[0], -scenario.origin[1], *scenario.torque_limit,
+        *human.kick(scenario.operator, H, L, R),
+        1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
+    )  # fmt: skip
+
+
+def damping(b0: tuple[float, float], b1: tuple[float, float], before: float, after: float) -> tuple[float, ...]:
+    """What a tick needs of the clay: b0, b1 before and after its sample [N.s/m], steps as above."""
+    span = before + after
+    return clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W)
+
+
+def tick(c, k, q1, q2, w1, w2, state):
+    """Carries the loop across one sample.
+
+    Args:
+        c: from `coefficients`. k: from `damping`.
+        q1, q2: joint angles at the sample [rad]. w1, w2: joint rates half a step before it [rad/s].
+        state: (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2
+            [rad/s^2]): compensator output and rate, reference model y = G delta and its rate, link
+            accelerations; positions at the sample, rates half a step before it.
+
+    Returns:
+        (state, command, sample, after):
+        state: for the next sample.
+        command: (tau1, tau2 of the motors, further torques 1, 2 [N.m]) for the engine, which treats
+            the clay's second part, k[1] and k[3], by itself.
+        sample: (joint rates 1, 2 [rad/s], position x, y [m], velocity x, y [m/s], fh x, y [N], delta
+            x, y [m]) at the sample.
+        after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) half a step after the sample.
+    """
+    (
+        H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
+        uhx, uhy, ox, noy, limit1, limit2, spring, mass, before, behind, held, shaped,
+    ) = c  # fmt: skip
+    cx0, cx1, cy0, cy1, lv, rv = k
+    deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2 = state
+
+    # measure: the handle, and the centripetal part c = J' q' of its acceleration
+    u1x, u1y, u2x, u2y = arm.columns(q1, q2)
+    px = u1y + u2y - ox
+    py = noy - u1x - u2x
+    r2 = w1 + w2
+    vx = u1x * w1 + u2x * r2
+    vy = u1y * w1 + u2y * r2
+    s1 = w1 + half * g1
+    s2 = r2 + half * g2
+    s1 *= s1
+    s2 *= s2
+    cx = -u1y * s1 - u2y * s2
+    cy = u1x * s1 + u2x * s2
+    if shaped:
+        sxx, sxy, syy = SXX, 0.0, SYY
+    else:
+        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+
+    # clay and operator: net force f = (fx - dx ux, fy - dy uy)
+    fx = uhx - cx0 * vx
+    fy = uhy - cy0 * vy
+    dx, dy = cx1, cy1
+    if held:
+        fx -= human.impedance(spring, mass, before, px, cx, vx)
+        fy -= human.impedance(spring, mass, before, py, cy, vy)
+        dx += behind
+        dy += behind
+
+    # servo: one kick of the reference model, then of the handle
+    vrx = keepx * ydx + takex * (deltax - yx)
+    vry = keepy * ydy + takey * (deltay - yy)
+    ax = servo.acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
+    ay = servo.acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
+    ux, uy = servo.outcome(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+    g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    ffx = fx - dx * ux
+    ffy = fy - dy * uy
+    t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
+    t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
+    if t1 > limit1 or t1 < -limit1 or t2 > limit2 or t2 < -limit2:
+        t1 = min(max(t1, -limit1), limit1)
+        t2 = min(max(t2, -limit2), limit2)
+        a1 = (t1 - t2) / arm.I1
+        a2 = t2 / arm.I2
+        ax = vx / H + u1x * a1 + u2x * a2
+        ay = vy / H + u1y * a1 + u2y * a2
+        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        ux, uy = servo.outcome(1.0 / H, 1.0 / H, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+        g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        ffx = fx - dx * ux
+        ffy = fy - dy * uy
+
+    # compensator, driven by the force that acts in this kick
+    ex = keep * ex + gainx * ffx
+    ey = keep * ey + gainy * ffy
+
+    # to the engine goes what it does not treat implicitly: the hand, and the clay's first part
+    hx, hy = uhx, uhy
+    if held:
+        fx -= behind * ux
+        fy -= behind * uy
+        hx = fx + cx0 * vx
+        hy = fy + cy0 * vy
+    p2 = u2x * fx + u2y * fy
+    p1 = u1x * fx + u1y * fy + p2
+    return (
+        (
+            deltax + step * ex, deltay + step * ey, ex, ey,
+            yx + step * vrx, yy + step * vry, vrx, vry, g1, g2,
+        ),
+        (t1, t2, p1, p2),
+        (
+            w1 + half * g1, w2 + half * (g2 - g1), px, py, lv * vx + rv * ux, lv * vy + rv * uy,
+            hx, hy, deltax, deltay,
+        ),
+        (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
+    )  # fmt: skip
+
+
+def advance(n, c, k, box, state, read, write, keep, angles, rates, drive, push, buffer, row, step, model, data):
+    """Whole steps in the interior of a region: n of them, or until the handle nears a border.
+
+    Args:
+        c, k: from `coefficients` and `damping`, for whole steps before and after.
+        box: (low x, high x, low y, high y), where whole steps are safe [m].
+        state: see `tick`.
+        read, write, keep: unpack two floats, pack two floats, pack a row of the record.
+        angles, rates, drive, push: the engine's qpos, qvel, ctrl and qfrc_applied as buffers.
+        buffer, row: the record and the offset of its next row, in bytes.
+        step, model, data: the engine.
+
+    Returns:
+        (number of steps made, state).
+    """
+    lowx, highx, lowy, highy = box
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9 = state
+    ahead = AHEAD * c[1]
+    done = 0
+    for done in range(1, n + 1):
+        q1, q2 = read(angles)
+        w1, w2 = read(rates)
+        (
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
+            (t1, t2, p1, p2),
+            (qd1, qd2, px, py, vx, vy, hx, hy, dx, dy),
+            (ux, uy, n1, n2),
+        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
+        write(drive, 0, t1, t2)
+        write(push, 0, p1, p2)
+        keep(buffer, row, q1, q2, qd1, qd2, px, py, vx, vy, hx, hy, t1, t2, dx, dy)
+        row += ROW
+        step(model, data)
+        if not (lowx < px + ahead * ux < highx and lowy < py + ahead * uy < highy):
+            break
+    return done, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9)

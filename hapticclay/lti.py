@@ -1,0 +1,92 @@
+"""The linear blocks of the loop (Fig. 2) as polynomials, and their exact closed loop.
+
+Polynomials in s are NumPy coefficient arrays, highest power first.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .errors import ParameterError, choice, number
+from .params import AXES, C_POLE, G, Operator, S
+
+
+def kick(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
+    """Coefficients (keep, take) of one kick of v' = -damping v + drive: v+ = keep v- + take drive.
+
+    Trapezoidal in the damping, exact in total impulse: any length, any split.
+
+    Args:
+        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
+    """
+    n = 1.0 / H + damping * R
+    return (1.0 / H - damping * L) / n, 1.0 / n
+
+
+def steady_speed(K: float, f: float, b: float) -> float:
+    """Speed under a constant hand force f [N] in clay b [N.s/m]: K f/(10 + K b) [m/s].
+
+    The compensator's damper and the clay carry the force together: f = (10/K + b) v (Eqs. 20, 21).
+    """
+    return K * f / (C_POLE + K * b)
+
+
+def characteristic(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
+    """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
+
+    Args:
+        axis: "x" or "y". K: compensator gain. b: clay [N.s/m]. operator: Th; None for Th = 0.
+
+    Returns:
+        Coefficients, shape (7,), highest power first.
+
+    Raises:
+        ParameterError: unknown axis, or K or b not finite and >= 0.
+    """
+    i = AXES.index(choice("axis", axis, AXES))
+    K, b = number("K", K, 0.0), number("b", b, 0.0, unit="N.s/m")
+    th = operator or Operator(0.0, 0.0, 0.0)
+    den_c = np.array([1.0, C_POLE, 0.0])
+    den_g = np.array([1.0, G[i].damping, G[i].stiffness])
+    den_s = np.array([1.0, S[i].damping, S[i].stiffness])
+    num_gc = np.array([G[i].gain * K])
+    num_t = np.array([th.mass, th.damper + b, th.spring])
+    num = np.polyadd(np.polymul(num_gc, den_s), S[i].gain * np.polymul(den_c, den_g))
+    return np.polyadd(np.polymul(np.polymul(den_c, den_g), den_s), np.polymul(num, num_t))
+
+
+def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
+    """Poles of the loop at the nominal pose [rad/s], shape (6,); arguments as `characteristic`.
+
+    Without a spring in Th one of them is the integrator that moves the handle (s = 0).
+    """
+    return np.roots(characteristic(axis, K, b, operator))
+
+
+def stable(axis: str, K: float, b: float, operator: Operator | None = None) -> bool:
+    """True if no closed-loop pole lies right of the imaginary axis; arguments as `characteristic`."""
+    poly = characteristic(axis, K, b, operator)
+    while poly[-1] == 0.0:
+        poly = poly[:-1]
+    return bool(np.all(np.roots(poly).real < 0.0))
+
+
+def gain_limit(axis: str, b: float, operator: Operator | None = None) -> float:
+    """Largest K for which the loop is stable at the nominal pose; inf if there is none.
+
+    Bisection on the poles to full precision, from below: the first loss of stability.
+
+    Args:
+        axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0.
+    """
+    low, high = 0.0, 1e-3
+    while stable(axis, high, b, operator):
+        low, high = high, 1.1 * high
+        if high > 1e6:
+            return math.inf
+    while high - low > 1e-12 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(axis, middle, b, operator) else (low, middle)
+    return low

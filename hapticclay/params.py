@@ -1,0 +1,197 @@
+"""Every printed number once, with its equation, and the frozen records that carry them.
+
+Source: M.-G. Her, K.-S. Hsu, T.-S. Lan, M. Karkoub, "Haptic Direct-Drive Robot Control Scheme
+in Virtual Reality", J. Intelligent and Robotic Systems 35 (2002) 247-264. SI units throughout;
+axes are always ordered (x, y).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from .errors import ParameterError, choice, flag, number, numbers_of, pair
+
+AXES = ("x", "y")
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """gain / (s^2 + damping s + stiffness); damping in 1/s, stiffness in 1/s^2."""
+
+    gain: float
+    damping: float
+    stiffness: float
+
+    def __post_init__(self):
+        object.__setattr__(self, "gain", number("gain", self.gain, 0.0, above=True))
+        object.__setattr__(self, "damping", number("damping", self.damping, 0.0, unit="1/s"))
+        object.__setattr__(self, "stiffness", number("stiffness", self.stiffness, 0.0, above=True, unit="1/s^2"))
+
+
+CM = 1e-2  # the paper prints lengths in centimetres
+
+L1 = 0.24  # link lengths [m], Sec. 4
+L2 = 0.35
+TS = 0.36e-3  # sampling period [s], Sec. 4
+
+G = (SecondOrder(910.19, 41.8, 910.19), SecondOrder(765.5, 30.3, 765.5))  # [m/m], Eqs. 15, 16
+S = (SecondOrder(79.19 * CM, 41.1, 432.0), SecondOrder(13.1 * CM, 32.4, 492.46))  # [m/N], Eqs. 17, 18
+
+C_POLE = 10.0  # C = K/(s^2 + 10 s) [m/N], Eqs. 20, 22, 27: virtual mass 1/K, damper 10/K
+B_CONSTANT = 90.0  # clay of the constant cut [N.s/m], Eq. 21
+CLAY_X = (0.05, 0.15)  # the clay lies 5 cm ahead of the tool and is 10 cm long [m], Sec. 4.1
+PATH_LENGTH = 0.20  # the records of Fig. 8 run to 20 cm [m]
+
+# Not printed. The middle of the 20 cm path is put at the nominal pose (elbow square, handle at
+# (L2, L1)): 20 cm of +x travel from the nominal pose itself would leave the reach of 0.59 m.
+ORIGIN = (0.25, 0.24)  # (L2 - PATH_LENGTH / 2, L1)
+GAIN = (1.0, 0.5)  # K = 1 on y is unstable in the printed model for 62 < b < 3900 N.s/m
+TORQUE_LIMIT = (40.0, 40.0)  # [N.m], ours: the class of direct-drive motors that carry such inertias
+
+B_MAX = 1e9  # [N.s/m]; the engine refuses controls above 1e10
+
+
+@dataclass(frozen=True)
+class Operator:
+    """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).
+
+    Attributes:
+        mass: kg. damper: N.s/m. spring: N/m, pulling towards p = 0.
+    """
+
+    mass: float = 0.25
+    damper: float = 2.0
+    spring: float = 6.0
+
+    def __post_init__(self):
+        for field, high, unit in (("mass", 1e3, "kg"), ("damper", B_MAX, "N.s/m"), ("spring", 1e9, "N/m")):
+            value = number(f"operator.{field}", getattr(self, field), 0.0, high, unit=unit)
+            object.__setattr__(self, field, value)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Damping b of one axis as a piecewise constant function of one coordinate.
+
+    Attributes:
+        edges: borders [m], ascending, shape (n,).
+        values: b in each region [N.s/m], shape (n + 1,); region i lies between edges i - 1 and i.
+        along: coordinate that decides, "x" or "y".
+    """
+
+    edges: tuple[float, ...]
+    values: tuple[float, ...]
+    along: str = "x"
+
+    def __post_init__(self):
+        edges = numbers_of("clay.edges", self.edges, [str(i) for i in range(_len("clay.edges", self.edges))], unit="m")
+        values = numbers_of(
+            "clay.values", self.values, [str(i) for i in range(len(edges) + 1)], 0.0, B_MAX, unit="N.s/m"
+        )
+        if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+            raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
+        choice("clay.along", self.along, AXES)
+        object.__setattr__(self, "edges", edges)
+        object.__setattr__(self, "values", values)
+
+
+def _len(field: str, value: object) -> int:
+    try:
+        return len(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise ParameterError(field, value, "must be a sequence of numbers") from None
+
+
+@dataclass(frozen=True)
+class Clay:
+    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0)."""
+
+    x: Profile
+    y: Profile
+
+    def __post_init__(self):
+        for field in AXES:
+            if not isinstance(getattr(self, field), Profile):
+                raise ParameterError(f"clay.{field}", getattr(self, field), "must be a Profile")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One run, complete: simulate(scenario) needs nothing else. Change it with dataclasses.replace.
+
+    Attributes:
+        name: label used in files and plots.
+        clay: the virtual clay; None for free space.
+        gain: compensator gain K on each axis, C = K/(s^2 + 10 s).
+        force: the operator's muscle force uh on each axis [N].
+        operator: impedance Th of the operator's arm; None for a pure force (Th = 0).
+        shaping: True lets the servo shape the handle's inertia, so that Sh holds at every pose.
+        dt: physics and control step [s].
+        t_max: the run ends then [s] ...
+        length: ... or when p_x reaches this [m]; None to run for t_max.
+        start: handle position p at t = 0 [m].
+        origin: world position of p = 0 [m].
+        torque_limit: of the shoulder and elbow motor [N.m].
+    """
+
+    name: str = "free"
+    clay: Clay | None = None
+    gain: tuple[float, float] = GAIN
+    force: tuple[float, float] = (1.0, 0.0)
+    operator: Operator | None = None
+    shaping: bool = False
+    dt: float = TS
+    t_max: float = 60.0
+    length: float | None = PATH_LENGTH
+    start: tuple[float, float] = (0.0, 0.0)
+    origin: tuple[float, float] = ORIGIN
+    torque_limit: tuple[float, float] = TORQUE_LIMIT
+
+    def __post_init__(self):
+        def put(field, value):
+            object.__setattr__(self, field, value)
+
+        if not isinstance(self.name, str) or not self.name:
+            raise ParameterError("name", self.name, "must be a non-empty string")
+        if self.clay is not None and not isinstance(self.clay, Clay):
+            raise ParameterError("clay", self.clay, "must be a Clay or None")
+        if self.operator is not None and not isinstance(self.operator, Operator):
+            raise ParameterError("operator", self.operator, "must be an Operator or None")
+        flag("shaping", self.shaping)
+        put("gain", pair("gain", self.gain, 0.0, 1e6, above=True))
+        put("force", pair("force", self.force, -1e6, 1e6, unit="N"))
+        put("dt", number("dt", self.dt, 1e-6, 0.1, unit="s"))
+        put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
+        put("start", pair("start", self.start, unit="m"))
+        put("origin", pair("origin", self.origin, unit="m"))
+        limit = numbers_of(
+            "torque_limit", self.torque_limit, ("shoulder", "elbow"), 0.0, 1e6, above=True, unit="N.m"
+        )
+        put("torque_limit", limit)
+        self._check_reach("start", self.start)
+        if self.length is not None:
+            put("length", number("length", self.length, -10.0, 10.0, unit="m"))
+            if self.length <= self.start[0]:
+                raise ParameterError("length", self.length, f"must lie ahead of start x = {self.start[0]:g} m")
+            self._check_reach("length", (self.length, self.start[1]))
+
+    def _check_reach(self, field: str, p: tuple[float, float]) -> None:
+        """Refuses p, or a straight path from start to p, beyond the reach or too near the shoulder."""
+        x, y = self.origin[0] + p[0], self.origin[1] + p[1]
+        r = math.hypot(x, y)
+        if field == "length":
+            x0 = self.origin[0] + self.start[0]
+            if x0 < 0.0 < x:
+                r = min(r, abs(y))
+        low, high = abs(L2 - L1) + REACH_MARGIN, L1 + L2 - REACH_MARGIN
+        if not low <= r <= high:
+            raise ParameterError(
+                field,
+                getattr(self, field),
+                f"unreachable: {r:.4g} m from the shoulder, must be {low:.4g} to {high:.4g} m "
+                f"(origin {self.origin[0]:g}, {self.origin[1]:g} m)",
+            )
+
+
+REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no force can be rendered

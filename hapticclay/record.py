@@ -1,0 +1,287 @@
+"""What a run leaves behind: arrays over time, how it ended, and files that outlive the session."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import platform
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import lti
+from .errors import ParameterError
+from .params import AXES, Clay, Operator, Profile, Scenario
+
+SCHEMA = "hapticclay-record-1"
+ARRAYS = {
+    "t": "s",
+    "p": "m",
+    "v": "m/s",
+    "fh": "N",
+    "fe": "N",
+    "b": "N.s/m",
+    "q": "rad",
+    "qd": "rad/s",
+    "tau": "N.m",
+    "delta": "m",
+}
+STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
+STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        code: "finished", "time limit", "diverged" or "out of reach".
+        time: simulated time of the end [s]. step: index of the last good sample.
+        axis: the axis that is to blame, "" if none.
+        cause: what happened, in words. advice: what to change, in words.
+    """
+
+    code: str
+    time: float
+    step: int
+    axis: str = ""
+    cause: str = ""
+    advice: str = ""
+
+    def __str__(self) -> str:
+        where = f": {self.axis} axis" if self.axis else ""
+        return f"{self.code}{where} at {self.time:.4f} s" + (f" ({self.cause})" if self.cause else "")
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The handle crossed a border: coordinate, border [m], time [s], speed along it [m/s]."""
+
+    axis: str
+    border: float
+    time: float
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Arrays of one run, all over the same n samples; axes ordered (x, y).
+
+    Attributes:
+        t: time [s], shape (n,); steps of dt, the last one shorter if the run ended between two.
+        p, v: handle position [m] and velocity [m/s], shape (n, 2).
+        fh, fe: force of the operator on the handle, resisting force of the clay [N], (n, 2).
+        b: damping of the clay at p [N.s/m], (n, 2).
+        q, qd: joint angles [rad] and rates [rad/s], (n, 2).
+        tau: motor torques [N.m], (n, 2). delta: compensator output [m], (n, 2).
+        scenario: what was run. outcome: how it ended. crossings: borders, in order.
+        steps: engine steps made. wall_time: seconds they took. versions: of the packages used.
+    """
+
+    t: np.ndarray
+    p: np.ndarray
+    v: np.ndarray
+    fh: np.ndarray
+    fe: np.ndarray
+    b: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    tau: np.ndarray
+    delta: np.ndarray
+    scenario: Scenario
+    outcome: Outcome
+    crossings: tuple[Crossing, ...] = ()
+    steps: int = 0
+    wall_time: float = 0.0
+    versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
+
+    @property
+    def status(self) -> str:
+        """How the run ended, in one line: its code, the axis and time, and the cause."""
+        return str(self.outcome)
+
+    def ratio(self, force: np.ndarray) -> np.ndarray:
+        """force / v along each axis [N.s/m], shape (n, 2); NaN where the handle stands still."""
+        out = np.full(self.v.shape, np.nan)
+        return np.divide(force, self.v, out=out, where=np.abs(self.v) > 1e-12)
+
+    def steady(self) -> np.ndarray:
+        """Which samples have a steady speed, shape (n, 2): less than 1 % of change in 1 s, for 0.1 s."""
+        n = len(self.t)
+        if n < 3:
+            return np.zeros(self.v.shape, dtype=bool)
+        a = np.gradient(self.v, self.t, axis=0)
+        moving = np.abs(a) > STEADY * np.abs(self.v)
+        count = np.concatenate((np.zeros((1, 2)), np.cumsum(moving, axis=0)))
+        span = max(1, round(STEADY_SPAN / float(self.t[1] - self.t[0])))
+        low, high = np.maximum(np.arange(n) - span, 0), np.minimum(np.arange(n) + span + 1, n)
+        return count[high] == count[low]
+
+    def regions(self) -> list[dict[str, Any]]:
+        """One entry for each stretch of constant damping, in order of time.
+
+        For each axis: fe/v against b over the stretch (mean, spread), and where the speed is steady,
+        the speed, fe/v and fh/v there, beside K f/(10 + K b) where the muscle force is constant.
+        """
+        if not len(self.t):
+            return []
+        change = np.flatnonzero(np.any(np.diff(self.b, axis=0) != 0.0, axis=1)) + 1
+        steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
+        out = []
+        for piece in np.split(np.arange(len(self.t)), change):
+            entry: dict[str, Any] = {"from_s": float(self.t[piece[0]]), "to_s": float(self.t[piece[-1]])}
+            for i, axis in enumerate(AXES):
+                s = piece[steady[piece, i]]
+                b = float(self.b[piece[0], i])
+                entry[axis] = {
+                    "from_m": float(self.p[piece[0], i]),
+                    "to_m": float(self.p[piece[-1], i]),
+                    "b": b,
+                    "fe_over_v": _spread(fe_v[piece, i]),
+                    "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
+                    "expected_speed": self._expected(i, b),
+                    "steady_fe_over_v": _spread(fe_v[s, i]),
+                    "steady_fh_over_v": _spread(fh_v[s, i]),
+                }
+            out.append(entry)
+        return out
+
+    def _expected(self, i: int, b: float) -> float | None:
+        s = self.scenario
+        return lti.steady_speed(s.gain[i], s.force[i], b) if s.operator is None else None
+
+    def summary(self) -> dict[str, Any]:
+        """Everything about the run but its arrays, ready for JSON."""
+        end = float(self.t[-1]) if len(self.t) else 0.0
+        return {
+            "schema": SCHEMA,
+            "status": self.status,
+            "outcome": dataclasses.asdict(self.outcome),
+            "scenario": dataclasses.asdict(self.scenario),
+            "crossings": [dataclasses.asdict(c) for c in self.crossings],
+            "regions": self.regions(),
+            "samples": len(self.t),
+            "steps": self.steps,
+            "simulated_time_s": end,
+            "wall_time_s": self.wall_time,
+            "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
+            "units": {"crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS},
+            "versions": self.versions,
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes record.npz and summary.json into the folder path, each whole or not at all.
+
+        Returns:
+            The folder.
+
+        Raises:
+            ParameterError: the folder cannot be made or written.
+        """
+        folder = Path(path)
+        head = {k: v for k, v in self.summary().items() if k != "regions"}
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        with atomic(folder / "record.npz") as f:
+            np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
+        with atomic(folder / "summary.json") as f:
+            f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
+        return folder
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Record:
+        """Reads what `save` wrote; path is the folder or its record.npz.
+
+        Raises:
+            ParameterError: no record there, or not one of this schema.
+        """
+        file = Path(path)
+        file = file / "record.npz" if file.is_dir() else file
+        try:
+            with np.load(file, allow_pickle=False) as z:
+                head = json.loads(str(z["summary"]))
+                arrays = {name: z[name] for name in ARRAYS}
+        except (OSError, KeyError, ValueError, EOFError) as error:
+            raise ParameterError("record", str(path), f"must be a saved record ({error})") from None
+        if head.get("schema") != SCHEMA:
+            raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {head.get('schema')}")
+        return cls(
+            **arrays,
+            scenario=_scenario(head["scenario"]),
+            outcome=Outcome(**head["outcome"]),
+            crossings=tuple(Crossing(**c) for c in head["crossings"]),
+            steps=head["steps"],
+            wall_time=head["wall_time_s"],
+            versions=head["versions"],
+        )
+
+
+def _spread(x: np.ndarray) -> dict[str, float] | None:
+    x = x[np.isfinite(x)]
+    return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
+
+
+def _scenario(d: dict[str, Any]) -> Scenario:
+    if d.get("clay"):
+        d["clay"] = Clay(**{axis: Profile(**d["clay"][axis]) for axis in AXES})
+    if d.get("operator"):
+        d["operator"] = Operator(**d["operator"])
+    return Scenario(**d)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages a run depends on."""
+    out = {"python": platform.python_version()}
+    for package in ("hapticclay", "mujoco", "numpy", "scipy"):
+        try:
+            out[package] = version(package)
+        except PackageNotFoundError:
+            out[package] = "unknown"
+    return out
+
+
+class atomic:
+    """Opens a file to be written under a temporary name and given its own only when complete.
+
+    Raises:
+        ParameterError: the file cannot be written; nothing is left behind.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __enter__(self):
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
+        except OSError as error:
+            raise self._refusal(error) from None
+        self.temporary = Path(name)
+        self.file = os.fdopen(handle, "wb")
+        return self.file
+
+    def __exit__(self, kind, error, trace):
+        try:
+            if kind is None:
+                self.file.flush()
+                os.fsync(self.file.fileno())
+                umask = os.umask(0)
+                os.umask(umask)
+                os.fchmod(self.file.fileno(), 0o666 & ~umask)
+            self.file.close()
+            if kind is None:
+                os.replace(self.temporary, self.path)
+                return
+        except OSError as late:
+            kind, error = OSError, late
+        self.temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise self._refusal(error) from None
+
+    def _refusal(self, error: OSError) -> ParameterError:
+        return ParameterError("out", str(self.path), f"must be writable ({error.strerror or error})")
+

@@ -1,0 +1,177 @@
+"""Independent solutions. Nothing here is taken from hapticclay but the printed numbers' meaning.
+
+`piecewise_linear` is the loop at one constant inertia (shaping on), axis by axis, solved by the matrix
+exponential. `nonlinear` is the arm in joint space, with its mass matrix, Jacobian and torques spelt
+out, integrated by SciPy at 1e-11 with the borders as events.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+# Printed numbers, typed again on purpose (Eqs. 15-20, Sec. 4)
+G0, G1 = np.array([910.19, 765.5]), np.array([41.8, 30.3])
+SG, S1, S0 = np.array([0.7919, 0.131]), np.array([41.1, 32.4]), np.array([432.0, 492.46])
+L1, L2, ORIGIN = 0.24, 0.35, np.array([0.25, 0.24])
+I1, I2 = L1**2 / 0.7919, L2**2 / 0.131
+
+
+class Linear:
+    """One axis with constant b: z' = A z, z = (p, v, delta, delta', y, y', 1)."""
+
+    def __init__(self, axis, b, K, uh, th=(0.0, 0.0, 0.0)):
+        m, d, k = th
+        i = axis
+        force = np.array([-k, -(d + b), 0, 0, 0, 0, uh])
+        servo = np.array([-S0[i], -S1[i], G0[i], 0, S0[i] - G0[i], S1[i] - G1[i], 0])
+        acceleration = (servo + SG[i] * force) / (1 + SG[i] * m)
+        f = force - m * acceleration
+        self.A = np.zeros((7, 7))
+        self.A[0, 1] = self.A[2, 3] = self.A[4, 5] = 1
+        self.A[1] = acceleration
+        self.A[3] = K * f
+        self.A[3, 3] -= 10
+        self.A[5] = [0, 0, G0[i], 0, -G0[i], -G1[i], 0]
+
+    def poles(self):
+        return np.linalg.eigvals(self.A[:6, :6])
+
+
+def piecewise_linear(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, t_max=60.0, z0=None):
+    """Exact solution along one axis, moving forward through the borders `edges` with b = `values`.
+
+    Returns (crossing times, position(t)).
+    """
+    z = np.array([0, 0, 0, 0, 0, 0, 1.0]) if z0 is None else np.array(z0, float)
+    t, pieces, crossings = 0.0, [], []
+    for edge, b in zip(edges, values, strict=True):
+        A = Linear(axis, b, K, uh, th).A
+        h = 0.002
+        E = expm(A * h)
+        a, ta = z, t
+        while True:
+            n = E @ a
+            if n[0] >= edge or ta > t_max:
+                break
+            a, ta = n, ta + h
+        pieces.append((t, z, A))
+        if ta > t_max:
+            break
+        s = brentq(lambda s, A=A, a=a, edge=edge: (expm(A * s) @ a)[0] - edge, 0.0, h, xtol=1e-15)
+        z = expm(A * s) @ a
+        z[0] = edge
+        t = ta + s
+        crossings.append(t)
+
+    def position(times):
+        """p at ascending times [m]."""
+        out = np.empty(len(times))
+        starts = np.array([p[0] for p in pieces])
+        index = np.searchsorted(starts, times, side="right") - 1
+        for j, (t0, z0, A) in enumerate(pieces):
+            mine = np.flatnonzero(index == j)
+            if not len(mine):
+                continue
+            gaps = np.diff(times[mine])
+            uniform = len(mine) > 2 and np.allclose(gaps, gaps[0], rtol=1e-9, atol=0)
+            if uniform:
+                E = expm(A * gaps[0])
+                a = expm(A * (times[mine[0]] - t0)) @ z0
+                for i in mine:
+                    out[i] = a[0]
+                    a = E @ a
+            else:
+                for i in mine:
+                    out[i] = (expm(A * (times[i] - t0)) @ z0)[0]
+        return out
+
+    return crossings, position
+
+
+class Arm:
+    """The two-link arm in relative joint angles, from first principles."""
+
+    M = np.array([[I1 + I2, I2], [I2, I2]])
+
+    @staticmethod
+    def forward(q):
+        a = q[0] + q[1]
+        return np.array([L1 * np.cos(q[0]) + L2 * np.cos(a), L1 * np.sin(q[0]) + L2 * np.sin(a)])
+
+    @staticmethod
+    def jacobian(q):  # Eq. 14
+        s1, c1, s12, c12 = np.sin(q[0]), np.cos(q[0]), np.sin(q[0] + q[1]), np.cos(q[0] + q[1])
+        return np.array([[-L1 * s1 - L2 * s12, -L2 * s12], [L1 * c1 + L2 * c12, L2 * c12]])
+
+    @staticmethod
+    def jacobian_rate(q, w):
+        s1, c1, s12, c12 = np.sin(q[0]), np.cos(q[0]), np.sin(q[0] + q[1]), np.cos(q[0] + q[1])
+        w12 = w[0] + w[1]
+        return np.array(
+            [[-L1 * c1 * w[0] - L2 * c12 * w12, -L2 * c12 * w12], [-L1 * s1 * w[0] - L2 * s12 * w12, -L2 * s12 * w12]]
+        )
+
+    @staticmethod
+    def start(p):
+        x, y = ORIGIN + p
+        q2 = -np.arccos((x * x + y * y - L1 * L1 - L2 * L2) / (2 * L1 * L2))
+        return np.array([np.arctan2(y, x) - np.arctan2(L2 * np.sin(q2), L1 + L2 * np.cos(q2)), q2])
+
+
+def nonlinear(
+    b_of_region, edges, K, uh, th=None, shaping=False, t_max=60.0, t_eval=None, rtol=1e-11, atol=1e-13, p0=(0.0, 0.0)
+):
+    """The whole arm, both axes, a slab across x: b_of_region[i] on both axes between edges i-1 and i.
+
+    Forward crossings of x only; ends at the last edge. Returns (crossing times, t, p (n, 2), v (n, 2)).
+    """
+    K, uh = np.array(K), np.array(uh)
+    m, d, k = th or (0.0, 0.0, 0.0)
+    p0 = np.array(p0, float)
+
+    def rhs(t, z, b):
+        q, w, delta, rate, y, yr = z.reshape(6, 2)
+        J, Jd = Arm.jacobian(q), Arm.jacobian_rate(q, w)
+        p, v, c = Arm.forward(q) - ORIGIN, J @ w, Jd @ w
+        W = J @ np.linalg.solve(Arm.M, J.T)
+        Lam = np.linalg.inv(W)
+        y2 = G0 * (delta - y) - G1 * yr
+        want = y2 + S1 * (yr - v) + S0 * (y - p)
+        S = np.diag(SG) if shaping else W
+        # p'' = want + S f,  f = uh - m p'' - d v - k p - b v
+        rest = uh - d * v - k * p - b * v
+        acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)
+        f = rest - m * acc
+        tau = J.T @ (Lam @ (want - c + (S - W) @ f))
+        wd = np.linalg.solve(Arm.M, tau + J.T @ f)
+        return np.concatenate((w, wd, rate, K * f - 10 * rate, yr, y2))
+
+    z = np.concatenate((Arm.start(p0), [0, 0], p0, [0, 0], p0, [0, 0]))
+    t, crossings, T, P, V = 0.0, [], [], [], []
+    for edge, b in zip(edges, b_of_region, strict=True):
+
+        def hit(t, z, b, edge=edge):
+            return Arm.forward(z[:2])[0] - ORIGIN[0] - edge
+
+        hit.terminal, hit.direction = True, 1
+        s = solve_ivp(
+            rhs, (t, t_max), z, "DOP853", rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=t_eval is not None
+        )
+        end = s.t[-1]
+        if t_eval is not None:
+            mine = t_eval[(t_eval >= t) & (t_eval < end)]
+            if len(mine):
+                Z = s.sol(mine)
+                T.append(mine)
+                P.append(np.array([Arm.forward(x[:2]) - ORIGIN for x in Z.T]))
+                V.append(np.array([Arm.jacobian(x[:2]) @ x[2:4] for x in Z.T]))
+        z, t = s.y[:, -1], end
+        if not len(s.t_events[0]):
+            break
+        crossings.append(t)
+    if not T:
+        return crossings, np.array([]), np.empty((0, 2)), np.empty((0, 2))
+    return crossings, np.concatenate(T), np.concatenate(P), np.concatenate(V)
