@@ -19,17 +19,22 @@ I2 = L2 * L2 / S[1].gain  # [kg.m^2]; Lambda_y = 1/0.131 kg (Eq. 18)
 TRACE_W = L1 * L1 / I1 + L2 * L2 / I2  # trace of Lambda^-1 [1/kg], the same at every pose
 
 
-def columns(q1: float, q2: float) -> tuple[float, float, float, float]:
+def columns(s1: float, c1: float, s12: float, c12: float) -> tuple[float, float, float, float]:
     """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14).
 
     Args:
-        q1, q2: joint angles [rad].
+        s1, c1: sine and cosine of q1. s12, c12: of q1 + q2. Floats, or arrays of one shape.
 
     Returns:
         (u1x, u1y, u2x, u2y) [m]. The handle lies at (u1y + u2y, -u1x - u2x) in the world.
     """
-    a = q1 + q2
-    return -L1 * sin(q1), L1 * cos(q1), -L2 * sin(a), L2 * cos(a)
+    return -L1 * s1, L1 * c1, -L2 * s12, L2 * c12
+
+
+def position(q1: float, q2: float) -> tuple[float, float]:
+    """World position of the handle [m] at joint angles q1, q2 [rad]."""
+    u1x, u1y, u2x, u2y = columns(sin(q1), cos(q1), sin(q1 + q2), cos(q1 + q2))
+    return u1y + u2y, -u1x - u2x
 
 
 def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float, float]:

@@ -23,14 +23,14 @@ def kick(
         w: largest acceleration per unit of force over all directions [1/kg].
 
     Returns:
-        (before x, after x, before y, after y [N.s/m], before, after [1]): fe = before v- + after v+,
-        and the weights of v- and v+ in the velocity that the clay feels at the sample.
+        (before x, after x, before y, after y [N.s/m], felt [1]): fe = before v- + after v+, and the
+        velocity that the clay feels at the sample is v- + felt (v+ - v-).
     """
     z = max(b1) * H * w
     if b0 == b1 and z > 2.0:
         L, R = 1.0 / z, 1.0 - 1.0 / z
-        return L * b0[0], R * b1[0], L * b0[1], R * b1[1], L, R
-    return L * b0[0], R * b1[0], L * b0[1], R * b1[1], R, L
+        return L * b0[0], R * b1[0], L * b0[1], R * b1[1], R
+    return L * b0[0], R * b1[0], L * b0[1], R * b1[1], L
 
 
 def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:

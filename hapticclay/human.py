@@ -17,7 +17,7 @@ def kick(operator: Operator | None, H: float, L: float, R: float) -> tuple[float
 
     Returns:
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
-        -(spring p + mass J'q' + before v- + after v+).
+        -(spring p - mass c + before v- + after v+), c the centripetal acceleration.
     """
     if operator is None:
         return 0.0, 0.0, 0.0, 0.0
@@ -30,6 +30,6 @@ def impedance(spring: float, mass: float, before: float, p: float, c: float, v: 
 
     Args:
         spring, mass, before: from `kick`.
-        p: handle position [m]. c: its centripetal acceleration [m/s^2]. v: velocity before [m/s].
+        p: handle position [m]. c: its centripetal acceleration, towards the centre [m/s^2]. v: velocity before [m/s].
     """
-    return spring * p + mass * c + before * v
+    return spring * p - mass * c + before * v

@@ -9,11 +9,12 @@ Derivation and error terms: docs/equations.md, section 4.
 
 from __future__ import annotations
 
+from math import cos, sin
+
 from . import arm, clay, human, lti, servo
 from .params import C_POLE, G, S, Scenario
 
-ROW = 14 * 8  # bytes of one row: q, qd, p, v, fh, tau, delta, two axes each
-AHEAD = 4.0  # steps that `advance` looks ahead for a border
+ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
 
@@ -35,7 +36,7 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
         H, after, 0.5 * before,
         *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
         keep, take * scenario.gain[0], take * scenario.gain[1],
-        *scenario.force, scenario.origin[0], -scenario.origin[1], *scenario.torque_limit,
+        *scenario.force, scenario.origin[0], -scenario.origin[1], *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
         *human.kick(scenario.operator, H, L, R),
         1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip
@@ -62,19 +63,20 @@ def tick(c, k, q1, q2, w1, w2, state):
         state: for the next sample.
         command: (tau1, tau2 of the motors, further torques 1, 2 [N.m]) for the engine, which treats
             the clay's second part, k[1] and k[3], by itself.
-        sample: (joint rates 1, 2 [rad/s], position x, y [m], velocity x, y [m/s], fh x, y [N], delta
-            x, y [m]) at the sample.
+        sample: (position x, y [m], velocity half a step before x, y [m/s], net hand force f of the
+            kick x, y [N], delta x, y [m]).
         after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) half a step after the sample.
     """
     (
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
-        uhx, uhy, ox, noy, limit1, limit2, spring, mass, before, behind, held, shaped,
+        uhx, uhy, ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, lv, rv = k
+    cx0, cx1, cy0, cy1, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2 = state
 
-    # measure: the handle, and the centripetal part c = J' q' of its acceleration
-    u1x, u1y, u2x, u2y = arm.columns(q1, q2)
+    # measure: the handle, and the centripetal part of its acceleration, J' q' = -c
+    a = q1 + q2
+    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
     px = u1y + u2y - ox
     py = noy - u1x - u2x
     r2 = w1 + w2
@@ -84,8 +86,8 @@ def tick(c, k, q1, q2, w1, w2, state):
     s2 = r2 + half * g2
     s1 *= s1
     s2 *= s2
-    cx = -u1y * s1 - u2y * s2
-    cy = u1x * s1 + u2x * s2
+    cx = u1y * s1 + u2y * s2
+    cy = -u1x * s1 - u2x * s2
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -107,12 +109,14 @@ def tick(c, k, q1, q2, w1, w2, state):
     ax = servo.acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
     ay = servo.acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
     ux, uy = servo.outcome(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
-    g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    dvx = ux - vx
+    dvy = uy - vy
+    g1, g2 = arm.rates(dvx, dvy, u1x, u1y, u2x, u2y, H)
     ffx = fx - dx * ux
     ffy = fy - dy * uy
     t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
     t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
-    if t1 > limit1 or t1 < -limit1 or t2 > limit2 or t2 < -limit2:
+    if t1 * t1 > square1 or t2 * t2 > square2:
         t1 = min(max(t1, -limit1), limit1)
         t2 = min(max(t2, -limit2), limit2)
         a1 = (t1 - t2) / arm.I1
@@ -121,7 +125,9 @@ def tick(c, k, q1, q2, w1, w2, state):
         ay = vy / H + u1y * a1 + u2y * a2
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
         ux, uy = servo.outcome(1.0 / H, 1.0 / H, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
-        g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        dvx = ux - vx
+        dvy = uy - vy
+        g1, g2 = arm.rates(dvx, dvy, u1x, u1y, u2x, u2y, H)
         ffx = fx - dx * ux
         ffy = fy - dy * uy
 
@@ -130,12 +136,9 @@ def tick(c, k, q1, q2, w1, w2, state):
     ey = keep * ey + gainy * ffy
 
     # to the engine goes what it does not treat implicitly: the hand, and the clay's first part
-    hx, hy = uhx, uhy
     if held:
         fx -= behind * ux
         fy -= behind * uy
-        hx = fx + cx0 * vx
-        hy = fy + cy0 * vy
     p2 = u2x * fx + u2y * fy
     p1 = u1x * fx + u1y * fy + p2
     return (
@@ -144,47 +147,37 @@ def tick(c, k, q1, q2, w1, w2, state):
             yx + step * vrx, yy + step * vry, vrx, vry, g1, g2,
         ),
         (t1, t2, p1, p2),
-        (
-            w1 + half * g1, w2 + half * (g2 - g1), px, py, lv * vx + rv * ux, lv * vy + rv * uy,
-            hx, hy, deltax, deltay,
-        ),
+        (px, py, vx, vy, ffx, ffy, deltax, deltay),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )  # fmt: skip
 
 
-def advance(n, c, k, box, state, read, write, keep, angles, rates, drive, push, buffer, row, step, model, data):
-    """Whole steps in the interior of a region: n of them, or until the handle nears a border.
+def advance(rows, c, k, state, read, write, keep, motion, drive, push, buffer, step, model, data):
+    """Whole steps within one region of the clay.
 
     Args:
+        rows: range of offsets into the record, one for each step [bytes].
         c, k: from `coefficients` and `damping`, for whole steps before and after.
-        box: (low x, high x, low y, high y), where whole steps are safe [m].
         state: see `tick`.
-        read, write, keep: unpack two floats, pack two floats, pack a row of the record.
-        angles, rates, drive, push: the engine's qpos, qvel, ctrl and qfrc_applied as buffers.
-        buffer, row: the record and the offset of its next row, in bytes.
+        read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
+        write: packs two floats into the engine's ctrl and qfrc_applied, drive and push.
+        keep: packs one row into the record, buffer.
         step, model, data: the engine.
 
     Returns:
-        (number of steps made, state).
+        The state after the last step.
     """
-    lowx, highx, lowy, highy = box
     s0, s1, s2, s3, s4, s5, s6, s7, s8, s9 = state
-    ahead = AHEAD * c[1]
-    done = 0
-    for done in range(1, n + 1):
-        q1, q2 = read(angles)
-        w1, w2 = read(rates)
+    for row in rows:
+        q1, q2, w1, w2 = read(motion)
         (
             (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
             (t1, t2, p1, p2),
-            (qd1, qd2, px, py, vx, vy, hx, hy, dx, dy),
+            (px, py, vx, vy, fx, fy, dx, dy),
             (ux, uy, n1, n2),
         ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
         write(drive, 0, t1, t2)
         write(push, 0, p1, p2)
-        keep(buffer, row, q1, q2, qd1, qd2, px, py, vx, vy, hx, hy, t1, t2, dx, dy)
-        row += ROW
+        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
         step(model, data)
-        if not (lowx < px + ahead * ux < highx and lowy < py + ahead * uy < highy):
-            break
-    return done, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9)
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9

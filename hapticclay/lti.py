@@ -45,16 +45,21 @@ def characteristic(axis: str, K: float, b: float, operator: Operator | None = No
     Raises:
         ParameterError: unknown axis, or K or b not finite and >= 0.
     """
+    free, driven = _split(axis, b, operator)
+    return np.polyadd(free, number("K", K, 0.0) * driven)
+
+
+def _split(axis: str, b: float, operator: Operator | None) -> tuple[np.ndarray, np.ndarray]:
+    """The closed-loop polynomial is free + K driven."""
     i = AXES.index(choice("axis", axis, AXES))
-    K, b = number("K", K, 0.0), number("b", b, 0.0, unit="N.s/m")
+    b = number("b", b, 0.0, unit="N.s/m")
     th = operator or Operator(0.0, 0.0, 0.0)
-    den_c = np.array([1.0, C_POLE, 0.0])
-    den_g = np.array([1.0, G[i].damping, G[i].stiffness])
-    den_s = np.array([1.0, S[i].damping, S[i].stiffness])
-    num_gc = np.array([G[i].gain * K])
-    num_t = np.array([th.mass, th.damper + b, th.spring])
-    num = np.polyadd(np.polymul(num_gc, den_s), S[i].gain * np.polymul(den_c, den_g))
-    return np.polyadd(np.polymul(np.polymul(den_c, den_g), den_s), np.polymul(num, num_t))
+    c = np.array([1.0, C_POLE, 0.0])
+    g = np.array([1.0, G[i].damping, G[i].stiffness])
+    s = np.array([1.0, S[i].damping, S[i].stiffness])
+    t = np.array([th.mass, th.damper + b, th.spring])
+    cg = np.convolve(c, g)
+    return np.polyadd(np.convolve(cg, s), S[i].gain * np.convolve(cg, t)), G[i].gain * np.convolve(s, t)
 
 
 def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
@@ -74,19 +79,22 @@ def stable(axis: str, K: float, b: float, operator: Operator | None = None) -> b
 
 
 def gain_limit(axis: str, b: float, operator: Operator | None = None) -> float:
-    """Largest K for which the loop is stable at the nominal pose; inf if there is none.
+    """Largest K up to which the loop is stable at the nominal pose; inf if there is none.
 
-    Bisection on the poles to full precision, from below: the first loss of stability.
+    Exact: on the imaginary axis the closed-loop polynomial A + K B vanishes, so Im(A B*) = 0, a
+    polynomial in omega, whose positive roots give the K at which a pair of poles can cross.
 
     Args:
         axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0.
     """
-    low, high = 0.0, 1e-3
-    while stable(axis, high, b, operator):
-        low, high = high, 1.1 * high
-        if high > 1e6:
-            return math.inf
-    while high - low > 1e-12 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(axis, middle, b, operator) else (low, middle)
-    return low
+    A, B = (p * 1j ** np.arange(len(p) - 1, -1, -1) for p in _split(axis, b, operator))
+    AB = np.convolve(A, B.conj())
+    roots = np.roots(np.trim_zeros(AB.imag, "f")) if np.any(AB.imag) else np.array([])
+    omega = roots[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0.0)].real
+    K = np.sort(-np.polyval(AB, omega).real / np.abs(np.polyval(B, omega)) ** 2)
+    for k in K[K > 0.0]:
+        if not stable(axis, (1.0 + 1e-6) * k, b, operator):
+            return float(k)
+    return math.inf
+
+

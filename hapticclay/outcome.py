@@ -28,59 +28,76 @@ class Watch:
 
     def __init__(self, scenario: Scenario):
         self.scenario = scenario
+        self.past = np.zeros((2, 2))  # last two velocities seen [m/s]
         self.turn = [0.0, 0.0]  # velocity at the last turning point [m/s]
-        self.velocity = [0.0, 0.0]  # last velocity seen [m/s]
+        self.hits = [0, 0]  # samples since then with a motor in its limit
         self.swings: list[list[tuple[float, bool]]] = [[], []]  # of the present growth: size [m/s], saturated
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
 
         Args:
-            rows: shape (n, 14), as loop.advance keeps them. first: index of the first.
+            rows: (q, p, v, fh, tau, delta), shape (12, n). first: index of the first.
 
         Returns:
             (number of good rows, outcome that ends the run there or None).
         """
         dt = self.scenario.dt
-        v, q2 = rows[:, 6:8], rows[:, 1]
-        fold = np.abs(np.sin(q2)) < FOLD
-        bad = ~np.isfinite(rows).all(axis=1) | (np.abs(v) > SPEED).any(axis=1) | fold
-        good = int(bad.argmax()) if bad.any() else len(rows)
-        found = self._unstable(rows[:good])
+        v, q2 = rows[4:6], rows[1]
+        good = rows.shape[1]
+        # first the question that costs little: is anything amiss at all?
+        if not (rows.shape[1] and np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and np.abs(np.sin(q2)).min() >= FOLD):
+            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (np.abs(np.sin(q2)) < FOLD)
+            good = int(bad.argmax()) if bad.any() else good
+        found = self._unstable(rows[:, :good])
         if found is not None:
             n, axis, cause = found
             step = first + n - 1
             return n, Outcome("diverged", step * dt, step, axis, cause, self._advice(axis))
-        if good == len(rows):
+        if good == rows.shape[1]:
             return good, None
         step = max(first + good - 1, 0)
         axis = self._blame([i for i in (0, 1) if len(self.swings[i]) >= 2 and self._above_limit(i)])
         if axis:
             return good, Outcome("diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis))
-        if fold[good]:
+        if abs(math.sin(q2[good])) < FOLD:
             where = "stretched" if math.cos(q2[good]) > 0.0 else "folded"
             advice = "choose a force, start or origin that keeps the handle within 0.11 to 0.59 m of the shoulder"
             return good, Outcome("out of reach", step * dt, step, "", f"the arm is {where}", advice)
-        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[good]), nan=np.inf)))]
+        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
         return good, Outcome("diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis))
 
     def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
         verdicts = {}
-        limit = np.array(self.scenario.torque_limit)
-        hit = (np.abs(rows[:, 10:12]) >= limit).any(axis=1)
+        v = np.concatenate((self.past, rows[4:6]), axis=1)
+        self.past = v[:, -2:]
+        tau, limit = np.abs(rows[8:10]), np.reshape(self.scenario.torque_limit, (2, 1))
+        hit = np.zeros(v.shape[1], dtype=int)
+        if np.any(tau.max(axis=1, initial=0.0) >= limit[:, 0]):
+            hit[2:] = np.cumsum((tau >= limit).any(axis=0))
         for i in range(2):
-            v = np.concatenate(([self.velocity[i]], rows[:, 6 + i]))
-            sign = np.sign(np.diff(v))
-            begin = 0
-            for k in np.flatnonzero((sign[1:] != sign[:-1]) & (sign[1:] != 0.0)):
-                self._swing(i, v[k + 1], bool(hit[begin : k + 1].any()))
-                begin = k + 1
+            rise = v[i, 1:] > v[i, :-1]
+            turns = np.flatnonzero(rise[1:] != rise[:-1]) + 1
+            if not len(turns):
+                self.hits[i] += int(hit[-1])
+                continue
+            hits = np.diff(hit[turns], prepend=-self.hits[i])
+            sizes = np.abs(np.diff(v[i, turns], prepend=self.turn[i]))
+            self.turn[i] = float(v[i, turns[-1]])
+            self.hits[i] = int(hit[-1] - hit[turns[-1]])
+            big = np.flatnonzero(sizes >= FLOOR)
+            before = -1
+            for j in big:
+                if j != before + 1:
+                    self.swings[i] = []
+                before = j
+                self._swing(i, float(sizes[j]), bool(hits[j]))
                 cause = self._verdict(i)
                 if cause:
-                    verdicts[i] = (int(k) + 1, cause)
+                    verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
                     break
-            if len(rows):
-                self.velocity[i] = float(v[-1])
+            if before != len(turns) - 1 and i not in verdicts:
+                self.swings[i] = []
         if not verdicts:
             return None
         growing = [i for i in (0, 1) if len(self.swings[i]) >= 3]
@@ -88,14 +105,11 @@ class Watch:
         n, cause = min(verdicts.values())
         return n, axis, cause
 
-    def _swing(self, i: int, velocity: float, saturated: bool) -> None:
-        size = abs(velocity - self.turn[i])
-        self.turn[i] = float(velocity)
+    def _swing(self, i: int, size: float, saturated: bool) -> None:
         last = self.swings[i][-1][0] if self.swings[i] else 0.0
-        if size < FLOOR or size < (0.8 if saturated else 1.0) * last:
+        if size < (0.8 if saturated else 1.0) * last:
             self.swings[i] = []
-        if size >= FLOOR:
-            self.swings[i].append((size, saturated))
+        self.swings[i].append((size, saturated))
 
     def _verdict(self, i: int) -> str:
         swings = self.swings[i]

@@ -34,9 +34,10 @@ def acceleration(
     Args:
         after, before, spring: from `kick`.
         yd1, yd0: rate of the reference model after and before [m/s]. v: handle velocity before [m/s].
-        y, p: reference and handle position [m]. c: centripetal acceleration of the handle [m/s^2].
+        y, p: reference and handle position [m]. c: its centripetal acceleration, towards the
+            centre [m/s^2].
     """
-    return after * yd1 + before * (v - yd0) + spring * (y - p) - c
+    return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
 def outcome(
@@ -53,11 +54,15 @@ def outcome(
     Returns:
         (ux, uy) [m/s].
     """
-    a = nx + sxx * dx
-    b = sxy * dy
-    c = sxy * dx
-    d = ny + syy * dy
     gx = ax + sxx * fx + sxy * fy
     gy = ay + sxy * fx + syy * fy
-    n = a * d - b * c
-    return (d * gx - b * gy) / n, (a * gy - c * gx) / n
+    if dx or dy:
+        a = nx + sxx * dx
+        b = sxy * dy
+        r = sxy * dx / a
+        uy = (gy - r * gx) / (ny + syy * dy - r * b)
+        ux = (gx - b * uy) / a
+    else:
+        ux = gx / nx
+        uy = gy / ny
+    return ux, uy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import math
 import struct
@@ -15,9 +16,9 @@ from . import arm, loop, outcome, record, scene
 from .clay import Regions
 from .errors import ParameterError, integer
 from .inline import inline
-from .params import Scenario
+from .params import AXES, Scenario
 
-CHUNK = 1024  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
+CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
 FUSE_FROM = 5_000  # steps from which inlining the loop (about 10 ms, once per process) pays
 
 _row = struct.Struct("14d")
@@ -56,6 +57,31 @@ def simulate(
     return run.result(wall)
 
 
+def _window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
+    """A view of the engine's memory from a to b, two floats each, and what reads all four at once."""
+    first, second = a.ctypes.data, b.ctypes.data
+    gap = second - first - a.nbytes
+    view = memoryview((ctypes.c_char * (a.nbytes + gap + b.nbytes)).from_address(first))
+    return view, struct.Struct(f"2d{gap}x2d").unpack_from
+
+
+def _sampled(raw: np.ndarray, k: np.ndarray, scenario: Scenario) -> np.ndarray:
+    """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
+
+    k is loop.damping of each kick, shape (5, n), or (5, 1) where it is the same for all.
+    """
+    out = np.empty((12, raw.shape[1]))
+    before, after = raw[4:6], raw[6:8]
+    out[0:4] = raw[0:4]
+    out[4:6] = before + k[4] * (after - before)
+    if scenario.operator:
+        out[6:8] = raw[8:10] + k[0:4:2] * before + k[1:4:2] * after
+    else:
+        out[6:8] = np.reshape(scenario.force, (2, 1))
+    out[8:12] = raw[10:14]
+    return out
+
+
 class _Run:
     def __init__(self, scenario: Scenario, every: int):
         self.scenario, self.every = scenario, every
@@ -63,6 +89,7 @@ class _Run:
         self.data = data = mujoco.MjData(self.model)
         data.qpos[:] = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
         self.angles, self.rates = memoryview(data.qpos), memoryview(data.qvel)
+        self.motion, self.read = _window(data.qpos, data.qvel)
         self.drive, self.push = memoryview(data.ctrl), memoryview(data.qfrc_applied)
         self.state = loop.initial_state(scenario.start)
         self.regions = Regions(scenario.clay, scenario.length, scenario.start)
@@ -75,9 +102,9 @@ class _Run:
         self.b = self.regions.b  # clay before the sample [N.s/m]
         self.rows = bytearray(CHUNK * loop.ROW)
         self.filled = 0
-        self.damping: list[tuple[float, float]] = []
-        self.kept: list[np.ndarray] = []
-        self.kept_b: list[np.ndarray] = []
+        self.stretches: list[tuple[int, tuple[float, float], tuple[float, ...]]] = []  # rows, their b and k
+        self.looked = 0  # rows judged so far
+        self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
         self.crossings: list[record.Crossing] = []
         self.watch = outcome.Watch(scenario)
         self.steps = 0  # of the engine
@@ -92,41 +119,63 @@ class _Run:
                 if self.filled >= CHUNK - 1 or self.outcome:
                     self._flush()
                     if progress:
-                        progress(self.t, self._handle()[0])
-        except ZeroDivisionError:  # the arm is exactly stretched or folded
-            self.outcome = record.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
+                        progress(self.t, self._ahead(self.angles, self.rates, 0.0)[0])
+        except (ArithmeticError, ValueError) as error:  # beyond floating point, or the arm exactly straight
+            if isinstance(error, ValueError) and all(map(math.isfinite, (*self.angles, *self.rates))):
+                raise
             self._flush()
-
-    def _handle(self) -> tuple[float, float]:
-        u1x, u1y, u2x, u2y = arm.columns(*self.angles)
-        return u1y + u2y - self.scenario.origin[0], -u1x - u2x - self.scenario.origin[1]
+            if self.outcome is None:
+                self.outcome = record.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
 
     def _glide(self) -> bool:
-        """Whole steps while no border is near; False if there is none to make."""
+        """Whole steps in one go; undone from the first that a border lies in. False if there is none to make."""
         dt, b = self.scenario.dt, self.regions.b
         n = min(self.last - self.i, CHUNK - 1 - self.filled)
         if self.before != dt or self.b != b or n < 1:
             return False
-        # a border is safe at 2 h^2 a from the extrapolated position, a = 50 m/s^2
-        low, high, margin = self.regions.low, self.regions.high, 100.0 * dt * dt
-        box = (low[0] + margin, high[0] - margin, low[1] + margin, high[1] - margin)
-        for h in (0.0, loop.AHEAD * dt):
-            x, y = self._ahead(self.angles, self.rates, h)
-            if not (box[0] < x < box[1] and box[2] < y < box[3]):
-                return False
+        p, ahead = self._ahead(self.angles, self.rates, 0.0), self._ahead(self.angles, self.rates, dt)
+        for i in (0, 1):  # do not run far beyond the border that lies ahead
+            d = ahead[i] - p[i]
+            if d:
+                way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
+                n = min(n, max(16, int(min(0.95 * way, n))))
         k = loop.damping(b, b, dt, dt)
         self._set_clay(k)
-        done, self.state = self.advance(
-            n, self.whole, k, box, self.state, _two.unpack_from, _two.pack_into, _row.pack_into,
-            self.angles, self.rates, self.drive, self.push, self.rows, self.filled * loop.ROW,
-            mujoco.mj_step, self.model, self.data,
-        )  # fmt: skip
-        self.damping += [b] * done
-        self.filled += done
-        self.steps += done
-        self.i += done
+        q, w, state = tuple(self.angles), tuple(self.rates), self.state
+        begin = self.filled * loop.ROW
+        while True:
+            self.state = self.advance(
+                range(begin, begin + n * loop.ROW, loop.ROW), self.whole, k, state,
+                self.read, _two.pack_into, _row.pack_into, self.motion, self.drive, self.push, self.rows,
+                mujoco.mj_step, self.model, self.data,
+            )  # fmt: skip
+            good = self._good(self.filled, n)
+            if good == n:
+                break
+            self.angles[0], self.angles[1] = q
+            self.rates[0], self.rates[1] = w
+            n = good
+            if n < 1:
+                self.state = state
+                return False
+        self.stretches.append((n, b, k))
+        self.filled += n
+        self.steps += n
+        self.i += n
         self.t = self.i * dt
         return True
+
+    def _good(self, first: int, n: int) -> int:
+        """How many of n steps from row first stay in the region, the position after the last included."""
+        rows = np.frombuffer(self.rows, dtype=float, count=14 * (first + n)).reshape(-1, 14)
+        end = self._ahead(self.angles, self.rates, 0.0)
+        out = np.zeros(n + 1, dtype=bool)
+        for i in (0, 1):
+            low, high = self.regions.low[i], self.regions.high[i]
+            if low > -math.inf or high < math.inf:
+                x = np.append(rows[first:, 2 + i], end[i])
+                out |= ~((x >= low) & (x < high))
+        return int(out.argmax()) - 1 if out.any() else n
 
     def _set_clay(self, k: tuple[float, ...]) -> None:
         if self.scenario.clay:
@@ -136,11 +185,10 @@ class _Run:
         """One step that looks where it ends, and ends on a border if one is in its way."""
         s = self.scenario
         target = (self.i + 1) * s.dt if self.i < self.last else s.t_max
-        after = target - self.t
+        on_grid = self.t == self.i * s.dt
+        after = s.dt if on_grid and self.i < self.last else target - self.t
         if after <= 1e-9 * s.dt or self.i > self.last:
             return self._close(record.Outcome("time limit", self.t, self.i))
-        if self.before == s.dt and self.i < self.last:
-            after = s.dt
         q = tuple(self.angles)
         w = tuple(self.rates)
         crossed = set()
@@ -153,7 +201,7 @@ class _Run:
             i = hit[0]
             up = self._ahead(q, out[2:], after)[i] >= self.regions.high[i]
             if self._beyond(i, up, self._ahead(q, out[2:], 0.0)[i]):
-                if self._cross(i, up, sample[4:6], self.t):
+                if self._cross(i, up, self.t):
                     return None
                 crossed.add(i)  # at most once a sample, so that a border cannot hold the run
                 continue
@@ -162,21 +210,18 @@ class _Run:
             landing, after = (i, self._ahead(q, out[2:], after)[i] >= self.regions.high[i]), spans[i]
             new, command, sample, out = self._tick(q, w, after)
             break
-        on_grid = self.t == self.i * s.dt
         if on_grid:
-            self._keep(q, sample, command, self.regions.b)
+            self._keep(q, sample, command, out, after)
         self._engine(w, command, out, after)
         self.state, self.b = new, self.regions.b
         self.before = after
         if landing is None:
             self.i += 1
             self.t = target
-            self.before = s.dt if after == s.dt else after
         else:
             self.t += after
             i, up = landing
-            velocity = self._tick(tuple(self.angles), tuple(self.rates), 0.0)[2][4:6]
-            self._cross(i, up, velocity, self.t)
+            self._cross(i, up, self.t)
 
     def _tick(self, q, w, after: float):
         s = self.scenario
@@ -186,8 +231,8 @@ class _Run:
 
     def _ahead(self, q, w, h: float) -> tuple[float, float]:
         """Handle position [m] when the joints have turned from q with w for h seconds."""
-        u1x, u1y, u2x, u2y = arm.columns(q[0] + h * w[0], q[1] + h * w[1])
-        return u1y + u2y - self.scenario.origin[0], -u1x - u2x - self.scenario.origin[1]
+        x, y = arm.position(q[0] + h * w[0], q[1] + h * w[1])
+        return x - self.scenario.origin[0], y - self.scenario.origin[1]
 
     def _inside(self, i: int, p: float) -> bool:
         return not (p >= self.regions.high[i] or p < self.regions.low[i])
@@ -219,11 +264,13 @@ class _Run:
                 break
         return b
 
-    def _cross(self, i: int, up: bool, velocity, t: float) -> bool:
+    def _cross(self, i: int, up: bool, t: float) -> bool:
         """Steps over a border; True if it was the end of the path."""
         end = self.regions.at_end(i, up)
         border = self.regions.high[i] if up else self.regions.low[i]
-        self.crossings.append(record.Crossing(axis="xy"[i], border=border, time=t, speed=float(velocity[i])))
+        # half a kick, on the near side of the border, brings the velocity to it
+        velocity = self._tick(tuple(self.angles), tuple(self.rates), 0.0)[3] if self.before else (0.0, 0.0)
+        self.crossings.append(record.Crossing(axis=AXES[i], border=border, time=t, speed=velocity[i]))
         if end:
             self._close(record.Outcome("finished", t, self.i))
         else:
@@ -234,17 +281,15 @@ class _Run:
         """The last sample: half a kick brings the rates to it, nothing is stepped."""
         q = tuple(self.angles)
         if self.before > 0.0:
-            _, command, sample, _ = self._tick(q, tuple(self.rates), 0.0)
-            self._keep(q, sample, command, self.b)
+            _, command, sample, out = self._tick(q, tuple(self.rates), 0.0)
+            self._keep(q, sample, command, out, 0.0)
         self.end_time = self.t
         self.outcome = result
 
-    def _keep(self, q, sample, command, b: tuple[float, float]) -> None:
-        qd1, qd2, px, py, vx, vy, hx, hy, dx, dy = sample
-        _row.pack_into(
-            self.rows, self.filled * loop.ROW, *q, qd1, qd2, px, py, vx, vy, hx, hy, command[0], command[1], dx, dy
-        )
-        self.damping.append(b)
+    def _keep(self, q, sample, command, out, after: float) -> None:
+        b0, b1 = self.b, self.regions.b
+        _row.pack_into(self.rows, self.filled * loop.ROW, *q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
+        self.stretches.append((1, b1 if after else b0, loop.damping(b0, b1, self.before, after)))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
@@ -268,28 +313,38 @@ class _Run:
     def _flush(self) -> None:
         """Judges the rows since the last look and moves them to the record."""
         n, self.filled = self.filled, 0
-        rows = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).copy()
-        b = np.array(self.damping[:n], dtype=float).reshape(n, 2)
-        self.damping = []
-        first = sum(len(r) for r in self.kept)
-        good, found = self.watch.look(rows, first)
+        raw = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).T.copy()
+        counts, b, k = zip(*self.stretches, strict=True) if n else ((), (), ())
+        self.stretches = []
+        b, k = (np.array(x).reshape(-1, w).T for x, w in ((b, 2), (k, 5)))
+        if len(counts) > 1:
+            k = np.repeat(k, counts, axis=1)
+        b = np.repeat(b, counts, axis=1)
+        rows = _sampled(raw, k, self.scenario)
+        good, found = self.watch.look(rows, self.looked)
         if found is not None:
             self.outcome, self.end_time = found, None
             self.crossings = [c for c in self.crossings if c.time <= found.time]
-            rows, b = rows[:good], b[:good]
-        self.kept.append(rows)
-        self.kept_b.append(b)
+        index = np.arange(self.looked, self.looked + good)
+        keep = index % self.every == 0
+        if self.outcome is not None and good:
+            keep[-1] = True
+        self.looked += good
+        self.kept.append((index[keep], rows[:, :good][:, keep], b[:, :good][:, keep]))
 
     def result(self, wall: float) -> record.Record:
-        rows, b = np.concatenate(self.kept), np.concatenate(self.kept_b)
-        t = np.arange(len(rows)) * self.scenario.dt
+        index, rows, b = (np.concatenate(x, axis=-1) for x in zip(*self.kept, strict=True))
+        t = index * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
         assert self.outcome is not None
-        x = [np.ascontiguousarray(rows[:, j : j + 2]) for j in range(0, 14, 2)]
-        q, qd, p, v, fh, tau, delta = x
+        q, p, v, fh, tau, delta = (rows[j : j + 2].T.copy() for j in range(0, 12, 2))
+        a = q.sum(axis=1)
+        u = arm.columns(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+        r1, r2 = arm.rates(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
+        qd = np.column_stack((r1, r2 - r1))
         return record.Record(
-            t=t, p=p, v=v, fh=fh, fe=b * v, b=b, q=q, qd=qd, tau=tau, delta=delta,
+            t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta,
             scenario=self.scenario, outcome=self.outcome, crossings=tuple(self.crossings),
             steps=self.steps, wall_time=wall,
         )  # fmt: skip

@@ -1,0 +1,61 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticclay import clay
+from hapticclay.errors import ParameterError
+from hapticclay.params import Clay, Profile
+
+
+@given(st.floats(0, 1e9), st.floats(1e-6, 1e-1))
+def test_interior_kick_conserves_the_damping_and_never_overshoots(b, H):
+    w = 0.92
+    before, after, *_ = clay.kick((b, b), (b, b), H, 0.5, 0.5, w)
+    assert before + after == pytest.approx(b, rel=1e-15)
+    z = b * H * w
+    amplification = (1 - H * w * before) / (1 + H * w * after)
+    assert -1e-9 <= amplification <= 1.0
+    if z < 2:
+        assert before == after == b / 2  # second order
+
+
+@given(st.floats(0, 1e3), st.floats(0, 1e3), st.floats(0.01, 0.99))
+def test_border_kick_gives_each_side_its_share(b0, b1, L):
+    before, after, _, _, felt = clay.kick((b0, b0), (b1, b1), 1e-4, L, 1 - L, 0.92)
+    if b0 != b1:
+        assert (before, after) == (L * b0, (1 - L) * b1)
+        assert felt == L  # linear in time between the midpoints of the steps
+
+
+def test_regions_of_the_slab():
+    r = clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.20, (0.0, 0.0))
+    assert r.b == (0.0, 0.0) and r.high[0] == 0.05
+    assert not r.at_end(0, True)
+    assert r.cross(0, True) == 0.05 and r.b == (90.0, 90.0) and (r.low[0], r.high[0]) == (0.05, 0.15)
+    assert r.cross(0, True) == 0.15 and r.b == (0.0, 0.0)
+    assert r.at_end(0, True) and r.high[0] == 0.20
+    assert r.cross(0, False) == 0.15 and r.b == (90.0, 90.0)
+
+
+@pytest.mark.parametrize("p,b", [((0.05, 0.0), 90.0), ((0.049, 0.0), 0.0), ((0.1, 0.3), 90.0), ((0.15, 0.0), 0.0)])
+def test_regions_from_any_start(p, b):
+    assert clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.2, p).b == (b, b)
+
+
+def test_each_axis_follows_its_own_coordinate():
+    both = Clay(Profile((0.05,), (50.0, 100.0), "x"), Profile((0.05,), (50.0, 200.0), "y"))
+    r = clay.Regions(both, None, (0.0, 0.0))
+    assert r.b == (50.0, 50.0)
+    r.cross(1, True)
+    assert r.b == (50.0, 200.0)
+    r.cross(0, True)
+    assert r.b == (100.0, 200.0)
+
+
+@pytest.mark.parametrize("edges,values,along", [
+    ((0.1, 0.05), (0, 1, 0), "x"), ((0.1,), (1.0,), "x"), ((0.1,), (0.0, -1.0), "x"), ((0.1,), (0.0, 1.0), "z"),
+    ((float("nan"),), (0.0, 1.0), "x"), (None, (0.0,), "x"), ((0.1,), (0.0, 1e12), "x"),
+])  # fmt: skip
+def test_bad_profiles_are_refused(edges, values, along):
+    with pytest.raises(ParameterError, match="clay"):
+        Profile(edges, values, along)

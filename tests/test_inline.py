@@ -1,0 +1,68 @@
+"""The inliner on made-up laws: same values, no calls left."""
+
+import dis
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticclay import inline
+
+inline.PACKAGE = inline.PACKAGE  # the package decides what counts as a law
+SCALE = 3.0
+
+
+def swap(a, b):
+    t = a * SCALE
+    return b, t
+
+
+def branch(a, b):
+    """Reassigns its argument."""
+    if a > b:
+        a, b = swap(a, b)
+    else:
+        a = -a
+    return (a, (b, a + b))
+
+
+def loop(n, c, x, y):
+    total = 0.0
+    for i in range(n):
+        x, (y, z) = branch(x, y)
+        y, x = swap(x, y)
+        total += single(z, i)
+        x *= 0.3
+        y *= 0.3
+    return x, y, total
+
+
+def single(z, i):
+    return z / (1.0 + i)
+
+
+@pytest.fixture
+def fused(monkeypatch):
+    monkeypatch.setattr(inline, "PACKAGE", __name__)
+    return inline.inline(loop)
+
+
+@given(n=st.integers(0, 6), x=st.floats(-10, 10), y=st.floats(-10, 10))
+def test_same_values_bit_for_bit(n, x, y):
+    old, inline.PACKAGE = inline.PACKAGE, __name__
+    try:
+        fused = inline.inline(loop)
+    finally:
+        inline.PACKAGE = old
+    assert fused(n, 0.0, x, y) == loop(n, 0.0, x, y)
+
+
+def test_no_law_is_called(fused):
+    names = {i.argval for i in dis.get_instructions(fused) if i.opname.startswith("LOAD_GLOBAL")}
+    assert names == {"range"}
+
+
+def test_a_function_without_source_is_left_alone():
+    space: dict = {}
+    exec("def f(x):\n    return x", space)
+    assert inline.inline(space["f"]) is space["f"]

@@ -1,0 +1,92 @@
+"""The linear loop against python-control and the paper's own limits."""
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import Linear
+
+import hapticclay as hc
+from hapticclay import lti
+from hapticclay.errors import ParameterError
+from hapticclay.params import Operator
+
+TH = Operator()
+
+
+def blocks(axis, K, b, operator):
+    s = control.tf("s")
+    G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
+    S = {"x": 0.7919 / (s**2 + 41.1 * s + 432), "y": 0.131 / (s**2 + 32.4 * s + 492.46)}[axis]
+    C = K / (s**2 + 10 * s)
+    T = b * s + (0.25 * s**2 + 2 * s + 6 if operator else 0)
+    return G, S, C, T
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("operator", [None, TH], ids=["hand off", "hand on"])
+@given(K=st.floats(0.1, 30), b=st.floats(1, 1000), omega=st.floats(0.1, 300))
+def test_characteristic_polynomial_is_one_plus_the_loop(axis, operator, K, b, omega):
+    G, S, C, T = blocks(axis, K, b, operator)
+    s = 1j * omega
+    den = np.prod([np.polyval(np.atleast_1d(x.den[0][0]), s) for x in (C, G, S)])
+    expected = (1 + (G(s) * C(s) + S(s)) * T(s)) * den
+    found = np.polyval(lti.characteristic(axis, K, b, operator), s)
+    assert found == pytest.approx(expected, rel=1e-11)  # cancellation between the terms costs up to 4 digits
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_poles_are_those_of_the_state_space_model(axis):
+    for K, b, th in [(1, 90, None), (0.5, 300, TH), (3, 20, TH)]:
+        m = Linear("xy".index(axis), b, K, 1.0, (0.25, 2, 6) if th else (0, 0, 0))
+        # the state space has p, v beside the servo's states: same loop, order 6 in both
+        np.testing.assert_allclose(
+            np.sort_complex(lti.closed_loop_poles(axis, K, b, th)), np.sort_complex(m.poles()), atol=1e-6
+        )
+
+
+@pytest.mark.parametrize("axis,b,on,printed", [
+    ("x", 50, True, 4.74), ("x", 90, True, 3.84), ("x", 100, True, 3.79),
+    ("y", 50, True, 1.42), ("y", 90, True, 0.86), ("y", 100, True, 0.80),
+    ("x", 50, False, 3.47), ("x", 90, False, 3.23), ("x", 100, False, 3.24),
+    ("y", 50, False, 1.18), ("y", 90, False, 0.77), ("y", 100, False, 0.73),
+])  # fmt: skip
+def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
+    limit = hc.gain_limit(axis, b, TH if on else None)
+    G, S, C, T = blocks(axis, 1.0, b, on)
+    loop = control.minreal(G * C * T / (1 + S * T), tol=1e-8, verbose=False)
+    margins = control.stability_margins(loop, returnall=True)[0]
+    assert limit == pytest.approx(min(m for m in margins if m > 0), rel=1e-6)
+    assert limit == pytest.approx(printed, abs=0.0055)  # half the last digit, and a hair
+
+
+def test_y_axis_is_unstable_at_unit_gain():
+    assert lti.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(2.36, abs=0.005)
+    assert lti.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(1.56, abs=0.005)
+    assert lti.stable("y", 1.0, 61.0) and not lti.stable("y", 1.0, 63.0)
+    assert not lti.stable("y", 1.0, 3800.0) and lti.stable("y", 1.0, 4000.0)
+
+
+def test_gain_limit_without_clay_and_hand_is_infinite():
+    assert hc.gain_limit("x", 0.0) == float("inf")
+
+
+@given(K=st.floats(0.01, 100), f=st.floats(-10, 10), b=st.floats(0, 1e6))
+def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
+    # p/uh = (GC + S)/(1 + (GC + S) b s) times s, at s = 0
+    G, S, C, _ = blocks("x", K, b, None)
+    s = 1e-7
+    H = G(s).real * C(s).real + S(s).real
+    assert lti.steady_speed(K, f, b) == pytest.approx(s * H / (1 + H * b * s) * f, rel=1e-6)
+
+
+@pytest.mark.parametrize("call,field", [
+    (lambda: lti.stable("z", 1, 1), "axis"),
+    (lambda: lti.stable("x", -1, 1), "K"),
+    (lambda: lti.stable("x", 1, float("nan")), "b"),
+])  # fmt: skip
+def test_bad_input_is_refused(call, field):
+    with pytest.raises(ParameterError) as e:
+        call()
+    assert e.value.field == field

@@ -1,0 +1,86 @@
+"""The MJCF files compile without a warning and mean what they say."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay import scene
+
+
+def test_operational_inertia_at_home_is_read_from_the_engine():
+    model = hc.build(hc.free())
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_forward(model, data)
+    J, M = np.zeros((3, 2)), np.zeros((2, 2))
+    mujoco.mj_jacSite(model, data, J, None, model.site("handle").id)
+    mujoco.mj_fullM(model, data, M)
+    Lambda = np.linalg.inv(J[:2] @ np.linalg.solve(M, J[:2].T))
+    np.testing.assert_allclose(Lambda, np.diag([1 / 0.7919, 1 / 0.131]), atol=1e-9)
+    np.testing.assert_allclose(data.site("handle").xpos, [0.35, 0.24, 0.0], atol=1e-15)
+
+
+def test_inertia_matrix_is_the_same_at_every_pose_and_velocity_adds_no_torque():
+    model = hc.build(hc.free())
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(0)
+    seen = []
+    for _ in range(20):
+        data.qpos[:], data.qvel[:] = rng.uniform(-3, 3, 2), rng.uniform(-10, 10, 2)
+        mujoco.mj_forward(model, data)
+        M = np.zeros((2, 2))
+        mujoco.mj_fullM(model, data, M)
+        seen.append(M)
+        np.testing.assert_allclose(data.qfrc_bias, 0.0, atol=1e-12)
+    np.testing.assert_allclose(seen, np.broadcast_to(seen[0], (20, 2, 2)), rtol=1e-13)
+    I1, I2 = 0.24**2 / 0.7919, 0.35**2 / 0.131
+    np.testing.assert_allclose(seen[0], [[I1 + I2, I2], [I2, I2]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("scenario", [hc.free(), hc.constant_cut(impedance=True)], ids=["free", "constant"])
+def test_headless_scene_holds_nothing_that_it_does_not_need(scenario):
+    m = hc.build(scenario)
+    for count in ("ngeom", "nsensor", "npair", "nmesh", "ntex", "nmat", "nlight", "ncam", "nhfield", "ntendon",
+                  "neq", "nflex", "nskin", "na", "nplugin", "nuserdata"):  # fmt: skip
+        assert getattr(m, count) == 0, count
+    assert (m.nq, m.nv, m.nbody) == (2, 2, 3)
+
+
+def test_clay_is_two_dampers_that_free_space_does_without():
+    assert hc.build(hc.free()).nu == 2
+    m = hc.build(hc.constant_cut())
+    assert [m.actuator(i).name for i in range(m.nu)] == ["shoulder", "elbow", "clay_x", "clay_y"]
+
+
+def test_damper_is_backward_euler_in_the_engine():
+    model = hc.build(hc.constant_cut(dt=1e-3))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data.qvel[:] = [-0.1 / 0.24, 0.1 / 0.24]  # motion along x alone
+    data.ctrl[2] = 1e6
+    mujoco.mj_step(model, data)
+    J = np.zeros((3, 2))
+    data.qpos[:] = model.key("home").qpos
+    mujoco.mj_forward(model, data)
+    mujoco.mj_jacSite(model, data, J, None, model.site("handle").id)
+    z = 1e6 * 1e-3 * 0.7919
+    assert (J @ data.qvel)[0] == pytest.approx(0.1 / (1 + z), rel=1e-9)
+
+
+def test_scenario_sets_step_and_torque_limits():
+    m = hc.build(hc.constant_cut(dt=1e-3, torque_limit=(3.0, 4.0)))
+    assert m.opt.timestep == 1e-3
+    np.testing.assert_array_equal(m.actuator_ctrlrange[:2], [[-3, 3], [-4, 4]])
+
+
+def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
+    with scene.warnings_caught() as caught:
+        model = mujoco.MjModel.from_xml_path(str(scene.folder() / "scene.xml"))
+        data = mujoco.MjData(model)
+        rng = np.random.default_rng(1)
+        for _ in range(1000):
+            data.ctrl[:2] = rng.uniform(-1, 1, 2)
+            mujoco.mj_step(model, data)
+    assert caught == []
+    assert model.ngeom > 0 and model.opt.timestep == 0.00036

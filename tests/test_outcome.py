@@ -1,0 +1,118 @@
+"""Instability is a result: named, timed, explained, and free of NaN."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hapticclay as hc
+from hapticclay import outcome, sim
+from hapticclay.params import Operator
+
+ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+
+
+def check_finite(r):
+    for name in ARRAYS:
+        assert np.all(np.isfinite(getattr(r, name))), name
+    assert len({len(getattr(r, name)) for name in ARRAYS}) == 1
+
+
+@pytest.mark.parametrize("shaping", [False, True])
+@pytest.mark.parametrize("impedance", [False, True])
+def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
+    r = hc.simulate(hc.constant_cut(gain=(1.0, 1.0), shaping=shaping, impedance=impedance, force=(1.0, 0.1)))
+    assert r.outcome.code == "diverged" and r.outcome.axis == "y"
+    assert r.status.startswith("diverged: y axis at ")
+    assert f"{r.outcome.time:.4f}" in r.status
+    assert 0.6 < r.outcome.time < 5.0 and r.t[-1] == pytest.approx(r.outcome.time, abs=1e-9)
+    assert "gain[y]" in r.outcome.advice
+    limit = hc.gain_limit("y", 90.0, Operator() if impedance else None)
+    assert f"{limit:.4g}" in r.outcome.advice
+    assert r.summary()["outcome"]["advice"] == r.outcome.advice
+    check_finite(r)
+    # the advice works
+    y = r.v[-3000:, 1]
+    better = hc.simulate(dataclasses.replace(r.scenario, gain=(1.0, 0.6 * limit)))
+    assert better.outcome.code == "finished", better.status
+    assert np.max(np.abs(y)) > 0.0
+
+
+def test_growth_rate_is_that_of_the_unstable_poles():
+    """Small swings of y under shaping grow as exp(sigma t), sigma from the closed-loop poles."""
+    r = hc.simulate(hc.constant_cut(gain=(1.0, 1.0), shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0)))
+    sigma = hc.closed_loop_poles("y", 1.0, 90.0).real.max()
+    v = r.v[:, 1] - r.v[:, 1].mean()
+    k = np.flatnonzero((v[1:-1] - v[:-2]) * (v[2:] - v[1:-1]) < 0) + 1
+    k = k[len(k) // 2 :]
+    rate = np.polyfit(r.t[k], np.log(np.abs(np.diff(r.v[k, 1], append=r.v[k[-1] - 1, 1]))[:]), 1)[0] if len(k) > 8 else None
+    swings = np.abs(np.diff(r.v[k, 1]))
+    rate = np.polyfit(r.t[k][1:], np.log(swings), 1)[0]
+    assert rate == pytest.approx(sigma, rel=0.02)
+
+
+def test_x_far_beyond_its_limit_blames_x():
+    r = hc.simulate(hc.constant_cut(b=100.0, gain=(25.0, 0.3), impedance=True))
+    assert (r.outcome.code, r.outcome.axis) == ("diverged", "x")
+    check_finite(r)
+
+
+@pytest.mark.parametrize("force,word", [((-1.0, 0.0), "stretched"), ((0.0, 1.0), "stretched"), ((-2.0, -3.0), "folded")])
+def test_out_of_reach(force, word):
+    r = hc.simulate(hc.free(force=force, gain=(0.5, 0.5), t_max=120.0))
+    assert r.outcome.code == "out of reach", r.status
+    assert word in r.status or "folded" in r.status
+    check_finite(r)
+    assert np.min(np.abs(np.sin(r.q[:, 1]))) >= outcome.FOLD
+
+
+@pytest.mark.parametrize("kw", [
+    dict(), dict(shaping=True), dict(impedance=True, force=(2.0, 0.0)), dict(gain=(2.5, 0.5)), dict(gain=(1.0, 0.7)),
+    dict(b=1.0), dict(b=1000.0, t_max=5.0), dict(b=1e6, t_max=2.0), dict(torque_limit=(0.2, 0.2)), dict(dt=5e-3),
+])  # fmt: skip
+def test_stable_runs_are_not_called_unstable(kw):
+    r = hc.simulate(hc.constant_cut(**kw))
+    assert r.outcome.code in ("finished", "time limit"), r.status
+    check_finite(r)
+
+
+@pytest.mark.parametrize("ratio,verdict", [(1.3, True), (1.05, True), (0.97, False)])
+@pytest.mark.parametrize("chunk", [50, 997])
+def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
+    """Made-up velocity of known growth per half swing, with a border's jump in it."""
+    s = hc.free()
+    n, half = 12_000, 100
+    t = np.arange(n)
+    v = np.where(t < 500, 0.1, 1e-3 * ratio ** ((t - 500) / half) * np.sin(np.pi * (t - 500) / half))
+    v = np.clip(v, -5, 5)
+    rows = np.zeros((12, n))
+    rows[1], rows[5] = -1.5, v
+    watch, found = outcome.Watch(s), None
+    for i in range(0, n, chunk):
+        good, found = watch.look(rows[:, i : i + chunk], i)
+        if found:
+            break
+    assert (found is not None) == verdict
+    if found:
+        assert (found.code, found.axis) == ("diverged", "y")
+
+
+def test_numbers_beyond_floating_point_end_the_run(monkeypatch):
+    """A state that overflows is cut off, not recorded."""
+    run = sim._Run(hc.constant_cut(t_max=0.5), 1)
+    for _ in range(50):
+        run._careful()
+    run.state = (*run.state[:6], 1e300, 1e300, *run.state[8:])
+    run.go(None)
+    r = run.result(1.0)
+    assert r.outcome.code in ("diverged", "out of reach")
+    check_finite(r)
+
+
+@given(st.floats(0.2, 30.0), st.floats(0.05, 5.0), st.floats(1.0, 1e4), st.sampled_from([3.6e-4, 2e-3, 1e-2]))
+def test_no_parameters_make_it_raise_or_record_nan(K, Ky, b, dt):
+    r = hc.simulate(hc.constant_cut(b=b, gain=(K, Ky), force=(3.0, 1.0), t_max=0.5, dt=dt))
+    check_finite(r)
+    assert r.outcome.code in ("finished", "time limit", "diverged", "out of reach")

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay import plot
+
+
+@pytest.fixture(scope="module")
+def run():
+    return hc.simulate(hc.constant_cut())
+
+
+def lines(figure):
+    return {line.get_label(): line for line in figure.axes[0].lines}
+
+
+def test_velocity_plot_shows_measured_and_expected(run):
+    figure = plot.velocity_position(run)
+    found = lines(figure)
+    np.testing.assert_array_equal(found["measured"].get_xdata(), 100 * run.p[:, 0])
+    np.testing.assert_array_equal(found["measured"].get_ydata(), run.v[:, 0])
+    expected = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
+    assert [line.get_ydata()[0] for line in expected] == pytest.approx([0.1, 0.01, 0.1])
+    assert "cm" in figure.axes[0].get_xlabel() and "m/s" in figure.axes[0].get_ylabel()
+    spans = [p for p in figure.axes[0].patches if p.get_label() == "clay"]
+    assert spans[0].get_x() == pytest.approx(5.0) and spans[0].get_width() == pytest.approx(10.0)
+
+
+def test_force_plot_shows_b_beside_the_ratios(run):
+    figure = plot.force_velocity(run)
+    labels = [t for t in lines(figure) if not t.startswith("_")]
+    assert labels == ["operator, f$_h$/v", "clay, f$_e$/v", "10/K + b", "b"]
+    b = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
+    assert [line.get_ydata()[0] for line in b] == [0.0, 90.0, 0.0]
+
+
+@pytest.mark.parametrize("scenario", [
+    hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0)), hc.constant_cut(t_max=1e-5), hc.free(force=(0.0, 0.0), t_max=0.1),
+    hc.constant_cut(impedance=True, t_max=1.0),
+], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_any_record_can_be_drawn(scenario, axis, tmp_path):
+    record = hc.simulate(scenario)
+    for draw in (plot.velocity_position, plot.force_velocity):
+        draw(record, axis).savefig(tmp_path / "p.png")
+        assert (tmp_path / "p.png").stat().st_size > 5000

@@ -1,0 +1,112 @@
+import dataclasses
+import errno
+import json
+import os
+import zipfile
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay import record
+from hapticclay.errors import ParameterError
+
+
+@pytest.fixture(scope="module")
+def run():
+    return hc.simulate(hc.constant_cut(impedance=True, force=(2.0, 0.0), t_max=2.0))
+
+
+def test_save_and_load_give_back_the_same_record(run, tmp_path):
+    folder = run.save(tmp_path / "a" / "b")
+    assert sorted(p.name for p in folder.iterdir()) == ["record.npz", "summary.json"]
+    for path in (folder, folder / "record.npz"):
+        again = hc.Record.load(path)
+        for f in dataclasses.fields(run):
+            a, b = getattr(run, f.name), getattr(again, f.name)
+            if isinstance(a, np.ndarray):
+                np.testing.assert_array_equal(a, b)
+            else:
+                assert a == b, f.name
+
+
+def test_every_array_is_named_shaped_and_has_a_unit(run):
+    n = len(run.t)
+    for name in record.ARRAYS:
+        assert getattr(run, name).shape == ((n,) if name == "t" else (n, 2))
+        assert getattr(run, name).dtype == np.float64
+
+
+def test_summary_holds_what_a_reader_needs(run, tmp_path):
+    s = json.loads((run.save(tmp_path) / "summary.json").read_text(), parse_constant=lambda x: pytest.fail(x))
+    assert s["schema"] == record.SCHEMA and s["status"].startswith("time limit")
+    assert s["crossings"][0]["border"] == 0.05 and s["crossings"][0]["speed"] > 0.1
+    assert s["steps"] == run.steps and s["real_time_factor"] > 0
+    assert set(s["versions"]) >= {"python", "hapticclay", "mujoco", "numpy"}
+    assert s["units"]["fe"] == "N"
+    clay = s["regions"][-1]["x"]
+    assert clay["b"] == 90.0 and clay["fe_over_v"]["mean"] == pytest.approx(90.0)
+    assert clay["fe_over_v"]["std"] < 1e-9
+
+
+def test_regions_report_the_steady_cut():
+    r = hc.simulate(hc.constant_cut())
+    x = [e["x"] for e in r.summary()["regions"]]
+    assert [e["b"] for e in x] == [0.0, 90.0, 0.0]
+    assert x[1]["steady_speed"] == pytest.approx(0.01, rel=1e-3)
+    assert x[1]["expected_speed"] == 0.01
+    assert x[1]["steady_fh_over_v"]["mean"] == pytest.approx(100.0, rel=1e-3)
+    assert x[0]["fe_over_v"]["mean"] == 0.0
+
+
+def test_record_can_be_read_without_pickle(run, tmp_path):
+    with zipfile.ZipFile(run.save(tmp_path) / "record.npz") as z:
+        for name in z.namelist():
+            assert b"|O" not in z.read(name)[:128]
+
+
+@pytest.mark.parametrize("content", [b"", b"not a record", None])
+def test_load_refuses_what_is_no_record(content, tmp_path):
+    file = tmp_path / "record.npz"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(ParameterError, match="record"):
+        hc.Record.load(file)
+
+
+def test_load_refuses_another_schema(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(record, "SCHEMA", "hapticclay-record-0")
+    run.save(tmp_path)
+    monkeypatch.undo()
+    with pytest.raises(ParameterError, match="schema"):
+        hc.Record.load(tmp_path)
+
+
+@pytest.mark.parametrize("moment", ["fsync", "replace"])
+def test_a_full_disk_leaves_nothing_half_written(run, tmp_path, monkeypatch, moment):
+    def full(*args, **kw):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, moment, full)
+    with pytest.raises(ParameterError, match="No space left"):
+        run.save(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_write_keeps_the_old_file(tmp_path):
+    file = tmp_path / "x"
+    file.write_text("old")
+    with pytest.raises(KeyboardInterrupt), record.atomic(file) as f:
+        f.write(b"new")
+        raise KeyboardInterrupt
+    assert file.read_text() == "old" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_save_refuses_an_unwritable_place(run):
+    with pytest.raises(ParameterError, match="writable"):
+        run.save("/proc/nowhere")
+
+
+def test_ratio_is_nan_only_where_nothing_moves(run):
+    assert np.isnan(run.ratio(run.fe)[0, 0])
+    assert np.all(np.isfinite(run.ratio(run.fe)[1:, 0]))
