@@ -52,9 +52,7 @@ def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, flo
     return wxx, u1y * a + u2y * b, TRACE_W - wxx
 
 
-def rates(
-    vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float
-) -> tuple[float, float]:
+def rates(vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float) -> tuple[float, float]:
     """Absolute link rates that move the handle with (vx, vy), divided by n.
 
     Args:

@@ -7,9 +7,7 @@ import bisect
 from .params import AXES, Clay, Profile
 
 
-def kick(
-    b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float
-) -> tuple[float, ...]:
+def kick(b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float) -> tuple[float, ...]:
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     Half and half in the interior (Crank-Nicolson, second order) while that is free of overshoot,

@@ -60,6 +60,7 @@ class Version:
         return 0
 
 
+MARKERS = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs)
 Command = Annotated[Run, tyro.conf.subcommand("run")] | Annotated[Version, tyro.conf.subcommand("version")]
 
 
@@ -162,7 +163,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                     prog="hapticclay",
                     description="Virtual clay, cut with a simulated haptic arm.",
                     args=argv,
-                    config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs),
+                    config=MARKERS,
                 )
         except SystemExit as stop:
             if stop.code in (0, None):

@@ -26,7 +26,7 @@ def inline(function: FunctionType) -> Callable[..., Any]:
     except (OSError, TypeError, SyntaxError):
         return function
     work = _Inliner()
-    scope = {n: _name(n) for n in _assigned(tree) | {a.arg for a in tree.args.args}}
+    scope: dict[str, ast.expr] = {n: _name(n) for n in _assigned(tree) | {a.arg for a in tree.args.args}}
     tree.body = work.block(tree.body, function, scope)
     tree.decorator_list, tree.returns = [], None
     for arg in tree.args.args:
@@ -123,18 +123,18 @@ class _Inliner:
         work = self
 
         class Resolve(ast.NodeTransformer):
-            def visit_Name(self, n: ast.Name):
-                if n.id in scope:
-                    new = scope[n.id]
-                    return ast.Name(id=new.id, ctx=n.ctx) if isinstance(new, ast.Name) else new
-                return work._global(n.id, function.__globals__.get(n.id), n)
+            def visit_Name(self, node: ast.Name):
+                if node.id in scope:
+                    new = scope[node.id]
+                    return ast.Name(id=new.id, ctx=node.ctx) if isinstance(new, ast.Name) else new
+                return work._global(node.id, function.__globals__.get(node.id), node)
 
-            def visit_Attribute(self, n: ast.Attribute):
-                if isinstance(n.value, ast.Name) and n.value.id not in scope:
-                    owner = function.__globals__.get(n.value.id)
+            def visit_Attribute(self, node: ast.Attribute):
+                if isinstance(node.value, ast.Name) and node.value.id not in scope:
+                    owner = function.__globals__.get(node.value.id)
                     if isinstance(owner, ModuleType):
-                        return work._global(f"{n.value.id}_{n.attr}", getattr(owner, n.attr), n)
-                return self.generic_visit(n)
+                        return work._global(f"{node.value.id}_{node.attr}", getattr(owner, node.attr), node)
+                return self.generic_visit(node)
 
         return Resolve().visit(ast.parse(ast.unparse(node)).body[0] if isinstance(node, ast.stmt) else _copy(node))
 
@@ -195,7 +195,7 @@ def _flatten(body: list[ast.stmt]) -> list[ast.stmt]:
 def _hoist(body: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
     """Takes the unpacking of names that the loop never assigns out of the loop."""
     assigned = set().union(*(_assigned(s) for s in body)) if body else set()
-    head = [
+    head: list[ast.stmt] = [
         s
         for s in body
         if isinstance(s, ast.Assign)

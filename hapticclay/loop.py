@@ -36,7 +36,8 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
         H, after, 0.5 * before,
         *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
         keep, take * scenario.gain[0], take * scenario.gain[1],
-        *scenario.force, scenario.origin[0], -scenario.origin[1], *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
+        *scenario.force, scenario.origin[0], -scenario.origin[1],
+        *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
         *human.kick(scenario.operator, H, L, R),
         1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from .errors import ParameterError, choice, number
+from .errors import choice, number
 from .params import AXES, C_POLE, G, Operator, S
 
 
@@ -96,5 +96,3 @@ def gain_limit(axis: str, b: float, operator: Operator | None = None) -> float:
         if not stable(axis, (1.0 + 1e-6) * k, b, operator):
             return float(k)
     return math.inf
-
-

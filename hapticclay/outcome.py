@@ -23,7 +23,8 @@ class Watch:
 
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if SWINGS in a row hardly shrink while a
-    motor is in its torque limit; or if it oscillates out of reach above the gain limit of its loop.
+    motor is in its torque limit; or if the handle swings out of reach while its gain is above the limit
+    of its loop.
     """
 
     def __init__(self, scenario: Scenario):
@@ -46,8 +47,9 @@ class Watch:
         v, q2 = rows[4:6], rows[1]
         good = rows.shape[1]
         # first the question that costs little: is anything amiss at all?
-        if not (rows.shape[1] and np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and np.abs(np.sin(q2)).min() >= FOLD):
-            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (np.abs(np.sin(q2)) < FOLD)
+        bend = np.abs(np.sin(q2))
+        if good and not (np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD):
+            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
             good = int(bad.argmax()) if bad.any() else good
         found = self._unstable(rows[:, :good])
         if found is not None:
@@ -57,7 +59,9 @@ class Watch:
         if good == rows.shape[1]:
             return good, None
         step = max(first + good - 1, 0)
-        axis = self._blame([i for i in (0, 1) if len(self.swings[i]) >= 2 and self._above_limit(i)])
+        count = [len(x) for x in self.swings]
+        above = [i for i in (0, 1) if count[i] and self._above_limit(i)]
+        axis = self._blame(above) if max(count) >= 3 or any(count[i] >= 2 for i in above) else ""
         if axis:
             return good, Outcome("diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis))
         if abs(math.sin(q2[good])) < FOLD:

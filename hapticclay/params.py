@@ -165,9 +165,7 @@ class Scenario:
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
         put("origin", pair("origin", self.origin, unit="m"))
-        limit = numbers_of(
-            "torque_limit", self.torque_limit, ("shoulder", "elbow"), 0.0, 1e6, above=True, unit="N.m"
-        )
+        limit = numbers_of("torque_limit", self.torque_limit, ("shoulder", "elbow"), 0.0, 1e6, above=True, unit="N.m")
         put("torque_limit", limit)
         self._check_reach("start", self.start)
         if self.length is not None:

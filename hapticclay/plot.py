@@ -15,7 +15,7 @@ from .record import Record
 
 BLUE, ORANGE, GREEN, BLACK = "#0072B2", "#D55E00", "#009E73", "#222222"  # Okabe and Ito, safe for all eyes
 CLAY = "#E8C9A8"
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.size": 10.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -41,7 +41,9 @@ def velocity_position(record: Record, axis: str = "x") -> Figure:
         ax.plot(100.0 * record.p[:, i], record.v[:, i], color=BLUE, label="measured")
         s = record.scenario
         if s.operator is None:
-            _steps(ax, record, i, lambda b: lti.steady_speed(s.gain[i], s.force[i], b), ORANGE, "expected, K f/(10 + K b)")
+            _steps(
+                ax, record, i, lambda b: lti.steady_speed(s.gain[i], s.force[i], b), ORANGE, "expected, K f/(10 + K b)"
+            )
         ax.set_ylabel(f"velocity v$_{axis}$ [m/s]")
         _limits(ax, record.v[:, i])
         _finish(figure, ax, record)

@@ -266,22 +266,21 @@ class atomic:
 
     def __exit__(self, kind, error, trace):
         try:
+            with self.file:
+                if kind is None:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+                    umask = os.umask(0)
+                    os.umask(umask)
+                    os.fchmod(self.file.fileno(), 0o666 & ~umask)
             if kind is None:
-                self.file.flush()
-                os.fsync(self.file.fileno())
-                umask = os.umask(0)
-                os.umask(umask)
-                os.fchmod(self.file.fileno(), 0o666 & ~umask)
-            self.file.close()
-            if kind is None:
-                os.replace(self.temporary, self.path)
-                return
+                return os.replace(self.temporary, self.path)
         except OSError as late:
-            kind, error = OSError, late
+            error = error or late
         self.temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise self._refusal(error) from None
+        return None
 
     def _refusal(self, error: OSError) -> ParameterError:
         return ParameterError("out", str(self.path), f"must be writable ({error.strerror or error})")
-

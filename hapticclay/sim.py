@@ -223,11 +223,11 @@ class _Run:
             i, up = landing
             self._cross(i, up, self.t)
 
-    def _tick(self, q, w, after: float):
+    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float):
         s = self.scenario
         c = self.whole if self.before == after == s.dt else loop.coefficients(s, self.before, after)
         k = loop.damping(self.b, self.regions.b, self.before, after)
-        return loop.tick(c, k, *q, *w, self.state)
+        return loop.tick(c, k, q[0], q[1], w[0], w[1], self.state)
 
     def _ahead(self, q, w, h: float) -> tuple[float, float]:
         """Handle position [m] when the joints have turned from q with w for h seconds."""
@@ -288,7 +288,9 @@ class _Run:
 
     def _keep(self, q, sample, command, out, after: float) -> None:
         b0, b1 = self.b, self.regions.b
-        _row.pack_into(self.rows, self.filled * loop.ROW, *q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
+        _row.pack_into(
+            self.rows, self.filled * loop.ROW, *q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:]
+        )
         self.stretches.append((1, b1 if after else b0, loop.damping(b0, b1, self.before, after)))
         self.filled += 1
 

@@ -34,7 +34,7 @@ def test_path_is_centred_on_the_nominal_pose():
     assert params.ORIGIN == pytest.approx((params.L2 - params.PATH_LENGTH / 2, params.L1), abs=1e-16)
 
 
-@pytest.mark.parametrize("number", ["41.8", "30.3", "765.5", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"])
+@pytest.mark.parametrize("number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"])
 def test_a_printed_number_is_typed_once(number):
     typed = 0
     for file in SOURCE.parent.glob("*.py"):

@@ -14,8 +14,9 @@ from hapticclay.errors import ParameterError
 @pytest.mark.parametrize("kw,field", [
     (dict(b=-1.0), "b"), (dict(b=math.nan), "b"), (dict(b=math.inf), "b"), (dict(b="90"), "b"), (dict(b=True), "b"),
     (dict(b=1e12), "b"), (dict(b=None), "b"), (dict(b=10**400), "b"),
-    (dict(gain=1.0), "gain"), (dict(gain=(1.0,)), "gain"), (dict(gain=(1.0, 0.0)), "gain[y]"), (dict(gain="ab"), "gain"),
-    (dict(gain=(1.0, -2.0)), "gain[y]"), (dict(force=(1.0, 2.0, 3.0)), "force"), (dict(force=(math.inf, 0.0)), "force[x]"),
+    (dict(gain=1.0), "gain"), (dict(gain=(1.0,)), "gain"), (dict(gain=(1.0, 0.0)), "gain[y]"),
+    (dict(gain="ab"), "gain"),    (dict(gain=(1.0, -2.0)), "gain[y]"), (dict(force=(1.0, 2.0, 3.0)), "force"),
+    (dict(force=(math.inf, 0.0)), "force[x]"),
     (dict(impedance=1), "impedance"), (dict(shaping="yes"), "shaping"),
     (dict(dt=0.0), "dt"), (dict(dt=-1e-3), "dt"), (dict(dt=1.0), "dt"), (dict(dt=math.nan), "dt"),
     (dict(t_max=0.0), "t_max"), (dict(t_max=-1.0), "t_max"), (dict(t_max=math.inf), "t_max"),

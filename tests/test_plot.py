@@ -35,7 +35,8 @@ def test_force_plot_shows_b_beside_the_ratios(run):
 
 
 @pytest.mark.parametrize("scenario", [
-    hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0)), hc.constant_cut(t_max=1e-5), hc.free(force=(0.0, 0.0), t_max=0.1),
+    hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0)), hc.constant_cut(t_max=1e-5),
+    hc.free(force=(0.0, 0.0), t_max=0.1),
     hc.constant_cut(impedance=True, t_max=1.0),
 ], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
 @pytest.mark.parametrize("axis", ["x", "y"])
