@@ -1,0 +1,82 @@
+"""The documents say what is so: snippets run, commands exist, figures and symbols are current."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hapticclay as hc
+from hapticclay import cli, params, record, scene
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.S))
+def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
+    out = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True)
+    printed = out.stdout.splitlines()
+    said = re.findall(r"print\(.*\)  # ([^:\n]*)", block)
+    assert len(printed) == len(said)
+    for a, b in zip(printed, said, strict=True):
+        try:
+            assert float(a) == pytest.approx(float(b), rel=1e-3)
+        except ValueError:
+            assert a == b
+    assert (tmp_path / "out" / "record.npz").is_file()
+
+
+@pytest.mark.parametrize("line", re.findall(r"^    (?:\$ )?hapticclay (.+)$", README, re.M))
+def test_readme_commands_run(line, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*line.split(), "--no-plots"] if "version" not in line else line.split()) == 0
+    if "--gain 1 1" in line:
+        shown = re.search(rf"\$ hapticclay {re.escape(line)}\n(.*?)\n\n", README, re.S)
+        assert shown
+        out = capsys.readouterr().out
+        for expected in shown[1].splitlines():
+            assert expected.strip() in out
+
+
+def test_readme_figures_and_links_exist():
+    for target in re.findall(r"!\[.*?\]\((.*?)\)", README):
+        assert (ROOT / target).is_file(), target
+    for target in re.findall(r"`((?:docs|mjcf)/\S+?)`", README):
+        assert (ROOT / target).is_file(), target
+    assert len(README.splitlines()) <= 90
+
+
+def test_make_targets_named_in_the_documents_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    for text in (README, (ROOT / "CONTRIBUTING.md").read_text()):
+        for names in re.findall(r"^    make ((?:demo|test|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M):
+            for name in names.split():
+                assert re.search(rf"^{name}:", makefile, re.M), name
+
+
+def test_every_recorded_array_is_in_the_symbol_table():
+    text = (ROOT / "docs" / "equations.md").read_text()
+    for name in record.ARRAYS:
+        assert name == "t" or f"`{name}`" in text, name
+
+
+def test_inertias_in_the_documents_are_those_of_the_model():
+    import mujoco
+
+    text = (ROOT / "docs" / "equations.md").read_text()
+    model = hc.build(hc.free())
+    link1 = model.body("link1").inertia[2]
+    assert repr(float(link1)) in text
+    assert repr(params.L1**2 / params.S[0].gain) in text and repr(params.L2**2 / params.S[1].gain) in text
+    mujoco.MjModel.from_xml_path(str(scene.folder() / "arm.xml"))
+
+
+def test_every_public_name_has_a_docstring():
+    for name in hc.__all__:
+        assert getattr(hc, name).__doc__ or name == "SCENARIOS", name
+
+
+def test_changelog_has_the_present_version():
+    assert f"## {hc.__version__}" in (ROOT / "CHANGELOG.md").read_text()
