@@ -61,6 +61,7 @@ class _Inliner:
     def __init__(self):
         self.bound: dict[str, Any] = {}
         self.count = itertools.count()
+        self.local: set[str] = set()  # names that laws brought in
 
     def block(self, body: list[ast.stmt], function: FunctionType, scope: dict[str, ast.expr]) -> list[ast.stmt]:
         """The statements of body, names resolved in function's scope, laws expanded."""
@@ -72,7 +73,7 @@ class _Inliner:
                 head: list[ast.stmt] = []
                 inner = self.block(statement.body, function, scope)
                 if isinstance(statement, ast.For):
-                    head, inner = _hoist(_prune(inner))
+                    head, inner = _hoist(_fold(_merge(_prune(inner)), self.local))
                 other = self.block(statement.orelse, function, scope)
                 if isinstance(statement, ast.If):
                     new: ast.stmt = ast.If(self.expression(statement.test, function, scope), inner, other)
@@ -155,7 +156,9 @@ class _Inliner:
         return found if isinstance(found, FunctionType) and found.__module__.startswith(PACKAGE) else None
 
     def _fresh(self, name: str) -> ast.Name:
-        return _name(f"{name}_{next(self.count)}")
+        fresh = f"{name}_{next(self.count)}"
+        self.local.add(fresh)
+        return _name(fresh)
 
 
 def _copy(node: ast.expr) -> ast.expr:
@@ -229,15 +232,75 @@ def _prune(body: list[ast.stmt]) -> list[ast.stmt]:
                 if not any(source in _assigned(o) for o in rest[:last]) and not (
                     source in _assigned(rest[last]) and not isinstance(rest[last], ast.Assign)
                 ):
-                    body = body[:i] + [_Rename(name, source).visit(o) for o in rest]
+                    body = body[:i] + [_Rename(name, _name(source)).visit(o) for o in rest]
                     changed = True
                     break
     return body
 
 
+def _merge(body: list[ast.stmt]) -> list[ast.stmt]:
+    """Makes one name of two where a = b at the top only serves b = a further down."""
+    i = 0
+    while i < len(body):
+        s = body[i]
+        i += 1
+        if not _is_copy(s):
+            continue
+        a, b = ast.unparse(s).split(" = ")
+        back = [j for j, o in enumerate(body) if j >= i and _is_copy(o) and ast.unparse(o) == f"{b} = {a}"]
+        if len(back) != 1 or sum(b in _assigned(o) for o in body) != 1 or any(a in _read(o) for o in body[: i - 1]):
+            continue
+        j = back[0]
+        if any(_reads(o, b) for o in body[i:j]) or any(a in _assigned(o) for o in body[j:]):
+            continue
+        i -= 1
+        body = [_Rename(a, _name(b)).visit(o) for n, o in enumerate(body) if n not in (i, j)]
+    return body
+
+
+def _is_copy(s: ast.stmt) -> bool:
+    return isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name) and isinstance(s.value, ast.Name)
+
+
+def _fold(body: list[ast.stmt], local: set[str]) -> list[ast.stmt]:
+    """Writes an expression where its name is read, if that is in one place only and nothing changes in between.
+
+    The operations and their order within the expression stay as they are.
+    """
+    i = 0
+    while i < len(body):
+        s, rest = body[i], body[i + 1 :]
+        i += 1
+        if not (isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)):
+            continue
+        name = s.targets[0].id
+        if (
+            name not in local
+            or isinstance(s.value, ast.Tuple)
+            or any(isinstance(n, ast.Call) for n in ast.walk(s.value))
+        ):
+            continue
+        if sum(name in _assigned(o) for o in body) > 1 or sum(_reads(o, name) for o in rest) != 1:
+            continue
+        j = next(j for j, o in enumerate(rest) if _reads(o, name))
+        inputs = _read(s.value)
+        if isinstance(rest[j], ast.If | ast.For | ast.AugAssign) or any(inputs & _assigned(o) for o in rest[:j]):
+            continue
+        rest[j] = _Rename(name, s.value).visit(rest[j])
+        body = body[: i - 1] + rest
+        i -= 1
+    return body
+
+
+def _reads(node: ast.AST, name: str) -> int:
+    return sum(isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load) for n in ast.walk(node))
+
+
 class _Rename(ast.NodeTransformer):
-    def __init__(self, old: str, new: str):
+    def __init__(self, old: str, new: ast.expr):
         self.old, self.new = old, new
 
     def visit_Name(self, node: ast.Name):
-        return ast.Name(id=self.new, ctx=node.ctx) if node.id == self.old else node
+        if node.id != self.old:
+            return node
+        return ast.Name(id=self.new.id, ctx=node.ctx) if isinstance(self.new, ast.Name) else self.new

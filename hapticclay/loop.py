@@ -62,8 +62,8 @@ def tick(c, k, q1, q2, w1, w2, state):
     Returns:
         (state, command, sample, after):
         state: for the next sample.
-        command: (tau1, tau2 of the motors, further torques 1, 2 [N.m]) for the engine, which treats
-            the clay's second part, k[1] and k[3], by itself.
+        command: (tau1, tau2 of the motors [N.m], clay that the engine treats implicitly bx, by [N.s/m],
+            further torques 1, 2 [N.m]) for the engine.
         sample: (position x, y [m], velocity half a step before x, y [m/s], net hand force f of the
             kick x, y [N], delta x, y [m]).
         after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) half a step after the sample.
@@ -83,10 +83,10 @@ def tick(c, k, q1, q2, w1, w2, state):
     r2 = w1 + w2
     vx = u1x * w1 + u2x * r2
     vy = u1y * w1 + u2y * r2
-    s1 = w1 + half * g1
-    s2 = r2 + half * g2
-    s1 *= s1
-    s2 *= s2
+    h1 = w1 + half * g1
+    h2 = r2 + half * g2
+    s1 = h1 * h1
+    s2 = h2 * h2
     cx = u1y * s1 + u2y * s2
     cy = -u1x * s1 - u2x * s2
     if shaped:
@@ -122,10 +122,10 @@ def tick(c, k, q1, q2, w1, w2, state):
         t2 = min(max(t2, -limit2), limit2)
         a1 = (t1 - t2) / arm.I1
         a2 = t2 / arm.I2
-        ax = vx / H + u1x * a1 + u2x * a2
-        ay = vy / H + u1y * a1 + u2y * a2
+        bx = vx / H + u1x * a1 + u2x * a2
+        by = vy / H + u1y * a1 + u2y * a2
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-        ux, uy = servo.outcome(1.0 / H, 1.0 / H, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+        ux, uy = servo.outcome(1.0 / H, 1.0 / H, bx, by, sxx, sxy, syy, fx, fy, dx, dy)
         dvx = ux - vx
         dvy = uy - vy
         g1, g2 = arm.rates(dvx, dvy, u1x, u1y, u2x, u2y, H)
@@ -147,13 +147,13 @@ def tick(c, k, q1, q2, w1, w2, state):
             deltax + step * ex, deltay + step * ey, ex, ey,
             yx + step * vrx, yy + step * vry, vrx, vry, g1, g2,
         ),
-        (t1, t2, p1, p2),
+        (t1, t2, cx1, cy1, p1, p2),
         (px, py, vx, vy, ffx, ffy, deltax, deltay),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )  # fmt: skip
 
 
-def advance(rows, c, k, state, read, write, keep, motion, drive, push, buffer, step, model, data):
+def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
     """Whole steps within one region of the clay.
 
     Args:
@@ -161,7 +161,7 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, push, buffer, s
         c, k: from `coefficients` and `damping`, for whole steps before and after.
         state: see `tick`.
         read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
-        write: packs two floats into the engine's ctrl and qfrc_applied, drive and push.
+        write: packs a command into the engine's memory, drive.
         keep: packs one row into the record, buffer.
         step, model, data: the engine.
 
@@ -173,12 +173,11 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, push, buffer, s
         q1, q2, w1, w2 = read(motion)
         (
             (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
-            (t1, t2, p1, p2),
+            (t1, t2, bx, by, p1, p2),
             (px, py, vx, vy, fx, fy, dx, dy),
             (ux, uy, n1, n2),
         ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
-        write(drive, 0, t1, t2)
-        write(push, 0, p1, p2)
+        write(drive, 0, t1, t2, bx, by, p1, p2)
         keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
         step(model, data)
     return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9

@@ -80,6 +80,9 @@ class Record:
         q, qd: joint angles [rad] and rates [rad/s], (n, 2).
         tau: motor torques [N.m], (n, 2). delta: compensator output [m], (n, 2).
         scenario: what was run. outcome: how it ended. crossings: borders, in order.
+        energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
+            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored); what is
+            left over (residual) and what went through (throughput) [J].
         steps: engine steps made. wall_time: seconds they took. versions: of the packages used.
     """
 
@@ -96,6 +99,7 @@ class Record:
     scenario: Scenario
     outcome: Outcome
     crossings: tuple[Crossing, ...] = ()
+    energy: dict[str, float] = dataclasses.field(default_factory=dict)
     steps: int = 0
     wall_time: float = 0.0
     versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
@@ -164,13 +168,14 @@ class Record:
             "outcome": dataclasses.asdict(self.outcome),
             "scenario": dataclasses.asdict(self.scenario),
             "crossings": [dataclasses.asdict(c) for c in self.crossings],
+            "energy": self.energy,
             "regions": self.regions(),
             "samples": len(self.t),
             "steps": self.steps,
             "simulated_time_s": end,
             "wall_time_s": self.wall_time,
             "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
-            "units": {"crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS},
+            "units": {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS},
             "versions": self.versions,
         }
 
@@ -214,6 +219,7 @@ class Record:
             scenario=_scenario(head["scenario"]),
             outcome=Outcome(**head["outcome"]),
             crossings=tuple(Crossing(**c) for c in head["crossings"]),
+            energy=head["energy"],
             steps=head["steps"],
             wall_time=head["wall_time_s"],
             versions=head["versions"],

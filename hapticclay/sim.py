@@ -8,11 +8,12 @@ import math
 import struct
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from . import arm, loop, outcome, record, scene
+from . import arm, energy, loop, outcome, record, scene
 from .clay import Regions
 from .errors import ParameterError, integer
 from .inline import inline
@@ -22,7 +23,6 @@ CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; sm
 FUSE_FROM = 5_000  # steps from which inlining the loop (about 10 ms, once per process) pays
 
 _row = struct.Struct("14d")
-_two = struct.Struct("2d")
 
 
 @functools.cache
@@ -55,6 +55,35 @@ def simulate(
         run.go(progress)
         wall = time.perf_counter() - begin
     return run.result(wall)
+
+
+def _outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
+    """A view of the engine's memory from ctrl on, and what writes a whole command into it.
+
+    ctrl holds the motors and, where there is clay, two dampers; its first 32 bytes are its own either
+    way if the next array begins only 64 bytes on (the engine aligns arrays so). One call then does
+    for both arrays; where they lie otherwise, two calls do.
+    """
+    first, second = ctrl.ctypes.data, push.ctypes.data
+    if second - first == 64:
+        view = memoryview((ctypes.c_char * 80).from_address(first))
+        return view, struct.Struct("4d32x2d").pack_into
+
+    def write(view, offset, t1, t2, bx, by, p1, p2):
+        ctrl[:] = (t1, t2, bx, by)[: len(ctrl)]
+        push[:] = p1, p2
+
+    return memoryview(ctrl), write  # type: ignore[arg-type]
+
+
+class _Stretch(NamedTuple):
+    """Rows in a row that have this in common."""
+
+    n: int
+    is_sample: bool  # False at a border between two samples
+    b: tuple[float, float]  # clay at the sample [N.s/m]
+    k: tuple[float, ...]  # loop.damping
+    H: float  # length of the kick [s]
 
 
 def _window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
@@ -90,7 +119,7 @@ class _Run:
         data.qpos[:] = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
         self.angles, self.rates = memoryview(data.qpos), memoryview(data.qvel)
         self.motion, self.read = _window(data.qpos, data.qvel)
-        self.drive, self.push = memoryview(data.ctrl), memoryview(data.qfrc_applied)
+        self.drive, self.write = _outlet(data.ctrl, data.qfrc_applied)
         self.state = loop.initial_state(scenario.start)
         self.regions = Regions(scenario.clay, scenario.length, scenario.start)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
@@ -102,7 +131,8 @@ class _Run:
         self.b = self.regions.b  # clay before the sample [N.s/m]
         self.rows = bytearray(CHUNK * loop.ROW)
         self.filled = 0
-        self.stretches: list[tuple[int, tuple[float, float], tuple[float, ...]]] = []  # rows, their b and k
+        self.stretches: list[_Stretch] = []
+        self.ledger = energy.Ledger(scenario)
         self.looked = 0  # rows judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
         self.crossings: list[record.Crossing] = []
@@ -140,13 +170,12 @@ class _Run:
                 way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
                 n = min(n, max(16, int(min(0.95 * way, n))))
         k = loop.damping(b, b, dt, dt)
-        self._set_clay(k)
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
         begin = self.filled * loop.ROW
         while True:
             self.state = self.advance(
                 range(begin, begin + n * loop.ROW, loop.ROW), self.whole, k, state,
-                self.read, _two.pack_into, _row.pack_into, self.motion, self.drive, self.push, self.rows,
+                self.read, self.write, _row.pack_into, self.motion, self.drive, self.rows,
                 mujoco.mj_step, self.model, self.data,
             )  # fmt: skip
             good = self._good(self.filled, n)
@@ -158,7 +187,7 @@ class _Run:
             if n < 1:
                 self.state = state
                 return False
-        self.stretches.append((n, b, k))
+        self.stretches.append(_Stretch(n, True, b, k, dt))
         self.filled += n
         self.steps += n
         self.i += n
@@ -176,10 +205,6 @@ class _Run:
                 x = np.append(rows[first:, 2 + i], end[i])
                 out |= ~((x >= low) & (x < high))
         return int(out.argmax()) - 1 if out.any() else n
-
-    def _set_clay(self, k: tuple[float, ...]) -> None:
-        if self.scenario.clay:
-            _two.pack_into(self.drive, 2 * 8, k[1], k[3])
 
     def _careful(self) -> None:
         """One step that looks where it ends, and ends on a border if one is in its way."""
@@ -210,8 +235,7 @@ class _Run:
             landing, after = (i, self._ahead(q, out[2:], after)[i] >= self.regions.high[i]), spans[i]
             new, command, sample, out = self._tick(q, w, after)
             break
-        if on_grid:
-            self._keep(q, sample, command, out, after)
+        self._keep(on_grid, q, sample, command, out, after)
         self._engine(w, command, out, after)
         self.state, self.b = new, self.regions.b
         self.before = after
@@ -282,32 +306,30 @@ class _Run:
         q = tuple(self.angles)
         if self.before > 0.0:
             _, command, sample, out = self._tick(q, tuple(self.rates), 0.0)
-            self._keep(q, sample, command, out, 0.0)
+            self._keep(True, q, sample, command, out, 0.0)
         self.end_time = self.t
         self.outcome = result
 
-    def _keep(self, q, sample, command, out, after: float) -> None:
+    def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
         b0, b1 = self.b, self.regions.b
         _row.pack_into(
             self.rows, self.filled * loop.ROW, *q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:]
         )
-        self.stretches.append((1, b1 if after else b0, loop.damping(b0, b1, self.before, after)))
+        k = loop.damping(b0, b1, self.before, after)
+        self.stretches.append(_Stretch(1, is_sample, b1 if after else b0, k, 0.5 * (self.before + after)))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
         """Steps the engine by after. If that differs from the length of the kick, the kick goes in whole."""
         model, data, dt = self.model, self.data, self.scenario.dt
-        t1, t2, p1, p2 = command
         self.steps += 1
-        _two.pack_into(self.drive, 0, t1, t2)
         if after == self.before == dt:
-            self._set_clay(loop.damping(self.b, self.regions.b, dt, dt))
-            _two.pack_into(self.push, 0, p1, p2)
+            self.write(self.drive, 0, *command)
             mujoco.mj_step(model, data)
             return
-        self._set_clay((0.0,) * 4)
+        t1, t2 = command[:2]
         a1, a2 = (out[2] - w[0]) / after, (out[2] + out[3] - w[0] - w[1]) / after
-        _two.pack_into(self.push, 0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
+        self.write(self.drive, 0, t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
         model.opt.timestep = after
         mujoco.mj_step(model, data)
         model.opt.timestep = dt
@@ -316,23 +338,28 @@ class _Run:
         """Judges the rows since the last look and moves them to the record."""
         n, self.filled = self.filled, 0
         raw = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).T.copy()
-        counts, b, k = zip(*self.stretches, strict=True) if n else ((), (), ())
-        self.stretches = []
-        b, k = (np.array(x).reshape(-1, w).T for x, w in ((b, 2), (k, 5)))
-        if len(counts) > 1:
-            k = np.repeat(k, counts, axis=1)
-        b = np.repeat(b, counts, axis=1)
-        rows = _sampled(raw, k, self.scenario)
+        pieces, self.stretches = self.stretches, []
+        k, H = np.array([x.k for x in pieces]).reshape(-1, 5).T, np.array([x.H for x in pieces])
+        at = slice(n)
+        if len(pieces) != 1:
+            counts = [x.n for x in pieces]
+            k, H = np.repeat(k, counts, axis=1), np.repeat(H, counts)
+            if not all(x.is_sample for x in pieces):
+                at = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
+        rows = _sampled(raw, k, self.scenario)[:, at]
         good, found = self.watch.look(rows, self.looked)
         if found is not None:
             self.outcome, self.end_time = found, None
             self.crossings = [c for c in self.crossings if c.time <= found.time]
-        index = np.arange(self.looked, self.looked + good)
-        keep = index % self.every == 0
-        if self.outcome is not None and good:
-            keep[-1] = True
+            n = good if isinstance(at, slice) or not good else int(at[good - 1]) + 1
+        self.ledger.add(raw[:, :n], k[:, :n], H[:n])
+        if good:
+            b = np.repeat([x.b for x in pieces if x.is_sample], [x.n for x in pieces if x.is_sample], axis=0).T
+            keep = np.arange(-self.looked % self.every, good, self.every)
+            if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
+                keep = np.append(keep, good - 1)
+            self.kept.append((self.looked + keep, rows[:, keep] if len(keep) < len(rows.T) else rows, b[:, keep]))
         self.looked += good
-        self.kept.append((index[keep], rows[:, :good][:, keep], b[:, :good][:, keep]))
 
     def result(self, wall: float) -> record.Record:
         index, rows, b = (np.concatenate(x, axis=-1) for x in zip(*self.kept, strict=True))
@@ -347,6 +374,6 @@ class _Run:
         qd = np.column_stack((r1, r2 - r1))
         return record.Record(
             t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta,
-            scenario=self.scenario, outcome=self.outcome, crossings=tuple(self.crossings),
+            scenario=self.scenario, outcome=self.outcome, crossings=tuple(self.crossings), energy=self.ledger.close(),
             steps=self.steps, wall_time=wall,
         )  # fmt: skip

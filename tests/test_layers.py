@@ -14,7 +14,7 @@ LEVELS = [
     {"errors", "inline"},
     {"params"},
     {"arm", "lti", "clay", "human"},
-    {"servo", "record"},
+    {"servo", "record", "energy"},
     {"loop", "scene", "outcome"},
     {"sim"},
     {"experiments"},

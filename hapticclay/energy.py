@@ -1,0 +1,72 @@
+"""Where the energy of a run comes from and where it goes, kick by kick."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import arm
+from .params import Operator, Scenario
+
+
+class Ledger:
+    """Adds up the work done in the kicks of a run; each force times the mean of the velocities around it.
+
+    The arm's kinetic energy is read from the engine's own rates, so the balance also tells whether
+    the engine did what the loop reckoned with.
+    """
+
+    def __init__(self, scenario: Scenario):
+        self.scenario = scenario
+        self.work = np.zeros(5)  # muscle, motors, clay, hand's damper, throughput
+        self.first: tuple[float, float] | None = None  # energy of arm and hand at the start
+        self.last = (0.0, 0.0)
+
+    def add(self, raw: np.ndarray, k: np.ndarray, H: np.ndarray) -> None:
+        """Enters kicks.
+
+        Args:
+            raw: shape (14, n), as loop.advance keeps them. k: loop.damping of each, (5, n) or (5, 1).
+            H: length of each kick [s], (n,) or (1,).
+        """
+        if not raw.shape[1]:
+            return
+        s, th = self.scenario, self.scenario.operator or Operator(0.0, 0.0, 0.0)
+        q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
+        v = 0.5 * (before + after)
+        a = q[0] + q[1]
+        columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
+        r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
+        muscle = H * (s.force[0] * v[0] + s.force[1] * v[1])
+        motors = H * (tau[0] * r1 + tau[1] * (r2 - r1))
+        clay = H * ((k[0:4:2] * before + k[1:4:2] * after) * v).sum(axis=0)
+        hand = H * th.damper * (v * v).sum(axis=0)
+        through = np.abs(muscle) + np.abs(motors)
+        self.work += [x.sum() for x in (muscle, motors, clay, hand, through)]
+
+        def stored(v: np.ndarray, p: np.ndarray, j: int) -> tuple[float, float]:
+            u1x, u1y, u2x, u2y = (float(x[j]) for x in columns)
+            r1, r2 = arm.rates(float(v[0, j]), float(v[1, j]), u1x, u1y, u2x, u2y, 1.0)
+            at_hand = th.mass * (v[:, j] @ v[:, j]) + th.spring * (p[:, j] @ p[:, j])
+            return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), 0.5 * float(at_hand)
+
+        if self.first is None:
+            self.first = stored(before, p, 0)
+        self.last = stored(after, p, -1)
+
+    def close(self) -> dict[str, float]:
+        """The balance [J]: muscle + motors = clay + hand_damper + kinetic + hand_stored + residual."""
+        muscle, motors, clay, hand, through = (float(x) for x in self.work)
+        first = self.first or self.last
+        kinetic, stored = self.last[0] - first[0], self.last[1] - first[1]
+        return {
+            "muscle": muscle,
+            "motors": motors,
+            "clay": clay,
+            "hand_damper": hand,
+            "kinetic": kinetic,
+            "hand_stored": stored,
+            "residual": muscle + motors - clay - hand - kinetic - stored,
+            "throughput": through,
+        }
