@@ -52,6 +52,24 @@ def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, flo
     return wxx, u1y * a + u2y * b, TRACE_W - wxx
 
 
+def along(r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
+    """Handle velocity [m/s] of the absolute link rates r1, r2 [rad/s]; columns as above."""
+    return u1x * r1 + u2x * r2, u1y * r1 + u2y * r2
+
+
+def centripetal(r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
+    """c = -J' q', acceleration of the handle towards the joints at link rates r1, r2 [m/s^2]."""
+    s1 = r1 * r1
+    s2 = r2 * r2
+    return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
+
+
+def torques(fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
+    """Joint torques J' f [N.m] of a force at the handle [N]."""
+    t2 = u2x * fx + u2y * fy
+    return u1x * fx + u1y * fy + t2, t2
+
+
 def rates(vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float) -> tuple[float, float]:
     """Absolute link rates that move the handle with (vx, vy), divided by n.
 

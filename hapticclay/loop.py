@@ -81,14 +81,8 @@ def tick(c, k, q1, q2, w1, w2, state):
     px = u1y + u2y - ox
     py = noy - u1x - u2x
     r2 = w1 + w2
-    vx = u1x * w1 + u2x * r2
-    vy = u1y * w1 + u2y * r2
-    h1 = w1 + half * g1
-    h2 = r2 + half * g2
-    s1 = h1 * h1
-    s2 = h2 * h2
-    cx = u1y * s1 + u2y * s2
-    cy = -u1x * s1 - u2x * s2
+    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
+    cx, cy = arm.centripetal(w1 + half * g1, r2 + half * g2, u1x, u1y, u2x, u2y)
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -109,28 +103,10 @@ def tick(c, k, q1, q2, w1, w2, state):
     vry = keepy * ydy + takey * (deltay - yy)
     ax = servo.acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
     ay = servo.acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
-    ux, uy = servo.outcome(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
-    dvx = ux - vx
-    dvy = uy - vy
-    g1, g2 = arm.rates(dvx, dvy, u1x, u1y, u2x, u2y, H)
-    ffx = fx - dx * ux
-    ffy = fy - dy * uy
-    t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
-    t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
-    if t1 * t1 > square1 or t2 * t2 > square2:
-        t1 = min(max(t1, -limit1), limit1)
-        t2 = min(max(t2, -limit2), limit2)
-        a1 = (t1 - t2) / arm.I1
-        a2 = t2 / arm.I2
-        bx = vx / H + u1x * a1 + u2x * a2
-        by = vy / H + u1y * a1 + u2y * a2
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-        ux, uy = servo.outcome(1.0 / H, 1.0 / H, bx, by, sxx, sxy, syy, fx, fy, dx, dy)
-        dvx = ux - vx
-        dvy = uy - vy
-        g1, g2 = arm.rates(dvx, dvy, u1x, u1y, u2x, u2y, H)
-        ffx = fx - dx * ux
-        ffy = fy - dy * uy
+    ux, uy, g1, g2, ffx, ffy, t1, t2 = servo.resolve(
+        H, vx, vy, u1x, u1y, u2x, u2y, nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy,
+        limit1, limit2, square1, square2,
+    )  # fmt: skip
 
     # compensator, driven by the force that acts in this kick
     ex = keep * ex + gainx * ffx
@@ -140,8 +116,7 @@ def tick(c, k, q1, q2, w1, w2, state):
     if held:
         fx -= behind * ux
         fy -= behind * uy
-    p2 = u2x * fx + u2y * fy
-    p1 = u1x * fx + u1y * fy + p2
+    p1, p2 = arm.torques(fx, fy, u1x, u1y, u2x, u2y)
     return (
         (
             deltax + step * ex, deltay + step * ey, ex, ey,

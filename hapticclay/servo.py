@@ -10,7 +10,7 @@ pose. The functions below are one kick of that law (docs/equations.md, section 4
 
 from __future__ import annotations
 
-from . import lti
+from . import arm, lti
 from .params import SecondOrder
 
 
@@ -66,3 +66,49 @@ def outcome(
         ux = gx / nx
         uy = gy / ny
     return ux, uy
+
+
+def pushed(
+    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
+    t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Handle velocity after a kick of length H under given motor torques t1, t2 [N.m]; the rest as in `outcome`."""
+    a1 = (t1 - t2) / arm.I1
+    a2 = t2 / arm.I2
+    ax, ay = arm.along(a1, a2, u1x, u1y, u2x, u2y)
+    sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+    n = 1.0 / H
+    ux, uy = outcome(n, n, n * vx + ax, n * vy + ay, sxx, sxy, syy, fx, fy, dx, dy)
+    return ux, uy
+
+
+def resolve(
+    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
+    nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
+    fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
+) -> tuple[float, float, float, float, float, float, float, float]:  # fmt: skip
+    """The kick that the servo wants, as far as the motors can give it.
+
+    Args:
+        H: length of the kick [s]. vx, vy: handle velocity before [m/s]. u1, u2: arm.columns [m].
+        nx .. dy: as in `outcome`.
+        limit1, limit2, square1, square2: torque limits [N.m] and their squares.
+
+    Returns:
+        (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after [m/s], link accelerations [rad/s^2], net
+        hand force [N], motor torques [N.m].
+    """
+    ux, uy = outcome(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+    ffx = fx - dx * ux
+    ffy = fy - dy * uy
+    g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
+    t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
+    if t1 * t1 > square1 or t2 * t2 > square2:
+        t1 = min(max(t1, -limit1), limit1)
+        t2 = min(max(t2, -limit2), limit2)
+        ux, uy = pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+        ffx = fx - dx * ux
+        ffy = fy - dy * uy
+        g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    return ux, uy, g1, g2, ffx, ffy, t1, t2

@@ -1,0 +1,61 @@
+"""The jobs that every integrator is given, and their reference solutions.
+
+A job is a constant cut without shaping: the nonlinear arm, the servo, the compensator, the clay between 5 and 15 cm,
+both axes. The reference is the arm in joint space under SciPy's DOP853 at 1e-12, borders as events (tests/oracles.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from oracles import nonlinear  # noqa: E402
+
+import hapticclay as hc  # noqa: E402
+
+EDGES = (0.05, 0.15, 0.20)  # [m] the clay begins, ends; the path ends
+
+PROBLEMS = {
+    "default cut": hc.constant_cut(),
+    "hand in the loop": hc.constant_cut(impedance=True, force=(2.0, 0.0)),
+    "off-axis force": hc.constant_cut(force=(1.0, 0.3)),
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What an integrator made of a job.
+
+    Attributes:
+        crossings: times at which x crossed EDGES [s], in order; shorter if the run failed.
+        t, p: samples of time [s], (n,), and handle position [m], (n, 2).
+        fe, v: clay force [N] and velocity [m/s] along x at the samples, (n,).
+        wall: seconds of run time of the integration alone. note: why it failed, if it did.
+    """
+
+    crossings: list[float]
+    t: np.ndarray
+    p: np.ndarray
+    fe: np.ndarray
+    v: np.ndarray
+    wall: float
+    note: str = ""
+
+
+@functools.cache
+def reference(name: str):
+    """(crossing times, dense position p(t), velocity v(t)) of a job; functions of ascending times (n,) -> (n, 2)."""
+    s = PROBLEMS[name]
+    assert s.clay is not None
+    b = s.clay.x.values
+    th = dataclasses.astuple(s.operator) if s.operator else None
+    grid = np.linspace(0.0, s.t_max, 60_001)
+    crossings, t, p, v = nonlinear(b, EDGES, s.gain, s.force, th, s.shaping, s.t_max, grid, rtol=1e-12, atol=1e-14)
+    return crossings, t, p, v
