@@ -18,7 +18,7 @@ import mujoco
 from tabulate import tabulate
 
 import hapticclay as hc
-from hapticclay import record, sim
+from hapticclay import leapfrog, record
 
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
@@ -48,7 +48,7 @@ def loop(scenario: hc.Scenario, steps: int, inlined: bool = True) -> float:
     """Seconds a step of simulate(), every sample recorded."""
     import dataclasses
 
-    sim.FUSE_FROM = 0 if inlined else 10**12
+    leapfrog.FUSE_FROM = 0 if inlined else 10**12
     r = hc.simulate(dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None))
     assert r.steps >= steps, r.status
     return r.wall_time / r.steps

@@ -16,6 +16,8 @@ LEVELS = [
     {"arm", "lti", "clay", "human"},
     {"servo", "record", "energy"},
     {"loop", "scene", "outcome"},
+    {"run"},
+    {"leapfrog"},
     {"sim"},
     {"experiments"},
     {"plot"},
@@ -23,7 +25,7 @@ LEVELS = [
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "sim"},
+    "mujoco": {"scene", "run", "leapfrog"},
     "matplotlib": {"plot"},
     "tyro": {"cli"},
     "tqdm": {"cli"},

@@ -8,7 +8,7 @@ import pytest
 from oracles import Arm
 
 import hapticclay as hc
-from hapticclay import inline, loop, sim
+from hapticclay import inline, leapfrog, loop
 from hapticclay.params import Operator
 
 CASES = {
@@ -24,9 +24,9 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
-    monkeypatch.setattr(sim, "FUSE_FROM", 0)
+    monkeypatch.setattr(leapfrog, "FUSE_FROM", 0)
     fused = hc.simulate(CASES[name])
-    monkeypatch.setattr(sim, "FUSE_FROM", 10**9)
+    monkeypatch.setattr(leapfrog, "FUSE_FROM", 10**9)
     plain = hc.simulate(CASES[name])
     assert inline.inline(loop.advance) is not loop.advance
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
@@ -37,15 +37,15 @@ def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
 def test_engine_does_what_the_tick_foretold(name, monkeypatch):
     """The rates after each engine step, and so the force the compensator saw, are the predicted ones."""
     worst = 0.0
-    plain = sim._Run._engine
+    plain = leapfrog.Leapfrog._engine
 
     def engine(self, w, command, out, after):
         nonlocal worst
         plain(self, w, command, out, after)
         worst = max(worst, np.max(np.abs(np.array(self.rates) - out[2:])))
 
-    monkeypatch.setattr(sim._Run, "_engine", engine)
-    monkeypatch.setattr(sim._Run, "_glide", lambda self: False)
+    monkeypatch.setattr(leapfrog.Leapfrog, "_engine", engine)
+    monkeypatch.setattr(leapfrog.Leapfrog, "_glide", lambda self: False)
     hc.simulate(dataclasses.replace(CASES[name], t_max=0.8))
     assert worst < 1e-11  # rounding of a 2x2 solve, conditioned by b dt/Lambda = 4e2 at most
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import outcome, sim
+from hapticclay import leapfrog, outcome
 from hapticclay.params import Operator
 
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
@@ -102,7 +102,7 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
 
 def test_numbers_beyond_floating_point_end_the_run(monkeypatch):
     """A state that overflows is cut off, not recorded."""
-    run = sim._Run(hc.constant_cut(t_max=0.5), 1)
+    run = leapfrog.Leapfrog(hc.constant_cut(t_max=0.5), 1)
     for _ in range(50):
         run._careful()
     run.state = (*run.state[:6], 1e300, 1e300, *run.state[8:])

@@ -1,0 +1,157 @@
+"""What every way of running a scenario shares: the engine's model, the regions, the record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from . import arm, outcome, record, scene
+from .clay import Regions
+from .params import AXES, Scenario
+
+CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
+
+
+class Run:
+    """One run of a scenario. A subclass makes the steps; this keeps what comes of them.
+
+    Attributes:
+        i: index of the sample at or before now. t: now [s]. last: number of whole steps.
+        steps: engine steps made.
+    """
+
+    def __init__(self, scenario: Scenario, every: int):
+        self.scenario, self.every = scenario, every
+        self.model = scene.build(scenario)
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:] = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
+        self.angles, self.rates = memoryview(self.data.qpos), memoryview(self.data.qvel)
+        self.regions = Regions(scenario.clay, scenario.length, scenario.start)
+        self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
+        self.i, self.t, self.steps = 0, 0.0, 0
+        self.watch = outcome.Watch(scenario)
+        self.looked = 0  # samples judged so far
+        self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
+        self.crossings: list[record.Crossing] = []
+        self.outcome: record.Outcome | None = None
+        self.end_time: float | None = None
+
+    def advance(self) -> bool:
+        """Makes a step or many; True if it is time to look at what came of them."""
+        raise NotImplementedError
+
+    def flush(self) -> None:
+        """Judges what has been done since the last look, by `judge`."""
+        raise NotImplementedError
+
+    def balance(self) -> dict[str, float]:
+        """The energy ledger, as record.Record.energy."""
+        raise NotImplementedError
+
+    def go(self, progress: Callable[[float, float], None] | None) -> None:
+        """Runs to the end."""
+        try:
+            while self.outcome is None:
+                if self.advance() or self.outcome:
+                    self.flush()
+                    if progress:
+                        progress(self.t, self.position(self.angles, self.rates, 0.0)[0])
+        except (ArithmeticError, ValueError) as error:  # beyond floating point, or the arm exactly straight
+            if isinstance(error, ValueError) and all(map(math.isfinite, (*self.angles, *self.rates))):
+                raise
+            self.flush()
+            if self.outcome is None:
+                self.outcome = record.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
+
+    def position(self, q, w, h: float) -> tuple[float, float]:
+        """Handle position [m] when the joints have turned from q with w for h seconds."""
+        x, y = arm.position(q[0] + h * w[0], q[1] + h * w[1])
+        return x - self.scenario.origin[0], y - self.scenario.origin[1]
+
+    def target(self) -> tuple[float, float, bool]:
+        """(time of the next sample [s], length of the step to it [s], whether now is a sample); length 0 at the end."""
+        s = self.scenario
+        on_grid = self.t == self.i * s.dt
+        if self.i > self.last:
+            return self.t, 0.0, on_grid
+        whole = self.i < self.last
+        target = (self.i + 1) * s.dt if whole else s.t_max
+        after = s.dt if on_grid and whole else target - self.t
+        return target, after if after > 1e-9 * s.dt else 0.0, on_grid
+
+    def inside(self, i: int, p: float) -> bool:
+        """Whether coordinate i at p [m] is in the present region (a NaN is: it is judged later)."""
+        return not (p >= self.regions.high[i] or p < self.regions.low[i])
+
+    def cross(self, i: int, up: bool, speed: float) -> bool:
+        """Steps over a border of coordinate i; True, and nothing stepped over, if it is the end of the path."""
+        end = self.regions.at_end(i, up)
+        border = self.regions.high[i] if up else self.regions.low[i]
+        self.crossings.append(record.Crossing(axis=AXES[i], border=border, time=self.t, speed=speed))
+        if not end:
+            self.regions.cross(i, up)
+        return end
+
+    def finish(self, code: str) -> None:
+        """Ends the run here."""
+        self.end_time = self.t
+        self.outcome = record.Outcome(code, self.t, self.i)
+
+    def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
+        """Takes samples into the record, up to where the run ceases to be one; returns how many.
+
+        Args:
+            rows: (q, p, v, fh, tau, delta), shape (12, n). b: gives the clay at each, shape (2, n).
+        """
+        good, found = self.watch.look(rows, self.looked)
+        if found is not None:
+            self.outcome, self.end_time = found, None
+            self.crossings = [c for c in self.crossings if c.time <= found.time]
+        if good:
+            keep = np.arange(-self.looked % self.every, good, self.every)
+            if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
+                keep = np.append(keep, good - 1)
+            everything = len(keep) == rows.shape[1]
+            self.kept.append((self.looked + keep, rows if everything else rows[:, keep], b()[:, keep]))
+        self.looked += good
+        return good
+
+    def result(self, wall: float) -> record.Record:
+        """The record of the run, which took wall seconds."""
+        index, rows, b = (np.concatenate(x, axis=-1) for x in zip(*self.kept, strict=True))
+        t = index * self.scenario.dt
+        if self.end_time is not None and len(t):
+            t[-1] = self.end_time
+        assert self.outcome is not None
+        q, p, v, fh, tau, delta = (rows[j : j + 2].T.copy() for j in range(0, 12, 2))
+        a = q.sum(axis=1)
+        u = arm.columns(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+        r1, r2 = arm.rates(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
+        qd = np.column_stack((r1, r2 - r1))
+        return record.Record(
+            t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta,
+            scenario=self.scenario, outcome=self.outcome, crossings=tuple(self.crossings), energy=self.balance(),
+            steps=self.steps, wall_time=wall,
+        )  # fmt: skip
+
+
+def root(f: Callable[[float], float], b: float, fb: float) -> float:
+    """Where f, of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding."""
+    a = 1e-9 * b
+    fa, end = f(a), b
+    if fa == 0.0 or (fa > 0.0) == (fb > 0.0):
+        return a
+    for _ in range(60):
+        h = b - fb * (b - a) / (fb - fa)
+        fh = f(h)
+        if (fh > 0.0) != (fb > 0.0):
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = h, fh
+        if abs(b - a) <= 1e-15 * end or abs(fh) < 1e-17:
+            break
+    return b
