@@ -10,10 +10,11 @@ from .params import AXES, Clay, Profile
 def kick(b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float) -> tuple[float, ...]:
     """Splits the clay's damping in one kick between the velocities before and after it.
 
-    Half and half in the interior (Crank-Nicolson, second order) while that is free of overshoot,
-    z = b H w <= 2; beyond, the least implicit split without overshoot (amplification 0), so that
-    no stiffness rings. Across a border each side keeps its own part of the kick: the total impulse
-    is then b times the distance travelled inside, exactly.
+    Each side of the sample keeps its own part of the kick: Crank-Nicolson, second order, and across a
+    border an impulse of exactly b times the distance travelled inside. Where the part before would
+    overshoot, L b H w > 1, the excess acts on the velocity after: the least implicit split without
+    overshoot, so that no stiffness rings. One share serves both axes, which keeps the energy that the
+    clay takes positive however the axes are coupled.
 
     Args:
         b0, b1: damping before and after the sample on each axis [N.s/m].
@@ -24,11 +25,10 @@ def kick(b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R
         (before x, after x, before y, after y [N.s/m], felt [1]): fe = before v- + after v+, and the
         velocity that the clay feels at the sample is v- + felt (v+ - v-).
     """
-    z = max(b1) * H * w
-    if b0 == b1 and z > 2.0:
-        L, R = 1.0 / z, 1.0 - 1.0 / z
-        return L * b0[0], R * b1[0], L * b0[1], R * b1[1], R
-    return L * b0[0], R * b1[0], L * b0[1], R * b1[1], L
+    z = L * max(b0) * H * w
+    share = 1.0 / z if z > 1.0 else 1.0
+    x, y = share * L * b0[0], share * L * b0[1]
+    return x, L * b0[0] - x + R * b1[0], y, L * b0[1] - y + R * b1[1], 1.0 - share * (1.0 - L)
 
 
 def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:

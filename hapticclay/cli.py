@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import sys
 import tempfile
@@ -41,10 +42,12 @@ class Run:
     def __call__(self) -> int:
         writable(self.out)
         record = simulate_with_progress(self.scenario, self.every)
-        record.save(self.out)
-        print(table(record))
-        if self.plots:
-            draw(record, self.out)
+        try:
+            record.save(self.out)
+            if self.plots:
+                draw(record, self.out)
+        finally:  # a full disk must not hide what was found
+            print(table(record))
         print(f"written to {self.out}")
         return 0
 
@@ -155,6 +158,8 @@ def draw(record: Record, folder: Path) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line; returns its exit status: 0, 2 for bad input, 130 for Ctrl-C."""
     complaint = io.StringIO()
+    with contextlib.suppress(AttributeError, ValueError):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no frames or bullets
     try:
         try:
             with contextlib.redirect_stderr(complaint):
@@ -170,11 +175,20 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return 0
             _check_names(list(sys.argv[1:] if argv is None else argv))
             raise ParameterError("arguments", "", _one_line(complaint.getvalue())) from None
-        return command()
+        code = command()
+        sys.stdout.flush()
+        return code
     except ParameterError as error:
         text = error.bound if error.field == "arguments" else str(error)
         print(f"hapticclay: {text}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # whoever read our output has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        print(f"hapticclay: {error}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except KeyboardInterrupt:
         print("hapticclay: interrupted", file=sys.stderr)
         return 130

@@ -43,7 +43,7 @@ def constant_cut(
         force: muscle force uh of the operator [N].
         impedance: True puts the operator's arm Th (Eq. 19) in the loop.
         shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.1.
+        dt: physics and control step [s], 1e-6 to 0.02.
         t_max: longest simulated time [s].
         clay: where the slab begins and ends [m].
         length: the run ends when the handle reaches this x [m].
@@ -93,7 +93,7 @@ def free(
         force: muscle force uh of the operator [N].
         impedance: True puts the operator's arm Th (Eq. 19) in the loop.
         shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.1.
+        dt: physics and control step [s], 1e-6 to 0.02.
         t_max: longest simulated time [s].
         length: the run ends when the handle reaches this x [m].
         start: handle position at t = 0 [m], at rest.

@@ -15,8 +15,9 @@ import numpy as np
 from . import arm, energy, loop
 from .inline import inline
 from .params import Scenario
-from .run import CHUNK, Run, root
+from .run import CHUNK, TOUCH, Run, root
 
+LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
 FUSE_FROM = 5_000  # steps from which inlining the loop (about 50 ms, once per process) pays
 
 _row = struct.Struct("14d")
@@ -91,6 +92,7 @@ class Leapfrog(Run):
         self.state = loop.initial_state(scenario.start)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
         self.many = _fused() if self.last >= FUSE_FROM else loop.advance
+        self.landings = 0  # on borders since the last sample
         self.before = 0.0  # length of the step that led here [s]
         self.b = self.regions.b  # clay before the sample [N.s/m]
         self.rows = bytearray(CHUNK * loop.ROW)
@@ -149,7 +151,7 @@ class Leapfrog(Run):
             low, high = self.regions.low[i], self.regions.high[i]
             if low > -math.inf or high < math.inf:
                 x = np.append(rows[first:, 2 + i], end[i])
-                out |= ~((x >= low) & (x < high))
+                out |= ~((x >= low - TOUCH) & (x <= high + TOUCH))
         return int(out.argmax()) - 1 if out.any() else n
 
     def _careful(self) -> None:
@@ -157,22 +159,28 @@ class Leapfrog(Run):
         target, after, on_grid = self.target()
         if not after:
             return self._close("time limit")
+        if on_grid:
+            self.landings = 0
         q, w = tuple(self.angles), tuple(self.rates)
-        crossed: set[int] = set()
+        crossed: dict[int, bool] = {}  # borders stepped over without a step: axis, upwards
         while True:
             new, command, sample, out = self._tick(q, w, after)
             here, there = self.position(q, out[2:], 0.0), self.position(q, out[2:], after)
-            hit = [i for i in (0, 1) if i not in crossed and not self.inside(i, there[i])]
+            ups = {i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])}
+            hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]  # no way back: a border must not hold the run
             if not hit:
                 landing = None
                 break
-            ups = {i: there[i] >= self.regions.high[i] for i in hit}
-            i = hit[0]
-            if here[i] >= self.regions.high[i] if ups[i] else here[i] < self.regions.low[i]:
+            beyond = [i for i in hit if not self.inside(i, here[i])]
+            if beyond:
+                i = beyond[0]
                 if self._cross(i, ups[i]):
                     return None
-                crossed.add(i)  # at most once a sample, so that a border cannot hold the run
+                crossed[i] = ups[i]
                 continue
+            if self.landings >= LANDINGS:
+                landing = None
+                break
             spans = {i: self._landing(q, w, i, ups[i], after, there[i]) for i in hit}
             i = min(hit, key=lambda i: spans[i])
             landing, after = (i, ups[i]), spans[i]
@@ -186,7 +194,11 @@ class Leapfrog(Run):
             self.i += 1
             self.t = target
         else:
+            self.landings += 1
             self.t += after
+            if target - self.t <= 1e-9 * self.scenario.dt:  # the border lies at the sample itself
+                self.i += 1
+                self.t = target
             self._cross(*landing)
         return None
 

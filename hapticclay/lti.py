@@ -91,8 +91,9 @@ def gain_limit(axis: str, b: float, operator: Operator | None = None) -> float:
     AB = np.convolve(A, B.conj())
     roots = np.roots(np.trim_zeros(AB.imag, "f")) if np.any(AB.imag) else np.array([])
     omega = roots[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0.0)].real
-    K = np.sort(-np.polyval(AB, omega).real / np.abs(np.polyval(B, omega)) ** 2)
-    for k in K[K > 0.0]:
+    with np.errstate(divide="ignore", invalid="ignore"):  # a zero of B on the axis: no K puts a pole there
+        K = np.sort(-np.polyval(AB, omega).real / np.abs(np.polyval(B, omega)) ** 2)
+    for k in K[(K > 0.0) & np.isfinite(K)]:
         if not stable(axis, (1.0 + 1e-6) * k, b, operator):
             return float(k)
     return math.inf

@@ -15,15 +15,17 @@ SPEED = 20.0  # [m/s] beyond any hand
 FLOOR = 1e-9  # [m/s] swings below this are rounding
 GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
 STEP = 2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
-SWINGS = 6  # consecutive swings that a verdict needs
+SWINGS = 6  # consecutive swings that a verdict of growth needs
+SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
+CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 
 
 class Watch:
     """Looks at the rows of a run, chunk by chunk, for the end of its good part.
 
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
-    one, SWINGS of them at least and by GROWTH together; or if SWINGS in a row hardly shrink while a
-    motor is in its torque limit; or if the handle swings out of reach while its gain is above the limit
+    one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
+    its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
     of its loop.
     """
 
@@ -32,7 +34,9 @@ class Watch:
         self.past = np.zeros((2, 2))  # last two velocities seen [m/s]
         self.turn = [0.0, 0.0]  # velocity at the last turning point [m/s]
         self.hits = [0, 0]  # samples since then with a motor in its limit
-        self.swings: list[list[tuple[float, bool]]] = [[], []]  # of the present growth: size [m/s], saturated
+        self.since = [0, 0]  # samples since then
+        # of the present growth: size [m/s], whether a motor was in its limit, samples
+        self.swings: list[list[tuple[float, bool, int]]] = [[], []]
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
@@ -84,7 +88,10 @@ class Watch:
             turns = np.flatnonzero(rise[1:] != rise[:-1]) + 1
             if not len(turns):
                 self.hits[i] += int(hit[-1])
+                self.since[i] += rows.shape[1]
                 continue
+            spans = np.diff(turns, prepend=1 - self.since[i])
+            self.since[i] = v.shape[1] - 1 - int(turns[-1])
             hits = np.diff(hit[turns], prepend=-self.hits[i])
             sizes = np.abs(np.diff(v[i, turns], prepend=self.turn[i]))
             self.turn[i] = float(v[i, turns[-1]])
@@ -95,7 +102,7 @@ class Watch:
                 if j != before + 1:
                     self.swings[i] = []
                 before = j
-                self._swing(i, float(sizes[j]), bool(hits[j]))
+                self._swing(i, float(sizes[j]), bool(hits[j]), int(spans[j]))
                 cause = self._verdict(i)
                 if cause:
                     verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
@@ -109,19 +116,22 @@ class Watch:
         n, cause = min(verdicts.values())
         return n, axis, cause
 
-    def _swing(self, i: int, size: float, saturated: bool) -> None:
+    def _swing(self, i: int, size: float, saturated: bool, span: int) -> None:
         last = self.swings[i][-1][0] if self.swings[i] else 0.0
         if size < (0.8 if saturated else 1.0) * last:
             self.swings[i] = []
-        self.swings[i].append((size, saturated))
+        self.swings[i].append((size, saturated, span))
 
     def _verdict(self, i: int) -> str:
         swings = self.swings[i]
         if len(swings) < SWINGS:
             return ""
-        if all(saturated for _, saturated in swings[-SWINGS:]):
+        cycle = swings[-CYCLE:]
+        if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
             return "oscillation against the torque limits"
-        sizes = [size for size, _ in swings]
+        sizes = [x[0] for x in swings]
+        if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
+            return ""
         if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) > GROWTH:
             return "growing oscillation"
         return ""
@@ -147,6 +157,8 @@ class Watch:
                 f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "
                 f"the limit of the linear loop at b = {b:g} N.s/m"
             )
+        if any(x[1] for x in self.swings[i]):
+            return f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m: the motors saturate"
         if not s.shaping:
             return "turn shaping on: the loop is stable at the nominal pose, the arm's inertia changes along the path"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"

@@ -161,7 +161,7 @@ class Scenario:
         flag("shaping", self.shaping)
         put("gain", pair("gain", self.gain, 0.0, 1e6, above=True))
         put("force", pair("force", self.force, -1e6, 1e6, unit="N"))
-        put("dt", number("dt", self.dt, 1e-6, 0.1, unit="s"))
+        put("dt", number("dt", self.dt, 1e-6, 0.02, unit="s"))
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
         put("origin", pair("origin", self.origin, unit="m"))

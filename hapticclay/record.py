@@ -7,6 +7,7 @@ import json
 import os
 import platform
 import tempfile
+import zipfile
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -207,23 +208,25 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
-            with np.load(file, allow_pickle=False) as z:
+            with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
-        except (OSError, KeyError, ValueError, EOFError) as error:
-            raise ParameterError("record", str(path), f"must be a saved record ({error})") from None
-        if head.get("schema") != SCHEMA:
-            raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {head.get('schema')}")
-        return cls(
-            **arrays,
-            scenario=_scenario(head["scenario"]),
-            outcome=Outcome(**head["outcome"]),
-            crossings=tuple(Crossing(**c) for c in head["crossings"]),
-            energy=head["energy"],
-            steps=head["steps"],
-            wall_time=head["wall_time_s"],
-            versions=head["versions"],
-        )
+            schema = head["schema"]
+            if schema == SCHEMA:
+                return cls(
+                    **arrays,
+                    scenario=_scenario(head["scenario"]),
+                    outcome=Outcome(**head["outcome"]),
+                    crossings=tuple(Crossing(**c) for c in head["crossings"]),
+                    energy=head["energy"],
+                    steps=head["steps"],
+                    wall_time=head["wall_time_s"],
+                    versions=head["versions"],
+                )
+        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+            what = " ".join(str(error).split()) or type(error).__name__
+            raise ParameterError("record", str(path), f"must be a saved record ({what})") from None
+        raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {schema}")
 
 
 def _spread(x: np.ndarray) -> dict[str, float] | None:

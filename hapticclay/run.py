@@ -12,6 +12,7 @@ from . import arm, outcome, record, scene
 from .clay import Regions
 from .params import AXES, Scenario
 
+TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
 
 
@@ -84,7 +85,7 @@ class Run:
 
     def inside(self, i: int, p: float) -> bool:
         """Whether coordinate i at p [m] is in the present region (a NaN is: it is judged later)."""
-        return not (p >= self.regions.high[i] or p < self.regions.low[i])
+        return not (p > self.regions.high[i] + TOUCH or p < self.regions.low[i] - TOUCH)
 
     def cross(self, i: int, up: bool, speed: float) -> bool:
         """Steps over a border of coordinate i; True, and nothing stepped over, if it is the end of the path."""
@@ -152,6 +153,6 @@ def root(f: Callable[[float], float], b: float, fb: float) -> float:
         else:
             fa *= 0.5
         b, fb = h, fh
-        if abs(b - a) <= 1e-15 * end or abs(fh) < 1e-17:
+        if abs(b - a) <= 1e-12 * end or abs(fh) < 4e-16:  # rounding of a position
             break
     return b

@@ -108,3 +108,42 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path):
     assert p.returncode == 130, (out, err)
     assert err.strip().splitlines()[-1].strip() == "hapticclay: interrupted"
     assert os.listdir(tmp_path) == []
+
+
+def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
+    out = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {sys.executable} -m hapticclay run constant --t-max 0.5 --out o | head -0"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert "Traceback" not in out.stderr
+    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+
+
+def test_a_full_device_for_output_is_one_line(tmp_path):
+    with open("/dev/full", "w") as full:
+        out = subprocess.run(
+            [sys.executable, "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--no-plots", "--out", "o"],
+            cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120,
+        )  # fmt: skip
+    assert out.returncode == 1 and out.stderr.count("\n") == 1 and "No space left" in out.stderr
+
+
+def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeypatch):
+    def full(self, path):
+        raise cli.ParameterError("out", str(path), "must be writable (No space left on device)")
+
+    monkeypatch.setattr(cli.Record, "save", full)
+    code, out, err = run(capsys, "run", "constant", "--t-max", "0.5", "--out", str(tmp_path))
+    assert code == 2 and "status: time limit" in out and err.count("\n") == 1
+
+
+def test_help_on_a_terminal_without_unicode(tmp_path):
+    env = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii"}
+    out = subprocess.run([sys.executable, "-m", "hapticclay", "--help"], env=env, capture_output=True, timeout=60)
+    assert out.returncode == 0 and b"run" in out.stdout and out.stderr == b""
+
+
+def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
+    args = ("--b", "1e4", "--start", "0.06", "0", "--force", "1e6", "0", "--dt", "0.02")
+    code, out, _ = run(capsys, "run", "constant", *args, "--out", str(tmp_path))
+    assert code == 0 and "diverged" in out and (tmp_path / "force.png").is_file()

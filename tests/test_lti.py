@@ -72,6 +72,14 @@ def test_gain_limit_without_clay_and_hand_is_infinite():
     assert hc.gain_limit("x", 0.0) == float("inf")
 
 
+def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
+    """An undamped hand makes the driven polynomial vanish at its resonance: no K puts a pole there."""
+    for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
+        limit = hc.gain_limit("y", 0.0, th)
+        assert limit > 0.0
+        assert limit == float("inf") or not lti.stable("y", 1.001 * limit, 0.0, th)
+
+
 @given(K=st.floats(0.01, 100), f=st.floats(-10, 10), b=st.floats(0, 1e6))
 def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
     # p/uh = (GC + S)/(1 + (GC + S) b s) times s, at s = 0

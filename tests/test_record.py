@@ -74,6 +74,24 @@ def test_load_refuses_what_is_no_record(content, tmp_path):
         hc.Record.load(file)
 
 
+def test_load_refuses_a_damaged_record(run, tmp_path):
+    file = run.save(tmp_path) / "record.npz"
+    whole = file.read_bytes()
+    rng = np.random.default_rng(0)
+    for at in rng.integers(0, len(whole), 30):
+        file.write_bytes(whole[:at])
+        with pytest.raises(ParameterError, match="record"):
+            hc.Record.load(file)
+    for change in ({"steps": None}, {"scenario": {"nonsense": 1}}, {"outcome": []}):
+        arrays = {name: getattr(run, name) for name in record.ARRAYS}
+        np.savez(file, summary=np.array(json.dumps({"schema": record.SCHEMA, **change})), **arrays)
+        with pytest.raises(ParameterError, match="record"):
+            hc.Record.load(file)
+    np.save(tmp_path / "a.npy", np.zeros(3))
+    with pytest.raises(ParameterError, match="record"):
+        hc.Record.load(tmp_path / "a.npy")
+
+
 def test_load_refuses_another_schema(run, tmp_path, monkeypatch):
     monkeypatch.setattr(record, "SCHEMA", "hapticclay-record-0")
     run.save(tmp_path)

@@ -214,6 +214,49 @@ def test_simulate_refuses_what_is_no_scenario():
         hc.simulate(hc.free(), every=0)
 
 
+@pytest.mark.parametrize("ulps", [0, 1, 2, 3, -1, -2])
+def test_a_border_that_lies_at_a_sample_is_crossed_once(ulps):
+    """The step lands within rounding of the end of a whole step."""
+    edge = float(hc.simulate(hc.constant_cut(t_max=0.2)).p[300, 0])
+    for _ in range(abs(ulps)):
+        edge = float(np.nextafter(edge, -1.0 if ulps > 0 else 1.0))
+    r = hc.simulate(hc.constant_cut(t_max=0.5, clay=(edge, 0.15)))
+    assert r.t[-1] == 0.5 and [c.border for c in r.crossings] == [edge]
+    assert r.crossings[0].time == pytest.approx(300 * 3.6e-4, abs=1e-9)
+
+
+def test_a_handle_that_slides_along_a_border_goes_on():
+    """Chatter over the border of the clay: no verdict of instability, and the motion converges."""
+    y = [
+        hc.simulate(hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6, dt=dt)).p[-1, 1]
+        for dt in (1e-3, 3.6e-4)
+    ]
+    assert y[0] == pytest.approx(y[1], rel=0.03)
+
+
+def test_a_border_into_stiff_clay_on_the_other_axis_is_crossed_once():
+    from hapticclay.params import Clay, Operator, Profile, Scenario
+
+    e = (0.008008749625277495, 0.11265424819257426)
+    s = Scenario(
+        clay=Clay(Profile(e, (0, 0, 0)), Profile(e, (0, 1e9, 0))),
+        operator=Operator(0, 0.5, 300),
+        gain=(0.44598979672675334, 0.3833403871645688),
+        force=(-0.1010242091352522, 0.3805432376543556),
+        start=(0.06284143979853994, -0.028811052389286194),
+        t_max=0.5,
+    )
+    r = hc.simulate(s)
+    assert [c.border for c in r.crossings] == [e[0]]
+    assert r.crossings[0].speed == pytest.approx(-0.303, abs=0.001)
+
+
+def test_a_start_at_rest_in_stiff_clay_is_recorded_at_rest():
+    r = hc.simulate(hc.constant_cut(b=1e6, start=(0.06, 0.0), t_max=0.01))
+    assert np.all(r.v[0] == 0.0) and np.all(r.fe[0] == 0.0)
+    assert r.fe[-1, 0] == pytest.approx(1.0, rel=1e-3)
+
+
 def test_runs_are_repeatable_bit_for_bit():
     a, b = (hc.simulate(hc.constant_cut(t_max=1.0)) for _ in range(2))
     np.testing.assert_array_equal(a.p, b.p)
