@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from oracles import nonlinear  # noqa: E402
+from oracles import Pieces, nonlinear_pieces  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
 
@@ -50,12 +50,9 @@ class Result:
 
 
 @functools.cache
-def reference(name: str):
-    """(crossing times, dense position p(t), velocity v(t)) of a job; functions of ascending times (n,) -> (n, 2)."""
+def reference(name: str) -> Pieces:
+    """The reference solution of a job: its crossings, and p(t), v(t) at any ascending times before the end."""
     s = PROBLEMS[name]
     assert s.clay is not None
-    b = s.clay.x.values
     th = dataclasses.astuple(s.operator) if s.operator else None
-    grid = np.linspace(0.0, s.t_max, 60_001)
-    crossings, t, p, v = nonlinear(b, EDGES, s.gain, s.force, th, s.shaping, s.t_max, grid, rtol=1e-12, atol=1e-14)
-    return crossings, t, p, v
+    return nonlinear_pieces(s.clay.x.values, EDGES, s.gain, s.force, th, s.shaping, s.t_max, 1e-12, 1e-14)

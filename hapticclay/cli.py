@@ -64,7 +64,39 @@ class Version:
 
 
 MARKERS = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs)
-Command = Annotated[Run, tyro.conf.subcommand("run")] | Annotated[Version, tyro.conf.subcommand("version")]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Error against run time, hapticclay beside its peers: diagrams, a page, the figures as JSON.
+
+    Needs a checkout (the benchmarks are not installed); a peer whose package is missing is listed as left out.
+    """
+
+    out: Path = Path("out/bench")
+    """Folder for work_precision.md, work_precision.json and the diagrams."""
+    quick: bool = False
+    """One job and three settings a method: half a minute."""
+
+    def __call__(self) -> int:
+        folder = Path(__file__).resolve().parents[1] / "benchmarks"
+        if not (folder / "work_precision.py").is_file():
+            raise ParameterError(
+                "benchmarks", str(folder), "not found: run from a checkout, after pip install -e .[bench]"
+            )
+        writable(self.out)
+        sys.path.insert(0, str(folder))
+        import importlib
+
+        importlib.import_module("work_precision").main(self.out, self.quick)
+        return 0
+
+
+Command = (
+    Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Version, tyro.conf.subcommand("version")]
+)
 
 
 def writable(folder: Path) -> None:
@@ -197,7 +229,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "version"))
+        choice("command", words[0], ("run", "bench", "version"))
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 

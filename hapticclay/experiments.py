@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 from .clay import slab
 from .errors import ParameterError, flag, number, numbers_of
@@ -34,6 +35,7 @@ def constant_cut(
     start: tuple[float, float] = (0.0, 0.0),
     origin: tuple[float, float] = ORIGIN,
     torque_limit: tuple[float, float] = TORQUE_LIMIT,
+    integrator: Literal["fast", "accurate"] = "fast",
 ) -> Scenario:
     """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
@@ -50,6 +52,7 @@ def constant_cut(
         start: handle position at t = 0 [m], at rest.
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
+        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
 
     Raises:
         ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
@@ -70,6 +73,7 @@ def constant_cut(
         start=start,
         origin=origin,
         torque_limit=torque_limit,
+        integrator=integrator,
     )
 
 
@@ -85,6 +89,7 @@ def free(
     start: tuple[float, float] = (0.0, 0.0),
     origin: tuple[float, float] = ORIGIN,
     torque_limit: tuple[float, float] = TORQUE_LIMIT,
+    integrator: Literal["fast", "accurate"] = "fast",
 ) -> Scenario:
     """The same path without clay: the steady speed is K f/10.
 
@@ -99,6 +104,7 @@ def free(
         start: handle position at t = 0 [m], at rest.
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
+        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
 
     Raises:
         ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
@@ -115,6 +121,7 @@ def free(
         start=start,
         origin=origin,
         torque_limit=torque_limit,
+        integrator=integrator,
     )
 
 

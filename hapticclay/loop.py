@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from . import arm, clay, human, lti, servo
-from .params import C_POLE, G, S, Scenario
+from .params import C_POLE, G, Operator, S, Scenario
 
 ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
@@ -125,6 +125,72 @@ def tick(c, k, q1, q2, w1, w2, state):
         (t1, t2, cx1, cy1, p1, p2),
         (px, py, vx, vy, ffx, ffy, deltax, deltay),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
+    )  # fmt: skip
+
+
+def instant(scenario: Scenario) -> tuple[float, ...]:
+    """What `derivative` needs of the scenario."""
+    th = scenario.operator or Operator(0.0, 0.0, 0.0)
+    return (
+        *scenario.gain, *scenario.force, scenario.origin[0], -scenario.origin[1],
+        *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
+        th.spring, th.mass, th.damper, 1.0 if scenario.shaping else 0.0,
+    )  # fmt: skip
+
+
+def derivative(c, bx, by, q1, q2, w1, w2, state):
+    """The same loop as a differential equation, at one instant.
+
+    Args:
+        c: from `instant`. bx, by: clay [N.s/m]. q1, q2, w1, w2: joint angles [rad] and rates [rad/s].
+        state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `tick`, all at this instant.
+
+    Returns:
+        (command, rates, sample):
+        command: (tau1, tau2, torques of the hand 1, 2) [N.m].
+        rates: derivative of state, and of the work of muscle, motors, clay, hand's damper, throughput [W].
+        sample: (position x, y [m], velocity x, y [m/s], fh x, y [N]).
+    """
+    (
+        gainx, gainy, uhx, uhy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
+    ) = c  # fmt: skip
+    deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
+    a = q1 + q2
+    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
+    px = u1y + u2y - ox
+    py = noy - u1x - u2x
+    r2 = w1 + w2
+    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
+    cx, cy = arm.centripetal(w1, r2, u1x, u1y, u2x, u2y)
+    if shaped:
+        sxx, sxy, syy = SXX, 0.0, SYY
+    else:
+        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+    hx = uhx - human.impedance(spring, mass, damper, px, cx, vx)
+    hy = uhy - human.impedance(spring, mass, damper, py, cy, vy)
+    y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
+    y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
+    # a kick of one second from rest, in which u is the acceleration
+    ax = servo.acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
+    ay = servo.acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
+    _, _, _, _, ffx, ffy, t1, t2 = servo.resolve(
+        1.0, 0.0, 0.0, u1x, u1y, u2x, u2y, 1.0, 1.0, ax, ay, sxx, sxy, syy,
+        hx - bx * vx, hy - by * vy, mass, mass, limit1, limit2, square1, square2,
+    )  # fmt: skip
+    hx = ffx + bx * vx
+    hy = ffy + by * vy
+    p1, p2 = arm.torques(hx, hy, u1x, u1y, u2x, u2y)
+    muscle = uhx * vx + uhy * vy
+    motors = t1 * w1 + t2 * w2
+    clay_power = bx * vx * vx + by * vy * vy
+    hand = damper * (vx * vx + vy * vy)
+    return (
+        (t1, t2, p1, p2),
+        (
+            ex, ey, gainx * ffx - C_POLE * ex, gainy * ffy - C_POLE * ey, ydx, ydy, y2x, y2y,
+            muscle, motors, clay_power, hand, abs(muscle) + abs(motors),
+        ),
+        (px, py, vx, vy, hx, hy),
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from .errors import ParameterError, choice, flag, number, numbers_of, pair
 
 AXES = ("x", "y")
+INTEGRATORS = ("fast", "accurate")
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,8 @@ class Scenario:
         start: handle position p at t = 0 [m].
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
+        integrator: "fast", second order, one engine step a sample, any stiffness; or "accurate", fourth
+            order, the controller's states integrated by the engine with the arm's, slower.
     """
 
     name: str = "free"
@@ -147,6 +150,7 @@ class Scenario:
     start: tuple[float, float] = (0.0, 0.0)
     origin: tuple[float, float] = ORIGIN
     torque_limit: tuple[float, float] = TORQUE_LIMIT
+    integrator: str = "fast"
 
     def __post_init__(self):
         def put(field, value):
@@ -161,6 +165,7 @@ class Scenario:
         flag("shaping", self.shaping)
         put("gain", pair("gain", self.gain, 0.0, 1e6, above=True))
         put("force", pair("force", self.force, -1e6, 1e6, unit="N"))
+        choice("integrator", self.integrator, INTEGRATORS)
         put("dt", number("dt", self.dt, 1e-6, 0.02, unit="s"))
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from . import arm, outcome, record, scene
 from .clay import Regions
+from .errors import ParameterError
 from .params import AXES, Scenario
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
@@ -19,17 +21,25 @@ CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; sm
 class Run:
     """One run of a scenario. A subclass makes the steps; this keeps what comes of them.
 
+    Raises:
+        ParameterError: somebody's control callback is installed in the engine; it would meddle.
+
     Attributes:
         i: index of the sample at or before now. t: now [s]. last: number of whole steps.
         steps: engine steps made.
     """
 
     def __init__(self, scenario: Scenario, every: int):
+        if mujoco.get_mjcb_control() is not None:
+            raise ParameterError(
+                "mjcb_control", mujoco.get_mjcb_control(), "the engine must be free of control callbacks"
+            )
         self.scenario, self.every = scenario, every
         self.model = scene.build(scenario)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:] = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
-        self.angles, self.rates = memoryview(self.data.qpos), memoryview(self.data.qvel)
+        self.angles: Any = memoryview(self.data.qpos)  # floats, in the engine's own memory
+        self.rates: Any = memoryview(self.data.qvel)
         self.regions = Regions(scenario.clay, scenario.length, scenario.start)
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
         self.i, self.t, self.steps = 0, 0.0, 0

@@ -31,7 +31,8 @@ def warnings_caught() -> Iterator[list[str]]:
 
 
 def build(scenario: Scenario) -> mujoco.MjModel:
-    """The model that simulate(scenario) steps: joints, inertias, motors, and the clay's dampers if any.
+    """The model that simulate(scenario) steps: joints, inertias, motors; the clay's dampers
+    and the states of an accurate run if there are any.
 
     It holds no geom, sensor, contact, mesh, material, light or camera.
 
@@ -41,12 +42,15 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     Raises:
         RuntimeError: the engine warned while compiling; the parts in mjcf/ do not fit together.
     """
-    parts = ["arm.xml"] + (["clay.xml"] if scenario.clay else [])
+    accurate = scenario.integrator == "accurate"
+    parts = ["arm.xml"] + ["clay.xml"] * (scenario.clay is not None) + ["states.xml"] * accurate
     text = "".join(f'<include file="{part}"/>' for part in parts)
     files = {part: (folder() / part).read_bytes() for part in parts}
     with warnings_caught() as caught:
         spec = mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
         spec.option.timestep = scenario.dt
+        if accurate:
+            spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         for name, limit in zip(("shoulder", "elbow"), scenario.torque_limit, strict=True):
             spec.actuator(name).ctrlrange = (-limit, limit)
         model = spec.compile()

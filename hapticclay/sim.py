@@ -9,6 +9,7 @@ from . import record, scene
 from .errors import ParameterError, integer
 from .leapfrog import Leapfrog
 from .params import Scenario
+from .rungekutta import RungeKutta
 
 
 def simulate(
@@ -25,13 +26,13 @@ def simulate(
         The record. Instability and its like are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: scenario or every is of the wrong kind.
+        ParameterError: scenario or every is of the wrong kind, or the scene too stiff for its integrator.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
     with scene.warnings_caught():
-        run = Leapfrog(scenario, every)
+        run = (Leapfrog if scenario.integrator == "fast" else RungeKutta)(scenario, every)
         begin = time.perf_counter()
         run.go(progress)
         wall = time.perf_counter() - begin

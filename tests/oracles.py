@@ -121,13 +121,39 @@ class Arm:
         return np.array([np.arctan2(y, x) - np.arctan2(L2 * np.sin(q2), L1 + L2 * np.cos(q2)), q2])
 
 
+class Pieces:
+    """A solution with events: dense pieces, one a region."""
+
+    def __init__(self):
+        self.crossings, self.spans, self.solutions = [], [], []
+
+    def __call__(self, times):
+        """Handle position and velocity at ascending times within the solution, (n, 2) each."""
+        index = np.searchsorted([t for t, _ in self.spans], times, side="right") - 1
+        p, v = np.empty((len(times), 2)), np.empty((len(times), 2))
+        for j, sol in enumerate(self.solutions):
+            mine = np.flatnonzero(index == j)
+            if len(mine):
+                for i, x in zip(mine, sol(times[mine]).T, strict=True):
+                    p[i], v[i] = Arm.forward(x[:2]) - ORIGIN, Arm.jacobian(x[:2]) @ x[2:4]
+        return p, v
+
+
 def nonlinear(
     b_of_region, edges, K, uh, th=None, shaping=False, t_max=60.0, t_eval=None, rtol=1e-11, atol=1e-13, p0=(0.0, 0.0)
 ):
     """The whole arm, both axes, a slab across x: b_of_region[i] on both axes between edges i-1 and i.
 
-    Forward crossings of x only; ends at the last edge. Returns (crossing times, t, p (n, 2), v (n, 2)).
+    Forward crossings of x only; ends at the last edge. Returns (crossing times, t, p (n, 2), v (n, 2)) at
+    the times t_eval before the end.
     """
+    pieces = nonlinear_pieces(b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0, t_eval is not None)
+    t = np.empty(0) if t_eval is None else t_eval[t_eval < pieces.spans[-1][1]]
+    return pieces.crossings, t, *(pieces(t) if len(t) else (np.empty((0, 2)), np.empty((0, 2))))
+
+
+def nonlinear_pieces(b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0=(0.0, 0.0), dense=True):
+    """As `nonlinear`, the solution as Pieces."""
     K, uh = np.array(K), np.array(uh)
     m, d, k = th or (0.0, 0.0, 0.0)
     p0 = np.array(p0, float)
@@ -150,28 +176,18 @@ def nonlinear(
         return np.concatenate((w, wd, rate, K * f - 10 * rate, yr, y2))
 
     z = np.concatenate((Arm.start(p0), [0, 0], p0, [0, 0], p0, [0, 0]))
-    t, crossings, T, P, V = 0.0, [], [], [], []
+    t, out = 0.0, Pieces()
     for edge, b in zip(edges, b_of_region, strict=True):
 
         def hit(t, z, b, edge=edge):
             return Arm.forward(z[:2])[0] - ORIGIN[0] - edge
 
         hit.terminal, hit.direction = True, 1
-        s = solve_ivp(
-            rhs, (t, t_max), z, "DOP853", rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=t_eval is not None
-        )
-        end = s.t[-1]
-        if t_eval is not None:
-            mine = t_eval[(t_eval >= t) & (t_eval < end)]
-            if len(mine):
-                Z = s.sol(mine)
-                T.append(mine)
-                P.append(np.array([Arm.forward(x[:2]) - ORIGIN for x in Z.T]))
-                V.append(np.array([Arm.jacobian(x[:2]) @ x[2:4] for x in Z.T]))
-        z, t = s.y[:, -1], end
+        s = solve_ivp(rhs, (t, t_max), z, "DOP853", rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=dense)
+        out.spans.append((t, s.t[-1]))
+        out.solutions.append(s.sol)
+        z, t = s.y[:, -1], s.t[-1]
         if not len(s.t_events[0]):
             break
-        crossings.append(t)
-    if not T:
-        return crossings, np.array([]), np.empty((0, 2)), np.empty((0, 2))
-    return crossings, np.concatenate(T), np.concatenate(P), np.concatenate(V)
+        out.crossings.append(t)
+    return out

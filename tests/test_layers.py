@@ -17,7 +17,7 @@ LEVELS = [
     {"servo", "record", "energy"},
     {"loop", "scene", "outcome"},
     {"run"},
-    {"leapfrog"},
+    {"leapfrog", "rungekutta"},
     {"sim"},
     {"experiments"},
     {"plot"},
@@ -25,7 +25,7 @@ LEVELS = [
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "run", "leapfrog"},
+    "mujoco": {"scene", "run", "leapfrog", "rungekutta"},
     "matplotlib": {"plot"},
     "tyro": {"cli"},
     "tqdm": {"cli"},

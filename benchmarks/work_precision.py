@@ -1,0 +1,282 @@
+"""Error against run time: hapticclay and its peers on the same jobs, in one process, taking turns.
+
+    python benchmarks/work_precision.py [--quick] [--out DIR]
+
+Writes work_precision.json, one PNG a job and work_precision.md, whose every figure comes from the runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import math
+import os
+import platform
+import statistics
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from problems import EDGES, PROBLEMS, Result, reference  # noqa: E402
+from tabulate import tabulate  # noqa: E402
+from tqdm import tqdm  # noqa: E402
+
+from hapticclay import record  # noqa: E402
+
+PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
+DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "control", "pybullet", "drake", "pin")
+ERRORS = {
+    "crossing": "largest error of the three crossing times [s]",
+    "position": "largest error of the handle position [m]",
+    "force": "root mean square error of the clay force along x [N]",
+    "b": "error of b fitted to the cut's speed [N.s/m]",
+}
+ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # errors in crossing time [s] of the `recommend` table
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
+MARKERS = "osD^v<>P"
+BEGIN, END = "<!-- recommend: benchmarks/work_precision.py --readme -->", "<!-- end -->"
+
+
+def errors(problem: str, r: Result) -> dict[str, float | None]:
+    """The four errors of a result; None where it does not reach so far."""
+    exact = reference(problem)
+    out: dict[str, float | None] = dict.fromkeys(ERRORS)
+    if r.note or len(r.crossings) < len(EDGES):
+        return out
+    out["crossing"] = float(np.max(np.abs(np.array(r.crossings) - exact.crossings)))
+    mine = np.flatnonzero(r.t < min(exact.crossings[-1], r.crossings[-1]))
+    mine = mine[:: max(1, len(mine) // 4000)]
+    p, v = exact(r.t[mine])
+    out["position"] = float(np.max(np.linalg.norm(r.p[mine] - p, axis=1)))
+    s = PROBLEMS[problem]
+    assert s.clay is not None
+    b = np.array(s.clay.x.values)[np.searchsorted(exact.crossings[:2], r.t[mine], side="right")]
+    clear = np.min(np.abs(r.t[mine, None] - exact.crossings), axis=1) > 1e-5  # on a border, b has two values
+    out["force"] = float(np.sqrt(np.mean((r.fe[mine] - b * v[:, 0])[clear] ** 2)))
+    i = np.flatnonzero((r.p[:, 0] >= 0.10) & (r.p[:, 0] <= 0.14))
+    if s.operator is None and len(i) > 1:  # f = (10/K + b) v, from the time between 10 and 14 cm, ours and exact
+        i = i[[0, -1]]
+        span, ways = r.t[i[1]] - r.t[i[0]], (r.p[i, 0], exact(r.t[i])[0][:, 0])
+        mine_b, exact_b = (s.force[0] * span / (x[1] - x[0]) - 10.0 / s.gain[0] for x in ways)
+        out["b"] = float(abs(mine_b - exact_b))
+    return out
+
+
+def measure(quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS) -> tuple[list[dict], list[str]]:
+    """All rows, and what was left out. Every setting is run once a round; times are medians over rounds."""
+    modules, omissions = [], []
+    for name in peers:
+        try:
+            modules.append(importlib.import_module(f"peers.{name}"))
+        except ImportError as error:
+            omissions.append(f"{name}: {error}")
+    jobs = []
+    for problem in problems:
+        for m in modules:
+            for method, settings in m.methods().items():
+                jobs += [(problem, m, method, x) for x in (settings[: 3 if quick else None])]
+    first: list[Result] = []
+    walls: list[list[float]] = [[] for _ in jobs]
+    rounds = 2 if quick else 5
+    with tqdm(total=rounds * len(jobs), delay=2.0, disable=None, leave=False) as bar:
+        for n in range(rounds):
+            for i, (problem, m, method, setting) in enumerate(jobs):
+                bar.set_description(f"{m.NAME} {method}")
+                if n == 0 or statistics.median(walls[i]) < 5.0:
+                    r = m.solve(problem, method, setting)
+                    walls[i].append(r.wall)
+                    if n == 0:
+                        first.append(r)
+                bar.update()
+    rows = []
+    for (problem, m, method, setting), r, wall in zip(jobs, first, walls, strict=True):
+        simulated = r.crossings[-1] if len(r.crossings) == len(EDGES) else (float(r.t[-1]) if len(r.t) else 0.0)
+        rows.append(
+            {
+                "problem": problem,
+                "package": m.NAME,
+                "method": method,
+                "setting": setting,
+                **errors(problem, r),
+                "wall": statistics.median(wall) / simulated if simulated else None,
+                "note": r.note,
+            }
+        )
+    return rows, omissions
+
+
+def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[str, Any]]:
+    """For each asked error in crossing time, over all jobs: the fastest setting that keeps it in every one."""
+    groups: dict[tuple, list[dict]] = {}
+    for r in rows:
+        if packages is None or r["package"] in packages:
+            groups.setdefault((r["package"], r["method"], r["setting"]), []).append(r)
+    out = []
+    for asked in ASKED:
+        fit = {
+            key: (max(r["crossing"] for r in g), statistics.mean(r["wall"] for r in g))
+            for key, g in groups.items()
+            if all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
+        }
+        if fit:
+            key = min(fit, key=lambda k: fit[k][1])
+            out.append({"asked": asked, "package": key[0], "method": key[1], "setting": key[2],
+                        "error": fit[key][0], "wall": fit[key][1]})  # fmt: skip
+    return out
+
+
+def dominance(rows: list[dict]) -> list[dict[str, Any]]:
+    """For each other package: how many of its points hapticclay beats in both error and time, with one setting."""
+    ours = [r for r in rows if r["package"] == "hapticclay" and r["crossing"] is not None]
+    out = []
+    for package in dict.fromkeys(r["package"] for r in rows if r["package"] != "hapticclay"):
+        points = [r for r in rows if r["package"] == package]
+        failed = sum(r["crossing"] is None for r in points)
+        beaten = sum(
+            any(
+                o["problem"] == r["problem"] and o["crossing"] <= r["crossing"] and o["wall"] <= r["wall"] for o in ours
+            )
+            for r in points
+            if r["crossing"] is not None
+        )
+        out.append({"package": package, "points": len(points), "failed": failed, "behind hapticclay in both": beaten})
+    return out
+
+
+def draw(rows: list[dict], problem: str):
+    """The four work-precision diagrams of a job."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from hapticclay.plot import STYLE
+
+    mine = [r for r in rows if r["problem"] == problem]
+    kinds = [k for k in ERRORS if any(r[k] is not None for r in mine)]
+    packages = list(dict.fromkeys(r["package"] for r in rows))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 3.9 * math.ceil(len(kinds) / 2)))
+        axes = figure.subplots(math.ceil(len(kinds) / 2), 2, squeeze=False).ravel()
+        for ax, kind in zip(axes, kinds, strict=False):
+            for package, method in dict.fromkeys((r["package"], r["method"]) for r in mine):
+                methods = list(dict.fromkeys(r["method"] for r in mine if r["package"] == package))
+                points = [r for r in mine if (r["package"], r["method"]) == (package, method) and r[kind]]
+                if not points:
+                    continue
+                label = package if len(methods) == 1 else f"{package}, {method}"
+                ax.plot(
+                    [r["wall"] for r in points], [r[kind] for r in points],
+                    color=COLORS[packages.index(package) % len(COLORS)], marker=MARKERS[methods.index(method) % 8],
+                    ls=("-", "--", ":", "-.")[methods.index(method) % 4], ms=4, label=label,
+                    lw=2.6 if package == "hapticclay" else 1.1, zorder=5 if package == "hapticclay" else 2,
+                )  # fmt: skip
+            ax.set(xscale="log", yscale="log", xlabel="run time per simulated second [s]")
+            ax.set_ylabel(ERRORS[kind].replace(" [", "\n["), fontsize=9)
+        for ax in axes[len(kinds) :]:
+            ax.remove()
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+        figure.suptitle(f"{problem}: down and left is better", fontsize=11)
+    return figure
+
+
+def machine() -> list[str]:
+    """Lines that say where and with what the figures were made."""
+    found = []
+    for name in DISTRIBUTIONS:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        names = [x.split(":", 1)[1].strip() for x in info.read_text().splitlines() if x.startswith("model name")]
+        cpu = names[0] if names else cpu
+    return [f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}", ", ".join(found)]
+
+
+def number(x: float | None) -> str:
+    return "-" if x is None else format(x, ".1e")
+
+
+def page(rows: list[dict], omissions: list[str]) -> str:
+    """The Markdown page."""
+    parts = [
+        "# Error against run time",
+        "Every package steps the same closed loop: the nonlinear arm, servo, compensator and clay on both axes, to the "
+        "end of the path. Errors are against the arm in joint space under DOP853 at 1e-12, borders as events. "
+        "The setting is a step [s], or a relative tolerance for adaptive methods. Generated by "
+        "`hapticclay bench`; do not edit.",
+        "## Recommended settings",
+        "The fastest setting that keeps the asked error in the crossing times on every job.",
+        table_of_settings(recommend(rows)),
+        "With a MuJoCo model in the loop:",
+        table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
+        "## Who is ahead",
+        tabulate(dominance(rows), headers="keys", tablefmt="github"),
+    ]
+    for problem in dict.fromkeys(r["problem"] for r in rows):
+        mine = [r for r in rows if r["problem"] == problem]
+        name = problem.replace(" ", "_")
+        cells = [
+            [r["package"], r["method"], format(r["setting"], "g"), *(number(r[k]) for k in ERRORS), number(r["wall"]),
+             r["note"]]
+            for r in mine
+        ]  # fmt: skip
+        head = ["package", "method", "setting", "crossing [s]", "position [m]", "force [N]", "b [N.s/m]",
+                "time per simulated s", "note"]  # fmt: skip
+        parts += [f"## {problem.capitalize()}", f"![work-precision diagrams]({name}.png)"]
+        parts.append(tabulate(cells, head, tablefmt="github", disable_numparse=True))
+    parts += ["## Left out", "\n".join(f"- {x}" for x in omissions) or "Nothing."]
+    parts += ["## Machine", "\n".join(f"- {x}" for x in machine())]
+    return "\n\n".join(parts) + "\n"
+
+
+def table_of_settings(found: list[dict[str, Any]]) -> str:
+    cells = [
+        [format(x["asked"], ".0e"), x["package"], x["method"], format(x["setting"], "g"), number(x["error"]),
+         number(x["wall"])]
+        for x in found
+    ]  # fmt: skip
+    head = ["asked error [s]", "package", "method", "setting", "error [s]", "time per simulated s"]
+    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
+
+
+def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None = None) -> None:
+    """Measures, writes the three kinds of file (and the table in readme), prints the recommendation."""
+    problems = list(PROBLEMS)[: 1 if quick else None]
+    rows, omissions = measure(quick, problems)
+    for problem in problems:
+        with record.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
+            draw(rows, problem).savefig(f, format="png")
+    data = {"schema": "hapticclay-bench-1", "machine": machine(), "omissions": omissions, "rows": rows}
+    with record.atomic(out / "work_precision.json") as f:
+        f.write((json.dumps(data, indent=1) + "\n").encode())
+    with record.atomic(out / "work_precision.md") as f:
+        f.write(page(rows, omissions).encode())
+    if readme:
+        head, _, rest = readme.read_text().partition(BEGIN)
+        with record.atomic(readme) as f:
+            table = table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"}))
+            f.write(f"{head}{BEGIN}\n\n{table}\n\n{END}{rest.partition(END)[2]}".encode())
+    print(table_of_settings(recommend(rows)))
+    print()
+    print(tabulate(dominance(rows), headers="keys"))
+    for x in omissions:
+        print(f"left out: {x}")
+    print(f"written to {out}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="one job, three settings a method")
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--readme", type=Path, help="a README whose table of recommended settings is to be renewed")
+    args = parser.parse_args()
+    main(args.out, args.quick, args.readme)

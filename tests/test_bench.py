@@ -1,0 +1,85 @@
+"""The benchmark: its figures follow from the runs, its tables from the figures."""
+
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import problems
+import work_precision as wp
+
+
+@pytest.fixture(scope="module")
+def rows():
+    found, omissions = wp.measure(True, ["default cut"], ("ours", "mujoco_plain", "scipy_ivp", "no_such_peer"))
+    assert len(omissions) == 1 and "no_such_peer" in omissions[0]
+    return found
+
+
+def of(rows, package, **kw):
+    return [r for r in rows if r["package"] == package and all(r[k] == v for k, v in kw.items())]
+
+
+def test_errors_of_the_exact_solution_are_none():
+    exact = problems.reference("default cut")
+    t = np.arange(0.0, 11.0, 0.01)
+    p, v = exact(t)
+    b = np.where((t > exact.crossings[0]) & (t < exact.crossings[1]), 90.0, 0.0)
+    found = wp.errors("default cut", problems.Result(exact.crossings, t, p, b * v[:, 0], v[:, 0], 1.0))
+    assert found["crossing"] == 0.0 and found["position"] == 0.0 and found["force"] < 1e-12
+    assert found["b"] == 0.0
+    late = [x + 1e-3 for x in exact.crossings]
+    assert wp.errors("default cut", problems.Result(late, t, p, b * v[:, 0], v[:, 0], 1.0))[
+        "crossing"
+    ] == pytest.approx(1e-3)
+
+
+def test_a_failed_run_is_a_row_without_errors():
+    r = problems.Result([], np.array([0.0]), np.zeros((1, 2)), np.zeros(1), np.zeros(1), 1.0, "blow-up")
+    assert set(wp.errors("default cut", r).values()) == {None}
+
+
+def test_the_default_path_is_a_thousand_times_closer_than_first_order_stepping(rows):
+    for r in of(rows, "MuJoCo, plain"):
+        for ours in of(rows, "hapticclay", setting=r["setting"]):
+            assert ours["crossing"] < 1e-3 * r["crossing"]
+    assert {r["setting"] for r in of(rows, "MuJoCo, plain")} & {r["setting"] for r in of(rows, "hapticclay")}
+
+
+def test_peers_converge_to_the_reference(rows):
+    best = min(r["crossing"] for r in of(rows, "SciPy"))
+    assert best < 1e-8
+
+
+def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):
+    for x in wp.recommend(rows):
+        fit = [r for r in rows if r["crossing"] is not None and r["crossing"] <= x["asked"]]
+        assert x["wall"] == min(r["wall"] for r in fit) and x["error"] <= x["asked"]
+
+
+def test_page_says_what_was_measured_and_nothing_else(rows, tmp_path):
+    text = wp.page(rows, ["a peer: not installed"])
+    for r in rows:
+        cells = (f"| {r['package']} ", f"| {r['method']} ", f"| {r['setting']:g} ", f"| {wp.number(r['crossing'])} ")
+        assert any(all(c in line for c in cells) for line in text.splitlines())
+    assert "- a peer: not installed" in text and "mujoco 4" in text
+    changed = [{**r, "crossing": (r["crossing"] or 0) + 0.123} for r in rows]
+    assert wp.page(changed, []) != text and "1.2e-01" in wp.page(changed, [])
+    json.dumps(rows, allow_nan=False)
+
+
+def test_diagram_has_a_line_a_method_and_units(rows, tmp_path):
+    figure = wp.draw(rows, "default cut")
+    assert len(figure.axes) == 4
+    assert len(figure.axes[0].lines) == len({(r["package"], r["method"]) for r in rows})
+    assert all("[" in ax.get_ylabel() and "[s]" in ax.get_xlabel() for ax in figure.axes)
+    figure.savefig(tmp_path / "a.png")
+
+
+def test_jobs_are_those_of_the_package():
+    assert dataclasses.replace(problems.PROBLEMS["default cut"]) == problems.hc.constant_cut()
