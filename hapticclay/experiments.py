@@ -36,6 +36,9 @@ def constant_cut(
     origin: tuple[float, float] = ORIGIN,
     torque_limit: tuple[float, float] = TORQUE_LIMIT,
     integrator: Literal["fast", "accurate"] = "fast",
+    control: Literal["continuous", "sampled"] = "continuous",
+    Ts: float | None = None,
+    render: Literal["held", "implicit"] = "held",
 ) -> Scenario:
     """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
@@ -53,6 +56,9 @@ def constant_cut(
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
         integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
+        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
+        Ts: control sample [s], a whole multiple of dt; None for dt.
+        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
 
     Raises:
         ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
@@ -74,6 +80,9 @@ def constant_cut(
         origin=origin,
         torque_limit=torque_limit,
         integrator=integrator,
+        control=control,
+        Ts=Ts,
+        render=render,
     )
 
 
@@ -90,6 +99,9 @@ def free(
     origin: tuple[float, float] = ORIGIN,
     torque_limit: tuple[float, float] = TORQUE_LIMIT,
     integrator: Literal["fast", "accurate"] = "fast",
+    control: Literal["continuous", "sampled"] = "continuous",
+    Ts: float | None = None,
+    render: Literal["held", "implicit"] = "held",
 ) -> Scenario:
     """The same path without clay: the steady speed is K f/10.
 
@@ -105,6 +117,9 @@ def free(
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
         integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
+        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
+        Ts: control sample [s], a whole multiple of dt; None for dt.
+        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
 
     Raises:
         ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
@@ -122,6 +137,9 @@ def free(
         origin=origin,
         torque_limit=torque_limit,
         integrator=integrator,
+        control=control,
+        Ts=Ts,
+        render=render,
     )
 
 

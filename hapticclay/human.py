@@ -5,15 +5,18 @@ from __future__ import annotations
 from .params import Operator
 
 
-def kick(operator: Operator | None, H: float, L: float, R: float) -> tuple[float, float, float, float]:
+def kick(
+    operator: Operator | None, H: float, L: float, R: float, step: float | None = None
+) -> tuple[float, float, float, float]:
     """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
 
-    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k H^2/4 to the
-    mass and keeps any spring stable at any step (Newmark, beta = 1/4).
+    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
+    mass and keeps any spring stable at any step h (Newmark, beta = 1/4).
 
     Args:
         operator: Th; None for Th = 0.
         H: length of the kick [s]. L, R: its shares before and after the sample.
+        step: h [s] if the kick is but a part of one between steps of h; None for H.
 
     Returns:
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
@@ -21,7 +24,8 @@ def kick(operator: Operator | None, H: float, L: float, R: float) -> tuple[float
     """
     if operator is None:
         return 0.0, 0.0, 0.0, 0.0
-    mass = operator.mass + 0.25 * operator.spring * H * H
+    h = H if step is None else step
+    mass = operator.mass + 0.25 * operator.spring * h * h
     return operator.spring, mass, operator.damper * L - mass / H, operator.damper * R + mass / H
 
 

@@ -7,7 +7,7 @@ import functools
 import math
 import struct
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -89,7 +89,7 @@ class Leapfrog(Run):
         super().__init__(scenario, every)
         self.motion, self.read = _window(self.data.qpos, self.data.qvel)
         self.drive, self.write = _outlet(self.data.ctrl, self.data.qfrc_applied)
-        self.state = loop.initial_state(scenario.start)
+        self.state: Any = loop.initial_state(scenario.start)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
         self.many = _fused() if self.last >= FUSE_FROM else loop.advance
         self.landings = 0  # on borders since the last sample
@@ -202,7 +202,7 @@ class Leapfrog(Run):
             self._cross(*landing)
         return None
 
-    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float):
+    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         s = self.scenario
         c = self.whole if self.before == after == s.dt else loop.coefficients(s, self.before, after)
         k = loop.damping(self.b, self.regions.b, self.before, after)
@@ -235,11 +235,13 @@ class Leapfrog(Run):
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
         b0, b1 = self.b, self.regions.b
-        _row.pack_into(
-            self.rows, self.filled * loop.ROW, *q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:]
-        )
+        row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
         k = loop.damping(b0, b1, self.before, after)
-        self.stretches.append(_Stretch(1, is_sample, b1 if after else b0, k, 0.5 * (self.before + after)))
+        self._put(is_sample, row, k, 0.5 * (self.before + after), b1 if after else b0)
+
+    def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, b) -> None:
+        _row.pack_into(self.rows, self.filled * loop.ROW, *row)
+        self.stretches.append(_Stretch(1, is_sample, b, k, H))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:

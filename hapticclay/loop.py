@@ -43,6 +43,12 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     )  # fmt: skip
 
 
+def columns(q1: float, q2: float) -> tuple[float, float, float, float]:
+    """arm.columns at joint angles [rad]."""
+    a = q1 + q2
+    return arm.columns(sin(q1), cos(q1), sin(a), cos(a))
+
+
 def damping(b0: tuple[float, float], b1: tuple[float, float], before: float, after: float) -> tuple[float, ...]:
     """What a tick needs of the clay: b0, b1 before and after its sample [N.s/m], steps as above."""
     span = before + after
@@ -192,6 +198,47 @@ def derivative(c, bx, by, q1, q2, w1, w2, state):
         ),
         (px, py, vx, vy, hx, hy),
     )  # fmt: skip
+
+
+def plant(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
+    """What `push` needs of the scenario and of the two steps around its kick [s]."""
+    H, span = 0.5 * (before + after), before + after
+    return (
+        H, *scenario.force, scenario.origin[0], -scenario.origin[1],
+        *human.kick(scenario.operator, H, before / span, after / span, max(before, after)),
+    )  # fmt: skip
+
+
+def push(c, k, q1, q2, w1, w2, t1, t2):
+    """One kick of the arm and the hand alone, under given motor torques.
+
+    Args:
+        c: from `plant`. k: from `damping`. q1, q2, w1, w2: as in `tick`. t1, t2: motor torques [N.m].
+
+    Returns:
+        (sample, after): (position x, y [m], velocity before x, y [m/s], net hand force x, y [N],
+        acceleration of the handle x, y [m/s^2]) and (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick.
+    """
+    H, uhx, uhy, ox, noy, spring, mass, before, behind = c
+    cx0, cx1, cy0, cy1, _ = k
+    a = q1 + q2
+    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
+    px = u1y + u2y - ox
+    py = noy - u1x - u2x
+    r2 = w1 + w2
+    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
+    cx, cy = arm.centripetal(w1, r2, u1x, u1y, u2x, u2y)
+    fx = uhx - cx0 * vx - human.impedance(spring, mass, before, px, cx, vx)
+    fy = uhy - cy0 * vy - human.impedance(spring, mass, before, py, cy, vy)
+    dx, dy = cx1 + behind, cy1 + behind
+    ux, uy = servo.pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+    ax = (ux - vx) / H
+    ay = (uy - vy) / H
+    g1, g2 = arm.rates(ax, ay, u1x, u1y, u2x, u2y, 1.0)
+    return (
+        (px, py, vx, vy, fx - dx * ux, fy - dy * uy, ax - cx, ay - cy),
+        (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
+    )
 
 
 def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):

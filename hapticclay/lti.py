@@ -25,6 +25,25 @@ def kick(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
+def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
+
+    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,).
+    """
+    from scipy.linalg import expm
+
+    g = G[AXES.index(choice("axis", axis, AXES))]
+    m = np.zeros((5, 5))
+    m[0, 1] = m[2, 3] = 1.0
+    m[1, 1], m[1, 4] = -C_POLE, K
+    m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
+    e = expm(T * m)
+    return e[:4, :4], e[:4, 4]
+
+
 def steady_speed(K: float, f: float, b: float) -> float:
     """Speed under a constant hand force f [N] in clay b [N.s/m]: K f/(10 + K b) [m/s].
 

@@ -14,6 +14,8 @@ from .errors import ParameterError, choice, flag, number, numbers_of, pair
 
 AXES = ("x", "y")
 INTEGRATORS = ("fast", "accurate")
+CONTROLS = ("continuous", "sampled")
+RENDERS = ("held", "implicit")
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,11 @@ class Scenario:
         torque_limit: of the shoulder and elbow motor [N.m].
         integrator: "fast", second order, one engine step a sample, any stiffness; or "accurate", fourth
             order, the controller's states integrated by the engine with the arm's, slower.
+        control: "continuous", the paper's analysis: the controller is part of the differential equation;
+            or "sampled", the paper's hardware: measured, computed and held every Ts.
+        Ts: control sample [s], a whole multiple of dt; None for dt.
+        render: where control is sampled, the clay is "held" (its force computed from the sample and held by
+            the motors) or "implicit" (physical, there all the time).
     """
 
     name: str = "free"
@@ -151,6 +158,9 @@ class Scenario:
     origin: tuple[float, float] = ORIGIN
     torque_limit: tuple[float, float] = TORQUE_LIMIT
     integrator: str = "fast"
+    control: str = "continuous"
+    Ts: float | None = None
+    render: str = "held"
 
     def __post_init__(self):
         def put(field, value):
@@ -166,7 +176,16 @@ class Scenario:
         put("gain", pair("gain", self.gain, 0.0, 1e6, above=True))
         put("force", pair("force", self.force, -1e6, 1e6, unit="N"))
         choice("integrator", self.integrator, INTEGRATORS)
+        choice("control", self.control, CONTROLS)
+        choice("render", self.render, RENDERS)
+        if self.control == "sampled" and self.integrator != "fast":
+            raise ParameterError("integrator", self.integrator, "must be 'fast' where control is 'sampled'")
         put("dt", number("dt", self.dt, 1e-6, 0.02, unit="s"))
+        if self.Ts is not None:
+            put("Ts", number("Ts", self.Ts, self.dt, 1.0, unit="s"))
+            if self.control != "sampled" or abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
+                bound = f"must be a whole multiple of dt = {self.dt:g} s, and None unless control is 'sampled'"
+                raise ParameterError("Ts", self.Ts, bound)
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
         put("origin", pair("origin", self.origin, unit="m"))

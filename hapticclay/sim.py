@@ -10,6 +10,7 @@ from .errors import ParameterError, integer
 from .leapfrog import Leapfrog
 from .params import Scenario
 from .rungekutta import RungeKutta
+from .sampled import Sampled
 
 
 def simulate(
@@ -32,7 +33,8 @@ def simulate(
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
     with scene.warnings_caught():
-        run = (Leapfrog if scenario.integrator == "fast" else RungeKutta)(scenario, every)
+        kind = RungeKutta if scenario.integrator == "accurate" else Leapfrog
+        run = (Sampled if scenario.control == "sampled" else kind)(scenario, every)
         begin = time.perf_counter()
         run.go(progress)
         wall = time.perf_counter() - begin

@@ -18,6 +18,7 @@ LEVELS = [
     {"loop", "scene", "outcome"},
     {"run"},
     {"leapfrog", "rungekutta"},
+    {"sampled"},
     {"sim"},
     {"experiments"},
     {"plot"},
@@ -25,12 +26,12 @@ LEVELS = [
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "run", "leapfrog", "rungekutta"},
+    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled"},
     "matplotlib": {"plot"},
     "tyro": {"cli"},
     "tqdm": {"cli"},
     "tabulate": {"cli"},
-    "scipy": set(),
+    "scipy": {"lti"},
     "imageio": set(),
     "numba": set(),
     "dask": set(),

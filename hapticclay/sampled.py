@@ -1,0 +1,132 @@
+"""The sampled run: what hardware does. Measured, computed and held every Ts, between which only the arm moves."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import mujoco
+
+from . import arm, human, loop, lti, servo
+from .leapfrog import CHUNK, Leapfrog
+from .params import AXES, G, Operator, S, Scenario
+
+NONE = (0.0, 0.0)
+
+
+class Sampled(Leapfrog):
+    """Leapfrog of the arm and the hand under torques that change at samples; the controller is exact between them.
+
+    At a sample the kick falls into two: one under the old torques, which brings the velocity to the sample, where it
+    is measured, and one under the new. Steps end on borders as they do in continuous time.
+    """
+
+    def __init__(self, scenario: Scenario, every: int):
+        super().__init__(scenario, every)
+        self.n = round((scenario.Ts or scenario.dt) / scenario.dt)
+        self.blocks = [lti.held(axis, K, self.n * scenario.dt) for axis, K in zip(AXES, scenario.gain, strict=True)]
+        x, y = scenario.start
+        # (delta, delta', y, y') of each axis, and the torques held
+        self.state = ((x, 0.0, x, 0.0), (y, 0.0, y, 0.0), NONE)
+        self.fresh = -1  # index of the last sample that was acted upon
+        self.physical = scenario.render == "implicit"
+        self.row: tuple[float, ...] | None = None
+
+    def advance(self) -> bool:
+        self._careful()
+        return self.filled >= CHUNK - 4
+
+    def _clay(self, before: float, after: float):
+        b0, b1 = (self.b, self.regions.b) if self.physical else (NONE, NONE)
+        return loop.damping(b0, b1, before, after)
+
+    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
+        x, y, tau = self.state
+        before, s = self.before, self.scenario
+        self.row, new, shown = None, self.state, self._delta(x, y)
+        if after > 0.0 and self._is_sample():
+            force = s.force
+            if before:
+                at, out = loop.push(loop.plant(s, before, 0.0), self._clay(before, 0.0), q[0], q[1], w[0], w[1], *tau)
+                self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown)
+                w = out[2:]
+                if s.operator:
+                    force = self._felt(s.operator, q, w, tau)
+            tau, f = self._control(q, w, x, y, force)
+            new = (
+                *(self._hold(z, block, f[i]) for i, (z, block) in enumerate(zip((x, y), self.blocks, strict=True))),
+                tau,
+            )
+            before = 0.0
+        at, out = loop.push(loop.plant(s, before, after), self._clay(before, after), q[0], q[1], w[0], w[1], *tau)
+        return new, (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown), out
+
+    def _felt(self, th: Operator, q, w, tau) -> tuple[float, float]:
+        """The operator's force that the sensor shows at the sample, before the torques change [N]."""
+        p, s = self.position(q, w, 0.0), self.scenario
+        u = loop.columns(q[0], q[1])
+        r = (w[0], w[0] + w[1])
+        v, c = arm.along(*r, *u), arm.centripetal(*r, *u)
+        b = self.b if self.physical else NONE
+        rest = [s.force[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
+        # a kick of one second from rest, in which the velocity after it is the acceleration
+        fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
+        a = servo.pushed(1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass)
+        return rest[0] - th.mass * a[0], rest[1] - th.mass * a[1]
+
+    def _is_sample(self) -> bool:
+        return self.i % self.n == 0 and self.t == self.i * self.scenario.dt and self.fresh != self.i
+
+    def _control(self, q, w, x, y, force):
+        """Torques to hold and the net force that the compensator is given, from what is measured now."""
+        (px, py), s = self.position(q, w, 0.0), self.scenario
+        u = loop.columns(*q)
+        r1, r2 = w[0], w[0] + w[1]
+        vx, vy = arm.along(r1, r2, *u)
+        cx, cy = arm.centripetal(r1, r2, *u)
+        bx, by = self.regions.b
+        fe = (bx * vx, by * vy)
+        f = (force[0] - fe[0], force[1] - fe[1])
+        a = []
+        for g, h, z, v, p, c in zip(G, S, (x, y), (vx, vy), (px, py), (cx, cy), strict=True):
+            y2 = g.stiffness * (z[0] - z[2]) - g.damping * z[3]
+            a.append(servo.acceleration(1.0, -h.damping, h.stiffness, y2, z[3], v, z[2], p, c))
+        sxx, sxy, syy = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(*u)
+        *_, t1, t2 = servo.resolve(  # the limits come last, after the clay's share
+            1.0, 0.0, 0.0, *u, 1.0, 1.0, a[0], a[1], sxx, sxy, syy, *f, 0.0, 0.0, inf, inf, inf, inf
+        )  # fmt: skip
+        if not self.physical:
+            p1, p2 = arm.torques(*fe, *u)
+            t1, t2 = t1 - p1, t2 - p2
+        (l1, l2) = s.torque_limit
+        return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
+
+    @staticmethod
+    def _hold(z, block, f: float) -> tuple[float, ...]:
+        A, B = block
+        return tuple((A @ z + B * f).tolist())
+
+    @staticmethod
+    def _delta(x, y) -> tuple[float, float]:
+        return x[0], y[0]
+
+    def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
+        before = self.before
+        if self.row:
+            self._put(False, self.row, self._clay(before, 0.0), 0.5 * before, self.b)
+            before = 0.0
+            self.fresh = self.i
+        elif after and self._is_sample():
+            before, self.fresh = 0.0, self.i
+        row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
+        k = self._clay(before, after)
+        self._put(is_sample, row, k, 0.5 * (before + after), self.regions.b if after else self.b)
+
+    def _engine(self, w, command, out, after: float) -> None:
+        model, data = self.model, self.data
+        self.steps += 1
+        t1, t2 = command[:2]
+        a1, a2 = (out[2] - w[0]) / after, (out[2] + out[3] - w[0] - w[1]) / after
+        self.write(self.drive, 0, t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
+        model.opt.timestep = after
+        mujoco.mj_step(model, data)

@@ -1,0 +1,109 @@
+"""The sampled loop against the hybrid system, exact between samples."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from oracles import hybrid
+
+import hapticclay as hc
+from hapticclay import lti
+from hapticclay.errors import ParameterError
+
+CASES = {
+    "held": dict(),
+    "implicit": dict(render="implicit"),
+    "held, shaped, off axis": dict(shaping=True, force=(1.0, 0.3)),
+    "implicit, hand": dict(render="implicit", impedance=True, force=(2.0, 0.0)),
+    "held, hand": dict(impedance=True, force=(2.0, 0.0)),
+}
+
+
+def slab(x):
+    return 90.0 if 0.03 <= x < 0.15 else 0.0
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
+    kw = dict(force=(1.5, 0.0), clay=(0.03, 0.15), t_max=0.5) | CASES[name]
+    s = hc.constant_cut(control="sampled", **kw)
+    th = (0.25, 2.0, 6.0) if s.operator else None
+    P, V, T = hybrid(slab, s.dt, s.gain, s.force, th, s.shaping, s.render, 0.45, (0.03, 0.15))
+    r = hc.simulate(s)
+    n = len(P)
+    assert r.crossings and r.crossings[0].time < 0.43
+    np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
+    np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
+    np.testing.assert_allclose(r.tau[: n - 1], T[: n - 1], atol=1e-3)
+
+
+def test_substeps_converge_to_the_hybrid_system_at_second_order():
+    Ts = 4e-3
+    kw = dict(force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="implicit", Ts=Ts, t_max=0.45)
+    P, *_ = hybrid(slab, Ts, (1.0, 0.5), (2.0, 0.0), render="implicit", t_end=0.4, edges=(0.03, 0.15))
+    error = []
+    for n in (1, 2, 4):
+        r = hc.simulate(hc.constant_cut(dt=Ts / n, **kw))
+        error.append(np.max(np.abs(r.p[::n][: len(P)] - P)))
+    order = np.polyfit(np.log([1, 2, 4]), -np.log(error), 1)[0]
+    assert 1.7 < order < 2.6, error
+
+
+def test_torques_are_held_between_samples():
+    r = hc.simulate(hc.constant_cut(control="sampled", dt=1.2e-4, Ts=3.6e-4, t_max=0.1))
+    held = r.tau[: len(r.tau) // 3 * 3].reshape(-1, 3, 2)
+    np.testing.assert_array_equal(held, np.repeat(held[:, :1], 3, axis=1))
+    assert len(np.unique(held[:, 0, 0])) > 200
+
+
+def test_sampled_tends_to_continuous_as_the_sample_shrinks():
+    gap = []
+    c = hc.simulate(hc.constant_cut(t_max=1.0))
+    for dt in (1.44e-3, 7.2e-4, 3.6e-4):
+        s = hc.simulate(hc.constant_cut(control="sampled", dt=dt, t_max=1.0))
+        n = round(dt / 3.6e-4)
+        m = min(len(s.p), len(c.p[::n])) - 1
+        gap.append(np.max(np.abs(s.p[:m] - c.p[::n][:m])))
+    assert 0.8 < np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] < 1.2, gap  # a hold is half a sample late
+
+
+def test_rendering_a_held_force_goes_unstable_where_physical_clay_does_not():
+    kw = dict(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1))
+    assert hc.simulate(hc.constant_cut(render="implicit", **kw)).outcome.code == "time limit"
+    held = hc.simulate(hc.constant_cut(render="held", **kw))
+    assert held.outcome.code == "diverged" and np.all(np.isfinite(held.p))
+
+
+def test_balance_closes():
+    for render in ("held", "implicit"):
+        e = hc.simulate(hc.constant_cut(control="sampled", render=render, t_max=1.5)).energy
+        assert abs(e["residual"]) < 1e-12 * e["throughput"]
+
+
+@pytest.mark.parametrize("axis,K", [("x", 1.0), ("y", 0.5)])
+def test_held_block_is_the_step_response_of_C_and_G(axis, K):
+    import control
+
+    s = control.tf("s")
+    G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
+    C = K / (s**2 + 10 * s)
+    A, B = lti.held(axis, K, 0.01)
+    z = np.zeros(4)
+    found = []
+    for _ in range(50):
+        found.append(z[[0, 2]])
+        z = A @ z + B
+    t = np.arange(50) * 0.01
+    np.testing.assert_allclose([x[0] for x in found], control.step_response(C, t).outputs, atol=1e-9)
+    np.testing.assert_allclose([x[1] for x in found], control.step_response(G * C, t).outputs, atol=1e-9)
+
+
+@pytest.mark.parametrize("kw,field", [
+    (dict(control="sampeld"), "control"), (dict(control="sampled", render="hold"), "render"),
+    (dict(Ts=1e-3), "Ts"), (dict(control="sampled", Ts=5e-4), "Ts"), (dict(control="sampled", Ts=1e-4), "Ts"),
+    (dict(control="sampled", integrator="accurate"), "integrator"),
+])  # fmt: skip
+def test_bad_choices_are_refused(kw, field):
+    with pytest.raises(ParameterError) as e:
+        dataclasses.replace(hc.constant_cut(), **kw)
+    assert e.value.field == field
