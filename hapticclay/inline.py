@@ -13,6 +13,7 @@ import inspect
 import itertools
 import textwrap
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -61,7 +62,6 @@ class _Inliner:
     def __init__(self):
         self.bound: dict[str, Any] = {}
         self.count = itertools.count()
-        self.local: set[str] = set()  # names that laws brought in
 
     def block(self, body: list[ast.stmt], function: FunctionType, scope: dict[str, ast.expr]) -> list[ast.stmt]:
         """The statements of body, names resolved in function's scope, laws expanded."""
@@ -73,7 +73,7 @@ class _Inliner:
                 head: list[ast.stmt] = []
                 inner = self.block(statement.body, function, scope)
                 if isinstance(statement, ast.For):
-                    head, inner = _hoist(_fold(_merge(_prune(inner)), self.local))
+                    head, inner = _hoist(_prune(inner))
                 other = self.block(statement.orelse, function, scope)
                 if isinstance(statement, ast.If):
                     new: ast.stmt = ast.If(self.expression(statement.test, function, scope), inner, other)
@@ -156,9 +156,7 @@ class _Inliner:
         return found if isinstance(found, FunctionType) and found.__module__.startswith(PACKAGE) else None
 
     def _fresh(self, name: str) -> ast.Name:
-        fresh = f"{name}_{next(self.count)}"
-        self.local.add(fresh)
-        return _name(fresh)
+        return _name(f"{name}_{next(self.count)}")
 
 
 def _copy(node: ast.expr) -> ast.expr:
@@ -210,97 +208,66 @@ def _hoist(body: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
     return head, [s for s in body if s not in head]
 
 
+@dataclass
+class _Line:
+    """A statement with what it reads and assigns, looked up once."""
+
+    statement: ast.stmt
+
+    def __post_init__(self):
+        names = [n for n in ast.walk(self.statement) if isinstance(n, ast.Name)]
+        self.assigned = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+        if isinstance(self.statement, ast.AugAssign):
+            self.read = {n.id for n in names}
+        else:
+            self.read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
+        self.calls = any(isinstance(n, ast.Call) for n in ast.walk(self.statement))
+
+    def target(self) -> str:
+        """The name that this plain assignment sets; "" for any other statement."""
+        s = self.statement
+        return s.targets[0].id if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name) else ""
+
+    def source(self) -> str:
+        """The name that this plain assignment copies; "" for any other statement."""
+        s = self.statement
+        return s.value.id if self.target() and isinstance(s, ast.Assign) and isinstance(s.value, ast.Name) else ""
+
+
 def _prune(body: list[ast.stmt]) -> list[ast.stmt]:
     """Drops, in a loop's body, the plain copies that can be read at their source, and what nobody reads."""
-    changed = True
-    while changed:
-        changed = False
-        for i, s in enumerate(body):
-            if not (isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)):
-                continue
-            name = s.targets[0].id
-            rest = body[i + 1 :]
-            if any(name in _read(o) for o in body[:i]) or sum(name in _assigned(o) for o in body) > 1:
-                continue
-            last = max((j for j, o in enumerate(rest) if name in _read(o)), default=-1)
-            if last < 0 and not any(isinstance(n, ast.Call) for n in ast.walk(s.value)):
-                body = body[:i] + rest
-                changed = True
-                break
-            if isinstance(s.value, ast.Name):
-                source = s.value.id
-                if not any(source in _assigned(o) for o in rest[:last]) and not (
-                    source in _assigned(rest[last]) and not isinstance(rest[last], ast.Assign)
-                ):
-                    body = body[:i] + [_Rename(name, _name(source)).visit(o) for o in rest]
-                    changed = True
-                    break
-    return body
-
-
-def _merge(body: list[ast.stmt]) -> list[ast.stmt]:
-    """Makes one name of two where a = b at the top only serves b = a further down."""
+    lines = [_Line(s) for s in body]
     i = 0
-    while i < len(body):
-        s = body[i]
+    while i < len(lines):
+        name, source = lines[i].target(), lines[i].source()
+        rest = lines[i + 1 :]
         i += 1
-        if not _is_copy(s):
+        once = name and not any(
+            name in x.read | x.assigned for x in lines[: i - 1] + [x for x in rest if name in x.assigned]
+        )
+        if not once:
             continue
-        a, b = ast.unparse(s).split(" = ")
-        back = [j for j, o in enumerate(body) if j >= i and _is_copy(o) and ast.unparse(o) == f"{b} = {a}"]
-        if len(back) != 1 or sum(b in _assigned(o) for o in body) != 1 or any(a in _read(o) for o in body[: i - 1]):
-            continue
-        j = back[0]
-        if any(_reads(o, b) for o in body[i:j]) or any(a in _assigned(o) for o in body[j:]):
-            continue
-        i -= 1
-        body = [_Rename(a, _name(b)).visit(o) for n, o in enumerate(body) if n not in (i, j)]
-    return body
-
-
-def _is_copy(s: ast.stmt) -> bool:
-    return isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name) and isinstance(s.value, ast.Name)
-
-
-def _fold(body: list[ast.stmt], local: set[str]) -> list[ast.stmt]:
-    """Writes an expression where its name is read, if that is in one place only and nothing changes in between.
-
-    The operations and their order within the expression stay as they are.
-    """
-    i = 0
-    while i < len(body):
-        s, rest = body[i], body[i + 1 :]
-        i += 1
-        if not (isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)):
-            continue
-        name = s.targets[0].id
-        if (
-            name not in local
-            or isinstance(s.value, ast.Tuple)
-            or any(isinstance(n, ast.Call) for n in ast.walk(s.value))
-        ):
-            continue
-        if sum(name in _assigned(o) for o in body) > 1 or sum(_reads(o, name) for o in rest) != 1:
-            continue
-        j = next(j for j, o in enumerate(rest) if _reads(o, name))
-        inputs = _read(s.value)
-        if isinstance(rest[j], ast.If | ast.For | ast.AugAssign) or any(inputs & _assigned(o) for o in rest[:j]):
-            continue
-        rest[j] = _Rename(name, s.value).visit(rest[j])
-        body = body[: i - 1] + rest
-        i -= 1
-    return body
-
-
-def _reads(node: ast.AST, name: str) -> int:
-    return sum(isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load) for n in ast.walk(node))
+        uses = [j for j, x in enumerate(rest) if name in x.read]
+        if not uses and not lines[i - 1].calls:
+            lines = lines[: i - 1] + rest
+            i = 0  # what fed it may now be idle too
+        elif source and uses:
+            last = rest[uses[-1]]
+            if any(source in x.assigned for x in rest[: uses[-1]]):
+                continue
+            if source in last.assigned and not isinstance(last.statement, ast.Assign):
+                continue
+            rename = _Rename(name, source)
+            for j in uses:
+                rest[j] = _Line(rename.visit(rest[j].statement))
+            lines = lines[: i - 1] + rest
+            i -= 1
+    return [x.statement for x in lines]
 
 
 class _Rename(ast.NodeTransformer):
-    def __init__(self, old: str, new: ast.expr):
+    def __init__(self, old: str, new: str):
         self.old, self.new = old, new
 
     def visit_Name(self, node: ast.Name):
-        if node.id != self.old:
-            return node
-        return ast.Name(id=self.new.id, ctx=node.ctx) if isinstance(self.new, ast.Name) else self.new
+        return ast.Name(id=self.new, ctx=node.ctx) if node.id == self.old else node

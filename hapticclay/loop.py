@@ -55,6 +55,28 @@ def damping(b0: tuple[float, float], b1: tuple[float, float], before: float, aft
     return clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W)
 
 
+def measure(q1, q2, w1, w2, d1, d2, ox, noy):
+    """What there is to know of the handle.
+
+    Args:
+        q1, q2: joint angles [rad]. w1, w2: joint rates [rad/s]. d1, d2: what the absolute link rates
+            have gained since, for the centripetal acceleration alone [rad/s].
+        ox, noy: origin of p, x and -y [m].
+
+    Returns:
+        (u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy): arm.columns and position [m], absolute rate of
+        link 2 [rad/s], velocity [m/s], centripetal acceleration c = -J' q' [m/s^2].
+    """
+    a = q1 + q2
+    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
+    px = u1y + u2y - ox
+    py = noy - u1x - u2x
+    r2 = w1 + w2
+    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
+    cx, cy = arm.centripetal(w1 + d1, r2 + d2, u1x, u1y, u2x, u2y)
+    return u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy
+
+
 def tick(c, k, q1, q2, w1, w2, state):
     """Carries the loop across one sample.
 
@@ -81,14 +103,7 @@ def tick(c, k, q1, q2, w1, w2, state):
     cx0, cx1, cy0, cy1, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2 = state
 
-    # measure: the handle, and the centripetal part of its acceleration, J' q' = -c
-    a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
-    px = u1y + u2y - ox
-    py = noy - u1x - u2x
-    r2 = w1 + w2
-    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
-    cx, cy = arm.centripetal(w1 + half * g1, r2 + half * g2, u1x, u1y, u2x, u2y)
+    u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -161,13 +176,7 @@ def derivative(c, bx, by, q1, q2, w1, w2, state):
         gainx, gainy, uhx, uhy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
     ) = c  # fmt: skip
     deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
-    a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
-    px = u1y + u2y - ox
-    py = noy - u1x - u2x
-    r2 = w1 + w2
-    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
-    cx, cy = arm.centripetal(w1, r2, u1x, u1y, u2x, u2y)
+    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -221,13 +230,7 @@ def push(c, k, q1, q2, w1, w2, t1, t2):
     """
     H, uhx, uhy, ox, noy, spring, mass, before, behind = c
     cx0, cx1, cy0, cy1, _ = k
-    a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
-    px = u1y + u2y - ox
-    py = noy - u1x - u2x
-    r2 = w1 + w2
-    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
-    cx, cy = arm.centripetal(w1, r2, u1x, u1y, u2x, u2y)
+    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
     fx = uhx - cx0 * vx - human.impedance(spring, mass, before, px, cx, vx)
     fy = uhy - cy0 * vy - human.impedance(spring, mass, before, py, cy, vy)
     dx, dy = cx1 + behind, cy1 + behind

@@ -83,3 +83,28 @@ def test_diagram_has_a_line_a_method_and_units(rows, tmp_path):
 
 def test_jobs_are_those_of_the_package():
     assert dataclasses.replace(problems.PROBLEMS["default cut"]) == problems.hc.constant_cut()
+
+
+def test_command_writes_page_figures_and_data_and_renews_the_readme(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(wp, "PEERS", ("ours",))
+    monkeypatch.setattr(wp.measure, "__defaults__", (("ours",),))
+    readme = tmp_path / "README.md"
+    readme.write_text(f"before\n{wp.BEGIN}\nold\n{wp.END}\nafter\n")
+    wp.main(tmp_path / "o", True, readme)
+    files = sorted(p.name for p in (tmp_path / "o").iterdir())
+    assert files == ["default_cut.png", "work_precision.json", "work_precision.md"]
+    data = json.loads((tmp_path / "o" / "work_precision.json").read_text())
+    assert {r["method"] for r in data["rows"]} == {"fast", "accurate"}
+    text = readme.read_text()
+    assert text.startswith("before") and text.endswith("after\n") and "old" not in text and "hapticclay | fast" in text
+
+
+def test_published_page_was_made_from_the_published_data():
+    folder = Path(__file__).parents[1] / "docs" / "bench"
+    data = json.loads((folder / "work_precision.json").read_text())
+    page = (folder / "work_precision.md").read_text()
+    assert wp.table_of_settings(wp.recommend(data["rows"])) in page
+    for r in data["rows"]:
+        assert f"| {wp.number(r['crossing'])} " in page
+    readme = (folder.parents[1] / "README.md").read_text()
+    assert wp.table_of_settings(wp.recommend(data["rows"], {"hapticclay", "MuJoCo, plain"})) in readme

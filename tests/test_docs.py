@@ -45,7 +45,7 @@ def test_readme_figures_and_links_exist():
         assert (ROOT / target).is_file(), target
     for target in re.findall(r"`((?:docs|mjcf)/\S+?)`", README):
         assert (ROOT / target).is_file(), target
-    assert len(README.splitlines()) <= 90
+    assert len(README.splitlines()) <= 95
 
 
 def test_make_targets_named_in_the_documents_exist():

@@ -66,3 +66,21 @@ def test_a_function_without_source_is_left_alone():
     space: dict = {}
     exec("def f(x):\n    return x", space)
     assert inline.inline(space["f"]) is space["f"]
+
+
+def test_inlining_the_loop_is_quick():
+    """A ratio: against compiling the module it comes from (20 times that; it is done once per process)."""
+    import time
+    from pathlib import Path
+
+    from hapticclay import loop
+
+    source = Path(loop.__file__).read_text()
+    ratios = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        compile(source, "loop.py", "exec")
+        middle = time.perf_counter()
+        inline.inline(loop.advance)
+        ratios.append((time.perf_counter() - middle) / (middle - begin))
+    assert min(ratios) < 200
