@@ -27,8 +27,9 @@ check: .venv/dev.done  ## lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 
-bench: .venv/dev.done  ## speed against a bare engine loop; error against run time
+bench: .venv/dev.done  ## speed against a bare engine loop; stiff clay; error against run time
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/stiffness.py
 	$(BIN)/hapticclay bench --quick
 
 build: .venv/dev.done  ## wheel and sdist into dist/

@@ -152,7 +152,9 @@ def nonlinear(
     return pieces.crossings, t, *(pieces(t) if len(t) else (np.empty((0, 2)), np.empty((0, 2))))
 
 
-def nonlinear_pieces(b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0=(0.0, 0.0), dense=True):
+def nonlinear_pieces(
+    b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0=(0.0, 0.0), dense=True, method="DOP853"
+):
     """As `nonlinear`, the solution as Pieces."""
     K, uh = np.array(K), np.array(uh)
     m, d, k = th or (0.0, 0.0, 0.0)
@@ -183,7 +185,7 @@ def nonlinear_pieces(b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, 
             return Arm.forward(z[:2])[0] - ORIGIN[0] - edge
 
         hit.terminal, hit.direction = True, 1
-        s = solve_ivp(rhs, (t, t_max), z, "DOP853", rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=dense)
+        s = solve_ivp(rhs, (t, t_max), z, method, rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=dense)
         out.spans.append((t, s.t[-1]))
         out.solutions.append(s.sol)
         z, t = s.y[:, -1], s.t[-1]

@@ -108,3 +108,27 @@ def test_published_page_was_made_from_the_published_data():
         assert f"| {wp.number(r['crossing'])} " in page
     readme = (folder.parents[1] / "README.md").read_text()
     assert wp.table_of_settings(wp.recommend(data["rows"], {"hapticclay", "MuJoCo, plain"})) in readme
+
+
+def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, capsys, monkeypatch):
+    import stiffness
+
+    monkeypatch.chdir(tmp_path)
+    rows = stiffness.main(tmp_path, sweep=(1e2, 1e5))
+    soft, stiff = rows
+    assert not any(soft[k]["broken"] for k in ("default", "plain, implicitfast", "plain, Euler"))
+    assert stiff["plain, Euler"]["broken"]  # explicit: b dt/Lambda = 28 > 2
+    for r in rows:
+        assert r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1
+    assert "broken" in (tmp_path / "stiffness.md").read_text()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.json", "stiffness.md"]
+
+
+def test_published_stiffness_page_was_made_from_the_published_data():
+    import stiffness
+
+    folder = Path(__file__).parents[1] / "docs" / "bench"
+    data = json.loads((folder / "stiffness.json").read_text())
+    table = stiffness.page(data["rows"], data["dt"]).split("## Machine")[0]
+    assert table == (folder / "stiffness.md").read_text().split("## Machine")[0]
+    assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in data["rows"])

@@ -27,6 +27,7 @@ def solve(problem: str, method: str, setting: float) -> Result:
     law, advance, c = common.law(job), common.advance(job, setting), [0.0] * 8
     model = build(PROBLEMS[problem])
     model.opt.timestep = setting
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
     data = mujoco.MjData(model)
     data.qpos[:] = job.q
     angles, rates, drive, push = (memoryview(x) for x in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied))

@@ -1,0 +1,102 @@
+"""Stiff clay: from soft to 1e9 N.s/m at one step, the default run beside plain MuJoCo, up to where each breaks down.
+
+    python benchmarks/stiffness.py [--dt 3.6e-4] [--out DIR]
+
+The reference is the arm in joint space under Radau. Writes stiffness.md and stiffness.json; every figure comes from
+the runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from peers import mujoco_plain, ours  # noqa: E402
+from problems import EDGES, PROBLEMS, nonlinear_pieces  # noqa: E402
+from tabulate import tabulate  # noqa: E402
+from work_precision import machine, number  # noqa: E402
+
+import hapticclay as hc  # noqa: E402
+from hapticclay import record  # noqa: E402
+from hapticclay.params import S  # noqa: E402
+from hapticclay.scene import warnings_caught  # noqa: E402
+
+T = 2.0  # [s] simulated
+SWEEP = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
+BROKEN = 1e-3  # [m] of error in the final position, or ten times the exact peak of energy: broken down
+
+
+def row(b: float, dt: float) -> dict[str, Any]:
+    """Final position and peak of v^2 along x for one b: error against, and ratio to, the reference."""
+    name = f"b = {b:g}"
+    PROBLEMS[name] = s = hc.constant_cut(b=b, t_max=T, gain=(1.0, 0.1))
+    try:
+        exact = nonlinear_pieces((0.0, b, 0.0), EDGES, s.gain, s.force, None, False, T, 1e-8, 1e-12, method="Radau")
+        p, _ = exact(np.array([T - 1e-9]))
+        _, v = exact(np.linspace(0.0, T, 4001)[:-1])
+        out: dict[str, Any] = {"b": b, "b dt/Lambda": b * dt * S[0].gain}
+        for label, solve in (
+            ("default", lambda: ours.solve(name, "fast", dt)),
+            ("plain, implicitfast", lambda: mujoco_plain.solve(name, "implicitfast", dt)),
+            ("plain, Euler", lambda: mujoco_plain.solve(name, "Euler", dt)),
+        ):
+            with warnings_caught():  # of a blow-up, which is a result
+                r = solve()
+            good = len(r.p) and abs(r.t[-1] - T) < 2.0 * dt and np.isfinite(r.p).all()
+            error = abs(float(r.p[-1, 0] - p[0, 0])) if good else None
+            energy = float(np.max(r.v**2) / np.max(v[:, 0] ** 2)) if good else None
+            broken = error is None or energy is None or error > BROKEN or energy > 10.0
+            out[label] = {"error": error, "energy": energy, "broken": broken}
+        return out
+    finally:
+        del PROBLEMS[name]
+
+
+def page(rows: list[dict[str, Any]], dt: float) -> str:
+    """The Markdown page."""
+    labels = [k for k in rows[0] if isinstance(rows[0][k], dict)]
+    head = ["b [N.s/m]", "b dt/Lambda"] + [f"{k}: {x}" for k in labels for x in ("error [m]", "energy")]
+    cells = []
+    for r in rows:
+        line = [format(r["b"], "g"), format(r["b dt/Lambda"], ".3g")]
+        for k in labels:
+            x = r[k]
+            line += ["broken", "broken"] if x["broken"] else [number(x["error"]), format(x["energy"], ".3f")]
+        cells.append(line)
+    return "\n\n".join(
+        [
+            "# Stiff clay",
+            f"The handle runs into clay of damping b at 0.1 m/s, in steps of {dt:g} s. Position error after {T:g} s "
+            "and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an error "
+            "above 1 mm, ten times the energy, or not a number. Made by `benchmarks/stiffness.py`; do not edit.",
+            tabulate(cells, head, tablefmt="github", disable_numparse=True),
+            "## Machine",
+            "\n".join(f"- {x}" for x in machine()),
+        ]
+    ) + "\n"  # fmt: skip
+
+
+def main(out: Path, dt: float = 3.6e-4, sweep: tuple[float, ...] = SWEEP) -> list[dict[str, Any]]:
+    """Measures, writes, prints; returns the rows."""
+    rows = [row(b, dt) for b in sweep]
+    with record.atomic(out / "stiffness.json") as f:
+        f.write((json.dumps({"schema": "hapticclay-stiffness-1", "dt": dt, "rows": rows}, indent=1) + "\n").encode())
+    with record.atomic(out / "stiffness.md") as f:
+        f.write(page(rows, dt).encode())
+    print(page(rows, dt))
+    return rows
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--dt", type=float, default=3.6e-4)
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    args = parser.parse_args()
+    main(args.out, args.dt)
