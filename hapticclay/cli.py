@@ -18,7 +18,7 @@ import tyro
 from .errors import ParameterError, choice
 from .experiments import SCENARIOS, constant_cut, free
 from .params import Scenario
-from .record import Record, atomic
+from .record import Record, atomic, versions
 from .sim import simulate
 
 Experiment = (
@@ -57,8 +57,6 @@ class Version:
     """Print the versions of hapticclay and of what it runs on."""
 
     def __call__(self) -> int:
-        from .record import versions
-
         print("  ".join(f"{name} {number}" for name, number in versions().items()))
         return 0
 

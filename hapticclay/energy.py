@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from . import arm
-from .params import Operator, Scenario
+from .params import NO_HAND, Operator, Scenario
+
+
+def stored(th: Operator, r1: float, r2: float, p: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    """Energy [J] of the arm at link rates r1, r2 [rad/s], and of mass and spring of the hand at p [m], v [m/s]."""
+    at_hand = 0.5 * (th.mass * (v @ v) + th.spring * (p @ p))
+    return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), float(at_hand)
+
+
+def balance(work: Sequence[float], first: tuple[float, float], last: tuple[float, float]) -> dict[str, float]:
+    """muscle + motors = clay + hand_damper + kinetic + hand_stored + residual [J].
+
+    Args:
+        work: of muscle, motors, clay, hand's damper, and throughput [J]. first, last: from `stored`.
+    """
+    muscle, motors, clay, hand, through = work
+    kinetic, at_hand = last[0] - first[0], last[1] - first[1]
+    return {
+        "muscle": muscle,
+        "motors": motors,
+        "clay": clay,
+        "hand_damper": hand,
+        "kinetic": kinetic,
+        "hand_stored": at_hand,
+        "residual": muscle + motors - clay - hand - kinetic - at_hand,
+        "throughput": through,
+    }
 
 
 class Ledger:
@@ -32,7 +59,7 @@ class Ledger:
         """
         if not raw.shape[1]:
             return
-        s, th = self.scenario, self.scenario.operator or Operator(0.0, 0.0, 0.0)
+        s, th = self.scenario, self.scenario.operator or NO_HAND
         q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
         v = 0.5 * (before + after)
         a = q[0] + q[1]
@@ -45,28 +72,15 @@ class Ledger:
         through = np.abs(muscle) + np.abs(motors)
         self.work += [x.sum() for x in (muscle, motors, clay, hand, through)]
 
-        def stored(v: np.ndarray, p: np.ndarray, j: int) -> tuple[float, float]:
-            u1x, u1y, u2x, u2y = (float(x[j]) for x in columns)
-            r1, r2 = arm.rates(float(v[0, j]), float(v[1, j]), u1x, u1y, u2x, u2y, 1.0)
-            at_hand = th.mass * (v[:, j] @ v[:, j]) + th.spring * (p[:, j] @ p[:, j])
-            return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), 0.5 * float(at_hand)
+        def held(v: np.ndarray, j: int) -> tuple[float, float]:
+            u1x, u1y, u2x, u2y = (x[j] for x in columns)
+            r = arm.rates(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
+            return stored(th, r[0], r[1], p[:, j], v[:, j])
 
         if self.first is None:
-            self.first = stored(before, p, 0)
-        self.last = stored(after, p, -1)
+            self.first = held(before, 0)
+        self.last = held(after, -1)
 
     def close(self) -> dict[str, float]:
-        """The balance [J]: muscle + motors = clay + hand_damper + kinetic + hand_stored + residual."""
-        muscle, motors, clay, hand, through = (float(x) for x in self.work)
-        first = self.first or self.last
-        kinetic, stored = self.last[0] - first[0], self.last[1] - first[1]
-        return {
-            "muscle": muscle,
-            "motors": motors,
-            "clay": clay,
-            "hand_damper": hand,
-            "kinetic": kinetic,
-            "hand_stored": stored,
-            "residual": muscle + motors - clay - hand - kinetic - stored,
-            "throughput": through,
-        }
+        """The balance of all kicks entered."""
+        return balance(self.work.tolist(), self.first or self.last, self.last)

@@ -252,13 +252,17 @@ class Leapfrog(Run):
         if after == self.before == dt:
             self.write(self.drive, 0, *command)
             mujoco.mj_step(model, data)
-            return
+        else:
+            self._whole(w, command, out, after)
+
+    def _whole(self, w, command, out, after: float) -> None:
+        """Steps the engine by after, from joint rates w to those of out, whatever the length of the kick."""
         t1, t2 = command[:2]
         a1, a2 = (out[2] - w[0]) / after, (out[2] + out[3] - w[0] - w[1]) / after
         self.write(self.drive, 0, t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
-        model.opt.timestep = after
-        mujoco.mj_step(model, data)
-        model.opt.timestep = dt
+        self.model.opt.timestep = after
+        mujoco.mj_step(self.model, self.data)
+        self.model.opt.timestep = self.scenario.dt
 
     def flush(self) -> None:
         n, self.filled = self.filled, 0

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from . import arm, clay, human, lti, servo
-from .params import C_POLE, G, Operator, S, Scenario
+from .params import C_POLE, NO_HAND, G, S, Scenario
 
 ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
@@ -41,12 +41,6 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
         *human.kick(scenario.operator, H, L, R),
         1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip
-
-
-def columns(q1: float, q2: float) -> tuple[float, float, float, float]:
-    """arm.columns at joint angles [rad]."""
-    a = q1 + q2
-    return arm.columns(sin(q1), cos(q1), sin(a), cos(a))
 
 
 def damping(b0: tuple[float, float], b1: tuple[float, float], before: float, after: float) -> tuple[float, ...]:
@@ -151,7 +145,7 @@ def tick(c, k, q1, q2, w1, w2, state):
 
 def instant(scenario: Scenario) -> tuple[float, ...]:
     """What `derivative` needs of the scenario."""
-    th = scenario.operator or Operator(0.0, 0.0, 0.0)
+    th = scenario.operator or NO_HAND
     return (
         *scenario.gain, *scenario.force, scenario.origin[0], -scenario.origin[1],
         *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),

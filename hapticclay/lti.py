@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from .errors import choice, number
-from .params import AXES, C_POLE, G, Operator, S
+from .params import AXES, C_POLE, NO_HAND, G, Operator, S
 
 
 def kick(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
@@ -72,7 +72,7 @@ def _split(axis: str, b: float, operator: Operator | None) -> tuple[np.ndarray, 
     """The closed-loop polynomial is free + K driven."""
     i = AXES.index(choice("axis", axis, AXES))
     b = number("b", b, 0.0, unit="N.s/m")
-    th = operator or Operator(0.0, 0.0, 0.0)
+    th = operator or NO_HAND
     c = np.array([1.0, C_POLE, 0.0])
     g = np.array([1.0, G[i].damping, G[i].stiffness])
     s = np.array([1.0, S[i].damping, S[i].stiffness])

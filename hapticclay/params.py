@@ -73,6 +73,9 @@ class Operator:
             object.__setattr__(self, field, value)
 
 
+NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0
+
+
 @dataclass(frozen=True)
 class Profile:
     """Damping b of one axis as a piecewise constant function of one coordinate.

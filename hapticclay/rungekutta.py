@@ -8,9 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from . import arm, loop
+from . import arm, energy, loop
 from .errors import ParameterError
-from .params import Operator, Scenario
+from .params import NO_HAND, Scenario
 from .run import CHUNK, Run, root
 
 REACH = 0.5  # fastest rate times step up to which an explicit step is trusted
@@ -26,7 +26,7 @@ class RungeKutta(Run):
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
-        th = scenario.operator or Operator(0.0, 0.0, 0.0)
+        th = scenario.operator or NO_HAND
         b = max((*scenario.clay.x.values, *scenario.clay.y.values)) if scenario.clay else 0.0
         fastest = (b + th.damper) * arm.TRACE_W + math.sqrt(th.spring * arm.TRACE_W)
         self.substeps = max(1, math.ceil(scenario.dt * fastest / REACH))
@@ -132,17 +132,9 @@ class RungeKutta(Run):
 
     def _stored(self) -> tuple[float, float]:
         """Energy of the arm, and of mass and spring of the hand [J]."""
-        th = self.scenario.operator or Operator(0.0, 0.0, 0.0)
         w1, w2 = self.rates
         p, v = np.array(self._derivative()[2][:4]).reshape(2, 2)
-        at_hand = 0.5 * float(th.mass * (v @ v) + th.spring * (p @ p))
-        return 0.5 * (arm.I1 * w1 * w1 + arm.I2 * (w1 + w2) ** 2), at_hand
+        return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, p, v)
 
     def balance(self) -> dict[str, float]:
-        muscle, motors, clay, hand, through = self.act[8:13]
-        kinetic, stored = (b - a for a, b in zip(self.start, self._stored(), strict=True))
-        residual = muscle + motors - clay - hand - kinetic - stored
-        return dict(
-            muscle=muscle, motors=motors, clay=clay, hand_damper=hand, kinetic=kinetic, hand_stored=stored,
-            residual=residual, throughput=through,
-        )  # fmt: skip
+        return energy.balance(self.act[8:13].tolist(), self.start, self._stored())

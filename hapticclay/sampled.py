@@ -5,13 +5,12 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-import mujoco
-
 from . import arm, human, loop, lti, servo
 from .leapfrog import CHUNK, Leapfrog
 from .params import AXES, G, Operator, S, Scenario
 
 NONE = (0.0, 0.0)
+Pair = tuple[float, float]
 
 
 class Sampled(Leapfrog):
@@ -43,7 +42,7 @@ class Sampled(Leapfrog):
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         x, y, tau = self.state
         before, s = self.before, self.scenario
-        self.row, new, shown = None, self.state, self._delta(x, y)
+        self.row, new, shown = None, self.state, (x[0], y[0])
         if after > 0.0 and self._is_sample():
             force = s.force
             if before:
@@ -61,12 +60,16 @@ class Sampled(Leapfrog):
         at, out = loop.push(loop.plant(s, before, after), self._clay(before, after), q[0], q[1], w[0], w[1], *tau)
         return new, (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown), out
 
+    def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
+        """arm.columns, position, velocity and centripetal acceleration of the handle."""
+        ox, oy = self.scenario.origin
+        u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
+        return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
+
     def _felt(self, th: Operator, q, w, tau) -> tuple[float, float]:
         """The operator's force that the sensor shows at the sample, before the torques change [N]."""
-        p, s = self.position(q, w, 0.0), self.scenario
-        u = loop.columns(q[0], q[1])
-        r = (w[0], w[0] + w[1])
-        v, c = arm.along(*r, *u), arm.centripetal(*r, *u)
+        s = self.scenario
+        u, p, v, c = self._measure(q, w)
         b = self.b if self.physical else NONE
         rest = [s.force[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
         # a kick of one second from rest, in which the velocity after it is the acceleration
@@ -79,18 +82,15 @@ class Sampled(Leapfrog):
 
     def _control(self, q, w, x, y, force):
         """Torques to hold and the net force that the compensator is given, from what is measured now."""
-        (px, py), s = self.position(q, w, 0.0), self.scenario
-        u = loop.columns(*q)
-        r1, r2 = w[0], w[0] + w[1]
-        vx, vy = arm.along(r1, r2, *u)
-        cx, cy = arm.centripetal(r1, r2, *u)
+        s = self.scenario
+        u, p, v, c = self._measure(q, w)
         bx, by = self.regions.b
-        fe = (bx * vx, by * vy)
+        fe = (bx * v[0], by * v[1])
         f = (force[0] - fe[0], force[1] - fe[1])
         a = []
-        for g, h, z, v, p, c in zip(G, S, (x, y), (vx, vy), (px, py), (cx, cy), strict=True):
+        for i, (g, h, z) in enumerate(zip(G, S, (x, y), strict=True)):
             y2 = g.stiffness * (z[0] - z[2]) - g.damping * z[3]
-            a.append(servo.acceleration(1.0, -h.damping, h.stiffness, y2, z[3], v, z[2], p, c))
+            a.append(servo.acceleration(1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]))
         sxx, sxy, syy = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(*u)
         *_, t1, t2 = servo.resolve(  # the limits come last, after the clay's share
             1.0, 0.0, 0.0, *u, 1.0, 1.0, a[0], a[1], sxx, sxy, syy, *f, 0.0, 0.0, inf, inf, inf, inf
@@ -106,10 +106,6 @@ class Sampled(Leapfrog):
         A, B = block
         return tuple((A @ z + B * f).tolist())
 
-    @staticmethod
-    def _delta(x, y) -> tuple[float, float]:
-        return x[0], y[0]
-
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
         before = self.before
         if self.row:
@@ -123,10 +119,5 @@ class Sampled(Leapfrog):
         self._put(is_sample, row, k, 0.5 * (before + after), self.regions.b if after else self.b)
 
     def _engine(self, w, command, out, after: float) -> None:
-        model, data = self.model, self.data
         self.steps += 1
-        t1, t2 = command[:2]
-        a1, a2 = (out[2] - w[0]) / after, (out[2] + out[3] - w[0] - w[1]) / after
-        self.write(self.drive, 0, t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
-        model.opt.timestep = after
-        mujoco.mj_step(model, data)
+        self._whole(w, command, out, after)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from hapticclay import inline
 
-inline.PACKAGE = inline.PACKAGE  # the package decides what counts as a law
 SCALE = 3.0
 
 
