@@ -49,7 +49,7 @@ def loop(scenario: hc.Scenario, steps: int, inlined: bool = True) -> float:
     import dataclasses
 
     leapfrog.FUSE_FROM = 0 if inlined else 10**12
-    leapfrog._fused.cache_clear()
+    leapfrog._fused.clear()
     r = hc.simulate(dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None))
     assert r.steps >= steps, r.status
     return r.wall_time / r.steps

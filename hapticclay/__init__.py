@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free
 from .lti import closed_loop_poles, gain_limit
-from .params import Clay, Operator, Profile, Scenario
+from .params import Clay, Multisine, Operator, Profile, Scenario
 from .record import Crossing, Outcome, Record
 from .scene import build
 from .sim import simulate
@@ -28,6 +28,7 @@ __all__ = [
     "SCENARIOS",
     "Clay",
     "Crossing",
+    "Multisine",
     "Operator",
     "Outcome",
     "ParameterError",

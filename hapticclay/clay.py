@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 
-from .params import AXES, Clay, Profile
+from .params import AXES, B_MAX, Clay, Profile
 
 
 def kick(b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float) -> tuple[float, ...]:
@@ -47,7 +47,8 @@ class Regions:
 
     Attributes:
         low, high: borders of the present region on each coordinate [m].
-        b: damping of the present region on each axis [N.s/m].
+        base, rate: the clay there is b = base + rate t on each axis [N.s/m, N.s/m per s].
+        grows: whether any region's clay grows.
     """
 
     def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
@@ -58,31 +59,47 @@ class Regions:
         if length is not None:
             self._edges[0] = sorted({e for e in self._edges[0] if e < length} | {length})
         self._index = [bisect.bisect_right(self._edges[i], p[i]) for i in (0, 1)]
+        self._entered: dict[tuple[int, int], float] = {}  # (axis, region of its profile) -> time [s]
+        self.grows = any(f.growth for f in self._profiles)
         self.low, self.high = [-inf, -inf], [inf, inf]
-        self.b = (0.0, 0.0)
-        self._settle()
+        self.base = self.rate = (0.0, 0.0)
+        self._settle(0.0)
 
-    def _settle(self) -> None:
+    def _settle(self, t: float) -> None:
         for i in (0, 1):
             edges, k = self._edges[i], self._index[i]
             self.low[i] = edges[k - 1] if k else -float("inf")
             self.high[i] = edges[k] if k < len(edges) else float("inf")
         if self._profiles:
-            bx, by = (self._value(f) for f in self._profiles)
-            self.b = bx, by
+            laws = [self._law(i, f, t) for i, f in enumerate(self._profiles)]
+            self.base = laws[0][0], laws[1][0]
+            self.rate = laws[0][1], laws[1][1]
 
-    def _value(self, profile: Profile) -> float:
-        i = AXES.index(profile.along)
-        low = self.low[i]
-        return profile.values[sum(1 for e in profile.edges if e <= low)]
+    def _law(self, axis: int, profile: Profile, t: float) -> tuple[float, float]:
+        low = self.low[AXES.index(profile.along)]
+        j = sum(1 for e in profile.edges if e <= low)
+        value, rate = profile.values[j], profile.growth[j] if profile.growth else 0.0
+        return value - rate * self._entered.setdefault((axis, j), t) if rate else value, rate
 
-    def cross(self, i: int, up: bool) -> float:
-        """Steps over the border of coordinate i, upwards or downwards; returns its place [m]."""
+    def b(self, t: float) -> tuple[float, float]:
+        """Damping of the present region at time t [s] on each axis [N.s/m]."""
+        return at(self.base, self.rate, t)
+
+    def cross(self, i: int, up: bool, t: float) -> float:
+        """Steps over the border of coordinate i at time t [s], upwards or downwards; returns its place [m]."""
         border = self.high[i] if up else self.low[i]
         self._index[i] += 1 if up else -1
-        self._settle()
+        self._settle(t)
         return border
 
     def at_end(self, i: int, up: bool) -> bool:
         """True if the border ahead on coordinate i is the end of the path."""
         return i == 0 and up and self._end is not None and self.high[0] == self._end
+
+
+def at(base: tuple[float, float], rate: tuple[float, float], t: float) -> tuple[float, float]:
+    """b = base + rate t on each axis [N.s/m]; growth ends at the largest damping there is."""
+    if rate == (0.0, 0.0):
+        return base
+    x, y = (min(b + r * t, B_MAX) for b, r in zip(base, rate, strict=True))
+    return x, y

@@ -54,18 +54,18 @@ class Ledger:
         """Enters kicks.
 
         Args:
-            raw: shape (14, n), as loop.advance keeps them. k: loop.damping of each, (5, n) or (5, 1).
+            raw: shape (14, n), as loop.advance keeps them. k: loop.inputs of each, (7, n) or (7, 1).
             H: length of each kick [s], (n,) or (1,).
         """
         if not raw.shape[1]:
             return
-        s, th = self.scenario, self.scenario.operator or NO_HAND
+        th = self.scenario.operator or NO_HAND
         q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
         v = 0.5 * (before + after)
         a = q[0] + q[1]
         columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
         r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
-        muscle = H * (s.force[0] * v[0] + s.force[1] * v[1])
+        muscle = H * (k[5] * v[0] + k[6] * v[1])
         motors = H * (tau[0] * r1 + tau[1] * (r2 - r1))
         clay = H * ((k[0:4:2] * before + k[1:4:2] * after) * v).sum(axis=0)
         hand = H * th.damper * (v * v).sum(axis=0)

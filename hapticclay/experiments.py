@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from .clay import slab
-from .errors import ParameterError, flag, number, numbers_of
+from .errors import ParameterError, flag, number, numbers_of, pair
 from .params import (
     B_CONSTANT,
     B_MAX,
@@ -69,7 +69,7 @@ def constant_cut(
     return Scenario(
         name="constant",
         clay=slab(number("b", b, 0.0, B_MAX, unit="N.s/m"), begin, end),
-        gain=gain,
+        gain=pair("gain", gain, 0.0, 1e6, above=True),
         force=force,
         operator=Operator() if flag("impedance", impedance) else None,
         shaping=shaping,
@@ -126,7 +126,7 @@ def free(
     """
     return Scenario(
         name="free",
-        gain=gain,
+        gain=pair("gain", gain, 0.0, 1e6, above=True),
         force=force,
         operator=Operator() if flag("impedance", impedance) else None,
         shaping=shaping,

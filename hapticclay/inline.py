@@ -73,7 +73,7 @@ class _Inliner:
                 head: list[ast.stmt] = []
                 inner = self.block(statement.body, function, scope)
                 if isinstance(statement, ast.For):
-                    head, inner = _hoist(_prune(inner))
+                    head, inner = _hoist(_prune(inner), _assigned(statement.target))
                 other = self.block(statement.orelse, function, scope)
                 if isinstance(statement, ast.If):
                     new: ast.stmt = ast.If(self.expression(statement.test, function, scope), inner, other)
@@ -193,9 +193,9 @@ def _flatten(body: list[ast.stmt]) -> list[ast.stmt]:
     return out
 
 
-def _hoist(body: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
-    """Takes the unpacking of names that the loop never assigns out of the loop."""
-    assigned = set().union(*(_assigned(s) for s in body)) if body else set()
+def _hoist(body: list[ast.stmt], targets: set[str]) -> tuple[list[ast.stmt], list[ast.stmt]]:
+    """Takes the unpacking of names that the loop, by its targets or in its body, never assigns out of the loop."""
+    assigned = targets.union(*(_assigned(s) for s in body))
     head: list[ast.stmt] = [
         s
         for s in body

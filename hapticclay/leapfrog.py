@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 import math
 import struct
 from collections.abc import Callable
@@ -13,6 +12,7 @@ import mujoco
 import numpy as np
 
 from . import arm, energy, loop
+from .clay import at
 from .inline import inline
 from .params import Scenario
 from .run import CHUNK, TOUCH, Run, root
@@ -21,11 +21,16 @@ LANDINGS = 4  # on borders in one step; a handle that slides along a border then
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
 
 _row = struct.Struct("14d")
+_fused: dict[Callable[..., Any], Callable[..., Any]] = {}  # loops that have been inlined
 
 
-@functools.cache
-def _fused() -> Callable[..., tuple[float, ...]]:
-    return inline(loop.advance)
+def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
+    """The loop with its laws inlined, where so many steps are worth it or it has been done before."""
+    if law not in _fused:
+        if steps < FUSE_FROM:
+            return law
+        _fused[law] = inline(law)
+    return _fused[law]
 
 
 def _outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
@@ -52,8 +57,8 @@ class _Stretch(NamedTuple):
 
     n: int
     is_sample: bool  # False at a border between two samples
-    b: tuple[float, float]  # clay at the sample [N.s/m]
-    k: tuple[float, ...]  # loop.damping
+    b: np.ndarray  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all
+    k: np.ndarray  # loop.inputs, (7, n) or (7, 1)
     H: float  # length of the kick [s]
 
 
@@ -65,10 +70,17 @@ def _window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tup
     return view, struct.Struct(f"2d{gap}x2d").unpack_from
 
 
+def _spread(columns: list[np.ndarray], counts: list[int]) -> np.ndarray:
+    """Columns side by side, those of one column repeated to its count."""
+    if not columns:
+        return np.empty((2, 0))
+    return np.concatenate([np.broadcast_to(x, (len(x), n)) for x, n in zip(columns, counts, strict=True)], axis=1)
+
+
 def _sampled(raw: np.ndarray, k: np.ndarray, scenario: Scenario) -> np.ndarray:
     """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
 
-    k is loop.damping of each kick, shape (5, n), or (5, 1) where it is the same for all.
+    k is loop.inputs of each kick, shape (7, n), or (7, 1) where they are the same for all.
     """
     out = np.empty((12, raw.shape[1]))
     before, after = raw[4:6], raw[6:8]
@@ -77,7 +89,7 @@ def _sampled(raw: np.ndarray, k: np.ndarray, scenario: Scenario) -> np.ndarray:
     if scenario.operator:
         out[6:8] = raw[8:10] + k[0:4:2] * before + k[1:4:2] * after
     else:
-        out[6:8] = np.reshape(scenario.force, (2, 1))
+        out[6:8] = k[5:7]
     out[8:12] = raw[10:14]
     return out
 
@@ -89,13 +101,12 @@ class Leapfrog(Run):
         super().__init__(scenario, every)
         self.motion, self.read = _window(self.data.qpos, self.data.qvel)
         self.drive, self.write = _outlet(self.data.ctrl, self.data.qfrc_applied)
-        self.state: Any = loop.initial_state(scenario.start)
+        self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
-        ready = _fused.cache_info().currsize > 0
-        self.many = _fused() if ready or self.last >= FUSE_FROM else loop.advance
+        self.many = _written_out(loop.vary if self.varies else loop.advance, self.last)
         self.landings = 0  # on borders since the last sample
         self.before = 0.0  # length of the step that led here [s]
-        self.b = self.regions.b  # clay before the sample [N.s/m]
+        self.clay = self.regions.base, self.regions.rate  # before the sample
         self.rows = bytearray(CHUNK * loop.ROW)
         self.filled = 0
         self.stretches: list[_Stretch] = []
@@ -108,9 +119,9 @@ class Leapfrog(Run):
 
     def _glide(self) -> bool:
         """Whole steps in one go; undone from the first that a border lies in. False if there is none to make."""
-        dt, b = self.scenario.dt, self.regions.b
+        dt = self.scenario.dt
         n = min(self.last - self.i, CHUNK - 1 - self.filled)
-        if self.before != dt or self.b != b or n < 1:
+        if self.before != dt or self.clay != (self.regions.base, self.regions.rate) or n < 1:
             return False
         p, ahead = self.position(self.angles, self.rates, 0.0), self.position(self.angles, self.rates, dt)
         for i in (0, 1):  # do not run far beyond the border that lies ahead
@@ -118,12 +129,20 @@ class Leapfrog(Run):
             if d:
                 way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
                 n = min(n, max(16, int(min(0.95 * way, n))))
-        k = loop.damping(b, b, dt, dt)
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
-        begin = self.filled * loop.ROW
+        rows = range(self.filled * loop.ROW, (self.filled + n) * loop.ROW, loop.ROW)
+        if self.varies:
+            b, inputs, shift = self._ahead(n)
+            given: Any = (list(zip(rows, inputs, *shift, strict=True)), self.whole)
+            b, k = np.array(b).T, np.array(inputs).T
+        else:
+            b = self.regions.b(self.t)
+            inputs = loop.inputs(b, b, self.scenario.force, dt, dt)
+            given = (rows, self.whole, inputs)
+            b, k = np.reshape(b, (2, 1)), np.reshape(inputs, (7, 1))
         while True:
             self.state = self.many(
-                range(begin, begin + n * loop.ROW, loop.ROW), self.whole, k, state,
+                given[0][:n], *given[1:], state,
                 self.read, self.write, _row.pack_into, self.motion, self.drive, self.rows,
                 mujoco.mj_step, self.model, self.data,
             )  # fmt: skip
@@ -136,12 +155,26 @@ class Leapfrog(Run):
             if n < 1:
                 self.state = state
                 return False
-        self.stretches.append(_Stretch(n, True, b, k, dt))
+        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt))
         self.filled += n
         self.steps += n
         self.i += n
         self.t = self.i * dt
         return True
+
+    def _ahead(self, n: int) -> tuple[list, list, list]:
+        """Clay at each of the next n samples, loop.inputs there, and the change of the command after it, x and y."""
+        dt = self.scenario.dt
+        t = (self.i + np.arange(n + 1)) * dt
+        b = [self.regions.b(x) for x in t[:n]]
+        uh = self.uh(t[:n] - 0.5 * dt, t[:n] + 0.5 * dt).tolist()
+        if self.regions.grows:
+            halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in t[:n]]
+            k = [loop.inputs(b0, b1, u, dt, dt) for (b0, b1), u in zip(halves, uh, strict=True)]
+        else:
+            same = loop.inputs(b[0], b[0], (0.0, 0.0), dt, dt)[:5]
+            k = [(*same, *u) for u in uh]
+        return b, k, self.shift(t[:n], t[1:]).T.tolist()
 
     def _good(self, first: int, n: int) -> int:
         """How many of n steps from row first stay in the region, the position after the last included."""
@@ -189,7 +222,7 @@ class Leapfrog(Run):
             break
         self._keep(on_grid, q, sample, command, out, after)
         self._engine(w, command, out, after)
-        self.state, self.b = new, self.regions.b
+        self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
         if landing is None:
             self.i += 1
@@ -206,8 +239,17 @@ class Leapfrog(Run):
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         s = self.scenario
         c = self.whole if self.before == after == s.dt else loop.coefficients(s, self.before, after)
-        k = loop.damping(self.b, self.regions.b, self.before, after)
-        return loop.tick(c, k, q[0], q[1], w[0], w[1], self.state)
+        state, *rest = loop.tick(c, self._inputs(self.before, after), q[0], q[1], w[0], w[1], self.state)
+        if self.command and after:
+            cx, cy = self.shift(self.t, self.t + after).tolist()
+            state = (state[0] + cx, state[1] + cy, *state[2:])
+        return state, *rest
+
+    def _inputs(self, before: float, after: float) -> tuple[float, ...]:
+        """loop.inputs of the kick at this time, between steps of these lengths."""
+        t = self.t
+        b0, b1 = at(*self.clay, t - 0.25 * before), self.regions.b(t + 0.25 * after)
+        return loop.inputs(b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after)
 
     def _landing(self, q, w, i: int, up: bool, after: float, there: float) -> float:
         """Length of the step that ends on the border of coordinate i."""
@@ -235,14 +277,15 @@ class Leapfrog(Run):
         self.finish(code)
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        b0, b1 = self.b, self.regions.b
         row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
-        k = loop.damping(b0, b1, self.before, after)
-        self._put(is_sample, row, k, 0.5 * (self.before + after), b1 if after else b0)
+        k = self._inputs(self.before, after)
+        self._put(is_sample, row, k, 0.5 * (self.before + after), after > 0.0)
 
-    def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, b) -> None:
+    def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool) -> None:
+        """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
         _row.pack_into(self.rows, self.filled * loop.ROW, *row)
-        self.stretches.append(_Stretch(1, is_sample, b, k, H))
+        b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
+        self.stretches.append(_Stretch(1, is_sample, np.reshape(b, (2, 1)), np.reshape(k, (7, 1)), H))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
@@ -268,20 +311,21 @@ class Leapfrog(Run):
         n, self.filled = self.filled, 0
         raw = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).T.copy()
         pieces, self.stretches = self.stretches, []
-        k, H = np.array([x.k for x in pieces]).reshape(-1, 5).T, np.array([x.H for x in pieces])
-        at = slice(n)
-        if len(pieces) != 1:
+        k, H, which = np.empty((7, 0)), np.array([x.H for x in pieces]), slice(n)
+        if len(pieces) == 1:
+            k = pieces[0].k
+        elif pieces:
             counts = [x.n for x in pieces]
-            k, H = np.repeat(k, counts, axis=1), np.repeat(H, counts)
+            k, H = _spread([x.k for x in pieces], counts), np.repeat(H, counts)
             if not all(x.is_sample for x in pieces):
-                at = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
+                which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
         samples = [x for x in pieces if x.is_sample]
         good = self.judge(
-            _sampled(raw, k, self.scenario)[:, at],
-            lambda: np.repeat([x.b for x in samples], [x.n for x in samples], axis=0).T,
+            _sampled(raw, k, self.scenario)[:, which],
+            lambda: _spread([x.b for x in samples], [x.n for x in samples]),
         )
         if self.outcome is not None and self.end_time is None:
-            n = good if isinstance(at, slice) or not good else int(at[good - 1]) + 1
+            n = good if isinstance(which, slice) or not good else int(which[good - 1]) + 1
         self.ledger.add(raw[:, :n], k[:, :n], H[:n])
 
     def balance(self) -> dict[str, float]:

@@ -18,9 +18,13 @@ ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, del
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
 
-def initial_state(p: tuple[float, float]) -> tuple[float, ...]:
-    """State of a loop at rest with the handle at p [m]; see `tick`."""
-    return (*p, 0.0, 0.0, *p, 0.0, 0.0, 0.0, 0.0)
+def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float, ...]:
+    """State of a loop whose handle is at p [m] and moves with v [m/s], as if it had done so for long; see `tick`.
+
+    The compensator is ahead by the lag of G at constant speed, damping/stiffness of G times v.
+    """
+    ahead = (p[i] + G[i].damping / G[i].stiffness * v[i] for i in (0, 1))
+    return (*ahead, *v, *p, *v, 0.0, 0.0)
 
 
 def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
@@ -36,17 +40,23 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
         H, after, 0.5 * before,
         *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
         keep, take * scenario.gain[0], take * scenario.gain[1],
-        *scenario.force, scenario.origin[0], -scenario.origin[1],
+        scenario.origin[0], -scenario.origin[1],
         *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
         *human.kick(scenario.operator, H, L, R),
         1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip
 
 
-def damping(b0: tuple[float, float], b1: tuple[float, float], before: float, after: float) -> tuple[float, ...]:
-    """What a tick needs of the clay: b0, b1 before and after its sample [N.s/m], steps as above."""
+def inputs(
+    b0: tuple[float, float], b1: tuple[float, float], uh: tuple[float, float], before: float, after: float
+) -> tuple[float, ...]:
+    """What a tick needs of its surroundings.
+
+    Args:
+        b0, b1: clay before and after the sample [N.s/m]. uh: muscle force [N]. before, after: as above [s].
+    """
     span = before + after
-    return clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W)
+    return *clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W), *uh
 
 
 def measure(q1, q2, w1, w2, d1, d2, ox, noy):
@@ -75,7 +85,7 @@ def tick(c, k, q1, q2, w1, w2, state):
     """Carries the loop across one sample.
 
     Args:
-        c: from `coefficients`. k: from `damping`.
+        c: from `coefficients`. k: from `inputs`.
         q1, q2: joint angles at the sample [rad]. w1, w2: joint rates half a step before it [rad/s].
         state: (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2
             [rad/s^2]): compensator output and rate, reference model y = G delta and its rate, link
@@ -92,9 +102,9 @@ def tick(c, k, q1, q2, w1, w2, state):
     """
     (
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
-        uhx, uhy, ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
+        ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, _ = k
+    cx0, cx1, cy0, cy1, _, uhx, uhy = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2 = state
 
     u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
@@ -147,17 +157,18 @@ def instant(scenario: Scenario) -> tuple[float, ...]:
     """What `derivative` needs of the scenario."""
     th = scenario.operator or NO_HAND
     return (
-        *scenario.gain, *scenario.force, scenario.origin[0], -scenario.origin[1],
+        *scenario.gain, scenario.origin[0], -scenario.origin[1],
         *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
         th.spring, th.mass, th.damper, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip
 
 
-def derivative(c, bx, by, q1, q2, w1, w2, state):
+def derivative(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
     """The same loop as a differential equation, at one instant.
 
     Args:
-        c: from `instant`. bx, by: clay [N.s/m]. q1, q2, w1, w2: joint angles [rad] and rates [rad/s].
+        c: from `instant`. bx, by: clay [N.s/m]. uhx, uhy: muscle force [N].
+        q1, q2, w1, w2: joint angles [rad] and rates [rad/s].
         state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `tick`, all at this instant.
 
     Returns:
@@ -167,7 +178,7 @@ def derivative(c, bx, by, q1, q2, w1, w2, state):
         sample: (position x, y [m], velocity x, y [m/s], fh x, y [N]).
     """
     (
-        gainx, gainy, uhx, uhy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
+        gainx, gainy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
     ) = c  # fmt: skip
     deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
     u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
@@ -207,7 +218,7 @@ def plant(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
     """What `push` needs of the scenario and of the two steps around its kick [s]."""
     H, span = 0.5 * (before + after), before + after
     return (
-        H, *scenario.force, scenario.origin[0], -scenario.origin[1],
+        H, scenario.origin[0], -scenario.origin[1],
         *human.kick(scenario.operator, H, before / span, after / span, max(before, after)),
     )  # fmt: skip
 
@@ -216,14 +227,14 @@ def push(c, k, q1, q2, w1, w2, t1, t2):
     """One kick of the arm and the hand alone, under given motor torques.
 
     Args:
-        c: from `plant`. k: from `damping`. q1, q2, w1, w2: as in `tick`. t1, t2: motor torques [N.m].
+        c: from `plant`. k: from `inputs`. q1, q2, w1, w2: as in `tick`. t1, t2: motor torques [N.m].
 
     Returns:
         (sample, after): (position x, y [m], velocity before x, y [m/s], net hand force x, y [N],
         acceleration of the handle x, y [m/s^2]) and (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick.
     """
-    H, uhx, uhy, ox, noy, spring, mass, before, behind = c
-    cx0, cx1, cy0, cy1, _ = k
+    H, ox, noy, spring, mass, before, behind = c
+    cx0, cx1, cy0, cy1, _, uhx, uhy = k
     u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
     fx = uhx - cx0 * vx - human.impedance(spring, mass, before, px, cx, vx)
     fy = uhy - cy0 * vy - human.impedance(spring, mass, before, py, cy, vy)
@@ -243,7 +254,7 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, m
 
     Args:
         rows: range of offsets into the record, one for each step [bytes].
-        c, k: from `coefficients` and `damping`, for whole steps before and after.
+        c, k: from `coefficients` and `inputs`, for whole steps before and after.
         state: see `tick`.
         read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
         write: packs a command into the engine's memory, drive.
@@ -262,6 +273,30 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, m
             (px, py, vx, vy, fx, fy, dx, dy),
             (ux, uy, n1, n2),
         ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
+        write(drive, 0, t1, t2, bx, by, p1, p2)
+        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
+        step(model, data)
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9
+
+
+def vary(steps, c, state, read, write, keep, motion, drive, buffer, step, model, data):
+    """As `advance`, where the clay, the muscle force or the command change from step to step.
+
+    Args:
+        steps: for each step its offset into the record [bytes], its `inputs`, and the change of the command
+            x, y over it [m].
+    """
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9 = state
+    for row, k, cx, cy in steps:
+        q1, q2, w1, w2 = read(motion)
+        (
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
+            (t1, t2, bx, by, p1, p2),
+            (px, py, vx, vy, fx, fy, dx, dy),
+            (ux, uy, n1, n2),
+        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
+        s0 += cx
+        s1 += cy
         write(drive, 0, t1, t2, bx, by, p1, p2)
         keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
         step(model, data)

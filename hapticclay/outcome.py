@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from . import lti
 from .params import AXES, Scenario
 from .record import Outcome
 
+LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
 SPEED = 20.0  # [m/s] beyond any hand
 FLOOR = 1e-9  # [m/s] swings below this are rounding
@@ -18,6 +20,10 @@ STEP = 2.0  # growth of one swing counts to this factor at most: a border crosse
 SWINGS = 6  # consecutive swings that a verdict of growth needs
 SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
+MEMORY = 200  # swings that are remembered
+STILL = 1e-5  # [m/s] a handle slower than this ...
+WHILE = 1.0  # ... for so long at the time limit is stalled; motors in their limits for so long are saturated [s]
+OFTEN = 0.1  # share of its last WHILE that an unstable run which goes on spends in the torque limits, if it cycles
 
 
 class Watch:
@@ -26,7 +32,7 @@ class Watch:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop.
+    of its loop. Under a muscle force that varies, growth counts only above that limit: the hand may swing as it likes.
     """
 
     def __init__(self, scenario: Scenario):
@@ -35,6 +41,11 @@ class Watch:
         self.turn = [0.0, 0.0]  # velocity at the last turning point [m/s]
         self.hits = [0, 0]  # samples since then with a motor in its limit
         self.since = [0, 0]  # samples since then
+        self.seen = 0  # samples
+        self.moved = self.unbound = -1  # last sample with the handle faster than STILL; with no motor in its limit
+        self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
+        self.often = 0  # samples with a motor in its limit
+        self.onset: Outcome | None = None  # of an instability through which the run went on
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
 
@@ -59,7 +70,11 @@ class Watch:
         if found is not None:
             n, axis, cause = found
             step = first + n - 1
-            return n, Outcome("diverged", step * dt, step, axis, cause, self._advice(axis))
+            code = "limit cycle" if cause == LIMITS else "diverged"
+            verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
+            if self.scenario.stop:
+                return n, verdict
+            self.onset = self.onset or verdict
         if good == rows.shape[1]:
             return good, None
         step = max(first + good - 1, 0)
@@ -69,11 +84,50 @@ class Watch:
         if axis:
             return good, Outcome("diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis))
         if abs(math.sin(q2[good])) < FOLD:
-            where = "stretched" if math.cos(q2[good]) > 0.0 else "folded"
+            stretched = math.cos(q2[good]) > 0.0
+            code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
             advice = "choose a force, start or origin that keeps the handle within 0.11 to 0.59 m of the shoulder"
-            return good, Outcome("out of reach", step * dt, step, "", f"the arm is {where}", advice)
+            return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
         axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
         return good, Outcome("diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis))
+
+    def end(self, outcome: Outcome) -> Outcome:
+        """What there is to say of a run that came to this end, now that all its rows have been seen."""
+        s = self.scenario
+        recent = max(1, min(self.seen, round(WHILE / s.dt)))
+        if self.onset is not None:
+            cycles = self.bound.sum() > OFTEN * len(self.bound)
+            cause = f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
+            return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
+        if outcome.code == "time limit":
+            if self.seen - 1 - self.unbound >= recent:
+                advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower the force"
+                return replace(outcome, code="saturated", cause="a motor stays in its limit", advice=advice)
+            if self.seen - 1 - self.moved >= recent:
+                return replace(outcome, code="stalled", cause=f"slower than {STILL:g} m/s", advice=self._why_still())
+        share = self.often / max(self.seen, 1)
+        if share >= 0.01:
+            return replace(outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time")
+        return outcome
+
+    def _why_still(self) -> str:
+        s = self.scenario
+        if s.operator and s.operator.spring:
+            return "the spring of the hand holds the muscle's force: raise force, or lower operator.spring"
+        return "raise force, or lower b" if any(s.force) else "give a force"
+
+    def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
+        """Notes when the handle last moved, and when the motors were in their limits."""
+        last = len(bound) - 1
+        fast = np.abs(v).max(axis=0) > STILL
+        if fast.any():
+            self.moved = self.seen + last - int(fast[::-1].argmax())
+        if not bound.all():
+            self.unbound = self.seen + last - int((~bound)[::-1].argmax())
+        self.often += int(bound.sum())
+        self.seen += last + 1
+        if not self.scenario.stop:
+            self.bound = np.concatenate((self.bound, bound))[-max(1, round(WHILE / self.scenario.dt)) :]
 
     def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
         verdicts = {}
@@ -81,8 +135,12 @@ class Watch:
         self.past = v[:, -2:]
         tau, limit = np.abs(rows[8:10]), np.reshape(self.scenario.torque_limit, (2, 1))
         hit = np.zeros(v.shape[1], dtype=int)
+        bound = np.zeros(rows.shape[1], dtype=bool)
         if np.any(tau.max(axis=1, initial=0.0) >= limit[:, 0]):
-            hit[2:] = np.cumsum((tau >= limit).any(axis=0))
+            bound = np.asarray((tau >= limit).any(axis=0))
+            hit[2:] = np.cumsum(bound)
+        if len(bound):
+            self._count(rows[4:6], bound)
         for i in range(2):
             rise = v[i, 1:] > v[i, :-1]
             turns = np.flatnonzero(rise[1:] != rise[:-1]) + 1
@@ -103,10 +161,11 @@ class Watch:
                     self.swings[i] = []
                 before = j
                 self._swing(i, float(sizes[j]), bool(hits[j]), int(spans[j]))
-                cause = self._verdict(i)
+                cause = "" if self.onset or i in verdicts else self._verdict(i)
                 if cause:
                     verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
-                    break
+                    if self.scenario.stop:
+                        break
             if before != len(turns) - 1 and i not in verdicts:
                 self.swings[i] = []
         if not verdicts:
@@ -121,6 +180,7 @@ class Watch:
         if size < (0.8 if saturated else 1.0) * last:
             self.swings[i] = []
         self.swings[i].append((size, saturated, span))
+        del self.swings[i][:-MEMORY]
 
     def _verdict(self, i: int) -> str:
         swings = self.swings[i]
@@ -128,8 +188,10 @@ class Watch:
             return ""
         cycle = swings[-CYCLE:]
         if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
-            return "oscillation against the torque limits"
+            return LIMITS
         sizes = [x[0] for x in swings]
+        if self.scenario.muscle and not self._above_limit(i):
+            return ""
         if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
             return ""
         if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) > GROWTH:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .errors import ParameterError, choice, flag, number, numbers_of, pair
+from .errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 
 AXES = ("x", "y")
 INTEGRATORS = ("fast", "accurate")
@@ -84,22 +84,28 @@ class Profile:
         edges: borders [m], ascending, shape (n,).
         values: b in each region [N.s/m], shape (n + 1,); region i lies between edges i - 1 and i.
         along: coordinate that decides, "x" or "y".
+        growth: rate at which b of each region grows from when the handle first enters it
+            [N.s/m per s], shape (n + 1,); empty for none (Sec. 4.2).
     """
 
     edges: tuple[float, ...]
     values: tuple[float, ...]
     along: str = "x"
+    growth: tuple[float, ...] = ()
 
     def __post_init__(self):
         edges = numbers_of("clay.edges", self.edges, [str(i) for i in range(_len("clay.edges", self.edges))], unit="m")
         values = numbers_of(
             "clay.values", self.values, [str(i) for i in range(len(edges) + 1)], 0.0, B_MAX, unit="N.s/m"
         )
+        names = [str(i) for i in range(len(values))] if _len("clay.growth", self.growth) else []
+        growth = numbers_of("clay.growth", self.growth, names, 0.0, B_MAX, unit="N.s/m per s")
         if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
             raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
         choice("clay.along", self.along, AXES)
         object.__setattr__(self, "edges", edges)
         object.__setattr__(self, "values", values)
+        object.__setattr__(self, "growth", growth if any(growth) else ())
 
 
 def _len(field: str, value: object) -> int:
@@ -123,20 +129,60 @@ class Clay:
 
 
 @dataclass(frozen=True)
+class Multisine:
+    """A periodic signal of random phases: sum of cosines at multiples of 1/period between low and high.
+
+    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System Identification,
+    2012, sec. 2.3).
+
+    Attributes:
+        rms: root mean square on each axis, in the unit of what the signal adds to.
+        low, high: band [Hz]. period: [s].
+        lines: number of lines, spread evenly over the logarithm of frequency; None for every multiple.
+        seed: of the phases.
+    """
+
+    rms: tuple[float, float] = (1.0, 0.0)
+    low: float = 0.1
+    high: float = 2.0
+    period: float = 20.0
+    lines: int | None = None
+    seed: int = 0
+
+    def __post_init__(self):
+        put = lambda field, value: object.__setattr__(self, field, value)  # noqa: E731
+        put("rms", pair("multisine.rms", self.rms, 0.0, 1e6))
+        put("period", number("multisine.period", self.period, 1e-3, 1e5, unit="s"))
+        put("low", number("multisine.low", self.low, 0.0, above=True, unit="Hz"))
+        put("high", number("multisine.high", self.high, self.low, 1e6, unit="Hz"))
+        put("seed", integer("multisine.seed", self.seed, 0, 2**32 - 1))
+        most = math.floor(self.high * self.period + 1e-9) - math.ceil(self.low * self.period - 1e-9) + 1
+        if not 1 <= most <= 100_000:
+            bound = f"the band must hold 1 to 100000 multiples of 1/period = {1.0 / self.period:g} Hz, not {most}"
+            raise ParameterError("multisine.high", self.high, bound)
+        if self.lines is not None:
+            put("lines", integer("multisine.lines", self.lines, 1, most))
+
+
+@dataclass(frozen=True)
 class Scenario:
     """One run, complete: simulate(scenario) needs nothing else. Change it with dataclasses.replace.
 
     Attributes:
         name: label used in files and plots.
         clay: the virtual clay; None for free space.
-        gain: compensator gain K on each axis, C = K/(s^2 + 10 s).
-        force: the operator's muscle force uh on each axis [N].
+        gain: compensator gain K on each axis, C = K/(s^2 + 10 s); 0 turns the compensator off.
+        force: the operator's muscle force uh on each axis [N], its constant part.
+        muscle: the part of uh that varies [N]; None for none.
+        command: displacement added to the compensator's output [m]; None for none.
         operator: impedance Th of the operator's arm; None for a pure force (Th = 0).
         shaping: True lets the servo shape the handle's inertia, so that Sh holds at every pose.
         dt: physics and control step [s].
         t_max: the run ends then [s] ...
         length: ... or when p_x reaches this [m]; None to run for t_max.
         start: handle position p at t = 0 [m].
+        velocity: of the handle at t = 0 [m/s]; compensator and servo as if it had moved so for long.
+        stop: the run ends when an axis is judged unstable; False lets it go on against the torque limits.
         origin: world position of p = 0 [m].
         torque_limit: of the shoulder and elbow motor [N.m].
         integrator: "fast", second order, one engine step a sample, any stiffness; or "accurate", fourth
@@ -158,12 +204,16 @@ class Scenario:
     t_max: float = 60.0
     length: float | None = PATH_LENGTH
     start: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[float, float] = (0.0, 0.0)
     origin: tuple[float, float] = ORIGIN
     torque_limit: tuple[float, float] = TORQUE_LIMIT
     integrator: str = "fast"
     control: str = "continuous"
     Ts: float | None = None
     render: str = "held"
+    muscle: Multisine | None = None
+    command: Multisine | None = None
+    stop: bool = True
 
     def __post_init__(self):
         def put(field, value):
@@ -175,8 +225,12 @@ class Scenario:
             raise ParameterError("clay", self.clay, "must be a Clay or None")
         if self.operator is not None and not isinstance(self.operator, Operator):
             raise ParameterError("operator", self.operator, "must be an Operator or None")
+        for field in ("muscle", "command"):
+            if not isinstance(getattr(self, field), Multisine | None):
+                raise ParameterError(field, getattr(self, field), "must be a Multisine or None")
         flag("shaping", self.shaping)
-        put("gain", pair("gain", self.gain, 0.0, 1e6, above=True))
+        flag("stop", self.stop)
+        put("gain", pair("gain", self.gain, 0.0, 1e6))
         put("force", pair("force", self.force, -1e6, 1e6, unit="N"))
         choice("integrator", self.integrator, INTEGRATORS)
         choice("control", self.control, CONTROLS)
@@ -191,6 +245,7 @@ class Scenario:
                 raise ParameterError("Ts", self.Ts, bound)
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
+        put("velocity", pair("velocity", self.velocity, -10.0, 10.0, unit="m/s"))
         put("origin", pair("origin", self.origin, unit="m"))
         limit = numbers_of("torque_limit", self.torque_limit, ("shoulder", "elbow"), 0.0, 1e6, above=True, unit="N.m")
         put("torque_limit", limit)

@@ -62,7 +62,7 @@ def force_velocity(record: Record, axis: str = "x") -> Figure:
         x = 100.0 * record.p[:, i]
         ax.plot(x, record.ratio(record.fh)[:, i], color=GREEN, label="operator, f$_h$/v")
         ax.plot(x, record.ratio(record.fe)[:, i], color=BLUE, label="clay, f$_e$/v")
-        own = C_POLE / record.scenario.gain[i]
+        own = C_POLE / record.scenario.gain[i] if record.scenario.gain[i] else 0.0
         if record.scenario.operator is None:
             _steps(ax, record, i, lambda b: own + b, BLACK, "10/K + b", ":")
         _steps(ax, record, i, lambda b: b, ORANGE, "b")

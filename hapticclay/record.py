@@ -17,7 +17,7 @@ import numpy as np
 
 from . import lti
 from .errors import ParameterError
-from .params import AXES, Clay, Operator, Profile, Scenario
+from .params import AXES, Clay, Multisine, Operator, Profile, Scenario
 
 SCHEMA = "hapticclay-record-1"
 ARRAYS = {
@@ -41,8 +41,11 @@ class Outcome:
     """How a run ended.
 
     Attributes:
-        code: "finished", "time limit", "diverged" or "out of reach".
-        time: simulated time of the end [s]. step: index of the last good sample.
+        code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
+            their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
+            "out of reach" (the arm is stretched), "singular" (it is folded).
+        time: simulated time of the end, or of the verdict where an unstable run went on [s].
+        step: index of the last good sample.
         axis: the axis that is to blame, "" if none.
         cause: what happened, in words. advice: what to change, in words.
     """
@@ -135,7 +138,11 @@ class Record:
         """
         if not len(self.t):
             return []
-        change = np.flatnonzero(np.any(np.diff(self.b, axis=0) != 0.0, axis=1)) + 1
+        if self.scenario.clay and (self.scenario.clay.x.growth or self.scenario.clay.y.growth):
+            cuts = np.searchsorted(self.t, [c.time for c in self.crossings])
+            change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t))])
+        else:
+            change = np.flatnonzero(np.any(np.diff(self.b, axis=0) != 0.0, axis=1)) + 1
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
         out = []
         for piece in np.split(np.arange(len(self.t)), change):
@@ -158,7 +165,7 @@ class Record:
 
     def _expected(self, i: int, b: float) -> float | None:
         s = self.scenario
-        return lti.steady_speed(s.gain[i], s.force[i], b) if s.operator is None else None
+        return lti.steady_speed(s.gain[i], s.force[i], b) if s.operator is None and s.muscle is None else None
 
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
@@ -239,6 +246,9 @@ def _scenario(d: dict[str, Any]) -> Scenario:
         d["clay"] = Clay(**{axis: Profile(**d["clay"][axis]) for axis in AXES})
     if d.get("operator"):
         d["operator"] = Operator(**d["operator"])
+    for field in ("muscle", "command"):
+        if d.get(field):
+            d[field] = Multisine(**d[field])
     return Scenario(**d)
 
 

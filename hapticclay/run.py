@@ -12,7 +12,7 @@ import numpy as np
 from . import arm, outcome, record, scene
 from .clay import Regions
 from .errors import ParameterError
-from .params import AXES, Scenario
+from .params import AXES, Multisine, Scenario
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
@@ -37,10 +37,15 @@ class Run:
         self.scenario, self.every = scenario, every
         self.model = scene.build(scenario)
         self.data = mujoco.MjData(self.model)
-        self.data.qpos[:] = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
+        q1, q2 = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
+        self.data.qpos[:] = q1, q2
+        r1, r2 = arm.rates(*scenario.velocity, *arm.columns(*_trigonometry(q1, q2)), 1.0)
+        self.data.qvel[:] = r1, r2 - r1
+        self.muscle, self.command = _signal(scenario.muscle), _signal(scenario.command)
         self.angles: Any = memoryview(self.data.qpos)  # floats, in the engine's own memory
         self.rates: Any = memoryview(self.data.qvel)
         self.regions = Regions(scenario.clay, scenario.length, scenario.start)
+        self.varies = bool(self.muscle or self.command or self.regions.grows)  # from step to step
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
         self.i, self.t, self.steps = 0, 0.0, 0
         self.watch = outcome.Watch(scenario)
@@ -77,6 +82,19 @@ class Run:
             if self.outcome is None:
                 self.outcome = record.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
 
+    def uh(self, begin: Any, end: Any) -> Any:
+        """Mean muscle force over [begin, end] [s], or many such spans [N], (2,) or (n, 2)."""
+        force = self.scenario.force
+        if self.muscle:
+            return force + self.muscle.mean(begin, end)
+        return force if isinstance(begin, float) else np.broadcast_to(force, (len(begin), 2))
+
+    def shift(self, begin: Any, end: Any) -> np.ndarray:
+        """Change of the command from begin to end [s] [m], (2,) or (n, 2)."""
+        if self.command:
+            return self.command(end) - self.command(begin)
+        return np.zeros(np.shape(begin) + (2,))
+
     def position(self, q, w, h: float) -> tuple[float, float]:
         """Handle position [m] when the joints have turned from q with w for h seconds."""
         x, y = arm.position(q[0] + h * w[0], q[1] + h * w[1])
@@ -103,7 +121,7 @@ class Run:
         border = self.regions.high[i] if up else self.regions.low[i]
         self.crossings.append(record.Crossing(axis=AXES[i], border=border, time=self.t, speed=speed))
         if not end:
-            self.regions.cross(i, up)
+            self.regions.cross(i, up, self.t)
         return end
 
     def finish(self, code: str) -> None:
@@ -121,6 +139,8 @@ class Run:
         if found is not None:
             self.outcome, self.end_time = found, None
             self.crossings = [c for c in self.crossings if c.time <= found.time]
+        elif self.outcome is not None:
+            self.outcome = self.watch.end(self.outcome)
         if good:
             keep = np.arange(-self.looked % self.every, good, self.every)
             if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
@@ -147,6 +167,18 @@ class Run:
             scenario=self.scenario, outcome=self.outcome, crossings=tuple(self.crossings), energy=self.balance(),
             steps=self.steps, wall_time=wall,
         )  # fmt: skip
+
+
+def _trigonometry(q1: float, q2: float) -> tuple[float, float, float, float]:
+    return math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
+
+
+def _signal(multisine: Multisine | None) -> Any:
+    if multisine is None:
+        return None
+    from .signals import Signal  # only a run that has one pays for it
+
+    return Signal(multisine)
 
 
 def root(f: Callable[[float], float], b: float, fb: float) -> float:

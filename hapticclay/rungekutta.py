@@ -39,22 +39,27 @@ class RungeKutta(Run):
         self.push: Any = memoryview(data.qfrc_applied)
         self.act: Any = memoryview(data.act)
         self.first = len(data.ctrl) - len(data.act)  # of the states among the actuators
-        data.act[:8] = loop.initial_state(scenario.start)[:8]
+        data.act[:8] = loop.initial_state(scenario.start, scenario.velocity)[:8]
         self.rows: list[tuple[float, ...]] = []
         self.b: list[tuple[float, float]] = []
         self.start = self._stored()
 
-    def _derivative(self):
-        bx, by = self.regions.b
+    def _derivative(self, t: float):
+        """The loop's derivative at time t [s], for the state that the engine holds."""
         (q1, q2), (w1, w2) = self.angles, self.rates
-        return loop.derivative(self.c, bx, by, q1, q2, w1, w2, tuple(self.act[:8]))
+        state = tuple(self.act[:8])
+        if self.command:
+            cx, cy = self.shift(0.0, t)
+            state = (state[0] + cx, state[1] + cy, *state[2:])
+        (bx, by), (uhx, uhy) = self.regions.b(t), self.uh(t, t)
+        return loop.derivative(self.c, bx, by, uhx, uhy, q1, q2, w1, w2, state)
 
     def _control(self, model, data) -> None:
-        command, rates, _ = self._derivative()
+        command, rates, _ = self._derivative(data.time)
         drive, push, first = self.drive, self.push, self.first
         drive[0], drive[1], push[0], push[1] = command
         if first == 4:
-            drive[2], drive[3] = self.regions.b
+            drive[2], drive[3] = self.regions.b(data.time)
         for i, x in enumerate(rates, first):
             drive[i] = x
 
@@ -89,7 +94,7 @@ class RungeKutta(Run):
             self.rates[0], self.rates[1] = before[1]
             for i, x in enumerate(before[2]):
                 self.act[i] = x
-            self.model.opt.timestep = h
+            self.model.opt.timestep, self.data.time = h, self.t
             mujoco.mj_step(self.model, self.data)
             self.steps += 1
             return self.position(self.angles, self.rates, 0.0)
@@ -113,7 +118,7 @@ class RungeKutta(Run):
         self.t += h
         if target - self.t <= 1e-9 * self.scenario.dt:
             self.i, self.t = self.i + 1, target
-        speed = self._derivative()[2][2 + i]
+        speed = self._derivative(self.t)[2][2 + i]
         if self.cross(i, up, speed):
             self._keep()
             self.finish("finished")
@@ -121,9 +126,10 @@ class RungeKutta(Run):
         return False
 
     def _keep(self) -> None:
-        command, _, sample = self._derivative()
-        self.rows.append((*self.angles, *sample, *command[:2], self.act[0], self.act[1]))
-        self.b.append(self.regions.b)
+        command, _, sample = self._derivative(self.t)
+        cx, cy = self.shift(0.0, self.t)
+        self.rows.append((*self.angles, *sample, *command[:2], self.act[0] + cx, self.act[1] + cy))
+        self.b.append(self.regions.b(self.t))
 
     def flush(self) -> None:
         rows, b = np.array(self.rows).reshape(-1, 12).T.copy(), np.array(self.b).reshape(-1, 2).T
@@ -133,7 +139,7 @@ class RungeKutta(Run):
     def _stored(self) -> tuple[float, float]:
         """Energy of the arm, and of mass and spring of the hand [J]."""
         w1, w2 = self.rates
-        p, v = np.array(self._derivative()[2][:4]).reshape(2, 2)
+        p, v = np.array(self._derivative(self.t)[2][:4]).reshape(2, 2)
         return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, p, v)
 
     def balance(self) -> dict[str, float]:

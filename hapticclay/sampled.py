@@ -6,6 +6,7 @@ from math import inf
 from typing import Any
 
 from . import arm, human, loop, lti, servo
+from .clay import at
 from .leapfrog import CHUNK, Leapfrog
 from .params import AXES, G, Operator, S, Scenario
 
@@ -24,9 +25,9 @@ class Sampled(Leapfrog):
         super().__init__(scenario, every)
         self.n = round((scenario.Ts or scenario.dt) / scenario.dt)
         self.blocks = [lti.held(axis, K, self.n * scenario.dt) for axis, K in zip(AXES, scenario.gain, strict=True)]
-        x, y = scenario.start
+        s = self.state
         # (delta, delta', y, y') of each axis, and the torques held
-        self.state = ((x, 0.0, x, 0.0), (y, 0.0, y, 0.0), NONE)
+        self.state = (s[0:8:2], s[1:8:2], NONE)
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
@@ -35,29 +36,28 @@ class Sampled(Leapfrog):
         self._careful()
         return self.filled >= CHUNK - 4
 
-    def _clay(self, before: float, after: float):
-        b0, b1 = (self.b, self.regions.b) if self.physical else (NONE, NONE)
-        return loop.damping(b0, b1, before, after)
+    def _inputs(self, before: float, after: float) -> tuple[float, ...]:
+        if self.physical:
+            return super()._inputs(before, after)
+        return loop.inputs(NONE, NONE, self.uh(self.t - 0.5 * before, self.t + 0.5 * after), before, after)
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         x, y, tau = self.state
         before, s = self.before, self.scenario
         self.row, new, shown = None, self.state, (x[0], y[0])
         if after > 0.0 and self._is_sample():
-            force = s.force
+            force = self.uh(self.t, self.t)
             if before:
-                at, out = loop.push(loop.plant(s, before, 0.0), self._clay(before, 0.0), q[0], q[1], w[0], w[1], *tau)
+                at, out = loop.push(loop.plant(s, before, 0.0), self._inputs(before, 0.0), q[0], q[1], w[0], w[1], *tau)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown)
                 w = out[2:]
                 if s.operator:
                     force = self._felt(s.operator, q, w, tau)
             tau, f = self._control(q, w, x, y, force)
-            new = (
-                *(self._hold(z, block, f[i]) for i, (z, block) in enumerate(zip((x, y), self.blocks, strict=True))),
-                tau,
-            )
+            shift = self.shift(self.t, self.t + self.n * s.dt)
+            new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
             before = 0.0
-        at, out = loop.push(loop.plant(s, before, after), self._clay(before, after), q[0], q[1], w[0], w[1], *tau)
+        at, out = loop.push(loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau)
         return new, (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown), out
 
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
@@ -68,10 +68,10 @@ class Sampled(Leapfrog):
 
     def _felt(self, th: Operator, q, w, tau) -> tuple[float, float]:
         """The operator's force that the sensor shows at the sample, before the torques change [N]."""
-        s = self.scenario
         u, p, v, c = self._measure(q, w)
-        b = self.b if self.physical else NONE
-        rest = [s.force[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
+        b = at(*self.clay, self.t) if self.physical else NONE
+        uh = self.uh(self.t, self.t)
+        rest = [uh[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
         # a kick of one second from rest, in which the velocity after it is the acceleration
         fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
         a = servo.pushed(1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass)
@@ -84,7 +84,7 @@ class Sampled(Leapfrog):
         """Torques to hold and the net force that the compensator is given, from what is measured now."""
         s = self.scenario
         u, p, v, c = self._measure(q, w)
-        bx, by = self.regions.b
+        bx, by = self.regions.b(self.t)
         fe = (bx * v[0], by * v[1])
         f = (force[0] - fe[0], force[1] - fe[1])
         a = []
@@ -102,21 +102,22 @@ class Sampled(Leapfrog):
         return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
 
     @staticmethod
-    def _hold(z, block, f: float) -> tuple[float, ...]:
+    def _hold(z, block, f: float, shift: float) -> tuple[float, ...]:
         A, B = block
-        return tuple((A @ z + B * f).tolist())
+        delta, *rest = (A @ z + B * f).tolist()
+        return delta + shift, *rest
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
         before = self.before
         if self.row:
-            self._put(False, self.row, self._clay(before, 0.0), 0.5 * before, self.b)
+            self._put(False, self.row, self._inputs(before, 0.0), 0.5 * before, False)
             before = 0.0
             self.fresh = self.i
         elif after and self._is_sample():
             before, self.fresh = 0.0, self.i
         row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
-        k = self._clay(before, after)
-        self._put(is_sample, row, k, 0.5 * (before + after), self.regions.b if after else self.b)
+        k = self._inputs(before, after)
+        self._put(is_sample, row, k, 0.5 * (before + after), after > 0.0)
 
     def _engine(self, w, command, out, after: float) -> None:
         self.steps += 1

@@ -29,27 +29,27 @@ def test_border_kick_gives_each_side_its_share(b0, b1, L):
 
 def test_regions_of_the_slab():
     r = clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.20, (0.0, 0.0))
-    assert r.b == (0.0, 0.0) and r.high[0] == 0.05
+    assert r.b(0.0) == (0.0, 0.0) and r.high[0] == 0.05
     assert not r.at_end(0, True)
-    assert r.cross(0, True) == 0.05 and r.b == (90.0, 90.0) and (r.low[0], r.high[0]) == (0.05, 0.15)
-    assert r.cross(0, True) == 0.15 and r.b == (0.0, 0.0)
+    assert r.cross(0, True, 0.0) == 0.05 and r.b(0.0) == (90.0, 90.0) and (r.low[0], r.high[0]) == (0.05, 0.15)
+    assert r.cross(0, True, 0.0) == 0.15 and r.b(0.0) == (0.0, 0.0)
     assert r.at_end(0, True) and r.high[0] == 0.20
-    assert r.cross(0, False) == 0.15 and r.b == (90.0, 90.0)
+    assert r.cross(0, False, 0.0) == 0.15 and r.b(0.0) == (90.0, 90.0)
 
 
 @pytest.mark.parametrize("p,b", [((0.05, 0.0), 90.0), ((0.049, 0.0), 0.0), ((0.1, 0.3), 90.0), ((0.15, 0.0), 0.0)])
 def test_regions_from_any_start(p, b):
-    assert clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.2, p).b == (b, b)
+    assert clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.2, p).b(0.0) == (b, b)
 
 
 def test_each_axis_follows_its_own_coordinate():
     both = Clay(Profile((0.05,), (50.0, 100.0), "x"), Profile((0.05,), (50.0, 200.0), "y"))
     r = clay.Regions(both, None, (0.0, 0.0))
-    assert r.b == (50.0, 50.0)
-    r.cross(1, True)
-    assert r.b == (50.0, 200.0)
-    r.cross(0, True)
-    assert r.b == (100.0, 200.0)
+    assert r.b(0.0) == (50.0, 50.0)
+    r.cross(1, True, 0.0)
+    assert r.b(0.0) == (50.0, 200.0)
+    r.cross(0, True, 0.0)
+    assert r.b(0.0) == (100.0, 200.0)
 
 
 @pytest.mark.parametrize("edges,values,along", [

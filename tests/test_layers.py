@@ -13,7 +13,7 @@ PACKAGE = Path(hapticclay.__file__).parent
 LEVELS = [
     {"errors", "inline"},
     {"params"},
-    {"arm", "lti", "clay", "human"},
+    {"arm", "lti", "clay", "human", "signals"},
     {"servo", "record", "energy"},
     {"loop", "scene", "outcome"},
     {"run"},

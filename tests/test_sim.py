@@ -167,7 +167,7 @@ def test_opposing_force_leaves_through_the_near_border():
 
 def test_no_force_no_motion():
     r = hc.simulate(hc.constant_cut(force=(0.0, 0.0), t_max=2.0))
-    assert np.max(np.abs(r.v)) < 1e-12 and r.outcome.code == "time limit"
+    assert np.max(np.abs(r.v)) < 1e-12 and r.outcome.code == "stalled"
 
 
 @pytest.mark.parametrize("b", [9000.0, 1e5, 1e6, 1e9])
@@ -175,7 +175,7 @@ def test_no_force_no_motion():
 def test_stiff_clay_stops_the_handle_where_it_should(b, shaping):
     s = hc.constant_cut(b=b, shaping=shaping, t_max=3.0)
     r = hc.simulate(s)
-    assert r.outcome.code == "time limit"
+    assert r.outcome.code in ("time limit", "stalled")
     if shaping:
         _, position = piecewise_linear(EDGES, (0, b, 0), 1.0, 1.0, t_max=3.0)
         expected = position(np.array([3.0]))[0]
