@@ -12,7 +12,7 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 from importlib.metadata import PackageNotFoundError, version
 
 from .errors import ParameterError
-from .experiments import SCENARIOS, constant_cut, free
+from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
 from .lti import closed_loop_poles, gain_limit
 from .params import Clay, Multisine, Operator, Profile, Scenario
 from .record import Crossing, Outcome, Record
@@ -40,5 +40,8 @@ __all__ = [
     "constant_cut",
     "free",
     "gain_limit",
+    "irregularity",
     "simulate",
+    "stability_test",
+    "variable_cut",
 ]

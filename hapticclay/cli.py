@@ -16,24 +16,26 @@ from typing import Annotated
 import tyro
 
 from .errors import ParameterError, choice
-from .experiments import SCENARIOS, constant_cut, free
-from .params import Scenario
+from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
+from .params import AXES, Scenario
 from .record import Record, atomic, versions
 from .sim import simulate
 
 Experiment = (
     Annotated[Scenario, tyro.conf.subcommand("constant", constructor=constant_cut)]
+    | Annotated[Scenario, tyro.conf.subcommand("variable", constructor=variable_cut)]
+    | Annotated[Scenario, tyro.conf.subcommand("stability", constructor=stability_test)]
     | Annotated[Scenario, tyro.conf.subcommand("free", constructor=free)]
 )
 
 
 @dataclass(frozen=True)
 class Run:
-    """Run one experiment: print a table, write the record, its summary and two plots."""
+    """Run one experiment: print a table, write the record, its summary and its plots."""
 
     scenario: Experiment
     out: Path = Path("out")
-    """Folder for record.npz, summary.json, velocity.png and force.png."""
+    """Folder for record.npz, summary.json and the plots."""
     every: int = 1
     """Keep every n-th sample in the record."""
     plots: bool = True
@@ -139,24 +141,26 @@ def table(record: Record) -> str:
         return "-" if x is None else format(x, form)
 
     s = record.scenario
-    way = s.clay.x.along if s.clay else "x"
-    if not s.clay and abs(s.force[1]) > abs(s.force[0]):
-        way = "y"
+    ways = s.clay.x.along if s.clay else "x"
+    if s.clay and s.clay.y.along != ways:
+        ways = "xy"
+    elif not s.clay and abs(s.force[1]) > abs(s.force[0]):
+        ways = "y"
     rows = []
-    pieces = record.regions()
-    for r in [piece[way] for piece in pieces[:6]]:
+    pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
+    for way, r in pieces[:6]:
         fe, fh = r["fe_over_v"], r["steady_fh_over_v"]
         rows.append(
             [
-                f"{100 * r['from_m']:.2f} - {100 * r['to_m']:.2f}",
-                format(r["b"], "g"),
-                cell(fe and fe["mean"], ".5g"),
+                f"{way}: {100 * r['from_m']:.2f} - {100 * r['to_m']:.2f}",
+                f"{r['b']:g}" if r["b"] == r["b_end"] else f"{r['b']:.4g} - {r['b_end']:.4g}",
+                cell(fe["mean"] if fe and r["b"] == r["b_end"] else None, ".5g"),
                 cell(fh and fh["mean"], ".5g"),
                 cell(r["steady_speed"], ".6f"),
                 cell(r["expected_speed"], ".6f"),
             ]
         )
-    head = [f"{way} [cm]", "b [N.s/m]", "fe/v [N.s/m]", "fh/v [N.s/m]", "steady v [m/s]", "expected v [m/s]"]
+    head = ["path [cm]", "b [N.s/m]", "fe/v [N.s/m]", "fh/v [N.s/m]", "steady v [m/s]", "expected v [m/s]"]
     lines = [tabulate(rows, head, colalign=("right",) * 6, disable_numparse=True), ""]
     if len(pieces) > 6:
         lines.insert(1, f"... and {len(pieces) - 6} more stretches")
@@ -164,6 +168,10 @@ def table(record: Record) -> str:
         lines.append(f"border {c.axis} = {100 * c.border:g} cm crossed at {c.time:.6f} s with {c.speed:.6f} m/s")
     if len(record.crossings) > 6:
         lines.append(f"... and {len(record.crossings) - 6} more crossings")
+    if s.muscle is not None:
+        axis = AXES[s.muscle.rms.index(max(s.muscle.rms))]
+        rms = float((record.fh[:, AXES.index(axis)] ** 2).mean() ** 0.5)
+        lines.append(f"operator's force along {axis}: rms {rms:.4g} N, irregularity {irregularity(record, axis):.4f}")
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
@@ -173,14 +181,10 @@ def table(record: Record) -> str:
 
 
 def draw(record: Record, folder: Path) -> None:
-    """Writes velocity.png and force.png."""
+    """Writes the figures of a run as PNG."""
     from . import plot
 
-    axis = "y" if abs(record.scenario.force[1]) > abs(record.scenario.force[0]) else "x"
-    for name, figure in (
-        ("velocity", plot.velocity_position(record, axis)),
-        ("force", plot.force_velocity(record, axis)),
-    ):
+    for name, figure in plot.figures(record).items():
         with atomic(folder / f"{name}.png") as f:
             figure.savefig(f, format="png")
 

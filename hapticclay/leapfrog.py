@@ -166,10 +166,11 @@ class Leapfrog(Run):
         """Clay at each of the next n samples, loop.inputs there, and the change of the command after it, x and y."""
         dt = self.scenario.dt
         t = (self.i + np.arange(n + 1)) * dt
-        b = [self.regions.b(x) for x in t[:n]]
+        now = t[:n].tolist()
+        b = [self.regions.b(x) for x in now]
         uh = self.uh(t[:n] - 0.5 * dt, t[:n] + 0.5 * dt).tolist()
         if self.regions.grows:
-            halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in t[:n]]
+            halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in now]
             k = [loop.inputs(b0, b1, u, dt, dt) for (b0, b1), u in zip(halves, uh, strict=True)]
         else:
             same = loop.inputs(b[0], b[0], (0.0, 0.0), dt, dt)[:5]

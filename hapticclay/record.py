@@ -130,33 +130,45 @@ class Record:
         low, high = np.maximum(np.arange(n) - span, 0), np.minimum(np.arange(n) + span + 1, n)
         return count[high] == count[low]
 
-    def regions(self) -> list[dict[str, Any]]:
-        """One entry for each stretch of constant damping, in order of time.
+    def stretches(self, axis: str | None = None) -> list[np.ndarray]:
+        """Indices of the samples, split wherever the handle entered another clay; of one axis, or of either."""
+        s = self.scenario
+        if s.clay and (s.clay.x.growth or s.clay.y.growth):
+            along = {getattr(s.clay, a).along for a in ([axis] if axis else AXES)}
+            cuts = np.searchsorted(self.t, [c.time for c in self.crossings if c.axis in along])
+            change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t) - 1)])
+        else:
+            b = self.b[:, AXES.index(axis)] if axis else self.b.sum(axis=1)
+            change = np.flatnonzero(np.diff(b)) + 1
+        return np.split(np.arange(len(self.t)), change)
+
+    def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
+        """One entry for each of the `stretches` in one clay, in order of time.
 
         For each axis: fe/v against b over the stretch (mean, spread), and where the speed is steady,
-        the speed, fe/v and fh/v there, beside K f/(10 + K b) where the muscle force is constant.
+        the speed, fe/v and fh/v there, beside K f/(10 + K b) where force and clay are constant.
+
+        Args:
+            axis: "x" or "y" for that axis and its own stretches alone.
         """
         if not len(self.t):
             return []
-        if self.scenario.clay and (self.scenario.clay.x.growth or self.scenario.clay.y.growth):
-            cuts = np.searchsorted(self.t, [c.time for c in self.crossings])
-            change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t))])
-        else:
-            change = np.flatnonzero(np.any(np.diff(self.b, axis=0) != 0.0, axis=1)) + 1
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
         out = []
-        for piece in np.split(np.arange(len(self.t)), change):
+        for piece in self.stretches(axis):
             entry: dict[str, Any] = {"from_s": float(self.t[piece[0]]), "to_s": float(self.t[piece[-1]])}
-            for i, axis in enumerate(AXES):
+            for name in [axis] if axis else AXES:
+                i = AXES.index(name)
                 s = piece[steady[piece, i]]
-                b = float(self.b[piece[0], i])
-                entry[axis] = {
+                b, last = float(self.b[piece[0], i]), float(self.b[piece[-1], i])
+                entry[name] = {
                     "from_m": float(self.p[piece[0], i]),
                     "to_m": float(self.p[piece[-1], i]),
                     "b": b,
+                    "b_end": last,
                     "fe_over_v": _spread(fe_v[piece, i]),
                     "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
-                    "expected_speed": self._expected(i, b),
+                    "expected_speed": self._expected(i, b) if b == last else None,
                     "steady_fe_over_v": _spread(fe_v[s, i]),
                     "steady_fh_over_v": _spread(fh_v[s, i]),
                 }

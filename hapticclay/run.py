@@ -85,9 +85,11 @@ class Run:
     def uh(self, begin: Any, end: Any) -> Any:
         """Mean muscle force over [begin, end] [s], or many such spans [N], (2,) or (n, 2)."""
         force = self.scenario.force
+        one = isinstance(begin, float)
         if self.muscle:
-            return force + self.muscle.mean(begin, end)
-        return force if isinstance(begin, float) else np.broadcast_to(force, (len(begin), 2))
+            force = force + self.muscle.mean(begin, end)
+            return force.tolist() if one else force
+        return force if one else np.broadcast_to(force, (len(begin), 2))
 
     def shift(self, begin: Any, end: Any) -> np.ndarray:
         """Change of the command from begin to end [s] [m], (2,) or (n, 2)."""
