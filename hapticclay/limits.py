@@ -19,7 +19,7 @@ import numpy as np
 
 from . import lti
 from .errors import ParameterError, choice, flag, number
-from .params import AXES, C_POLE, NO_HAND, RENDERS, G, Operator, S
+from .params import AXES, B_MAX, C_POLE, NO_HAND, RENDERS, G, Operator, S
 
 STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
@@ -77,15 +77,44 @@ def critical(
     axis: str, b: float, operator: Operator | None, Ts: float | None = None, delay: float = 0.0, render: str = "held"
 ) -> tuple[float, float]:
     """The gain limit and the frequency at which the loop then rings [rad/s]; arguments as `gain_limit`."""
-    number("b", b, 0.0, unit="N.s/m")
-    delay = number("delay", delay, 0.0, 1.0, unit="s")
-    if Ts is not None:
-        return first(lifted(axis, b, operator, number("Ts", Ts, 1e-6, 1.0, unit="s"), delay, render))
-    if delay:
-        return first(late(axis, b, operator, delay, render))
-    choice("render", render, RENDERS)
+    loop = family(axis, b, operator, Ts, delay, render)
+    if loop:
+        return first(loop)
     blank, passive, driven = lti.terms(axis, b, operator)
     return lti.first_crossing(np.polyadd(blank, passive), driven)
+
+
+def is_stable(
+    axis: str,
+    K: float,
+    b: float,
+    operator: Operator | None,
+    Ts: float | None = None,
+    delay: float = 0.0,
+    render: str = "held",
+) -> bool:
+    """Whether the loop is stable at this very K, whatever it is below; other arguments as `gain_limit`."""
+    K, loop = number("K", K, 0.0, above=True), family(axis, b, operator, Ts, delay, render)
+    return loop.stable(K) if loop else lti.stable(axis, K, b, operator)
+
+
+def family(
+    axis: str, b: float, operator: Operator | None, Ts: float | None, delay: float, render: str
+) -> Family | None:
+    """The loop for every K; None for the one that is a polynomial. Arguments as `gain_limit`.
+
+    Raises:
+        ParameterError: a value is out of its bounds.
+    """
+    choice("axis", axis, AXES)
+    b = number("b", b, 0.0, B_MAX, unit="N.s/m")
+    delay = number("delay", delay, 0.0, 1.0, unit="s")
+    choice("render", render, RENDERS)
+    if Ts is not None:
+        Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
+        number("delay", delay, 0.0, 100.0 * Ts, unit="s")
+        return lifted(axis, b, operator, Ts, delay, render)
+    return late(axis, b, operator, delay, render) if delay else None
 
 
 @dataclass(frozen=True)

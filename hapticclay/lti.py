@@ -118,6 +118,12 @@ def terms(
     return np.convolve(cg, s), S[i].gain * np.convolve(cg, t), G[i].gain * np.convolve(np.convolve(n, s), t)
 
 
+def device(axis: str, K: float, compensator: Compensator = PRINTED) -> tuple[np.ndarray, np.ndarray]:
+    """What the handle shows to any impedance: G C + Sh as (numerator, denominator); arguments as `characteristic`."""
+    blank, passive, driven = terms(axis, 0.0, Operator(0.0, 0.0, 1.0), compensator)  # against a unit spring
+    return np.polyadd(passive, number("K", K, 0.0) * driven), blank
+
+
 def impedance(b: float, operator: Operator | None = None) -> np.ndarray:
     """Te + Th as coefficients, shape (3,): clay b [N.s/m] and the operator's arm (Eqs. 4, 19)."""
     b, th = number("b", b, 0.0, unit="N.s/m"), operator or NO_HAND
