@@ -289,11 +289,11 @@ def matrices(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, beta, gamma of the sampled loop x(k+1) = (M + K beta gamma') x(k), x at the sample before it acts.
 
-    x = (p, v, delta, delta', y, y', u(k-1), ..., u(k-1-n)), u the motors' force on the handle [N], n the whole samples in
-    the delay. Between samples handle and hand move under held u (matrix exponential); a fraction of a sample in
-    the delay splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed., 3.2). As in `Sampled`, the
-    net force f = gamma' x that drives the compensator is measured before u changes, so it holds the share of the hand's
-    mass under the u of the sample before.
+    x = (p, v, delta, delta', y, y', u(k-1), ..., u(k-1-n)), u the motors' force on the handle [N], n the whole
+    samples in the delay. Between samples handle and hand move under held u (matrix exponential); a fraction of a
+    sample in the delay splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed., 3.2). As in
+    `Sampled`, the net force f = gamma' x that drives the compensator is measured before u changes, so it holds the
+    share of the hand's mass under the u that acted until then.
 
     Args:
         axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0. Ts: sample [s].

@@ -138,9 +138,7 @@ def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None =
     return np.roots(characteristic(axis, K, b, operator))
 
 
-def stable(
-    axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
-) -> bool:
+def stable(axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED) -> bool:
     """True if no closed-loop pole lies right of the imaginary axis; arguments as `characteristic`."""
     return hurwitz(characteristic(axis, K, b, operator, compensator))
 

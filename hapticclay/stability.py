@@ -1,6 +1,5 @@
-"""Is the loop stable, by how much, and is what the handle shows passive? Verdicts on one axis at the nominal pose.
+"""Is the loop with this hand stable, and by how much? Verdicts on one axis at the nominal pose.
 
-Coupled stability (with this hand) and passivity (with any passive hand) are different questions and are answered apart.
 Frequency responses are ratios of polynomials, so their extremes and crossings are roots of polynomials: exact.
 """
 
@@ -16,7 +15,6 @@ from . import limits, lti
 from .errors import ParameterError, choice, number
 from .lti import PRINTED, Compensator
 from .params import Operator
-from .record import Record
 
 BREAKS = ("force", "compensator")
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
@@ -152,7 +150,7 @@ def encirclements(n: np.ndarray, d: np.ndarray) -> tuple[int, int]:
     low, high = 1e-3 * size.min(), 1e6 * size.max()
 
     def near(s: complex) -> float:
-        return abs(np.polyval(n, s) / np.polyval(d, s))
+        return float(np.abs(np.polyval(n, s) / np.polyval(d, s)))
 
     while order > 0 and near(low) < 1e3:
         low *= 0.1
@@ -181,16 +179,16 @@ def margins(axis: str, K: float, b: float, *, at: str = "compensator", **kw) -> 
     nd = np.convolve(n_, d_.conj())
     omega = lti.positive_roots(nd.imag)
     with np.errstate(divide="ignore"):
-        factor = -np.abs(np.polyval(d_, omega)) ** 2 / np.polyval(nd, omega).real
+        factor = -(np.abs(np.polyval(d_, omega)) ** 2) / np.polyval(nd, omega).real
     more, more_at = _nearest(factor, omega, factor > 1.0, np.argmin, math.inf)
     less, less_at = _nearest(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
-    omega = np.sqrt(lti.positive_roots(np.polysub(_square(n), _square(d))))
+    omega = np.sqrt(lti.positive_roots(np.polysub(square(n), square(d))))
     lag = np.angle(np.polyval(nd, omega)) + np.pi  # how far L is ahead of -1, 0 to 2 pi
     phase, phase_at = _nearest(np.minimum(lag, 2.0 * np.pi - lag), omega, lag > -1.0, np.argmin, math.inf)
     delay, delay_at = _nearest(lag / omega, omega, lag > -1.0, np.argmin, math.inf)
     if len(n) == len(d) and abs(n[0]) >= abs(d[0]):  # L does not fall off: any delay turns it round -1
         delay, delay_at = 0.0, math.inf
-    worst, disk_at = least(-_square(np.polysub(d, n)), _square(np.polyadd(d, n)))
+    worst, disk_at = least(-square(np.polysub(d, n)), square(np.polyadd(d, n)))
     disk = 2.0 / math.sqrt(-worst)
     return Margins(True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at)
 
@@ -204,12 +202,12 @@ def _nearest(
     return float(value[i]), float(omega[i])
 
 
-def _square(poly: np.ndarray) -> np.ndarray:
+def square(poly: np.ndarray) -> np.ndarray:
     """|poly(j omega)|^2 as a polynomial in omega^2."""
-    return _real(poly, poly)
+    return real(poly, poly)
 
 
-def _real(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def real(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Re p(j omega) q(j omega)* as a polynomial in omega^2."""
     return np.convolve(lti.on_axis(p), lti.on_axis(q).conj()).real[::-1][::2][::-1]
 
@@ -273,8 +271,8 @@ def coupled_stability(
 def small_gain(axis: str, K: float, b: float, *, equation: int = 13, **kw) -> Verdict:
     """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail; hand as in `loop`.
 
-    (11), the same as (10), asks for |L| < 1 and (13), the same as (12), for |G C| < |1/(Te + Th) + Sh|: each sufficient,
-    none necessary. (9) asks only that |1 + L| has no zero on the axis, which unstable loops fulfil too.
+    (11), the same as (10), asks for |L| < 1 and (13), the same as (12), for |G C| < |1/(Te + Th) + Sh|: each
+    sufficient, none necessary. (9) asks only that |1 + L| has no zero on the axis, which unstable loops fulfil too.
 
     Args:
         equation: 9, 10, 11, 12 or 13.
@@ -286,20 +284,18 @@ def small_gain(axis: str, K: float, b: float, *, equation: int = 13, **kw) -> Ve
         raise ParameterError("equation", equation, "must be 9, 10, 11, 12 or 13")
     if equation == 9:
         n, d = loop(axis, K, b, **kw)
-        worst, omega = least(_square(np.polyadd(n, d)), _square(d))
+        worst, omega = least(square(np.polyadd(n, d)), square(d))
         how = "extreme of a ratio of polynomials: exact. Necessary for stability, not sufficient"
         return Verdict(worst > 0.0, math.sqrt(max(worst, 0.0)), omega, (LINEAR,), how, "least |1 + L|")
     n, d = loop(axis, K, b, at="force" if equation < 12 else "compensator", **kw)
-    worst, omega = least(-_square(n), _square(d))
+    worst, omega = least(-square(n), square(d))
     margin = 1.0 / math.sqrt(-worst) if worst else math.inf
     how = "extreme of a ratio of polynomials: exact. Sufficient for stability, not necessary"
-    fails = bands(np.polysub(_square(n), _square(d)))
+    fails = bands(np.polysub(square(n), square(d)))
     return Verdict(margin > 1.0, margin, omega, (LINEAR,), how, "least right side over left side", fails)
 
 
-def transparency(
-    axis: str, K: float, b: float, omega: np.ndarray, *, compensator: Compensator = PRINTED
-) -> np.ndarray:
+def transparency(axis: str, K: float, b: float, omega: np.ndarray, *, compensator: Compensator = PRINTED) -> np.ndarray:
     """fe/fh, the share of the hand's force that is the clay's (Eq. 7); the hand does not matter.
 
     Args:
@@ -312,99 +308,3 @@ def transparency(
     s = 1j * np.asarray(omega, dtype=float)
     felt = number("b", b, 0.0, unit="N.s/m") * np.polyval(e, s)
     return felt / (felt + np.polyval(d[:-1], s))
-
-
-def passivity(axis: str, K: float, b: float, *, compensator: Compensator = PRINTED) -> Verdict:
-    """Whether the impedance shown to the hand is passive: stable with every passive hand, in continuous time.
-
-    Z = fh/v = b + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable and Re Z(j omega) >= 0
-    (Colgate, Hogan, Int. J. Control 48, 1988).
-
-    Args:
-        axis: "x" or "y". K: gain. b: clay [N.s/m]. compensator: shape of C.
-
-    Returns:
-        Verdict with the least Re Z [N.s/m]: as much damping the clay has to spare, or lacks.
-    """
-    e, d = lti.device(axis, K, compensator)
-    b = number("b", b, 0.0, unit="N.s/m")
-    R, Q = np.polyadd(_real(d[:-1], e), b * _square(e)), _square(e)
-    worst, omega = least(R, Q)
-    alone = lti.stable(axis, K, b, None, compensator)
-    how = "stable without a hand and Re Z >= 0 at the least of a ratio of polynomials: exact"
-    what = "least Re Z [N.s/m]" + ("" if alone else "; not stable without a hand")
-    return Verdict(alone and worst >= 0.0, worst, omega, (LINEAR, "continuous time"), how, what, bands(-R))
-
-
-def colgate_schenkel(H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = 20_001) -> Verdict:
-    """Passivity of a sampled virtual object behind a physical damper.
-
-    Necessary and sufficient (Colgate, Schenkel, J. Robotic Systems 14, 1997):
-
-        damping > Ts/2 1/(1 - cos omega Ts) Re{(1 - exp(-j omega Ts)) H(exp(j omega Ts))},  0 < omega <= pi/Ts
-
-    Args:
-        H: pulse transfer function from sampled position to held force [N/m] at complex z, shape (n,) to (n,).
-        Ts: sample [s]. damping: of the device itself, physical [N.s/m]. n: frequencies looked at.
-    """
-    Ts, damping = number("Ts", Ts, 0.0, above=True, unit="s"), number("damping", damping, 0.0, unit="N.s/m")
-    theta = np.linspace(0.0, np.pi, n)[1:]
-    z = np.exp(1j * theta)
-    need = 0.5 * Ts / (1.0 - np.cos(theta)) * ((1.0 - 1.0 / z) * H(z)).real
-    i = int(np.argmax(need))
-    fails = _runs(theta / Ts, need >= damping)
-    how = f"Colgate and Schenkel's test at {n - 1} frequencies up to pi/Ts: sampled"
-    assumptions = ("a mass and a physical damper, nothing else, behind the handle", "position sampled, force held")
-    return Verdict(
-        bool(damping > need[i]), damping - float(need[i]), theta[i] / Ts, assumptions, how, "damping to spare [N.s/m]", fails
-    )
-
-
-def _runs(x: np.ndarray, mine: np.ndarray) -> tuple[tuple[float, float], ...]:
-    up = np.concatenate(([False], mine, [False]))
-    start, stop = np.flatnonzero(up[1:] & ~up[:-1]), np.flatnonzero(up[:-1] & ~up[1:]) - 1
-    return tuple((float(x[i]), float(x[j])) for i, j in zip(start, stop, strict=True))
-
-
-def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0) -> Verdict:
-    """Passivity of held clay, its velocity the difference of two samples, without servo and compensator.
-
-    In closed form: damping > stiffness Ts/2 + b, the second term at the Nyquist frequency (Colgate, Schenkel 1997). The
-    handle has no physical damper of its own, so held clay is never passive by itself; clay with render="implicit" is.
-
-    Args:
-        b: clay [N.s/m]. Ts: sample [s]. damping: physical, of the handle [N.s/m]. stiffness: of a wall beside it [N/m].
-    """
-    b, k = number("b", b, 0.0, unit="N.s/m"), number("stiffness", stiffness, 0.0, unit="N/m")
-    return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
-
-
-def port_energy(record: Record) -> np.ndarray:
-    """Energy that the hand has put into the handle since the start, along each axis [J], shape (n, 2).
-
-    The observer of Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002): the integral of fh v.
-    """
-    power = record.fh * record.v
-    steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
-    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
-
-
-def observed_passivity(record: Record) -> Verdict:
-    """Whether a recorded run took more energy from the hand than it gave back, at every instant.
-
-    Active on one record proves that the device is not passive; passive on one proves nothing about others.
-
-    Returns:
-        Verdict with the least energy [J]. An energy within what the quadrature leaves open (the integral over every other
-        sample against that over all) counts as passive.
-    """
-    if len(record.t) < 3:
-        raise ParameterError("record", len(record.t), "must have three samples or more")
-    energy = port_energy(record).sum(axis=1)
-    power = (record.fh * record.v).sum(axis=1)[::2]
-    coarse = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1]))))
-    open_ = float(np.max(np.abs(coarse - energy[::2])))
-    i = int(np.argmin(energy))
-    how = f"energy observer on the record, trapezoidal, to {open_:.1e} J; least at {record.t[i]:.4g} s"
-    assumptions = ("the run started at rest", "this motion only")
-    return Verdict(bool(energy[i] >= -open_), float(energy[i]), math.nan, assumptions, how, "least energy put in [J]")

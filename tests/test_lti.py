@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import Linear
 
-import hapticclay as hc
 from hapticclay import lti
 from hapticclay.errors import ParameterError
 from hapticclay.params import Operator
