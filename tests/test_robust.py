@@ -16,12 +16,12 @@ def spans(high):
     return st.tuples(side, side).map(lambda x: (min(x), max(x)))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(axis=st.sampled_from("xy"), b=st.floats(5.0, 300.0), m=spans(2.0), d=spans(40.0), k=spans(400.0))
 def test_the_worst_case_is_no_better_than_any_sample_and_is_reached(axis, b, m, d, k):
     box = hc.Box(m, d, k)
     worst = hc.worst_case(axis, 1.0, b, box)
-    samples = box.corners() + box.sample(100, seed=3)
+    samples = box.corners() + box.sample(60, seed=3)
     limits = [lti.gain_limit(axis, b, th) for th in samples]
     assert worst.limit <= min(limits) * (1 + 1e-9)  # rounding of roots
     assert worst.hand is not None
@@ -53,9 +53,9 @@ def test_a_worst_case_inside_an_edge():
     """Without mass and spring the limit in x is least near b + damper = 94 N.s/m: no corner of this box."""
     box = hc.Box((0.0, 0.0), (0.0, 40.0), (0.0, 0.0))
     worst = hc.worst_case("x", 1.0, 70.0, box)
-    dense = min((lti.gain_limit("x", 70.0 + d, None), d) for d in np.linspace(0.0, 40.0, 4001))
-    assert worst.limit == pytest.approx(dense[0], rel=1e-7)  # 0.01 N.s/m about a minimum: second order
-    assert worst.hand.damper == pytest.approx(dense[1], abs=0.05) and 5.0 < worst.hand.damper < 35.0
+    dense = min((lti.gain_limit("x", 70.0 + d, None), d) for d in np.linspace(0.0, 40.0, 401))
+    assert worst.limit == pytest.approx(dense[0], rel=2e-6)  # 0.1 N.s/m about a minimum: second order
+    assert worst.hand.damper == pytest.approx(dense[1], abs=0.5) and 5.0 < worst.hand.damper < 35.0
     assert worst.limit < min(lti.gain_limit("x", 70.0, th) for th in box.corners())
 
 

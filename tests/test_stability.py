@@ -19,7 +19,8 @@ LOOPS = dict(
     axis=st.sampled_from("xy"),
     K=st.floats(0.01, 20.0),
     b=st.floats(1.0, 500.0),
-    th=st.none() | st.builds(Operator, st.floats(0.0, 2.0), st.floats(0.0, 20.0), st.sampled_from([0.0, 6.0, 300.0])),
+    th=st.none()
+    | st.builds(Operator, st.sampled_from([0.0, 0.25, 2.0]), st.floats(0.1, 20.0), st.sampled_from([0.0, 6.0, 300.0])),
     at=st.sampled_from(BREAKS),
 )
 
@@ -61,7 +62,7 @@ def test_nyquist_count_of_500_random_loops():
         integrators = int(rng.integers(0, 4))
         d = np.concatenate((poly(int(rng.integers(1, 5))), np.zeros(integrators)))
         n = 10.0 ** rng.uniform(-2.0, 2.0) * poly(int(rng.integers(0, len(d))))
-        n *= 1.0 if len(n) == len(d) else abs(d[-1] / n[-1]) if d[-1] else 10.0 ** rng.uniform(0.0, 3.0)
+        n *= 1.0 if len(n) == len(d) else (abs(d[-1] / n[-1]) if d[-1] else 1.0) * 10.0 ** rng.uniform(-1.0, 3.0)
         right, nearest = roots_right(np.polyadd(n, d))
         if nearest < 1e-4 or (len(n) == len(d) and abs(1.0 + n[0] / d[0]) < 1e-3):
             continue
@@ -92,7 +93,7 @@ def test_margins_against_python_control(axis, K, b, th, at):
     z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
     dense = 2.0 / np.max(np.abs((1.0 - z) / (1.0 + z)))
     assert m.disk <= dense * (1.0 + 1e-9)  # exact: no grid finds less
-    assert m.disk == pytest.approx(min(dense, 2.0), rel=1e-3)  # 20 001 points, a resonance 1e-3 wide
+    assert m.disk == pytest.approx(dense, rel=1e-3)  # 20 001 points, a resonance 1e-3 wide
 
 
 @pytest.mark.parametrize("axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")])
