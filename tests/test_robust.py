@@ -88,13 +88,16 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
     assert hc.worst_case(axis, 0.5, 90.0, box).limit == hc.worst_case(axis, 0.5, 90.0, hc.Box((0.1, 0.5))).limit
 
 
-def test_a_rigid_arm_does_limit_a_slow_enough_lead():
-    """C = K/(s (s + 0.1)): the zeros of G C + Sh cross, and rigid arms near infinity confirm it."""
-    c = hc.Compensator(0.01)
+def test_a_rigid_arm_limits_a_slower_compensator():
+    """C = K/(s (s + 1)) in y: the zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it."""
+    c, arm = hc.Compensator(1.0), Operator(1e3, 1e8, 1e9)
     limit, omega = robust.rigid_limit("y", c)
-    if limit < float("inf"):
-        assert omega > 0.0
-        assert hc.worst_case("y", 1e-3, 90.0, hc.Box(rigid=True), compensator=c).limit <= limit
+    assert 50.0 < omega < 200.0
+    assert lti.gain_limit("y", 90.0, arm, c) == pytest.approx(limit, rel=1e-3)  # as near to rigid as 1e8 is to infinity
+    for b in (0.0, 90.0):
+        worst = hc.worst_case("y", 0.1, b, hc.Box((0.25, 0.25), (2.0, 2.0), (0.0, 0.0), rigid=True), compensator=c)
+        alone = lti.gain_limit("y", b, Operator(0.25, 2.0, 0.0), c)
+        assert worst.limit == pytest.approx(min(alone, limit), rel=1e-9) and (worst.hand is None) == (limit < alone)
 
 
 @pytest.mark.parametrize("call,field", [
