@@ -161,6 +161,7 @@ def crossings(loop: Family) -> list[tuple[float, float]]:
     if not np.any(z):  # nothing drives the compensator
         return []
     y, ahead = z.imag / np.abs(z), z.real > 0.0
+    y[y == 0.0] = 1e-300  # a grid point on a crossing: found from one side
     spans = [(x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (ahead[:-1] | ahead[1:]))]
     dip = (np.abs(y[1:-1]) <= np.minimum(np.abs(y[:-2]), np.abs(y[2:]))) & (y[:-2] * y[1:-1] > 0.0)
     for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & ahead[1:-1]) + 1:

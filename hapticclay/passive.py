@@ -60,7 +60,7 @@ def colgate_schenkel(H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: 
     return Verdict(
         bool(damping > need[i]),
         damping - float(need[i]),
-        theta[i] / Ts,
+        float(theta[i] / Ts),
         assumptions,
         how,
         "damping to spare [N.s/m]",

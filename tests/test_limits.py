@@ -143,6 +143,29 @@ def test_sampled_limits_against_the_period_map(axis, hand, timing, render):
     assert all(beyond(K) < 0 for K in np.geomspace(0.01, 0.999, 25) * found)  # no window below it
 
 
+def test_sampled_limits_of_random_loops():
+    """Clay to 3e4 N.s/m, hands to 30 kg and 1e5 N/m, samples of 10 us to 10 ms, delays to four of them."""
+    rng = np.random.default_rng(7)
+    zero = 0
+    for _ in range(40):
+        b, Ts = 10 ** rng.uniform(0.0, 4.5), 10 ** rng.uniform(-5.0, -2.0)
+        hand = [float(rng.choice([0.0, 10 ** rng.uniform(*x)])) for x in ((-2.0, 1.5), (-1.0, 2.5), (-1.0, 5.0))]
+        delay = float(rng.choice([0.0, Ts * rng.uniform(0.0, 4.0), Ts * rng.integers(0, 4)]))
+        axis, render = "xy"[rng.integers(2)], ("held", "implicit")[rng.integers(2)]
+        found = limit(axis, b, hand, Ts=Ts, delay=delay, render=render)
+
+        def beyond(K):
+            return radius(period(axis, K, b, hand, Ts, delay, render), hand[2]) - 1  # noqa: B023
+
+        if found == 0.0:
+            zero += 1
+            assert beyond(1e-4) > -1e-10
+        else:  # the eigenvalues of a long run of slow samples lie within 1e-10 of the circle, all of them
+            assert all(beyond(K) < 1e-10 for K in found * np.array([1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1 - 1e-5]))
+            assert beyond(found * (1 + 1e-5)) > -1e-11
+    assert 0 < zero < 20
+
+
 @pytest.mark.parametrize("axis,n", list(itertools.product("xy", [0, 1, 3])))
 def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n):
     """No hand: the loop broken at the sampled net force, from python-control's own discretisations."""
