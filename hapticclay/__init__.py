@@ -11,13 +11,27 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
+from .design import Design, compare, design_gain, transparency_error
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
-from .lti import closed_loop_poles, gain_limit
+from .limits import gain_limit
+from .lti import Compensator, closed_loop_poles
 from .params import Clay, Multisine, Operator, Profile, Scenario
+from .passive import clay_passivity, observed_passivity, passivity, port_energy
 from .record import Crossing, Outcome, Record
+from .robust import Box, WorstCase, worst_case
 from .scene import build
 from .sim import simulate
+from .stability import (
+    Margins,
+    Nyquist,
+    Verdict,
+    coupled_stability,
+    margins,
+    nyquist,
+    small_gain,
+    transparency,
+)
 
 try:
     __version__ = version("hapticclay")
@@ -25,23 +39,43 @@ except PackageNotFoundError:  # a checkout that was never installed
     __version__ = "unknown"
 
 __all__ = [
-    "SCENARIOS",
+    "Box",
     "Clay",
+    "Compensator",
     "Crossing",
+    "Design",
+    "Margins",
     "Multisine",
+    "Nyquist",
     "Operator",
     "Outcome",
     "ParameterError",
     "Profile",
     "Record",
+    "SCENARIOS",
     "Scenario",
+    "Verdict",
+    "WorstCase",
     "build",
+    "clay_passivity",
     "closed_loop_poles",
+    "compare",
     "constant_cut",
+    "coupled_stability",
+    "design_gain",
     "free",
     "gain_limit",
     "irregularity",
+    "margins",
+    "nyquist",
+    "observed_passivity",
+    "passivity",
+    "port_energy",
     "simulate",
+    "small_gain",
     "stability_test",
+    "transparency",
+    "transparency_error",
     "variable_cut",
+    "worst_case",
 ]

@@ -6,6 +6,7 @@ Polynomials in s are NumPy coefficient arrays, highest power first.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,11 +53,39 @@ def steady_speed(K: float, f: float, b: float) -> float:
     return K * f / (C_POLE + K * b)
 
 
-def characteristic(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
+@dataclass(frozen=True)
+class Compensator:
+    """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
+
+    Attributes:
+        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
+    """
+
+    pole: float = C_POLE
+    zero: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s"))
+        if self.zero is not None:
+            object.__setattr__(self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s"))
+
+    @property
+    def fraction(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numerator and denominator of C/K."""
+        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array([1.0, self.pole, 0.0])
+
+
+PRINTED = Compensator()
+
+
+def characteristic(
+    axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
+) -> np.ndarray:
     """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
 
     Args:
         axis: "x" or "y". K: compensator gain. b: clay [N.s/m]. operator: Th; None for Th = 0.
+        compensator: shape of C.
 
     Returns:
         Coefficients, shape (7,), highest power first.
@@ -64,21 +93,41 @@ def characteristic(axis: str, K: float, b: float, operator: Operator | None = No
     Raises:
         ParameterError: unknown axis, or K or b not finite and >= 0.
     """
-    free, driven = _split(axis, b, operator)
-    return np.polyadd(free, number("K", K, 0.0) * driven)
+    blank, passive, driven = terms(axis, b, operator, compensator)
+    return np.polyadd(np.polyadd(blank, passive), number("K", K, 0.0) * driven)
 
 
-def _split(axis: str, b: float, operator: Operator | None) -> tuple[np.ndarray, np.ndarray]:
-    """The closed-loop polynomial is free + K driven."""
+def terms(
+    axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The closed-loop polynomial falls into blank + passive + K driven.
+
+    blank is the common denominator of G, C and Sh, so L = (G C + Sh)(Te + Th) is (passive + K driven)/blank.
+
+    Args:
+        axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0. compensator: shape of C.
+
+    Raises:
+        ParameterError: unknown axis, or b not finite and >= 0.
+    """
     i = AXES.index(choice("axis", axis, AXES))
-    b = number("b", b, 0.0, unit="N.s/m")
-    th = operator or NO_HAND
-    c = np.array([1.0, C_POLE, 0.0])
-    g = np.array([1.0, G[i].damping, G[i].stiffness])
+    n, c = compensator.fraction
     s = np.array([1.0, S[i].damping, S[i].stiffness])
-    t = np.array([th.mass, th.damper + b, th.spring])
-    cg = np.convolve(c, g)
-    return np.polyadd(np.convolve(cg, s), S[i].gain * np.convolve(cg, t)), G[i].gain * np.convolve(s, t)
+    t = impedance(b, operator)
+    cg = np.convolve(c, [1.0, G[i].damping, G[i].stiffness])
+    return np.convolve(cg, s), S[i].gain * np.convolve(cg, t), G[i].gain * np.convolve(np.convolve(n, s), t)
+
+
+def device(axis: str, K: float, compensator: Compensator = PRINTED) -> tuple[np.ndarray, np.ndarray]:
+    """What the handle shows to any impedance: G C + Sh as (numerator, denominator); arguments as `characteristic`."""
+    blank, passive, driven = terms(axis, 0.0, Operator(0.0, 0.0, 1.0), compensator)  # against a unit spring
+    return np.polyadd(passive, number("K", K, 0.0) * driven), blank
+
+
+def impedance(b: float, operator: Operator | None = None) -> np.ndarray:
+    """Te + Th as coefficients, shape (3,): clay b [N.s/m] and the operator's arm (Eqs. 4, 19)."""
+    b, th = number("b", b, 0.0, unit="N.s/m"), operator or NO_HAND
+    return np.array([th.mass, th.damper + b, th.spring])
 
 
 def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
@@ -89,30 +138,52 @@ def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None =
     return np.roots(characteristic(axis, K, b, operator))
 
 
-def stable(axis: str, K: float, b: float, operator: Operator | None = None) -> bool:
+def stable(axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED) -> bool:
     """True if no closed-loop pole lies right of the imaginary axis; arguments as `characteristic`."""
-    poly = characteristic(axis, K, b, operator)
-    while poly[-1] == 0.0:
-        poly = poly[:-1]
-    return bool(np.all(np.roots(poly).real < 0.0))
+    return hurwitz(characteristic(axis, K, b, operator, compensator))
 
 
-def gain_limit(axis: str, b: float, operator: Operator | None = None) -> float:
+def hurwitz(poly: np.ndarray) -> bool:
+    """True if every root of poly but those at s = 0 lies left of the imaginary axis."""
+    return bool(np.all(np.roots(np.trim_zeros(poly)).real < 0.0))
+
+
+def gain_limit(axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED) -> float:
     """Largest K up to which the loop is stable at the nominal pose; inf if there is none.
 
-    Exact: on the imaginary axis the closed-loop polynomial A + K B vanishes, so Im(A B*) = 0, a
-    polynomial in omega, whose positive roots give the K at which a pair of poles can cross.
+    Args:
+        axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0. compensator: shape of C.
+    """
+    blank, passive, driven = terms(axis, b, operator, compensator)
+    return first_crossing(np.polyadd(blank, passive), driven)[0]
+
+
+def first_crossing(A: np.ndarray, B: np.ndarray) -> tuple[float, float]:
+    """Smallest K > 0 at which a root of A + K B leaves the left half plane, and where [rad/s]; (inf, nan) if none.
+
+    Exact: on the imaginary axis A + K B vanishes, so Im(A B*) = 0, a polynomial in omega, whose positive
+    roots give the K at which a pair of roots can cross.
 
     Args:
-        axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0.
+        A, B: polynomials; A has no root right of the imaginary axis.
     """
-    A, B = (p * 1j ** np.arange(len(p) - 1, -1, -1) for p in _split(axis, b, operator))
-    AB = np.convolve(A, B.conj())
-    roots = np.roots(np.trim_zeros(AB.imag, "f")) if np.any(AB.imag) else np.array([])
-    omega = roots[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0.0)].real
+    A_, B_ = on_axis(A), on_axis(B)
+    AB = np.convolve(A_, B_.conj())
+    omega = positive_roots(AB.imag)
     with np.errstate(divide="ignore", invalid="ignore"):  # a zero of B on the axis: no K puts a pole there
-        K = np.sort(-np.polyval(AB, omega).real / np.abs(np.polyval(B, omega)) ** 2)
-    for k in K[(K > 0.0) & np.isfinite(K)]:
-        if not stable(axis, (1.0 + 1e-6) * k, b, operator):
-            return float(k)
-    return math.inf
+        K = -np.polyval(AB, omega).real / np.abs(np.polyval(B_, omega)) ** 2
+    for i in np.argsort(K):
+        if 0.0 < K[i] < math.inf and not hurwitz(np.polyadd(A, (1.0 + 1e-6) * K[i] * B)):
+            return float(K[i]), float(omega[i])
+    return math.inf, math.nan
+
+
+def on_axis(poly: np.ndarray) -> np.ndarray:
+    """poly(j omega) as a polynomial in omega with complex coefficients."""
+    return poly * 1j ** np.arange(len(poly) - 1, -1, -1)
+
+
+def positive_roots(poly: np.ndarray) -> np.ndarray:
+    """Positive real roots of a real polynomial, to rounding."""
+    roots = np.roots(np.trim_zeros(poly, "f")) if np.any(poly) else np.array([])
+    return roots[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0.0)].real

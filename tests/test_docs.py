@@ -28,6 +28,27 @@ def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
     assert (tmp_path / "out" / "record.npz").is_file()
 
 
+def test_stability_page_says_what_its_snippets_print():
+    text = (ROOT / "docs" / "stability.md").read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    said = " ".join(re.findall(r"print\(.*\)  # ([^:\n]*)", code)).split()
+    for a, b in zip(out.stdout.split(), said, strict=True):
+        assert a == b or float(a) == pytest.approx(float(b), rel=1e-3)
+
+
+def test_every_limit_in_the_stability_page_is_recomputed():
+    text = (ROOT / "docs" / "stability.md").read_text()
+    rows = re.findall(r"^\| ([xy]) \| (nominal|none) \| (\d+) \|(.*)\|$", text, re.M)
+    Ts = params.TS
+    columns = ({}, dict(Ts=Ts), dict(Ts=Ts, delay=Ts), dict(delay=1e-3), dict(Ts=Ts, render="implicit"))
+    assert len(rows) == 12
+    for axis, hand, b, cells in rows:
+        for cell, kw in zip(cells.split("|"), columns, strict=True):
+            limit = hc.gain_limit(axis, float(b), impedance=hand == "nominal", **kw)
+            assert f"{limit:.4f}" == cell.strip()
+
+
 @pytest.mark.parametrize("line", re.findall(r"^    (?:\$ )?hapticclay (.+)$", README, re.M))
 def test_readme_commands_run(line, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)

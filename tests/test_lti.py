@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import Linear
 
-import hapticclay as hc
 from hapticclay import lti
 from hapticclay.errors import ParameterError
 from hapticclay.params import Operator
@@ -53,7 +52,7 @@ def test_poles_are_those_of_the_state_space_model(axis):
     ("y", 50, False, 1.18), ("y", 90, False, 0.77), ("y", 100, False, 0.73),
 ])  # fmt: skip
 def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
-    limit = hc.gain_limit(axis, b, TH if on else None)
+    limit = lti.gain_limit(axis, b, TH if on else None)
     G, S, C, T = blocks(axis, 1.0, b, on)
     loop = control.minreal(G * C * T / (1 + S * T), tol=1e-8, verbose=False)
     margins = control.stability_margins(loop, returnall=True)[0]
@@ -69,13 +68,13 @@ def test_y_axis_is_unstable_at_unit_gain():
 
 
 def test_gain_limit_without_clay_and_hand_is_infinite():
-    assert hc.gain_limit("x", 0.0) == float("inf")
+    assert lti.gain_limit("x", 0.0) == float("inf")
 
 
 def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
     """An undamped hand makes the driven polynomial vanish at its resonance: no K puts a pole there."""
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
-        limit = hc.gain_limit("y", 0.0, th)
+        limit = lti.gain_limit("y", 0.0, th)
         assert limit > 0.0
         assert limit == float("inf") or not lti.stable("y", 1.001 * limit, 0.0, th)
 

@@ -1,0 +1,81 @@
+"""The largest gain for a margin: it has the margin, and a little more has not."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+import hapticclay as hc
+from hapticclay import lti
+from hapticclay.design import BAND
+from hapticclay.errors import ParameterError
+
+MARGINS = [
+    (dict(gain_margin=2.0), lambda m: m.gain[1] - 2.0),
+    (dict(phase_margin=math.radians(45.0)), lambda m: m.phase - math.radians(45.0)),
+    (dict(disk_margin=0.5), lambda m: m.disk - 0.5),
+    (dict(delay_margin=0.02), lambda m: m.delay - 0.02),
+]
+
+
+@settings(max_examples=3)
+@given(axis=st.sampled_from("xy"), b=st.floats(20.0, 300.0), on=st.booleans())
+@pytest.mark.parametrize("asked,left", MARGINS)
+def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):
+    K = hc.design_gain(axis, b, impedance=on, **asked)
+    assert left(hc.margins(axis, K, b, impedance=on)) >= 0.0
+    assert left(hc.margins(axis, K * (1 + 1e-9), b, impedance=on)) < 1e-8
+    for factor in (0.1, 0.5, 0.9):  # every lower gain has it too
+        assert left(hc.margins(axis, factor * K, b, impedance=on)) >= 0.0
+
+
+@pytest.mark.parametrize("kw", [dict(), dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-3, delay=1.5e-3)])
+def test_gain_margin_divides_the_gain_limit(kw):
+    for axis in "xy":
+        assert hc.design_gain(axis, 90.0, gain_margin=2.5, **kw) == pytest.approx(
+            hc.gain_limit(axis, 90.0, **kw) / 2.5, rel=1e-9
+        )
+
+
+def test_without_clay_and_hand_any_gain_will_do():
+    assert hc.design_gain("x", 0.0, impedance=False, gain_margin=2.0) == math.inf
+
+
+def test_transparency_error_is_its_integral():
+    low, high = BAND
+
+    def miss(x):
+        return abs(1 - hc.transparency("x", 1.0, 90.0, np.array([math.exp(x)]))[0]) ** 2
+
+    exact = math.sqrt(quad(miss, math.log(low), math.log(high), epsabs=1e-12)[0] / math.log(high / low))
+    assert hc.transparency_error("x", 1.0, 90.0) == pytest.approx(exact, rel=1e-6)  # Simpson, steps of 1 %: h^4
+
+
+def test_shapes_are_compared_at_equal_margin_the_best_first():
+    shapes = [hc.Compensator(), hc.Compensator(40.0), hc.Compensator(2.0), hc.Compensator(40.0, 20.0)]
+    for axis in "xy":
+        found = hc.compare(axis, 90.0, shapes, disk_margin=0.5, delay_margin=0.005)
+        assert {d.compensator for d in found} == set(shapes)
+        assert np.all(np.diff([d.error for d in found]) > 0)
+        assert found[0].compensator == hc.Compensator(40.0, 20.0)  # a lead pays
+        for d in found:
+            assert min(d.margins.disk - 0.5, d.margins.delay - 0.005) == pytest.approx(0.0, abs=1e-9)
+            assert lti.stable(axis, d.K, 90.0, None, d.compensator) and d.margins.stable
+
+
+def test_a_shape_without_a_largest_gain_is_refused():
+    with pytest.raises(ParameterError, match="largest K"):
+        hc.compare("x", 90.0, [hc.Compensator(40.0, 5.0)], disk_margin=0.5)
+
+
+@pytest.mark.parametrize("kw,field", [
+    (dict(gain_margin=0.5), "gain_margin"), (dict(phase_margin=4.0), "phase_margin"),
+    (dict(disk_margin=3.0), "disk_margin"), (dict(at="motor"), "at"), (dict(phase_margin=0.5, Ts=1e-3), None),
+])  # fmt: skip
+def test_bad_input_is_refused(kw, field):
+    with pytest.raises(ParameterError) as e:
+        hc.design_gain("x", 90.0, **kw)
+    assert field in (None, e.value.field)

@@ -1,0 +1,211 @@
+"""Verdicts and margins against the poles, python-control, dense frequencies and the theorems they come from."""
+
+import math
+
+import control
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import hapticclay as hc
+from hapticclay import lti, stability
+from hapticclay.errors import ParameterError
+from hapticclay.params import Operator
+from hapticclay.stability import BREAKS
+
+OMEGA = np.geomspace(1e-2, 1e4, 20_001)
+LOOPS = dict(
+    axis=st.sampled_from("xy"),
+    K=st.floats(0.01, 20.0),
+    b=st.floats(1.0, 500.0),
+    th=st.none()
+    | st.builds(Operator, st.sampled_from([0.0, 0.25, 2.0]), st.floats(0.1, 20.0), st.sampled_from([0.0, 6.0, 300.0])),
+    at=st.sampled_from(BREAKS),
+)
+
+
+def hand(th):
+    return dict(impedance=th is not None, operator=th)
+
+
+def roots_right(poly):
+    roots = np.roots(np.trim_zeros(poly))
+    return int(np.sum(roots.real > 0.0)), float(np.min(np.abs(roots.real) / np.abs(roots), initial=1.0))
+
+
+@settings(max_examples=300)
+@given(**LOOPS)
+def test_nyquist_count_of_the_loop_is_that_of_its_poles(axis, K, b, th, at):
+    right, nearest = roots_right(lti.characteristic(axis, K, b, th))
+    assume(nearest > 1e-6)  # the curve then passes -1 as near: nothing to count
+    found = hc.nyquist(axis, K, b, at=at, **hand(th))
+    assert found.Z == right and found.P == 0
+    assert found.Z == found.N + found.P
+
+
+def test_nyquist_count_of_500_random_loops():
+    """Unstable ones and ones with up to three integrators: Z = N + P, the poles by np.roots."""
+    rng = np.random.default_rng(1)
+
+    def poly(n):
+        out = np.ones(1)
+        while len(out) <= n:
+            a, w = rng.uniform(-1.0, 2.0), 10.0 ** rng.uniform(-1.0, 2.0)
+            out = np.convolve(
+                out, [1.0, 2.0 * a * w, w * w] if n - len(out) >= 1 and rng.random() < 0.5 else [1.0, a * w]
+            )
+        return out
+
+    seen = set()
+    for _ in range(500):
+        integrators = int(rng.integers(0, 4))
+        d = np.concatenate((poly(int(rng.integers(1, 5))), np.zeros(integrators)))
+        n = 10.0 ** rng.uniform(-2.0, 2.0) * poly(int(rng.integers(0, len(d))))
+        n *= 1.0 if len(n) == len(d) else (abs(d[-1] / n[-1]) if d[-1] else 1.0) * 10.0 ** rng.uniform(-1.0, 3.0)
+        right, nearest = roots_right(np.polyadd(n, d))
+        if nearest < 1e-4 or (len(n) == len(d) and abs(1.0 + n[0] / d[0]) < 1e-3):
+            continue
+        N, P = stability.encirclements(n, d)
+        assert N + P == right, (n, d)
+        seen.add((P, N))
+    assert len(seen) > 10 and any(P for P, _ in seen) and any(N < 0 for _, N in seen)
+
+
+@settings(max_examples=60)
+@given(**LOOPS)
+def test_margins_against_python_control(axis, K, b, th, at):
+    n, d = stability.loop(axis, K, b, at=at, **hand(th))
+    m = hc.margins(axis, K, b, at=at, **hand(th))
+    assert m.stable == lti.stable(axis, K, b, th)
+    if not m.stable:
+        assert m.gain == (1.0, 1.0) and m.phase == m.delay == m.disk == 0.0
+        return
+    assume(m.phase > 1e-3)
+    L = control.tf(n, d)
+    gains, phases, _, _, crossovers, _ = control.stability_margins(L, returnall=True)
+    above = [x for x in gains if x > 1.0 and math.isfinite(x)]
+    assert m.gain[1] == pytest.approx(min(above, default=math.inf), rel=1e-6)  # both roots of order 12
+    lag = np.deg2rad(np.array(phases)) % (2.0 * np.pi)
+    assert m.phase == pytest.approx(np.min(np.minimum(lag, 2.0 * np.pi - lag), initial=math.inf), abs=1e-6)
+    if len(n) < len(d) or abs(n[0]) < abs(d[0]):
+        assert m.delay == pytest.approx(np.min(lag / crossovers, initial=math.inf), rel=1e-6)
+    z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
+    dense = 2.0 / np.max(np.abs((1.0 - z) / (1.0 + z)))
+    assert m.disk <= dense * (1.0 + 1e-9)  # exact: no grid finds less
+    assert m.disk == pytest.approx(dense, rel=1e-3)  # 20 001 points, a resonance 1e-3 wide
+
+
+@pytest.mark.parametrize("axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")])
+def test_disk_margin_against_python_control(axis, K, at):
+    n, d = stability.loop(axis, K, 90.0, at=at)
+    alpha, down, turn = control.disk_margins(control.tf(n, d), OMEGA[OMEGA < 1e3])
+    m = hc.margins(axis, K, 90.0, at=at)
+    assert m.disk == pytest.approx(float(alpha), rel=1e-5)  # its grid: 2e-4 in omega, squared, times the curvature
+    assert 20.0 * math.log10((1 + m.disk / 2) / (1 - m.disk / 2)) == pytest.approx(float(down), rel=1e-4)
+    assert 2.0 * math.atan(m.disk / 2) == pytest.approx(math.radians(float(turn)), rel=1e-4)
+
+
+@settings(max_examples=40)
+@given(**LOOPS, turn=st.floats(-1, 1), size=st.floats(0.0, 0.999))
+def test_what_the_margins_allow_is_stable(axis, K, b, th, at, turn, size):
+    m = hc.margins(axis, K, b, at=at, **hand(th))
+    assume(m.stable and 0.01 < m.disk < 1.99)
+    n, d = stability.loop(axis, K, b, at=at, **hand(th))
+    z = size * m.disk / 2 * np.exp(1j * np.pi * turn)
+    factor = (1 + z) / (1 - z)
+    L = factor * np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
+    assert np.min(np.abs(1 + L)) > 0.0
+    both = [np.roots(np.polyadd(n * abs(factor), d)).real.max()]  # a real factor of that size lies in the disk as well
+    assert 1 / m.gain[1] < 1 < m.gain[1]
+    low, high = (1 - m.disk / 2) / (1 + m.disk / 2), (1 + m.disk / 2) / (1 - m.disk / 2)
+    if low * 1.001 < abs(factor) < high * 0.999:
+        assert max(both) < 1e-9
+
+
+@given(**{k: v for k, v in LOOPS.items() if k != "at"})
+@settings(max_examples=60)
+def test_gain_margin_at_the_compensator_is_the_gain_limit(axis, K, b, th):
+    limit = hc.gain_limit(axis, b, **hand(th))
+    assume(K < 0.99 * limit)
+    assert hc.margins(axis, K, b, **hand(th)).gain[1] * K == pytest.approx(limit, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "kw", [dict(), dict(impedance=False), dict(Ts=1e-3), dict(Ts=1e-3, delay=5e-4), dict(delay=2e-3)]
+)
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_coupled_stability(axis, kw):
+    limit = hc.gain_limit(axis, 90.0, **kw)
+    for factor in (0.999, 1.001):
+        v = hc.coupled_stability(axis, factor * limit, 90.0, **kw)
+        assert bool(v) == v.verdict == (factor < 1.0)
+        assert v.margin == pytest.approx(1.0 / factor, rel=1e-12)
+        assert 30.0 < v.omega < 80.0 and v.method.endswith("exact") and v.assumptions
+
+
+@settings(max_examples=60)
+@given(**{k: v for k, v in LOOPS.items() if k != "at"}, equation=st.sampled_from([11, 13]))
+def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, th, equation):
+    v = hc.small_gain(axis, K, b, equation=equation, **hand(th))
+    s = 1j * OMEGA
+    T = np.polyval(lti.impedance(b, th), s)
+    i = "xy".index(axis)
+    g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
+    GC, Sh = g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s), w / (s**2 + kd * s + kp)
+    left, right = (np.abs(GC), np.abs((1 + Sh * T) / T)) if equation == 13 else (np.abs(GC * T + Sh * T), 1.0)
+    bad = left >= right
+    assert v.margin <= np.min(right / left) * (1 + 1e-9)
+    inside = np.zeros(len(OMEGA), dtype=bool)
+    for low, high in v.fails:
+        inside |= (OMEGA > low) & (OMEGA < high)
+    edge = np.abs(np.log(left / right)) < 1e-9
+    assert np.all((bad == inside) | edge)
+    assert v.verdict == (not v.fails)
+    if v.verdict:
+        assert lti.stable(axis, K, b, th)  # sufficient
+
+
+def test_the_papers_condition_fails_near_zero_for_every_gain():
+    """C integrates and Th has a spring, so |GC| outgrows the right side (PAPER: not 5C, not any)."""
+    for K in (1e-3, 1.0):
+        v = hc.small_gain("x", K, 50.0)
+        assert not v and v.margin == 0.0 and v.omega == 0.0 and v.fails[0][0] == 0.0
+        assert hc.coupled_stability("x", K, 50.0)
+    assert hc.small_gain("y", 5.0, 90.0, equation=9) and not hc.coupled_stability("y", 5.0, 90.0)
+
+
+def test_equation_9_is_the_distance_from_minus_one():
+    n, d = stability.loop("x", 2.0, 90.0)
+    z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
+    assert hc.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(np.min(np.abs(1 + z)), rel=1e-5)  # grid
+
+
+@given(K=st.floats(0.1, 10.0), b=st.floats(1.0, 500.0), axis=st.sampled_from("xy"))
+def test_transparency_is_equation_7(K, b, axis):
+    found = hc.transparency(axis, K, b, np.array([0.0, 3.0, 40.0]))
+    assert found[0] == pytest.approx(K * b / (10.0 + K * b), rel=1e-12)  # the clay's share of 10/K + b
+    s = 1j * np.array([3.0, 40.0])
+    i = "xy".index(axis)
+    g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
+    H = b * s * (w / (s**2 + kd * s + kp) + g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s))
+    np.testing.assert_allclose(found[1:], H / (1 + H), rtol=1e-10)
+
+
+def test_least_finds_the_ends_and_the_middle():
+    # (x^2 - 2x + 3)/1 at x = omega^2 = 1; 1/(x + 1) at infinity; (x + 1)/(x + 2) at 0
+    assert stability.least(np.array([1.0, -2.0, 3.0]), np.array([1.0])) == pytest.approx((2.0, 1.0))
+    assert stability.least(np.array([1.0]), np.array([1.0, 1.0])) == (0.0, math.inf)
+    assert stability.least(np.array([1.0, 1.0]), np.array([1.0, 2.0])) == (0.5, 0.0)
+
+
+@pytest.mark.parametrize("call,field", [
+    (lambda: hc.margins("z", 1.0, 90.0), "axis"), (lambda: hc.margins("x", -1.0, 90.0), "K"),
+    (lambda: hc.nyquist("x", 1.0, 90.0, at="motor"), "at"),
+    (lambda: hc.small_gain("x", 1.0, 90.0, equation=8), "equation"),
+    (lambda: hc.coupled_stability("x", 0.0, 90.0), "K"), (lambda: hc.Compensator(-1.0), "compensator.pole"),
+])  # fmt: skip
+def test_bad_input_is_refused(call, field):
+    with pytest.raises(ParameterError) as e:
+        call()
+    assert e.value.field == field
