@@ -55,6 +55,40 @@ class Run:
 
 
 @dataclass(frozen=True)
+class Reproduce:
+    """Run the whole paper: every figure and number beside ours, on one page.
+
+    The exit status is 1 if a number that should agree does not.
+    """
+
+    out: Path = Path("out/paper")
+    """Folder for report.html (self-contained), report.md, ledger.json and figures/."""
+    quick: bool = False
+    """Leave out the map of Sh over the workspace."""
+    page: Path | None = None
+    """Also write the ledger alone, as Markdown, to this file."""
+
+    def __call__(self) -> int:
+        writable(self.out)
+        from tqdm import tqdm
+
+        from . import report
+
+        with tqdm(total=0, delay=2.0, bar_format="{elapsed} {desc}", disable=None, leave=False) as bar:
+            rows = report.reproduce(self.out, self.quick, lambda name: bar.set_description_str(name))
+        if self.page:
+            with atomic(self.page) as f:
+                f.write(report.paper_page(rows).encode())
+        wrong = [r for r in rows if r.agrees is False]
+        for r in wrong:
+            print(f"does not agree: {r.what} ({r.where}): {report.number(r.ours, r.unit)}, {report.error(r)}")
+        agree = sum(r.agrees is True for r in rows)
+        print(f"{agree} of {agree + len(wrong)} numbers agree; {len(rows) - agree - len(wrong)} more are explained")
+        print(f"report: {(self.out / 'report.html').resolve()}")
+        return 1 if wrong else 0
+
+
+@dataclass(frozen=True)
 class Version:
     """Print the versions of hapticclay and of what it runs on."""
 
@@ -94,6 +128,7 @@ class Bench:
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Version, tyro.conf.subcommand("version")]
 )
@@ -231,7 +266,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "bench", "version"))
+        choice("command", words[0], ("run", "reproduce", "bench", "version"))
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 

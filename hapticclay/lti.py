@@ -6,6 +6,7 @@ Polynomials in s are NumPy coefficient arrays, highest power first.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,6 +129,59 @@ def impedance(b: float, operator: Operator | None = None) -> np.ndarray:
     """Te + Th as coefficients, shape (3,): clay b [N.s/m] and the operator's arm (Eqs. 4, 19)."""
     b, th = number("b", b, 0.0, unit="N.s/m"), operator or NO_HAND
     return np.array([th.mass, th.damper + b, th.spring])
+
+
+def state_space(axis: str, K: float, b: float, operator: Operator | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The loop at the nominal pose as z' = A z + B uh, z = (p, p', delta, delta', y, y'), y = G delta.
+
+    The servo's law is that of docs/equations.md, section 3; arguments as `characteristic`.
+
+    Returns:
+        A, shape (6, 6), and B, shape (6,).
+    """
+    i = AXES.index(choice("axis", axis, AXES))
+    th, g, s = operator or NO_HAND, G[i], S[i]
+    own = 1.0 + s.gain * th.mass  # p'' appears in the hand's force too
+    rest = np.array([-th.spring, -th.damper - b, 0.0, 0.0, 0.0, 0.0])  # force without the hand's mass
+    servo = np.array([-s.stiffness, -s.damping, g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping])
+    A, B = np.zeros((6, 6)), np.zeros(6)
+    A[0, 1] = A[2, 3] = A[4, 5] = 1.0
+    A[1], B[1] = (servo + s.gain * rest) / own, s.gain / own
+    A[3], B[3] = K * (rest - th.mass * A[1]), K * (1.0 - th.mass * B[1])
+    A[3, 3] -= C_POLE
+    A[5, 2], A[5, 4], A[5, 5] = g.gain, -g.stiffness, -g.damping
+    return A, B
+
+
+def crossing_times(
+    axis: str, K: float, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
+) -> list[float]:
+    """When a handle that starts at rest under a constant force passes each border, without a hand: exact.
+
+    Between borders the loop is linear: matrix exponentials, the times by bisection to rounding (Brent 1973).
+
+    Args:
+        axis: "x" or "y". K: gain. uh: force [N]. edges: borders, ascending [m]. b: clay before each [N.s/m].
+        t_max: where to stop looking [s].
+    """
+    from scipy.linalg import expm
+    from scipy.optimize import brentq
+
+    z, t, out = np.zeros(7), 0.0, []
+    z[6] = uh
+    for edge, here in zip(edges, b, strict=True):
+        A = np.zeros((7, 7))
+        A[:6, :6], A[:6, 6] = state_space(axis, K, here)
+        step = 1e-3
+        E = expm(A * step)
+        while (ahead := E @ z)[0] < edge and t < t_max:
+            z, t = ahead, t + step
+        if t >= t_max:
+            break
+        h = brentq(lambda h, A=A, z=z, edge=edge: float((expm(A * h) @ z)[0]) - edge, 0.0, step, xtol=1e-15)
+        z, t = expm(A * h) @ z, t + h
+        out.append(t)
+    return out
 
 
 def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:

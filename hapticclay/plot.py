@@ -149,6 +149,21 @@ def force_maneuver(records: Sequence[Record], axis: str = "x", against: str = "t
     return figure
 
 
+def readings(records: dict[str, Record], axis: str = "x") -> Figure:
+    """Velocity against position of several runs of one path, by name."""
+    i = AXES.index(axis)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(6.4, 3.6))
+        ax = figure.add_subplot()
+        for (name, r), color, style in zip(
+            records.items(), (BLACK, GREEN, BLUE, ORANGE), ("-", "--", "-", "-."), strict=False
+        ):
+            ax.plot(100.0 * r.p[:, i], 1000.0 * r.v[:, i], color=color, ls=style, label=name)
+        ax.set(xlabel=f"position {axis} [cm]", ylabel=f"velocity v$_{axis}$ [mm/s]")
+        figure.legend(loc="outside upper center", ncols=5)
+    return figure
+
+
 def figures(record: Record) -> dict[str, Figure]:
     """The figures that say what there is to say of a run, by name of the file."""
     s = record.scenario

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import ledger
-from .ledger import STATUSES, Row, Runs
+from .entries import STATUSES, Row, Runs
 from .params import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from .record import atomic, versions
 
@@ -73,7 +73,8 @@ PICTURES = (
             "The clay's share is b inside and nothing outside; the operator feels the compensator's 10/K on top.",
             lambda r: _plot("force_velocity", r.constant())),
     Picture("fig09", "Fig. 9: path of the variable cut",
-            "Clay of 50 N·s/m up to 5 cm on each axis, 100 beyond, growing in x.", lambda r: _plot("path", r.variable())),
+            "Clay of 50 N·s/m up to 5 cm on each axis, 100 beyond, growing in x.",
+            lambda r: _plot("path", r.variable())),
     Picture("fig10", "Fig. 10: velocity of the variable cut",
             "Constant up to 5 cm, an abrupt drop, then slowly less in x as the clay grows by 30 N·s/m a second.",
             lambda r: _plot("velocity_position", r.variable(), "xy")),
@@ -84,7 +85,7 @@ PICTURES = (
             "The paper prints the growth in three ways; each would have given this speed in x.",
             lambda r: _plot("readings", {x: r.variable(x) for x in ("none", "0.15/s", "30/s", "0.15/sample")})),
     Picture("fig11a", "Fig. 11: force during a maneuver, against time",
-            "Below the limit the hand meets its own muscle's force; far above it the motors swing against their limits.",
+            "Below the limit the hand feels its own muscle; far above it the motors swing against their limits.",
             lambda r: _plot("force_maneuver", [r.stability(K) for K in GAINS_FIG11])),
     Picture("fig11b", "Fig. 11: force during a maneuver, against position", "The same runs.",
             lambda r: _plot("force_maneuver", [r.stability(K) for K in GAINS_FIG11], "x", "position")),

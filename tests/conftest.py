@@ -2,6 +2,7 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))  # oracles
@@ -10,3 +11,19 @@ os.environ.setdefault("MPLBACKEND", "agg")
 # deterministic in CI, no deadline: run times on shared machines mean nothing
 settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)
 settings.load_profile("default")
+
+
+@pytest.fixture(scope="session")
+def paper_runs():
+    """The runs behind the ledger, made once."""
+    from hapticclay.entries import Runs
+
+    return Runs()
+
+
+@pytest.fixture(scope="session")
+def ledger_rows(paper_runs):
+    """The rows of the ledger."""
+    from hapticclay import ledger
+
+    return ledger.rows(paper_runs)

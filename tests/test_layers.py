@@ -20,14 +20,17 @@ LEVELS = [
     {"leapfrog", "rungekutta"},
     {"sampled"},
     {"sim"},
-    {"experiments"},
-    {"plot"},
-    {"plot_stability"},
+    {"experiments", "identify"},
+    {"plot", "entries"},
+    {"plot_stability", "plot_identify", "paper_model", "paper_cuts"},
+    {"ledger"},
+    {"report"},
     {"cli"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled"},
+    "jinja2": {"report"},
+    "mujoco": {"paper_model", "scene", "run", "leapfrog", "rungekutta", "sampled"},
     "matplotlib": {"plot", "plot_stability"},
     "tyro": {"cli"},
     "tqdm": {"cli"},

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from oracles import Linear
+from oracles import Linear, piecewise_linear
 
 from hapticclay import lti
 from hapticclay.errors import ParameterError
@@ -97,3 +97,20 @@ def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()
     assert e.value.field == field
+
+
+@pytest.mark.parametrize("axis", "xy")
+@pytest.mark.parametrize("th", [None, Operator(), Operator(5.0, 0.0, 100.0)])
+def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
+    A, B = lti.state_space(axis, 0.7, 90.0, th)
+    poles = np.sort_complex(lti.closed_loop_poles(axis, 0.7, 90.0, th))
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5)  # a double pole near 0
+    numbers = (th.mass, th.damper, th.spring) if th else (0.0, 0.0, 0.0)
+    other = Linear("xy".index(axis), 90.0, 0.7, 1.3, numbers).A
+    np.testing.assert_allclose(np.column_stack((A, 1.3 * B)), other[:6], rtol=1e-13, atol=1e-12)
+
+
+def test_crossing_times_beside_the_oracle():
+    exact, _ = piecewise_linear((0.05, 0.15, 0.2), (0.0, 90.0, 0.0), 1.0, 1.0)
+    assert lti.crossing_times("x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)) == pytest.approx(exact, abs=1e-12)
+    assert lti.crossing_times("x", 1.0, -1.0, (0.05,), (0.0,), t_max=0.5) == []

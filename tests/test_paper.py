@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticclay import params
+from hapticclay import entries, params, report
 
 SOURCE = Path(params.__file__)
 
@@ -27,11 +27,37 @@ def test_operator_clay_arm_and_sampling():
     th = params.Operator()
     assert (th.mass, th.damper, th.spring) == (0.25, 2.0, 6.0)
     assert (params.L1, params.L2, params.TS) == (0.24, 0.35, 0.36e-3)
+    assert (params.B_VARIABLE, params.BORDER, params.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
+    assert (params.GROWTH, params.GROWTH_EQ25, params.B_STABILITY) == (30.0, 0.15, 100.0)
+    assert (params.GAINS_FIG11, params.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
     assert (params.C_POLE, params.B_CONSTANT, params.CLAY_X, params.PATH_LENGTH) == (10.0, 90.0, (0.05, 0.15), 0.20)
 
 
 def test_path_is_centred_on_the_nominal_pose():
     assert params.ORIGIN == pytest.approx((params.L2 - params.PATH_LENGTH / 2, params.L1), abs=1e-16)
+
+
+def test_docs_paper_is_what_the_ledger_gives(ledger_rows):
+    page = Path(params.__file__).parents[1] / "docs" / "paper.md"
+    assert page.read_text() == report.paper_page(ledger_rows), (
+        "make docs/paper.md anew: hapticclay reproduce --page docs/paper.md"
+    )
+
+
+def test_every_row_that_should_agree_does(ledger_rows):
+    wrong = [(r.what, r.error) for r in ledger_rows if r.agrees is False]
+    assert not wrong
+    assert sum(r.agrees is True for r in ledger_rows) > 40
+    assert {r.status for r in ledger_rows} == set(entries.STATUSES)
+
+
+@pytest.mark.parametrize("words", [  # each disagreement of the paper with itself has a row with evidence
+    "90 N-s/cm", "10 N-s/cm", "approach zero", "100 + 30t", "100 + 0.15t", "18-20 cm", "should not exceed 5C",
+    "a steady cut", "25", "force in x, position y",
+])  # fmt: skip
+def test_each_contradiction_has_its_row(words, ledger_rows):
+    mine = [r for r in ledger_rows if words in r.printed]
+    assert mine and all(len(r.reason) > 15 for r in mine)
 
 
 @pytest.mark.parametrize("number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"])

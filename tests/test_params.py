@@ -73,6 +73,6 @@ def test_choice_lists_what_would_have_been_valid(name):
 
 
 def test_scenarios_are_frozen_and_listed():
-    assert set(hc.SCENARIOS) == {"constant", "free"}
+    assert set(hc.SCENARIOS) == {"constant", "variable", "stability", "free"}
     with pytest.raises(dataclasses.FrozenInstanceError):
         hc.free().dt = 1.0  # type: ignore[misc]
