@@ -15,8 +15,9 @@ BIN := .venv/bin
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@
 
-demo: .venv/run.done  ## set up, run the constant cut, say where the plots are
+demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say where plots and report are
 	$(BIN)/hapticclay run constant --out out/demo
+	$(BIN)/hapticclay reproduce --quick --out out/demo/paper
 	@echo "plots: $(CURDIR)/out/demo/velocity.png $(CURDIR)/out/demo/force.png"
 
 test: .venv/dev.done  ## set up and run all tests

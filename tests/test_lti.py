@@ -112,5 +112,7 @@ def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
 
 def test_crossing_times_beside_the_oracle():
     exact, _ = piecewise_linear((0.05, 0.15, 0.2), (0.0, 90.0, 0.0), 1.0, 1.0)
-    assert lti.crossing_times("x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)) == pytest.approx(exact, abs=1e-12)
+    assert lti.crossing_times("x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)) == pytest.approx(
+        exact, abs=1e-10
+    )  # eleven thousand products
     assert lti.crossing_times("x", 1.0, -1.0, (0.05,), (0.0,), t_max=0.5) == []
