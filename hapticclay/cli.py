@@ -20,6 +20,7 @@ from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_
 from .params import AXES, Scenario
 from .record import Record, atomic, versions
 from .sim import simulate
+from .sweep_command import SweepCommand
 
 Experiment = (
     Annotated[Scenario, tyro.conf.subcommand("constant", constructor=constant_cut)]
@@ -129,6 +130,7 @@ class Bench:
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Version, tyro.conf.subcommand("version")]
 )
@@ -266,7 +268,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "reproduce", "bench", "version"))
+        choice("command", words[0], ("run", "reproduce", "sweep", "bench", "version"))
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 
