@@ -32,7 +32,8 @@ class Watch:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop. Under a muscle force or a command that varies, growth counts only above that limit: it may swing as it likes.
+    of its loop. Under a muscle force or a command that varies, growth counts only above that limit: the handle may
+    swing as it is driven.
     """
 
     def __init__(self, scenario: Scenario):
