@@ -11,8 +11,10 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
+from .drift import Drift, drift_map
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free
+from .identify import Identified, Noise, identify
 from .lti import closed_loop_poles, gain_limit
 from .params import Clay, Multisine, Operator, Profile, Scenario
 from .record import Crossing, Outcome, Record
@@ -28,7 +30,10 @@ __all__ = [
     "SCENARIOS",
     "Clay",
     "Crossing",
+    "Drift",
+    "Identified",
     "Multisine",
+    "Noise",
     "Operator",
     "Outcome",
     "ParameterError",
@@ -38,7 +43,9 @@ __all__ = [
     "build",
     "closed_loop_poles",
     "constant_cut",
+    "drift_map",
     "free",
     "gain_limit",
+    "identify",
     "simulate",
 ]

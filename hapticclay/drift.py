@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from . import arm
 from .errors import integer, number
 from .estimate import NAMES, printed
-from .identify import NOMINAL, identify
+from .identify import NOMINAL, identify, mobility
 from .params import AXES, L1, L2
 
 BLOCKS = ("G", "S")
@@ -81,13 +80,6 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     r = np.hypot(x, y)
     inside = (r >= abs(L2 - L1) + MARGIN) & (r <= L1 + L2 - MARGIN)
     return x[inside], y[inside]
-
-
-def mobility(x: float, y: float) -> tuple[float, float]:
-    """Wxx and Wyy of the arm with its handle at world (x, y) [1/kg]."""
-    q1, q2 = arm.inverse(x, y)
-    wxx, _, wyy = arm.mobility(*arm.columns(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2)))
-    return float(wxx), float(wyy)
 
 
 def drift_map(spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None) -> Drift:

@@ -6,7 +6,9 @@ what limits it: docs/identify.md.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +43,13 @@ class Coefficient:
         return self.value / self.printed - 1.0
 
 
+def value(c: Coefficient) -> str:
+    """Fitted value and half its interval, to two figures of the latter: "41.793 +- 0.012"."""
+    half = 0.5 * (c.high - c.low)
+    digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
+    return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"
+
+
 def printed(what: str, axis: str) -> tuple[float, ...]:
     """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19), in the order of NAMES."""
     i = AXES.index(axis)
@@ -71,8 +80,10 @@ def estimate(signals: np.ndarray, n: int, bins: np.ndarray) -> tuple[np.ndarray,
     if len(r) == 1:  # scatter over its periods then
         r, u, y = (x.reshape(-1, n) for x in (r, u, y))
 
+    keep: Any = False
+
     def spectrum(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return csd(a, b, window="boxcar", nperseg=n, noverlap=0, detrend=False)[1][:, bins]
+        return csd(a, b, window="boxcar", nperseg=n, noverlap=0, detrend=keep)[1][:, bins]
 
     ru, ry = spectrum(r, u), spectrum(r, y)
     H = ry.mean(axis=0) / ru.mean(axis=0)

@@ -23,9 +23,9 @@ from .sim import simulate
 
 SCHEMA = "hapticclay-identify-1"
 NOMINAL = (L2, L1)  # world position of the handle where the elbow is square [m]
-BAND = {"G": (0.2, 20.0), "S": (0.2, 20.0), "Th": (0.1, 3.0)}  # [Hz], either side of the corner
+BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz], either side of the corner
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
-AMPLITUDE = {"G": 1e-3, "S": 1e-3, "Th": 1e-2}  # [m]: small, so that the pose stays; Th is the same at every pose
+AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small, so that the pose stays; Th is the same at every pose
 LINES = 40
 
 
@@ -99,6 +99,13 @@ class Identified:
         }
 
 
+def mobility(x: float, y: float) -> tuple[float, float]:
+    """Wxx and Wyy of the arm with its handle at world (x, y) [1/kg]."""
+    q1, q2 = arm.inverse(x, y)
+    wxx, _, wyy = arm.mobility(*arm.columns(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2)))
+    return float(wxx), float(wyy)
+
+
 def measured(record: Record, noise: Noise | None, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Handle position [m] and hand force [N] as the sensors show them, each (n, 2).
 
@@ -143,12 +150,12 @@ def identify(
         shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
         noise: of the sensors; None for none.
         seed: of the phases and of the noise.
-        band: lowest and highest frequency [Hz], to 0.1/dt; None for (0.2, 20), Th (0.1, 3).
+        band: lowest and highest frequency [Hz], to 0.1/dt; None for (0.15, 20), Th (0.08, 3).
         period: of the multisine [s], rounded up to a number of samples that is quick to transform; None for 5, Th 10.
         periods: kept of each run, after one that is discarded.
         realisations: number of runs, each with phases of its own.
         lines: of the multisine, spread over the logarithm of frequency; fewer where the period is too short for them.
-        amplitude: rms of the handle's motion that is aimed at [m]; None for 1e-3, Th 1e-2.
+        amplitude: rms of the handle's motion that is aimed at [m]; None for 2e-3, Th 1e-2.
         control: "continuous", or "sampled" (slow, about real time). dt: physics and control step [s].
         progress: called after each run with (runs made, runs in all).
 
@@ -173,7 +180,8 @@ def identify(
         length=None,
     )  # fmt: skip
     n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
-    rms = size * S[i].stiffness / S[i].gain if what == "S" else size
+    gain = S[i].gain if shaping or what != "S" else mobility(*base.origin)[i]
+    rms = size * S[i].stiffness / gain if what == "S" else size
     wave = _multisine((rms, 0.0) if i == 0 else (0.0, rms), band or BAND[what], n * base.dt, lines, 0.1 / base.dt)
     base = replace(base, t_max=(1 + periods) * wave.period)
     phases, noises = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1).tolist()

@@ -10,17 +10,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MultipleLocator, NullFormatter
 
-from .drift import BLOCKS, Drift, mobility
-from .estimate import printed, response
-from .identify import NOMINAL, Identified
-from .params import AXES, L1, L2
+from .drift import BLOCKS, Drift
+from .estimate import printed, response, value
+from .identify import NOMINAL, Identified, mobility
+from .params import AXES, L1, L2, ORIGIN, PATH_LENGTH
 from .plot import BLACK, BLUE, ORANGE, STYLE
 
 FIGURES = {"G": "fig4", "S": "fig5", "Th": "fig6"}  # of the paper
 EQUATIONS = {"Gx": "Eq. 15", "Gy": "Eq. 16", "Sx": "Eq. 17", "Sy": "Eq. 18", "Thx": "Eq. 19", "Thy": "Eq. 19"}
 SYMBOLS = {"G": "G", "S": "S", "Th": "T$_h$"}
-UNITS = {"G": "dB re 1 m/m", "S": "dB re 1 m/N", "Th": "dB re 1 N/m"}
+SCALES = {"G": "dB re 1 m/m", "S": "dB re 1 m/N", "Th": "dB re 1 N/m"}
+GREY = "#888888"
 POSES = 81  # points along each side on which the contours of W are drawn
 
 
@@ -38,7 +41,7 @@ def bode(results: Sequence[Identified]) -> Figure:
         for column, result in zip(axes.T, results, strict=True):
             _column(column, result)
         what = results[0].what
-        for ax, label in zip(axes[:, 0], (f"magnitude [{UNITS[what]}]", "phase [deg]", "coherence"), strict=True):
+        for ax, label in zip(axes[:, 0], (f"magnitude [{SCALES[what]}]", "phase [deg]", "coherence"), strict=True):
             ax.set_ylabel(label)
         figure.align_ylabels(axes[:, 0])
         handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -51,33 +54,26 @@ def _column(axes: Sequence[Axes], result: Identified) -> None:
     what, f = result.what, result.frequency
     fine = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
     block = f"{what}{result.axis}"
-    rows = (("printed", ORANGE, "-", response(what, printed(what, result.axis), fine)),)
-    fitted = response(what, result.values, fine)
+    known, fitted = (response(what, x, fine) for x in (printed(what, result.axis), result.values))
     share = result.deviation / np.abs(result.response)
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
-        for label, color, style, H in rows:
-            ax.plot(fine, part(H), color=color, ls=style, lw=2.2, label=f"{label} ({_equations(what)})")
+        ax.plot(fine, part(known), color=ORANGE, lw=2.2, label="printed")
         ax.plot(fine, part(fitted), color=BLACK, ls=":", lw=1.2, label="fitted to the points")
         marks: Any = dict(fmt="o", ms=4.0, mfc="white", mew=1.2, color=BLUE, elinewidth=1.0, zorder=3)
-        ax.errorbar(f, part(result.response), e, label="simulated arm, 95 %", **marks)
+        ax.errorbar(f, part(result.response), e, label="simulated arm, with 95 % bars", **marks)
     coherence.plot(f, result.coherence, "o", ms=3.0, color=BLUE)
     low = min(0.9, float(result.coherence.min()))
     coherence.set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
     coherence.set_xscale("log")
     coherence.set_xlabel("frequency [Hz]")
     coherence.xaxis.set_major_formatter("{x:g}")
-    phase.yaxis.set_major_locator(matplotlib.ticker.MultipleLocator(45.0))
+    coherence.xaxis.set_minor_formatter(NullFormatter())
+    phase.yaxis.set_major_locator(MultipleLocator(45.0))
     magnitude.set_title(f"{SYMBOLS[what]}, {result.axis} axis ({EQUATIONS[block]})", fontsize=10, loc="left")
-    text = "\n".join(
-        f"{c.name} {c.value:.5g} $\\pm$ {0.5 * (c.high - c.low):.1g} {_unit(c.unit)}" for c in result.coefficients
-    )
-    where: Any = dict(x=0.97, y=0.06, ha="right") if what == "Th" else dict(x=0.04, y=0.06, ha="left")
-    magnitude.text(**where, s=text, transform=magnitude.transAxes, va="bottom", fontsize=8, color="#444444")
-
-
-def _equations(what: str) -> str:
-    return {"G": "Eqs. 15, 16", "S": "Eqs. 17, 18", "Th": "Eq. 19"}[what]
+    text = "\n".join(f"{c.name} {value(c)} {_unit(c.unit)}" for c in result.coefficients)
+    where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
+    magnitude.text(0.04, s=text, transform=magnitude.transAxes, fontsize=8, color="#444444", **where)
 
 
 def _unit(unit: str) -> str:
@@ -99,10 +95,11 @@ def workspace(drift: Drift) -> Figure:
         drift: from drift_map. An axis a row; without and with inertia shaping.
     """
     with matplotlib.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(9.0, 5.6))
+        figure = Figure(figsize=(9.4, 5.6))
         axes: Any = figure.subplots(2, 2, sharex=True, sharey=True)
         for i, row in enumerate(axes):
             top = max(float(drift.mobility[:, i].max()), float(drift.coefficients[:, :, 1, i, 0].max()))
+            mesh: Any = None
             for k, ax in enumerate(row):
                 mesh = _cells(ax, drift, drift.coefficients[:, k, BLOCKS.index("S"), i, 0], 1.02 * top)
                 if k == 0:
@@ -111,13 +108,13 @@ def workspace(drift: Drift) -> Figure:
                 title = ("without inertia shaping", "with inertia shaping")[k]
                 ax.set_title(f"gain of S$_{AXES[i]}$, {title}", fontsize=10, loc="left")
             bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
-            bar.set_label("gain [1/kg]")
+            bar.set_label("gain [1/kg] (line: printed)")
             bar.ax.axhline(printed("S", AXES[i])[0], color=ORANGE, lw=2.0)
             row[0].set_ylabel("world y [m]")
         for ax in axes[1]:
             ax.set_xlabel("world x [m]")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        figure.legend(handles, labels, loc="outside upper center", ncols=5)
     return figure
 
 
@@ -138,17 +135,20 @@ def _contours(ax: Axes, i: int, top: float) -> None:
     w = np.full((len(y), len(x)), np.nan)
     for n, m in np.ndindex(w.shape):
         if abs(L2 - L1) < np.hypot(x[m], y[n]) < L1 + L2:
-            w[n, m] = mobility(x[m], y[n])[i]
-    lines = ax.contour(x, y, w, np.arange(0.1, top, 0.2), colors="white", linewidths=1.0)
-    ax.clabel(lines, fmt="%.1f", fontsize=7)
-    ax.plot([], [], color="#999999", lw=1.0, label="mobility W of the bare arm [1/kg]")
+            w[n, m] = mobility(float(x[m]), float(y[n]))[i]
+    lines = ax.contour(x, y, w, np.arange(0.1, top, 0.2), colors=BLACK, linewidths=0.8)
+    lines.set_path_effects([withStroke(linewidth=2.4, foreground="white")])
+    for text in ax.clabel(lines, fmt="%.1f", fontsize=7):
+        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+    ax.plot([], [], color=BLACK, lw=0.8, label="W of the bare arm [1/kg]")
 
 
 def _surroundings(ax: Axes) -> None:
     for n, r in enumerate((L1 + L2, abs(L2 - L1))):
-        ax.add_patch(Arc((0.0, 0.0), 2.0 * r, 2.0 * r, theta1=0.0, theta2=180.0, color=BLACK, lw=1.4))
-        ax.plot([], [], color=BLACK, lw=1.4, label="_" if n else "limits of the reach")
-    ax.plot(0.0, 0.0, "^", color=BLACK, ms=7, clip_on=False, label="shoulder")
+        ax.add_patch(Arc((0.0, 0.0), 2.0 * r, 2.0 * r, theta1=0.0, theta2=180.0, color=GREY, lw=2.0))
+        ax.plot([], [], color=GREY, lw=2.0, label="_" if n else "limits of the reach")
+    ax.plot(0.0, 0.0, "^", color=GREY, ms=7, clip_on=False, label="shoulder")
+    ax.plot((ORIGIN[0], ORIGIN[0] + PATH_LENGTH), (ORIGIN[1], ORIGIN[1]), color=ORANGE, label="default path")
     ax.plot(*NOMINAL, "o", mfc="none", mec=ORANGE, mew=2.0, ms=9, label="nominal pose")
     ax.set_aspect("equal")
     ax.set_xlim(-0.62, 0.62)
