@@ -12,8 +12,10 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 from importlib.metadata import PackageNotFoundError, version
 
 from .design import Design, compare, design_gain, transparency_error
+from .drift import Drift, drift_map
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
+from .identify import Identified, Noise, identify
 from .limits import gain_limit
 from .lti import Compensator, closed_loop_poles
 from .params import Clay, Multisine, Operator, Profile, Scenario
@@ -44,8 +46,11 @@ __all__ = [
     "Compensator",
     "Crossing",
     "Design",
+    "Drift",
+    "Identified",
     "Margins",
     "Multisine",
+    "Noise",
     "Nyquist",
     "Operator",
     "Outcome",
@@ -63,8 +68,10 @@ __all__ = [
     "constant_cut",
     "coupled_stability",
     "design_gain",
+    "drift_map",
     "free",
     "gain_limit",
+    "identify",
     "irregularity",
     "margins",
     "nyquist",

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -127,10 +127,40 @@ class Bench:
         return 0
 
 
+@dataclass(frozen=True)
+class Identify:
+    """Identify G, Sh and Th on the simulated arm: frequency responses, fits, Figs. 4, 5, 6 (half a minute)."""
+
+    out: Path = Path("out/identify")
+    """Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png."""
+    axis: Literal["x", "y", "both"] = "both"
+    """Which axis."""
+    noise: bool = False
+    """Record with noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms."""
+    map: bool = False
+    """Also how G and Sh drift over the workspace, with and without inertia shaping (two minutes more)."""
+    quick: bool = False
+    """Shorter signals, a coarser map."""
+    seed: int = 0
+    """Of the signals' phases and of the noise."""
+    control: Literal["continuous", "sampled"] = "continuous"
+    """Sampled control is slow: some ten minutes, two with --quick."""
+
+    def __call__(self) -> int:
+        from . import identify_command
+
+        writable(self.out)
+        axes = AXES if self.axis == "both" else (self.axis,)
+        identify_command.run(self.out, axes, self.noise, self.map, self.quick, self.seed, self.control)
+        print(f"written to {self.out}")
+        return 0
+
+
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
+    | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Version, tyro.conf.subcommand("version")]
 )
@@ -268,7 +298,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "reproduce", "sweep", "bench", "version"))
+        choice("command", words[0], ("run", "reproduce", "identify", "sweep", "bench", "version"))
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 

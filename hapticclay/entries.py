@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from . import lti
 from .experiments import constant_cut, free, stability_test, variable_cut
@@ -64,9 +65,9 @@ class Runs:
 
     def __init__(self, progress: Callable[[str], None] | None = None):
         self.progress = progress or (lambda name: None)
-        self._kept: dict[str, Record | Identified] = {}
+        self._kept: dict[str, Any] = {}
 
-    def _get(self, name: str, make: Callable[[], Record | Identified]):
+    def _get(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self._kept:
             self.progress(name)
             self._kept[name] = make()
@@ -75,7 +76,7 @@ class Runs:
     def constant(self, **kw) -> Record:
         return self._get(f"constant cut {_words(kw)}", lambda: simulate(constant_cut(**kw)))
 
-    def variable(self, growth: str = "30/s", **kw) -> Record:
+    def variable(self, growth: Any = "30/s", **kw) -> Record:
         return self._get(f"variable cut, growth {growth} {_words(kw)}", lambda: simulate(variable_cut(growth, **kw)))
 
     def stability(self, gain: float, **kw) -> Record:

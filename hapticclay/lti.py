@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,8 +47,8 @@ def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
     return e[:4, :4], e[:4, 4]
 
 
-def steady_speed(K: float, f: float, b: float) -> float:
-    """Speed under a constant hand force f [N] in clay b [N.s/m]: K f/(10 + K b) [m/s].
+def steady_speed(K: float, f: float, b: Any) -> Any:
+    """Speed under a constant hand force f [N] in clay b [N.s/m], a float or an array: K f/(10 + K b) [m/s].
 
     The compensator's damper and the clay carry the force together: f = (10/K + b) v (Eqs. 20, 21).
     """
@@ -178,7 +179,7 @@ def crossing_times(
             z, t = ahead, t + step
         if t >= t_max:
             break
-        h = brentq(lambda h, A=A, z=z, edge=edge: float((expm(A * h) @ z)[0]) - edge, 0.0, step, xtol=1e-15)
+        h: Any = brentq(lambda h, A=A, z=z, edge=edge: float((expm(A * h) @ z)[0]) - edge, 0.0, step, xtol=1e-15)
         z, t = expm(A * h) @ z, t + h
         out.append(t)
     return out

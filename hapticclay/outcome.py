@@ -32,7 +32,8 @@ class Watch:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop. Under a muscle force that varies, growth counts only above that limit: the hand may swing as it likes.
+    of its loop. Under a muscle force or a command that varies, growth counts only above that limit: the handle may
+    swing as it is driven.
     """
 
     def __init__(self, scenario: Scenario):
@@ -190,7 +191,7 @@ class Watch:
         if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
             return LIMITS
         sizes = [x[0] for x in swings]
-        if self.scenario.muscle and not self._above_limit(i):
+        if (self.scenario.muscle or self.scenario.command) and not self._above_limit(i):
             return ""
         if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
             return ""

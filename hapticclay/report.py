@@ -40,7 +40,7 @@ def _plot(name: str, *args: Any, **kw: Any) -> Any:
 def _response(runs: Runs, what: str) -> Any:
     from . import plot_identify
 
-    return plot_identify.responses([runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")])
+    return plot_identify.bode([runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")])
 
 
 def _theory(name: str, *args: Any, **kw: Any) -> Any:
@@ -51,9 +51,9 @@ def _theory(name: str, *args: Any, **kw: Any) -> Any:
 
 def _map(runs: Runs) -> Any:
     from . import plot_identify
-    from .identify import drift_map
+    from .drift import drift_map
 
-    return plot_identify.map_figure(drift_map())
+    return plot_identify.workspace(drift_map())
 
 
 PICTURES = (

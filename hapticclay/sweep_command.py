@@ -57,7 +57,13 @@ class SweepCommand:
         left = sum(min(plan.chunk, len(plan) - n * plan.chunk) for n in sweep.missing(plan, self.out))
         try:
             with tqdm(total=len(plan), initial=len(plan) - left, unit="run", desc=plan.experiment, disable=None) as bar:
-                sweep.run(plan, self.out, workers=self.workers, scheduler=self.scheduler, progress=bar.update)
+                sweep.run(
+                    plan,
+                    self.out,
+                    workers=self.workers,
+                    scheduler=self.scheduler,
+                    progress=lambda n: bar.update(n) and None,
+                )
         except KeyboardInterrupt:
             here = len(plan) - sum(
                 min(plan.chunk, len(plan) - n * plan.chunk) for n in sweep.missing(plan, self.out)

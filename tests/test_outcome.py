@@ -153,3 +153,12 @@ def test_no_parameters_make_it_raise_or_record_nan(K, Ky, b, dt):
     r = hc.simulate(hc.constant_cut(b=b, gain=(K, Ky), force=(3.0, 1.0), t_max=0.5, dt=dt))
     check_finite(r)
     assert r.outcome.code in CODES
+
+
+def test_a_command_may_beat_as_it_likes():
+    """Two close lines grow from next to nothing, swing by swing, and shrink again: no instability at K = 0."""
+    command = hc.Multisine(rms=(1e-3, 0.0), low=4.9, high=5.1, period=10.0, lines=2, seed=0)
+    s = dataclasses.replace(
+        hc.free(force=(0.0, 0.0), t_max=3.0), gain=(0.0, 0.0), length=None, command=command, origin=(0.35, 0.24)
+    )
+    assert hc.simulate(s).outcome.code == "time limit"
