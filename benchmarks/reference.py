@@ -1,7 +1,7 @@
 """The reference solution of any scenario, and a verdict on it by its own means.
 
 Nothing of how hapticclay steps, controls or judges is used: the arm is that of tests/oracles.py in relative joint
-angles, with the printed numbers typed again; time is SciPy's (DOP853, or Radau where clay or hand are stiff); borders
+angles, with the printed numbers typed again; time is SciPy's (DOP853, or LSODA where the clay is stiff); borders
 are found on the dense solution, in both directions. Torques are clipped, and the hand's mass answers to what is left.
 
 On a border that both sides push the handle onto, a solution chatters ever faster. Bounces lower than BOUNCE are
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853, Radau, solve_ivp
+from scipy.integrate import DOP853, LSODA, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -37,8 +37,8 @@ STILL, WHILE = 1e-5, 1.0  # [m/s], [s] stalled is slower than this for so long; 
 BOUNCE = 1e-10  # [m] height of a bounce on a border below which it is sliding
 GROWTH = math.log(1e4)  # an excitation that the linear loop would have made so much larger is an instability
 SATURATED = 0.1  # share of the last WHILE in the torque limits from which an oscillation is bounded by them
-STIFF = 3e3  # [1/s] rate from which Radau is used
-RTOL = {DOP853: 1e-10, Radau: 1e-8}
+STIFF = 3e3  # [1/s] rate from which LSODA is used
+RTOL = {DOP853: 1e-10, LSODA: 1e-10}
 ATOL = 1e-13
 
 
@@ -245,7 +245,9 @@ class Run:
         self.out = Solution()
         self.p: list[np.ndarray] = []
         self.trace: list[tuple[float, float, bool, float, float]] = []  # t, speed, motor in its limit, v
-        self.sum, self.judged = 0.0, 0.0
+        self.sum = self.worst = 0.0  # growth of an excitation since it last began to grow, and at most [1]
+        self.judged = self.looked = 0.0
+        self.sigma, self.where = 0.0, None
         self.spacing = max(0.02, s.t_max / 500)
         self.slide: tuple[int, int] | None = None  # coordinate, its region below the border
 
@@ -276,7 +278,7 @@ class Run:
     def solver(self, t: float, z: np.ndarray):
         low, high = self.laws(t)
         stiff = (max(*low(t), *high(t)) + self.loop.d) * 0.93 > STIFF
-        kind = Radau if stiff else DOP853
+        kind = LSODA if stiff else DOP853
         return kind(self.rhs(t), t, z, self.s.t_max, rtol=RTOL[kind], atol=ATOL, max_step=max(self.s.t_max / 50, 0.05))
 
     def events(self, z, t, low, high) -> list[float]:
@@ -375,22 +377,19 @@ class Run:
 
     def verdict(self, t: float, z, b) -> bool:
         """Adds up the growth of the linear loop; True if it is unstable and the run is to end there."""
-        if t - self.judged < self.spacing:
-            return False
-        sigma = self.loop.growth(z, b)
-        self.out.sigma = max(self.out.sigma, sigma)
-        self.sum = max(0.0, self.sum + sigma * (t - self.judged))
-        self.worst = max(getattr(self, "worst", 0.0), self.sum)
+        where = (*self.map.place, self.slide)
+        if t - self.looked >= self.spacing or where != self.where:
+            self.sigma, self.looked, self.where = self.loop.growth(z, b), t, where
+            self.out.sigma = max(self.out.sigma, self.sigma)
+        self.sum = max(0.0, self.sum + self.sigma * (t - self.judged))
+        self.worst = max(self.worst, self.sum)
         self.judged = t
         return self.s.stop and self.worst > GROWTH
 
     def finish(self, code: str, t: float) -> Solution:
         out = self.out
         out.end, out.p = t, np.array(self.p).reshape(-1, 2)
-        if out.sigma == -math.inf:
-            z, b = self.loop.start(), self.map.law(0.0)(0.0)
-            out.sigma = self.loop.growth(z, b)
-        out.code = judged(code, np.array(self.trace, float), getattr(self, "worst", 0.0) > GROWTH)
+        out.code = judged(code, np.array(self.trace, float), self.worst > GROWTH)
         return out
 
 
@@ -501,8 +500,8 @@ class SampledRun:
                 mark.terminal = abs(p[i] - e) > 1e-12
                 marks.append(mark)
             r = solve_ivp(
-                lambda t, z: self.arm(z, tau, b, uh)[0], (t, span), z, "Radau" if stiff else "DOP853",
-                rtol=1e-8 if stiff else 1e-11, atol=1e-14, events=marks or None,
+                lambda t, z: self.arm(z, tau, b, uh)[0], (t, span), z, "LSODA" if stiff else "DOP853",
+                rtol=1e-10 if stiff else 1e-11, atol=1e-14, events=marks or None,
             )  # fmt: skip
             t, z = r.t[-1], r.y[:, -1]
             if self.s.length is not None and self.loop.kinematics(*z)[1][0] >= self.s.length - 1e-12:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from dataclasses import replace
 
 import numpy as np
 
 from . import lti
-from .params import AXES, Scenario
+from .params import AXES, Profile, Scenario
 from .record import Outcome
 
 LIMITS = "oscillation against the torque limits"
@@ -32,7 +33,8 @@ class Watch:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop. Under a muscle force that varies, growth counts only above that limit: the hand may swing as it likes.
+    of its loop in some clay that it has been in. Under a muscle force that varies, growth counts only above that limit:
+    the hand may swing as it likes.
     """
 
     def __init__(self, scenario: Scenario):
@@ -42,6 +44,7 @@ class Watch:
         self.hits = [0, 0]  # samples since then with a motor in its limit
         self.since = [0, 0]  # samples since then
         self.seen = 0  # samples
+        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]  # where the handle has been [m]
         self.moved = self.unbound = -1  # last sample with the handle faster than STILL; with no motor in its limit
         self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
         self.often = 0  # samples with a motor in its limit
@@ -66,6 +69,10 @@ class Watch:
         if good and not (np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD):
             bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
             good = int(bad.argmax()) if bad.any() else good
+        if good:
+            for i in (0, 1):
+                self.least[i] = min(self.least[i], float(rows[2 + i, :good].min()))
+                self.most[i] = max(self.most[i], float(rows[2 + i, :good].max()))
         found = self._unstable(rows[:, :good])
         if found is not None:
             n, axis, cause = found
@@ -201,19 +208,24 @@ class Watch:
     def _blame(self, axes: list[int]) -> str:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
-    def _limit(self, i: int) -> tuple[float, float]:
-        """The clay and the gain limit of the linear loop of axis i at the nominal pose."""
-        clay = self.scenario.clay
-        values = getattr(clay, AXES[i]).values if clay else (0.0,)
+    def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
+        """Of these values of clay, that with the least gain limit of the linear loop of axis i, and this limit."""
         return min(((b, lti.gain_limit(AXES[i], b, self.scenario.operator)) for b in values), key=lambda x: x[1])
 
+    def _profile(self, i: int) -> Profile:
+        clay = self.scenario.clay
+        return getattr(clay, AXES[i]) if clay else Profile((), (0.0,))
+
     def _above_limit(self, i: int) -> bool:
-        return self.scenario.gain[i] > self._limit(i)[1]
+        profile = self._profile(i)
+        k = AXES.index(profile.along)
+        first, last = (bisect.bisect_right(profile.edges, x) for x in (self.least[k], self.most[k]))
+        return self.scenario.gain[i] > self._limit(i, profile.values[first : last + 1])[1]
 
     def _advice(self, axis: str) -> str:
         s = self.scenario
         i = AXES.index(axis)
-        b, limit = self._limit(i)
+        b, limit = self._limit(i, self._profile(i).values)
         if s.gain[i] > limit:
             return (
                 f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "

@@ -70,6 +70,12 @@ def test_out_of_reach(force, word):
     assert np.min(np.abs(np.sin(r.q[:, 1]))) >= outcome.FOLD
 
 
+def test_clay_that_was_never_touched_makes_no_loop_unstable():
+    """K = 1e4 throws the handle into the folded arm in free space, where no gain is too much."""
+    r = hc.simulate(hc.constant_cut(gain=(1e4, 1e4)))
+    assert not r.crossings and r.outcome.code == "singular", r.status
+
+
 @pytest.mark.parametrize("kw", [
     dict(), dict(shaping=True), dict(impedance=True, force=(2.0, 0.0)), dict(gain=(2.5, 0.5)), dict(gain=(1.0, 0.7)),
     dict(torque_limit=(0.05, 0.05)), dict(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0),
