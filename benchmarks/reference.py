@@ -49,8 +49,9 @@ class Solution:
     Attributes:
         code: the verdict: finished, time limit, stalled, saturated, unstable, limit cycle, out of reach, singular.
         end: time of the end [s]. sigma: largest real part of the loop's oscillating poles on the way [1/s].
-        p: handle position [m] at the times asked for that lie before the end, (n, 2). crossings: of borders, (axis, border [m],
-        time [s]). kinetic: largest kinetic energy of the arm [J]. slides: times at which sliding began [s].
+        p: handle position [m] at the times asked for that lie before the end, (n, 2).
+        crossings: of borders, (axis, border [m], time [s]). kinetic: largest kinetic energy of the arm [J].
+        slides: times at which sliding began [s].
     """
 
     code: str = ""
@@ -328,8 +329,9 @@ class Run:
                 found = []
                 for k in hit:
                     g = lambda t, k=k: self.events(dense(t), t, low, high)[k]  # noqa: E731
-                    start = g(before)
-                    found.append((brentq(g, before, t, xtol=1e-15, rtol=1e-15) if start > 0.0 else before, k))
+                    # a run that has just left the border may come back to it within the same step
+                    clear = [u for u in np.linspace(before, t, 17)[:-1] if g(u) > 0.0]
+                    found.append((brentq(g, clear[-1], t, xtol=1e-15, rtol=1e-15) if clear else before, k))
                 when, k = min(found)
                 return when, dense(when), k
             before = t
@@ -409,18 +411,17 @@ def judged(code: str, trace: np.ndarray, unstable: bool) -> str:
 
 
 def _swings_on(last: np.ndarray) -> bool:
-    """Whether a velocity swings to and fro, no less in the second half of the time than in the first."""
+    """Whether the velocity swings to and fro, no less in the second half of the time than in the first."""
     half = 0.5 * (last[0, 0] + last[-1, 0])
-    for i in (3, 4):
-        v = last[:, i] - last[:, i].mean()
-        late = last[:, 0] > half
-        if np.sum(v[1:] * v[:-1] < 0.0) > 10 and v[late].std() > 0.95 * v[~late].std():
-            return True
-    return False
+    v = last[:, 3:] - last[:, 3:].mean(axis=0)
+    late = last[:, 0] > half
+    swings = np.sum(v[1:] * v[:-1] < 0.0, axis=0).max()
+    # both axes together: one may lend its energy to the other
+    return swings > 10 and np.sum(v[late].var(axis=0)) > 0.98 * np.sum(v[~late].var(axis=0))
 
 
 class SampledRun:
-    """The hybrid system: z = (q, q') of the arm between samples; controller states x = (delta, delta', y, y') an axis."""
+    """The hybrid system: z = (q, q') of the arm between samples; controller x = (delta, delta', y, y') an axis."""
 
     def __init__(self, s: Scenario, times: np.ndarray):
         self.s, self.loop, self.map, self.times = s, Loop(s), Map(s), times
@@ -500,7 +501,7 @@ class SampledRun:
                 mark.terminal = abs(p[i] - e) > 1e-12
                 marks.append(mark)
             r = solve_ivp(
-                lambda t, z: self.arm(z, tau, b, uh)[0], (t, span), z, "LSODA" if stiff else "DOP853",
+                lambda t, z, b=b: self.arm(z, tau, b, uh)[0], (t, span), z, "LSODA" if stiff else "DOP853",
                 rtol=1e-10 if stiff else 1e-11, atol=1e-14, events=marks or None,
             )  # fmt: skip
             t, z = r.t[-1], r.y[:, -1]

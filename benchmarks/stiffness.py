@@ -71,9 +71,9 @@ def sections(data: dict[str, Any]) -> list[str]:
         cells.append(line)
     return [
         "## Stiff clay",
-        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. Position error after {T:g} s "
-        "and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an error "
-        "above 1 mm, ten times the energy, or not a number.",
+        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. Position error after "
+        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an "
+        "error above 1 mm, ten times the energy, or not a number.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]  # fmt: skip
 

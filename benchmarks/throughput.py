@@ -86,8 +86,9 @@ def sections(data: dict[str, Any]) -> list[str]:
     head = ["scene", "bare engine [us/step]", "closed loop [us/step]", "ratio", "ratio, loop not inlined"]
     return [
         "## Throughput",
-        "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same model, in "
-        f"turns; medians of {data['rounds']} rounds of {data['steps']} steps. Ratios hold on a noisy machine, microseconds do not.",
+        "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same model, "
+        f"in turns; medians of {data['rounds']} rounds of {data['steps']} steps. Ratios hold on a noisy machine, "
+        "microseconds do not.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]  # fmt: skip
 

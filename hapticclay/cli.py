@@ -66,7 +66,7 @@ MARKERS = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.con
 
 @dataclass(frozen=True)
 class Bench:
-    """Error against run time beside peers, stiff and extreme scenes, throughput: diagrams, one page, the figures as JSON.
+    """Error against run time beside peers, stiff and extreme scenes, throughput: diagrams, a page, the figures as JSON.
 
     Needs a checkout (the benchmarks are not installed); a peer whose package is missing is listed as left out.
     """

@@ -20,6 +20,9 @@ GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is uns
 STEP = 2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
 SWINGS = 6  # consecutive swings that a verdict of growth needs
 SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
+TRANSFER = (
+    3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
+)
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
@@ -34,7 +37,7 @@ class Watch:
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
     of its loop in some clay that it has been in. Under a muscle force that varies, growth counts only above that limit:
-    the hand may swing as it likes.
+    the hand may swing as it likes. Below it, the axis must outgrow what the other may have lent it.
     """
 
     def __init__(self, scenario: Scenario):
@@ -51,6 +54,7 @@ class Watch:
         self.onset: Outcome | None = None  # of an instability through which the run went on
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
+        self.largest = [0.0, 0.0]  # swing so far [m/s]
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
@@ -187,6 +191,7 @@ class Watch:
         if size < (0.8 if saturated else 1.0) * last:
             self.swings[i] = []
         self.swings[i].append((size, saturated, span))
+        self.largest[i] = max(self.largest[i], size)
         del self.swings[i][:-MEMORY]
 
     def _verdict(self, i: int) -> str:
@@ -195,15 +200,16 @@ class Watch:
             return ""
         cycle = swings[-CYCLE:]
         if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
-            return LIMITS
+            if cycle[-1][0] >= self.largest[1 - i] or self._above_limit(i):
+                return LIMITS
         sizes = [x[0] for x in swings]
-        if self.scenario.muscle and not self._above_limit(i):
-            return ""
         if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
             return ""
-        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) > GROWTH:
-            return "growing oscillation"
-        return ""
+        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) <= GROWTH:
+            return ""
+        if (self.scenario.muscle or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
+            return ""
+        return "growing oscillation"
 
     def _blame(self, axes: list[int]) -> str:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
