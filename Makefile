@@ -28,9 +28,7 @@ check: .venv/dev.done  ## lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 
-bench: .venv/dev.done  ## speed against a bare engine loop; stiff clay; error against run time
-	$(BIN)/python benchmarks/throughput.py
-	$(BIN)/python benchmarks/stiffness.py
+bench: .venv/dev.done  ## error against run time, stiff and extreme scenes, throughput: one page in out/bench
 	$(BIN)/hapticclay bench --quick
 
 build: .venv/dev.done  ## wheel and sdist into dist/

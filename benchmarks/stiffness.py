@@ -2,14 +2,13 @@
 
     python benchmarks/stiffness.py [--dt 3.6e-4] [--out DIR]
 
-The reference is the arm in joint space under Radau. Writes stiffness.md and stiffness.json; every figure comes from
-the runs.
+The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks/bench.py makes the
+page.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -21,10 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import mujoco_plain, ours  # noqa: E402
 from problems import EDGES, PROBLEMS, nonlinear_pieces  # noqa: E402
 from tabulate import tabulate  # noqa: E402
-from work_precision import machine, number  # noqa: E402
+from work_precision import number, write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import record  # noqa: E402
 from hapticclay.params import S  # noqa: E402
 from hapticclay.scene import warnings_caught  # noqa: E402
 
@@ -59,8 +57,9 @@ def row(b: float, dt: float) -> dict[str, Any]:
         del PROBLEMS[name]
 
 
-def page(rows: list[dict[str, Any]], dt: float) -> str:
-    """The Markdown page."""
+def sections(data: dict[str, Any]) -> list[str]:
+    """The paragraphs of the page."""
+    rows = data["rows"]
     labels = [k for k in rows[0] if isinstance(rows[0][k], dict)]
     head = ["b [N.s/m]", "b dt/Lambda"] + [f"{k}: {x}" for k in labels for x in ("error [m]", "energy")]
     cells = []
@@ -70,28 +69,18 @@ def page(rows: list[dict[str, Any]], dt: float) -> str:
             x = r[k]
             line += ["broken", "broken"] if x["broken"] else [number(x["error"]), format(x["energy"], ".3f")]
         cells.append(line)
-    return "\n\n".join(
-        [
-            "# Stiff clay",
-            f"The handle runs into clay of damping b at 0.1 m/s, in steps of {dt:g} s. Position error after {T:g} s "
-            "and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an error "
-            "above 1 mm, ten times the energy, or not a number. Made by `benchmarks/stiffness.py`; do not edit.",
-            tabulate(cells, head, tablefmt="github", disable_numparse=True),
-            "## Machine",
-            "\n".join(f"- {x}" for x in machine()),
-        ]
-    ) + "\n"  # fmt: skip
+    return [
+        "## Stiff clay",
+        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. Position error after "
+        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an "
+        "error above 1 mm, ten times the energy, or not a number.",
+        tabulate(cells, head, tablefmt="github", disable_numparse=True),
+    ]  # fmt: skip
 
 
-def main(out: Path, dt: float = 3.6e-4, sweep: tuple[float, ...] = SWEEP) -> list[dict[str, Any]]:
-    """Measures, writes, prints; returns the rows."""
-    rows = [row(b, dt) for b in sweep]
-    with record.atomic(out / "stiffness.json") as f:
-        f.write((json.dumps({"schema": "hapticclay-stiffness-1", "dt": dt, "rows": rows}, indent=1) + "\n").encode())
-    with record.atomic(out / "stiffness.md") as f:
-        f.write(page(rows, dt).encode())
-    print(page(rows, dt))
-    return rows
+def main(out: Path = Path("out/bench"), quick: bool = False, dt: float = 3.6e-4) -> dict[str, Any]:
+    """Measures, writes the data; returns it."""
+    return write(out, "stiffness", {"dt": dt, "rows": [row(b, dt) for b in (SWEEP[1::3] if quick else SWEEP)]})
 
 
 if __name__ == "__main__":
@@ -99,4 +88,4 @@ if __name__ == "__main__":
     parser.add_argument("--dt", type=float, default=3.6e-4)
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
-    main(args.out, args.dt)
+    print("\n\n".join(sections(main(args.out, dt=args.dt))))

@@ -103,19 +103,19 @@ MARKERS = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.con
 
 @dataclass(frozen=True)
 class Bench:
-    """Error against run time, hapticclay beside its peers: diagrams, a page, the figures as JSON.
+    """Error against run time beside peers, stiff and extreme scenes, throughput: diagrams, a page, the figures as JSON.
 
     Needs a checkout (the benchmarks are not installed); a peer whose package is missing is listed as left out.
     """
 
     out: Path = Path("out/bench")
-    """Folder for work_precision.md, work_precision.json and the diagrams."""
+    """Folder for bench.md, the data and the diagrams."""
     quick: bool = False
-    """One job and three settings a method: half a minute."""
+    """Fewer jobs, settings and scenes: about a minute."""
 
     def __call__(self) -> int:
         folder = Path(__file__).resolve().parents[1] / "benchmarks"
-        if not (folder / "work_precision.py").is_file():
+        if not (folder / "bench.py").is_file():
             raise ParameterError(
                 "benchmarks", str(folder), "not found: run from a checkout, after pip install -e .[bench]"
             )
@@ -123,7 +123,7 @@ class Bench:
         sys.path.insert(0, str(folder))
         import importlib
 
-        importlib.import_module("work_precision").main(self.out, self.quick)
+        importlib.import_module("bench").main(self.out, self.quick)
         return 0
 
 

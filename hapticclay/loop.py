@@ -36,13 +36,14 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
     keep, take = lti.kick(C_POLE, H, L, R)
+    half = None if before and after else max(before, after)  # at start and end the kick is half of one
     return (
         H, after, 0.5 * before,
         *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
         keep, take * scenario.gain[0], take * scenario.gain[1],
         scenario.origin[0], -scenario.origin[1],
         *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
-        *human.kick(scenario.operator, H, L, R),
+        *human.kick(scenario.operator, H, L, R, half),
         1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
     )  # fmt: skip
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from dataclasses import replace
 
 import numpy as np
 
 from . import lti
-from .params import AXES, Scenario
+from .params import AXES, Profile, Scenario
 from .record import Outcome
 
 LIMITS = "oscillation against the torque limits"
@@ -19,6 +20,9 @@ GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is uns
 STEP = 2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
 SWINGS = 6  # consecutive swings that a verdict of growth needs
 SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
+TRANSFER = (
+    3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
+)
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
@@ -32,8 +36,9 @@ class Watch:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
     one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
     its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop. Under a muscle force or a command that varies, growth counts only above that limit: the handle may
-    swing as it is driven.
+    of its loop in some clay that it has been in. Under a muscle force or a command that varies, growth counts only
+    above that limit: the handle may swing as it is driven. Below it, the axis must outgrow what the other may have
+    lent it.
     """
 
     def __init__(self, scenario: Scenario):
@@ -43,12 +48,14 @@ class Watch:
         self.hits = [0, 0]  # samples since then with a motor in its limit
         self.since = [0, 0]  # samples since then
         self.seen = 0  # samples
+        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]  # where the handle has been [m]
         self.moved = self.unbound = -1  # last sample with the handle faster than STILL; with no motor in its limit
         self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
         self.often = 0  # samples with a motor in its limit
         self.onset: Outcome | None = None  # of an instability through which the run went on
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
+        self.largest = [0.0, 0.0]  # swing so far [m/s]
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
@@ -67,6 +74,10 @@ class Watch:
         if good and not (np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD):
             bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
             good = int(bad.argmax()) if bad.any() else good
+        if good:
+            for i in (0, 1):
+                self.least[i] = min(self.least[i], float(rows[2 + i, :good].min()))
+                self.most[i] = max(self.most[i], float(rows[2 + i, :good].max()))
         found = self._unstable(rows[:, :good])
         if found is not None:
             n, axis, cause = found
@@ -181,6 +192,7 @@ class Watch:
         if size < (0.8 if saturated else 1.0) * last:
             self.swings[i] = []
         self.swings[i].append((size, saturated, span))
+        self.largest[i] = max(self.largest[i], size)
         del self.swings[i][:-MEMORY]
 
     def _verdict(self, i: int) -> str:
@@ -189,32 +201,39 @@ class Watch:
             return ""
         cycle = swings[-CYCLE:]
         if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
-            return LIMITS
+            if cycle[-1][0] >= self.largest[1 - i] or self._above_limit(i):
+                return LIMITS
         sizes = [x[0] for x in swings]
-        if (self.scenario.muscle or self.scenario.command) and not self._above_limit(i):
-            return ""
         if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
             return ""
-        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) > GROWTH:
-            return "growing oscillation"
-        return ""
+        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) <= GROWTH:
+            return ""
+        driven = self.scenario.muscle or self.scenario.command
+        if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
+            return ""
+        return "growing oscillation"
 
     def _blame(self, axes: list[int]) -> str:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
-    def _limit(self, i: int) -> tuple[float, float]:
-        """The clay and the gain limit of the linear loop of axis i at the nominal pose."""
-        clay = self.scenario.clay
-        values = getattr(clay, AXES[i]).values if clay else (0.0,)
+    def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
+        """Of these values of clay, that with the least gain limit of the linear loop of axis i, and this limit."""
         return min(((b, lti.gain_limit(AXES[i], b, self.scenario.operator)) for b in values), key=lambda x: x[1])
 
+    def _profile(self, i: int) -> Profile:
+        clay = self.scenario.clay
+        return getattr(clay, AXES[i]) if clay else Profile((), (0.0,))
+
     def _above_limit(self, i: int) -> bool:
-        return self.scenario.gain[i] > self._limit(i)[1]
+        profile = self._profile(i)
+        k = AXES.index(profile.along)
+        first, last = (bisect.bisect_right(profile.edges, x) for x in (self.least[k], self.most[k]))
+        return self.scenario.gain[i] > self._limit(i, profile.values[first : last + 1])[1]
 
     def _advice(self, axis: str) -> str:
         s = self.scenario
         i = AXES.index(axis)
-        b, limit = self._limit(i)
+        b, limit = self._limit(i, self._profile(i).values)
         if s.gain[i] > limit:
             return (
                 f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "

@@ -57,12 +57,16 @@ class SweepCommand:
         left = sum(min(plan.chunk, len(plan) - n * plan.chunk) for n in sweep.missing(plan, self.out))
         try:
             with tqdm(total=len(plan), initial=len(plan) - left, unit="run", desc=plan.experiment, disable=None) as bar:
+
+                def show(n: int) -> None:
+                    bar.update(n)
+
                 sweep.run(
                     plan,
                     self.out,
                     workers=self.workers,
                     scheduler=self.scheduler,
-                    progress=lambda n: bar.update(n) and None,
+                    progress=show,
                 )
         except KeyboardInterrupt:
             here = len(plan) - sum(

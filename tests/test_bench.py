@@ -10,7 +10,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
+import bench
+import extremes
 import problems
+import stiffness
+import throughput
 import work_precision as wp
 
 
@@ -63,13 +67,14 @@ def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):
 
 
 def test_page_says_what_was_measured_and_nothing_else(rows, tmp_path):
-    text = wp.page(rows, ["a peer: not installed"])
+    data = {"machine": wp.machine(), "omissions": ["a peer: not installed"], "rows": rows, "hybrid": []}
+    text = bench.page({"work_precision": data})
     for r in rows:
         cells = (f"| {r['package']} ", f"| {r['method']} ", f"| {r['setting']:g} ", f"| {wp.number(r['crossing'])} ")
         assert any(all(c in line for c in cells) for line in text.splitlines())
     assert "- a peer: not installed" in text and "mujoco 4" in text
     changed = [{**r, "crossing": (r["crossing"] or 0) + 0.123} for r in rows]
-    assert wp.page(changed, []) != text and "1.2e-01" in wp.page(changed, [])
+    assert "1.2e-01" in bench.page({"work_precision": data | {"rows": changed}})
     json.dumps(rows, allow_nan=False)
 
 
@@ -85,50 +90,66 @@ def test_jobs_are_those_of_the_package():
     assert dataclasses.replace(problems.PROBLEMS["default cut"]) == problems.hc.constant_cut()
 
 
-def test_command_writes_page_figures_and_data_and_renews_the_readme(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(wp, "PEERS", ("ours",))
+def test_sampled_control_is_as_late_as_its_hold_and_as_exact_as_the_hybrid_system():
+    found = wp.against_hybrid(True)
+    assert {r["render"] for r in found} == {"held", "implicit"}
+    for r in found:
+        assert r["hybrid"] < 0.05 * r["continuous"]
+    for coarse, fine in zip(found[0::2], found[1::2], strict=True):  # first order in Ts
+        assert coarse["continuous"] / fine["continuous"] == pytest.approx(coarse["Ts"] / fine["Ts"], rel=0.2 * 4)
+
+
+def test_sampled_rows_recommend_nothing(rows):
+    cheap = [{**r, "crossing": 0.0, "wall": 0.0} for r in of(rows, "hapticclay", method="sampled, held")]
+    assert cheap and wp.recommend(rows + cheap) == wp.recommend(rows)
+
+
+def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(wp.measure, "__defaults__", (("ours",),))
+    monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
+    monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
+    monkeypatch.setattr(throughput, "SCENES", {"free space": throughput.SCENES["free space"]})
+    some = [c for c in extremes.cases() if c.name in ("none", "held", "folded") and c.quick][:2]
+    monkeypatch.setattr(extremes, "cases", lambda: some)
     readme = tmp_path / "README.md"
-    readme.write_text(f"before\n{wp.BEGIN}\nold\n{wp.END}\nafter\n")
-    wp.main(tmp_path / "o", True, readme)
+    readme.write_text(f"before\n{bench.BEGIN}\nold\n{bench.END}\nafter\n")
+    bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
-    assert files == ["default_cut.png", "work_precision.json", "work_precision.md"]
-    data = json.loads((tmp_path / "o" / "work_precision.json").read_text())
-    assert {r["method"] for r in data["rows"]} == {"fast", "accurate"}
+    assert files == [
+        "bench.md", "default_cut.png", "extremes.json", "stiffness.json", "throughput.json", "work_precision.json"
+    ]  # fmt: skip
+    data = bench.load(tmp_path / "o")
+    methods = {r["method"] for r in data["work_precision"]["rows"]}
+    assert methods == {"fast", "accurate", "sampled, held", "sampled, implicit"}
     text = readme.read_text()
     assert text.startswith("before") and text.endswith("after\n") and "old" not in text and "hapticclay | fast" in text
+    page = (tmp_path / "o" / "bench.md").read_text()
+    assert page == bench.page(data) and all(c.name in page for c in some)
 
 
 def test_published_page_was_made_from_the_published_data():
     folder = Path(__file__).parents[1] / "docs" / "bench"
-    data = json.loads((folder / "work_precision.json").read_text())
-    page = (folder / "work_precision.md").read_text()
-    assert wp.table_of_settings(wp.recommend(data["rows"])) in page
-    for r in data["rows"]:
-        assert f"| {wp.number(r['crossing'])} " in page
-    readme = (folder.parents[1] / "README.md").read_text()
-    assert wp.table_of_settings(wp.recommend(data["rows"], {"hapticclay", "MuJoCo, plain"})) in readme
+    data = bench.load(folder)
+    assert set(data) == set(bench.PARTS)
+    assert (folder / "bench.md").read_text() == bench.page(data)
+    assert bench.recommended(data) in (folder.parents[1] / "README.md").read_text()
+    for problem in {r["problem"] for r in data["work_precision"]["rows"]}:
+        assert (folder / f"{problem.replace(' ', '_')}.png").is_file()
 
 
-def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, capsys, monkeypatch):
-    import stiffness
-
+def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    rows = stiffness.main(tmp_path, sweep=(1e2, 1e5))
-    soft, stiff = rows
+    monkeypatch.setattr(stiffness, "SWEEP", (1e2, 1e5))
+    data = stiffness.main(tmp_path)
+    soft, stiff = data["rows"]
     assert not any(soft[k]["broken"] for k in ("default", "plain, implicitfast", "plain, Euler"))
     assert stiff["plain, Euler"]["broken"]  # explicit: b dt/Lambda = 28 > 2
-    for r in rows:
+    for r in data["rows"]:
         assert r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1
-    assert "broken" in (tmp_path / "stiffness.md").read_text()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.json", "stiffness.md"]
+    assert "broken" in stiffness.sections(data)[-1]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.json"]
 
 
-def test_published_stiffness_page_was_made_from_the_published_data():
-    import stiffness
-
-    folder = Path(__file__).parents[1] / "docs" / "bench"
-    data = json.loads((folder / "stiffness.json").read_text())
-    table = stiffness.page(data["rows"], data["dt"]).split("## Machine")[0]
-    assert table == (folder / "stiffness.md").read_text().split("## Machine")[0]
-    assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in data["rows"])
+def test_published_stiff_clay_breaks_nothing_of_ours():
+    rows = bench.load(Path(__file__).parents[1] / "docs" / "bench")["stiffness"]["rows"]
+    assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in rows)

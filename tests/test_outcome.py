@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import leapfrog, outcome
+from hapticclay import arm, leapfrog, outcome
+from hapticclay.params import Operator
 
 CODES = {"finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"}
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
@@ -67,6 +68,34 @@ def test_out_of_reach(force, word):
     assert word in r.status
     check_finite(r)
     assert np.min(np.abs(np.sin(r.q[:, 1]))) >= outcome.FOLD
+
+
+def test_clay_that_was_never_touched_makes_no_loop_unstable():
+    """K = 1e4 throws the handle into the folded arm in free space, where no gain is too much."""
+    r = hc.simulate(hc.constant_cut(gain=(1e4, 1e4)))
+    assert not r.crossings and r.outcome.code == "singular", r.status
+
+
+@pytest.mark.parametrize("dt", [3.6e-4, 1e-2])
+def test_a_spring_far_too_stiff_for_the_step_gets_no_more_energy_than_it_is_given(dt):
+    """A step of force F on a spring k alone stores F^2/(2 k) at most in the mass; omega dt is 1, and 28."""
+    s = hc.constant_cut(gain=(1e-3, 1e-3), t_max=0.5, dt=dt)
+    r = hc.simulate(dataclasses.replace(s, operator=Operator(0.0, 0.0, 1e7)))
+    kinetic = 0.5 * (arm.I1 * r.qd[:, 0] ** 2 + arm.I2 * r.qd.sum(axis=1) ** 2)
+    assert r.outcome.code in ("time limit", "stalled") and np.max(kinetic) < 1.01 * 0.5 / 1e7
+
+
+def test_a_beat_between_the_axes_is_no_instability():
+    """A heavy hand on a stiff spring swings on both axes at nearly one frequency: x lends its energy to y."""
+    s = hc.constant_cut(gain=(1e-3, 1e-3), t_max=1.0)
+    s = dataclasses.replace(s, operator=Operator(100.0, 0.0, 1e7))
+    r = hc.simulate(s)
+    assert r.outcome.code == "time limit", r.status
+    assert np.max(np.abs(r.v[:, 1])) > 0.01 * np.max(np.abs(r.v[:, 0]))
+    check_finite(r)
+    # nor is it a limit cycle where the motors saturate: what y does dies out with x
+    s = dataclasses.replace(s, operator=Operator(100.0, 1e3, 1e7), velocity=(2.0, 0.0))
+    assert hc.simulate(s).outcome.code == "time limit"
 
 
 @pytest.mark.parametrize("kw", [

@@ -1,0 +1,97 @@
+"""Every benchmark, and the one page that holds their results.
+
+    python benchmarks/bench.py [--quick] [--out DIR] [--readme FILE] [--page-only]
+
+Each part writes its own data as JSON; bench.md is made from these files and nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import extremes  # noqa: E402
+import stiffness  # noqa: E402
+import throughput  # noqa: E402
+import work_precision  # noqa: E402
+
+from hapticclay import record  # noqa: E402
+
+PARTS: dict[str, Any] = {
+    "work_precision": work_precision,
+    "stiffness": stiffness,
+    "extremes": extremes,
+    "throughput": throughput,
+}
+BEGIN, END = "<!-- recommend: benchmarks/bench.py --readme -->", "<!-- end -->"
+
+
+def load(folder: Path) -> dict[str, dict[str, Any]]:
+    """The data of the parts that folder holds."""
+    files = {name: folder / f"{name}.json" for name in PARTS}
+    return {name: json.loads(file.read_text()) for name, file in files.items() if file.is_file()}
+
+
+def page(data: dict[str, dict[str, Any]]) -> str:
+    """The Markdown page."""
+    text = ["# Benchmarks", "Every figure here comes from the runs of `hapticclay bench`; do not edit."]
+    for name, found in data.items():
+        text += PARTS[name].sections(found)
+    omissions = [x for found in data.values() for x in found.get("omissions", ())]
+    text += ["## Left out", "\n".join(f"- {x}" for x in omissions) or "Nothing.", "## Machine"]
+    made: dict[tuple[str, ...], list[str]] = {}
+    for name, found in data.items():
+        made.setdefault(tuple(found["machine"]), []).append(name.replace("_", " "))
+    text += ["\n".join((f"- {', '.join(names)}:", *(f"  - {x}" for x in lines))) for lines, names in made.items()]
+    return "\n\n".join(text) + "\n"
+
+
+def recommended(data: dict[str, dict[str, Any]]) -> str:
+    """The table of recommended settings for the README."""
+    found = work_precision.recommend(data["work_precision"]["rows"], {"hapticclay", "MuJoCo, plain"})
+    return work_precision.table_of_settings(found)
+
+
+def publish(out: Path, readme: Path | None = None) -> None:
+    """Writes the page from the data in out, and the table in readme."""
+    data = load(out)
+    with record.atomic(out / "bench.md") as f:
+        f.write(page(data).encode())
+    if readme:
+        head, _, rest = readme.read_text().partition(BEGIN)
+        with record.atomic(readme) as f:
+            f.write(f"{head}{BEGIN}\n\n{recommended(data)}\n\n{END}{rest.partition(END)[2]}".encode())
+
+
+def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None = None) -> None:
+    """Measures all parts, writes data, diagrams and the page, prints what matters most."""
+    for name, part in PARTS.items():
+        print(f"{name.replace('_', ' ')} ...", flush=True)
+        part.main(out, quick)
+    publish(out, readme)
+    data = load(out)
+    print(f"\n{recommended(data)}\n")
+    print(work_precision.tabulate(work_precision.dominance(data["work_precision"]["rows"]), headers="keys"))
+    rows = data["extremes"]["rows"]
+    print(f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of the reference")
+    for x in data["work_precision"]["omissions"]:
+        print(f"left out: {x}")
+    print(f"written to {out}, the page is {out / 'bench.md'}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute")
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--readme", type=Path, help="a README whose table of recommended settings is to be renewed")
+    parser.add_argument("--page-only", action="store_true", help="make the page anew from the data in the folder")
+    args = parser.parse_args()
+    if args.page_only:
+        publish(args.out, args.readme)
+    else:
+        main(args.out, args.quick, args.readme)

@@ -1,0 +1,103 @@
+"""Stiff and extreme scenes beside a reference solution with a verdict of its own (benchmarks/reference.py)."""
+
+import dataclasses
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles import piecewise_linear
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import bench
+import extremes
+import reference
+
+import hapticclay as hc
+from hapticclay.params import Clay, Multisine, Profile
+
+CASES = extremes.cases()
+LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",
+          "sampled", "accurate")  # fmt: skip
+# a step of 1e-2 s, or torque limits that are hit and left between samples, are the only ones worse than 10 um
+COARSE, FINE = 5e-5, 1e-5
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}")
+def test_verdict_is_the_reference_s_and_energy_is_bounded(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    row = extremes.run(case)
+    assert row["agree"], row
+    assert row["nan"] == 0 and row["warnings"] == 0 and not list(tmp_path.iterdir())
+    if row["reference"] not in ("unstable", "limit cycle"):
+        assert row["energy"] < 1.01, row
+        coarse = case.scenario.dt > 1e-3 or case.scenario.torque_limit[0] < 1.0 or case.scenario.gain[0] > 1e3
+        assert row["position"] < (2e-4 if case.scenario.gain[0] > 1e3 else COARSE if coarse else FINE), row
+    if case.scenario.operator is None and case.scenario.integrator == "fast":
+        assert row["residual"] < 1e-10, row
+
+
+def test_registry_covers_the_list():
+    assert tuple(dict.fromkeys(c.group for c in CASES)) == LISTED
+    assert len({(c.group, c.name) for c in CASES}) == len(CASES)
+    s = [c.scenario for c in CASES]
+    b = [v for x in s if x.clay for v in x.clay.x.values]
+    assert min(b) == 0.0 and max(b) == 1e9
+    assert max(math.hypot(*x.velocity) for x in s) == pytest.approx(2.0)
+    hands = [x.operator for x in s if x.operator]
+    assert max(h.spring for h in hands) == 1e7 and {0.0, 100.0} <= {h.mass for h in hands}
+    assert min(x.gain[0] for x in s) == 1e-6 and max(x.gain[0] for x in s) == 1e4
+    assert min(x.dt for x in s) == 1e-5 and max(x.dt for x in s) == 1e-2
+    assert min(x.torque_limit[0] for x in s) == 0.1 and max(x.t_max for x in s) == 3600.0
+
+
+def test_published_verdicts_agree_and_nothing_escaped():
+    rows = bench.load(Path(__file__).parents[1] / "docs" / "bench")["extremes"]["rows"]
+    assert [(r["group"], r["name"]) for r in rows] == [(c.group, c.name) for c in CASES]
+    for r in rows:
+        assert r["nan"] == 0 and r["warnings"] == 0 and r["ours"] != "raised", r
+        assert r["energy"] is None or r["energy"] < 1.05, r
+    assert {r["ours"] for r in rows} == {
+        "finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"
+    }  # fmt: skip
+
+
+def test_a_scene_that_raises_is_a_row(monkeypatch):
+    monkeypatch.setattr(hc, "simulate", lambda *a, **k: 1 / 0)
+    row = extremes.run(CASES[0])
+    assert row["ours"] == "raised" and not row["agree"] and "ZeroDivisionError" in row["note"]
+    assert "ZeroDivisionError" in "\n".join(extremes.sections({"rows": [row]}))
+
+
+# The reference is checked too, by what is simpler still
+
+
+def test_reference_is_the_matrix_exponential_where_the_loop_is_linear():
+    s = hc.constant_cut(shaping=True, impedance=True, force=(2.0, 0.0), t_max=3.0)
+    t = np.linspace(0.0, 2.9, 50)
+    x = reference.solve(s, t)
+    crossings, position = piecewise_linear((0.05, 0.15), (0.0, 90.0), 1.0, 2.0, (0.25, 2.0, 6.0), t_max=3.0)
+    assert x.crossings[0][2] == pytest.approx(crossings[0], abs=1e-9)
+    np.testing.assert_allclose(x.p[:, 0], position(t), atol=1e-9)
+
+
+def test_reference_finds_the_poles_of_the_linear_loop():
+    s = hc.constant_cut(gain=(1.0, 1.0), origin=(0.35, 0.24), start=(0.0, 0.0), length=0.1)
+    loop = reference.Loop(s)
+    sigma = loop.growth(loop.start(), (90.0, 90.0))
+    poles = np.concatenate([hc.closed_loop_poles(a, 1.0, 90.0) for a in ("x", "y")])
+    assert sigma == pytest.approx(max(p.real for p in poles if abs(p) > 0.5), rel=1e-5)
+
+
+def test_reference_crosses_borders_both_ways():
+    clay = Clay(Profile((0.0,), (0.0, 500.0)), Profile((), (0.0,)))
+    muscle = Multisine(rms=(2.0, 0.0), low=1.0, high=3.0, period=4.0, seed=3)
+    s = dataclasses.replace(hc.free(force=(0.0, 0.0), t_max=2.0), clay=clay, muscle=muscle, length=None)
+    t = np.linspace(0.0, 1.99, 2000)
+    x = reference.solve(s, t)
+    ways = [float(np.interp(u + 1e-3, t, x.p[:, 0]) - np.interp(u - 1e-3, t, x.p[:, 0])) for *_, u in x.crossings[1:-1]]
+    assert min(ways) < 0.0 < max(ways)
+    r = hc.simulate(s)
+    assert np.max(np.abs(np.interp(t, r.t, r.p[:, 0]) - x.p[:, 0])) < 1e-5
