@@ -45,6 +45,11 @@ class Row:
     status: str
     reason: str = ""
 
+    def __post_init__(self):
+        for field in ("expected", "ours"):  # NumPy's numbers become plain ones
+            value = getattr(self, field)
+            object.__setattr__(self, field, None if value is None else float(value))
+
     @property
     def error(self) -> float | None:
         """Relative error, absolute where expected is 0; None where there is nothing to compare."""

@@ -80,10 +80,11 @@ def force_velocity(record: Record, axis: str = "x") -> Figure:
 def path(record: Record) -> Figure:
     """The way of the handle over the clay (Figs. 7, 9)."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 4.6))
-        ax = figure.add_subplot()
         p = 100.0 * record.p
         low, high = p.min(axis=0), p.max(axis=0)
+        shape = float((high - low + 1.0)[1] / (high - low + 1.0)[0])
+        figure = Figure(figsize=(6.4, min(max(6.4 * shape, 1.0) + 1.3, 6.4)))
+        ax = figure.add_subplot()
         margin = 0.08 * max(float((high - low).max()), 0.1)
         low, high = low - margin, high + margin
         _clay_map(figure, ax, record, low, high)

@@ -34,7 +34,7 @@ def bode(results: Sequence[Identified]) -> Figure:
         results: of one block, one or both axes.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(1.2 + 3.6 * len(results), 5.4))
+        figure = Figure(figsize=(max(1.2 + 3.6 * len(results), 6.0), 5.4))
         axes: Any = figure.subplots(
             3, len(results), sharex=True, sharey="row", squeeze=False, height_ratios=(2.2, 2.0, 0.8)
         )

@@ -124,8 +124,8 @@ def nyquist(
 
 def small_gain(
     axis: str,
-    b: float,
     K: float,
+    b: float,
     *,
     impedance: bool = True,
     operator: Operator | None = None,
