@@ -179,7 +179,7 @@ def _far(sweep: Sweep, out: Path, address: str):
             raise ParameterError("scheduler", address, f"must be the address of a dask scheduler ({error})") from None
         with client:
             jobs = client.map(lambda n: run_chunk(sweep, n, str(out.resolve())), todo, pure=False, retries=10)
-            for job in as_completed(jobs):
+            for job in as_completed(jobs, loop=client.loop):
                 yield job.result()
 
     return chunks

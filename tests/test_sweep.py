@@ -1,0 +1,296 @@
+"""Sweeps: the space is what was asked for, and the data set survives interruption, murder and a change of mind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hapticclay as hc
+from hapticclay import cli, plot_sweep, space, sweep
+from hapticclay.errors import ParameterError
+from hapticclay.space import Range, Sweep, parse_fixed, parse_grid
+
+GRID = "b=10:1000:3log gain.x=1:2:2"
+
+
+def small(**kw):
+    return Sweep("constant", parse_grid(GRID), {"t_max": 0.02}, chunk=2, **kw)
+
+
+def columns(table):
+    """Everything but the time it took, to the last bit (repr of a float is exact)."""
+    return {c: repr(table[c].to_pylist()) for c in table.column_names if c != "wall_time"}
+
+
+@pytest.mark.parametrize("text,values", [
+    ("1:1000:4log", [1, 10, 100, 1000]), ("0:2:3", [0, 1, 2]), ("1,2,5", [1, 2, 5]), ("7", [7]), ("3:3:1", [3]),
+    (4, [4]), ([1, 2], [1, 2]), ("-1:1:3", [-1, 0, 1]),
+])  # fmt: skip
+def test_ranges(text, values):
+    np.testing.assert_allclose(Range.parse("b", text).grid(), values, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a", "1:2", "1:2:0", "2:1:5", "0:1:5log", "-1:1:5log", "nan", "1:inf:3", None, "1:2:3:4"]
+)
+def test_bad_ranges_are_refused(text):
+    with pytest.raises(ParameterError, match="b = "):
+        Range.parse("b", text)
+
+
+@pytest.mark.parametrize("text", ["b", "=3", "b=1 b=2", "b:1:2"])
+def test_bad_grids_are_refused(text):
+    with pytest.raises(ParameterError):
+        parse_grid(text)
+
+
+@given(st.integers(1, 5), st.integers(1, 5), st.integers(1, 7))
+def test_grid_is_every_combination_once_whatever_the_chunks(n, m, chunk):
+    s = Sweep("constant", {"b": Range(1.0, 2.0 + n, n), "gain": Range(0.1, 1.0, m)}, chunk=chunk)
+    points = np.vstack([s.points(i * chunk, min((i + 1) * chunk, len(s))) for i in range(s.chunks)])
+    assert len(points) == n * m == len(set(map(tuple, points)))
+    np.testing.assert_array_equal(points, s.points(0, len(s)))
+    assert np.all(points[:m, 0] == 1.0)  # the last parameter is the fastest
+
+
+@pytest.mark.parametrize("design", ["lhs", "sobol"])
+def test_samples_fill_the_space(design):
+    s = Sweep("constant", parse_grid("b=1:1000:2log gain.x=0:2:2"), {}, design, 60, seed=3)
+    points = s.points(0, 60)
+    np.testing.assert_array_equal(points, Sweep("constant", s.vary, {}, design, 60, seed=3).points(0, 60))
+    u = np.column_stack((np.log10(points[:, 0]) / 3.0, points[:, 1] / 2.0))
+    assert u.min() >= 0.0 and u.max() < 1.0
+    for i in (0, 1):
+        strata = np.unique((u[:, i] * (60 if design == "lhs" else 32)).astype(int))
+        assert len(strata) == (60 if design == "lhs" else 32)  # each stratum of a Latin hypercube once
+    other = Sweep("constant", s.vary, {}, design, 60, seed=4)
+    assert not np.array_equal(points, other.points(0, 60))
+
+
+def test_parameters_reach_the_scenario():
+    vary = parse_grid("b=50 gain.y=0.3 force=2 operator.mass=1.5")
+    s = Sweep("constant", vary, parse_fixed("shaping=true operator.damper=3 t_max=5 clay=0.01,0.02"))
+    scenario = s.scenario(s.points(0, 1)[0])
+    assert scenario.gain == (1.0, 0.3) and scenario.force == (2.0, 2.0) and scenario.shaping and scenario.t_max == 5.0
+    assert (
+        scenario.clay is not None
+        and scenario.clay.x.values == (0.0, 50.0, 0.0)
+        and scenario.clay.x.edges == (0.01, 0.02)
+    )
+    assert scenario.operator == hc.Operator(1.5, 3.0, 6.0)
+    seeded = Sweep("stability", parse_grid("seed=1,2 gain=2"), {})
+    assert seeded.scenario(seeded.points(1, 2)[0]).muscle.seed == 2
+
+
+@pytest.mark.parametrize("kw,word", [
+    (dict(experiment="cut"), "experiment"), (dict(vary={}), "grid"), (dict(design="random"), "design"),
+    (dict(runs=5), "runs"), (dict(design="lhs"), "runs"), (dict(vary={"bb": Range(1, 2, 2)}), "did you mean 'b'"),
+    (dict(vary={"gain.z": Range(1, 2, 2)}), "axis of gain"),
+    (dict(vary={"operator.weight": Range(1, 2, 2)}), "parameter"),
+    (dict(vary={"b": Range(-5, 2, 2)}), "b = -5"), (dict(chunk=0), "chunk"), (dict(fixed={"tmax": 3.0}), "t_max"),
+    (dict(vary={"b": Range(1, 2, 10**8)}), "runs"),
+])  # fmt: skip
+def test_bad_sweeps_are_refused(kw, word):
+    with pytest.raises(ParameterError) as e:
+        Sweep(**{"experiment": "constant", "vary": parse_grid("b=1:2:2"), **kw})
+    assert word in str(e.value)
+
+
+def test_rows_say_what_the_runs_said(tmp_path):
+    s = Sweep("constant", parse_grid("b=90 gain.y=0.5,1"), {}, chunk=2)
+    assert sweep.run(s, tmp_path, workers=1) == 2
+    rows = sweep.read(tmp_path).to_pylist()
+    assert [r["status"] for r in rows] == ["finished", "diverged"]
+    r = hc.simulate(hc.constant_cut())
+    assert [rows[0][f"crossing{k}"] for k in (1, 2, 3)] == [c.time for c in r.crossings]
+    assert rows[0]["fe_over_v_x"] == pytest.approx(90.0, rel=1e-6) and rows[0]["speed_x"] == pytest.approx(
+        0.01, rel=1e-3
+    )
+    assert rows[0]["gain_margin_y"] == pytest.approx(0.7748 / 0.5, rel=1e-4) and rows[1]["gain_margin_y"] < 1.0
+    assert rows[1]["axis"] == "y" and rows[0]["energy_residual"] < 1e-12
+
+
+def test_a_refused_run_is_a_row(tmp_path):
+    s = Sweep("constant", parse_grid("b=90 dt=0.001,0.5"), {"t_max": 0.01})
+    sweep.run(s, tmp_path, workers=1)
+    rows = sweep.read(tmp_path).to_pylist()
+    assert [r["status"] for r in rows] == ["time limit", "refused"] and "dt = 0.5" in rows[1]["cause"]
+
+
+def test_only_what_is_missing_is_done_and_the_result_is_the_same(tmp_path):
+    whole, torn = tmp_path / "whole", tmp_path / "torn"
+    assert sweep.run(small(), whole, workers=1) == 6
+    assert sweep.run(small(), whole, workers=1) == 0
+    sweep.run(small(), torn, workers=1)
+    sweep.part(torn, 1).unlink()
+    (torn / "data" / ".part-000001.parquet.abc").write_bytes(b"half a file")
+    assert sweep.missing(small(), torn) == [1]
+    assert sweep.run(small(), torn, workers=1) == 2
+    assert columns(sweep.read(torn)) == columns(sweep.read(whole))
+
+
+def test_two_processes_give_the_same(tmp_path):
+    one, two = tmp_path / "1", tmp_path / "2"
+    sweep.run(small(), one, workers=1)
+    sweep.run(small(), two, workers=2)
+    assert columns(sweep.read(one)) == columns(sweep.read(two))
+
+
+def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
+    sweep.run(small(), tmp_path, workers=1)
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.run(small(seed=1), tmp_path, workers=1)
+    (tmp_path / "sweep.json").write_text("{")
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.begin(small(), tmp_path)
+
+
+def test_spec_file(tmp_path):
+    spec = tmp_path / "s.toml"
+    spec.write_text(
+        'experiment = "free"\nchunk = 3\n[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
+    )
+    s = Sweep(**space.load(spec))
+    assert (s.experiment, len(s), s.chunk) == ("free", 4, 3)
+    for text, word in (
+        ("experiment = ", "TOML"),
+        ("expermient = 'free'", "did you mean 'experiment'"),
+        ("vary = 3", "table"),
+    ):
+        spec.write_text(text)
+        with pytest.raises(ParameterError, match=word):
+            space.load(spec)
+    with pytest.raises(ParameterError, match="spec"):
+        space.load(tmp_path / "none.toml")
+
+
+COMMAND = [sys.executable, "-m", "hapticclay", "sweep", "--grid", "b=10:1000:40log gain.x=1:2:2", "--fixed",
+           "t_max=0.3", "--chunk", "4", "--workers", "2", "--no-maps"]  # fmt: skip
+
+
+@pytest.mark.parametrize("how,code", [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
+    out = tmp_path / "o"
+    with subprocess.Popen([*COMMAND, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          start_new_session=True) as p:  # fmt: skip
+        for _ in range(600):
+            if len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None:
+                break
+            time.sleep(0.05)
+        if how == signal.SIGKILL:
+            os.killpg(p.pid, how)
+        else:
+            p.send_signal(how)
+        said, _ = p.communicate(timeout=60)
+        assert p.returncode == code
+    if how == signal.SIGINT:
+        assert "goes on from there" in said
+    done = len(list((out / "data").glob("part-*")))
+    assert 2 <= done < 20
+    sweep.read(out)  # whatever is there is valid
+    again = subprocess.run([*COMMAND, "--out", str(out)], capture_output=True, text=True, check=True)
+    table = sweep.read(out)
+    assert table["run"].to_pylist() == list(range(80)) and "80 runs" in again.stdout
+
+
+def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys):
+    args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--workers", "1", "--out"]
+    assert cli.main([*args, str(tmp_path)]) == 0
+    assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
+    for extra, word in (
+        (["--grid", "b=1:2"], "b = "), (["--grid", "b=1", "--runs", "3"], "runs"), ([], "either"),
+            (["--grid", "b=1", "--design", "lhs"], "runs"),
+        (["--grid", "b=1:2:2", "--workers", "0"], "workers"),
+            (["--grid", "b=1:2:2", "--experiment", "fre"], "did you mean"),
+        (["nothing.toml"], "spec"), (["--grid", GRID, "--fixed", "t_max"], "fixed"),
+    ):  # fmt: skip
+        assert cli.main(["sweep", *extra, "--out", str(tmp_path / "x")]) == 2
+        err = capsys.readouterr().err
+        assert word in err and err.count("\n") == 1 and not (tmp_path / "x").exists()
+
+
+def test_maps(tmp_path):
+    sweep.run(
+        Sweep("constant", parse_grid("b=10:1000:5log gain.y=0.3:1:3"), {"t_max": 2.0, "dt": 2e-3}), tmp_path, workers=1
+    )
+    table = sweep.read(tmp_path)
+    figure = plot_sweep.heat(table)
+    ax = figure.axes[0]
+    assert ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
+    assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(table["status"].to_pylist())
+    plot_sweep.heat(table, "speed_x").savefig(tmp_path / "a.png")
+    with pytest.raises(ParameterError, match="column"):
+        plot_sweep.heat(table, "speedx")
+
+
+@pytest.mark.parametrize("package,extra", [("pyarrow", "sweep"), ("distributed", "cluster")])
+def test_missing_packages_are_named(package, extra, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ParameterError, match=rf"hapticclay\[{extra}\]"):
+        sweep.run(small(), tmp_path, scheduler="tcp://127.0.0.1:1" if extra == "cluster" else None)
+
+
+def spawn(*args, **kw):
+    return subprocess.Popen([sys.executable, "-m", *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **kw)
+
+
+def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
+    """A real scheduler, two worker processes without a nanny, one killed with work in hand."""
+    s = Sweep("constant", parse_grid("b=10:1000:12log gain.x=1:2:2"), {"t_max": 0.5}, chunk=1)
+    file = tmp_path / "scheduler.json"
+    scheduler = spawn("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+                      "--scheduler-file", str(file))  # fmt: skip
+    workers = []
+    try:
+        for _ in range(400):
+            if file.is_file() and file.stat().st_size:
+                break
+            time.sleep(0.05)
+        address = json.loads(file.read_text())["address"]
+        workers = [
+            spawn(
+                "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1", "--no-dashboard", cwd=tmp_path
+            )
+            for _ in range(2)
+        ]
+        killed = []
+
+        def kill(n):
+            if not killed:
+                killed.append(workers[0].pid)
+                workers[0].kill()
+
+        far, here = tmp_path / "far", tmp_path / "here"
+        assert sweep.run(s, far, scheduler=address, progress=kill) >= 24
+        assert killed and workers[0].wait(10) == -9
+        sweep.run(s, here, workers=1)
+        assert columns(sweep.read(far)) == columns(sweep.read(here))
+    finally:
+        for p in (*workers, scheduler):
+            p.kill()
+            p.wait()
+
+
+def test_unreachable_scheduler_is_one_line(tmp_path, monkeypatch):
+    import distributed
+
+    real = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout, **kw: real(address, timeout="1s", **kw))
+    with pytest.raises(ParameterError, match="scheduler"):
+        sweep.run(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_damaged_folder_is_refused(tmp_path):
+    with pytest.raises(ParameterError, match="hapticclay sweep has written"):
+        sweep.read(tmp_path)
+    Path(tmp_path / "data").mkdir()
+    with pytest.raises(ParameterError):
+        sweep.read(tmp_path)
