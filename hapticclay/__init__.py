@@ -11,6 +11,7 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
+from .batch import simulate_batch
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free
 from .lti import closed_loop_poles, gain_limit
@@ -41,4 +42,5 @@ __all__ = [
     "free",
     "gain_limit",
     "simulate",
+    "simulate_batch",
 ]

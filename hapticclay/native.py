@@ -6,9 +6,12 @@ compiled code is kept on disk, in a folder named after the sources it was made f
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import hashlib
 import os
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +22,14 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic, overload
 
 from . import clay, energy, loop, record, run, scene, signals, stride
+from .clay import slab
 from .inline import inline
 from .params import AXES, NO_HAND, Scenario
 from .run import CHUNK, Run
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    loop.coefficients, loop.entire, loop.tick, stride.around, stride.kick, stride.enter, clay.at, clay.settle, stride.place,
+    clay.at, clay.settle, loop.coefficients, loop.entire, loop.tick,
+    stride.around, stride.enter, stride.kick, stride.place,
 )  # fmt: skip
 PLAIN = (
     run.aim, run.root, signals.line, stride.heading, stride.land, stride.mean, stride.miss, stride.move,
@@ -110,21 +115,33 @@ STEP = _mj_step()
 
 
 class Bench:
-    """Engines of one thread, used again by run after run: one with clay, one without."""
+    """Engines of one thread, used again by run after run: one with clay, one without.
 
-    def __init__(self):
-        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData]] = {}
+    Args:
+        models: to copy, by whether there is clay; those that lack are built when needed.
+    """
+
+    def __init__(self, models: dict[bool, mujoco.MjModel]):
+        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.Engine]] = {}
+        for clay, model in models.items():
+            self._take(clay, copy.copy(model))
         self.rows = np.empty((CHUNK - 1, stride.ROW))
+
+    def _take(self, clay: bool, model: mujoco.MjModel) -> None:
+        data = mujoco.MjData(model)
+        views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(model)
+        at = STEP, model._address, data._address, *(x.ctypes.data for x in views)
+        self.engines[clay] = model, data, stride.Engine(*at)
 
     def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The engine as scene.build(s) would make it, at rest."""
-        if (s.clay is not None) not in self.engines:
-            model = scene.build(s)
-            self.engines[s.clay is not None] = model, mujoco.MjData(model)
-        model, data = self.engines[s.clay is not None]
+        clay = s.clay is not None
+        if clay not in self.engines:
+            self._take(clay, scene.build(s))
+        model, data, _ = self.engines[clay]
         model.opt.timestep = s.dt
-        limit = np.array(s.torque_limit)
-        model.actuator_ctrlrange[:2] = np.column_stack((-limit, limit))
+        for i, limit in enumerate(s.torque_limit):
+            model.actuator_ctrlrange[i] = -limit, limit
         mujoco.mj_resetData(model, data)
         return model, data
 
@@ -138,16 +155,14 @@ class Native(Run):
     """
 
     def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
-        self.bench = bench or Bench()
+        self.bench = bench or Bench({})
         super().__init__(scenario, every)
-        s, data = scenario, self.data
+        s, engine = scenario, self.bench.engines[scenario.clay is not None][2]
         th = s.operator or NO_HAND
         given = stride.Given(
             s.gain, s.force, s.origin, s.torque_limit, stride.Hand(th.mass, th.damper, th.spring),
             s.shaping, s.operator is not None, s.clay is not None, s.dt, s.t_max, self.last,
         )  # fmt: skip
-        views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(self.model)
-        engine = stride.Engine(STEP, self.model._address, data._address, *(x.ctypes.data for x in views))
         self.now = np.zeros(1, stride.STATE)
         self.now["loop"] = loop.initial_state(s.start, s.velocity)
         self.now["clay"] = *self.regions.base, *self.regions.rate
@@ -156,7 +171,7 @@ class Native(Run):
         self.crossed = np.empty((ROOM, 4))
         given = given, _lines(self.muscle), _lines(self.command), self.regions.table, engine
         self.given = (*given, self.now, self.rows, self.crossed)
-        w1, w2 = data.qvel
+        w1, w2 = self.data.qvel
         self.first = energy.stored(th, w1, w1 + w2, np.array(s.start), np.array(s.velocity))
         self.before = self._state()  # at the last look
         self.quiet = quiet
@@ -173,8 +188,8 @@ class Native(Run):
         code, self.filled, n = _stride(*self.given, CHUNK - 1, CHUNK - 1)
         now = self.now[0]
         self.t, self.i, self.steps = float(now["t"]), int(now["i"]), int(now["steps"])
-        for axis, border, time, speed in self.crossed[:n].tolist():
-            self.crossings.append(record.Crossing(AXES[int(axis)], border, time, speed))
+        for axis, *crossing in self.crossed[:n].tolist():
+            self.crossings.append(record.Crossing(AXES[int(axis)], *crossing))
         if code == stride.NOT_FINITE:
             raise ArithmeticError
         if code:
@@ -215,9 +230,32 @@ class Suspicious(Exception):
     """A run to be made again, and watched."""
 
 
-def fits(scenario: Scenario) -> bool:
-    """Whether native can run this: continuous control, the fast integrator."""
-    return scenario.control == "continuous" and scenario.integrator == "fast"
+class Pool:
+    """What the threads of a batch share, and what each has of its own.
+
+    Args:
+        every: keep each every-th sample, and the last. brief: keep the last alone.
+    """
+
+    def __init__(self, every: int, brief: bool):
+        self.every, self.brief = 1_000_000_000 if brief else every, brief
+        self.own = threading.local()
+        self.models = {x.clay is not None: scene.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
+
+    def run(self, scenario: Scenario) -> record.Record:
+        """The record of a run that native can make; without its samples if it is to be brief."""
+        if not hasattr(self.own, "bench"):
+            self.own.bench = Bench(self.models)
+        try:
+            return self._go(scenario, self.brief and scenario.stop)
+        except Suspicious:
+            return self._go(scenario, False)
+
+    def _go(self, scenario: Scenario, quiet: bool) -> record.Record:
+        run = Native(scenario, self.every, self.own.bench, quiet)
+        begin = time.perf_counter()
+        run.go(None)
+        return run.result(time.perf_counter() - begin)
 
 
 def _timestep(model: mujoco.MjModel) -> np.ndarray:

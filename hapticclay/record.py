@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import os
 import platform
@@ -252,6 +253,7 @@ def _scenario(d: dict[str, Any]) -> Scenario:
     return Scenario(**d)
 
 
+@functools.cache  # some milliseconds
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages a run depends on."""
     out = {"python": platform.python_version()}

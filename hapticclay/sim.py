@@ -39,7 +39,8 @@ def simulate(
         The record. Instability and its like are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: scenario, every or engine is of the wrong kind, native is not installed, or the scene too stiff for its integrator.
+        ParameterError: scenario, every or engine is of the wrong kind, numba is not installed, or the scene is too
+            stiff for its integrator.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
@@ -55,18 +56,22 @@ def simulate(
 
 def _kind(scenario: Scenario, engine: str) -> type[Run]:
     """What runs this scenario."""
-    plain = Leapfrog
-    if scenario.control == "sampled" or scenario.integrator == "accurate":
-        plain = Sampled if scenario.control == "sampled" else RungeKutta
+    if not fits(scenario):
         if engine == "native":
             print("hapticclay: native runs neither sampled control nor 'accurate'; Python does", file=sys.stderr)
-    elif engine == "native" or (engine == "auto" and scenario.t_max / scenario.dt >= NATIVE_FROM and has_numba()):
-        if not has_numba():
-            raise ParameterError("engine", engine, NUMBA)
+        return Sampled if scenario.control == "sampled" else RungeKutta
+    if engine == "native" and not has_numba():
+        raise ParameterError("engine", engine, NUMBA)
+    if engine == "native" or (engine == "auto" and scenario.t_max / scenario.dt >= NATIVE_FROM and has_numba()):
         from .native import Native  # only a run that takes it pays for it
 
         return Native
-    return plain
+    return Leapfrog
+
+
+def fits(scenario: Scenario) -> bool:
+    """Whether native can run this: continuous control, the fast integrator."""
+    return scenario.control == "continuous" and scenario.integrator == "fast"
 
 
 NUMBA = "needs numba: pip install hapticclay[fast]"

@@ -217,7 +217,8 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
     """Steps on, until most kicks are made, room rows written, crossings full, or the run is over.
 
     Args:
-        g: Given. muscle, commanded: lines of their multisines, see `mean`. table: of the clay. engine: Engine. run: array of one STATE, which is advanced.
+        g: Given. muscle, commanded: lines of their multisines, see `mean`. table: see clay.table. engine: Engine.
+        run: array of one STATE, which is advanced.
         rows: one for each sample, (room, ROW), as Run.judge takes them, and the clay.
         crossings: (n, 4), n >= 4: coordinate, border [m], time [s], speed along it [m/s].
 
