@@ -18,22 +18,24 @@ LEVELS = [
     {"loop", "scene", "outcome"},
     {"run"},
     {"leapfrog", "rungekutta"},
-    {"sampled"},
+    {"sampled", "stride"},
+    {"native"},
     {"sim"},
+    {"batch"},
     {"experiments"},
     {"plot"},
     {"cli"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled"},
+    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled", "native"},
     "matplotlib": {"plot"},
     "tyro": {"cli"},
     "tqdm": {"cli"},
     "tabulate": {"cli"},
     "scipy": {"lti"},
     "imageio": set(),
-    "numba": set(),
+    "numba": {"native"},
     "dask": set(),
 }
 
