@@ -1,25 +1,35 @@
 """Closed loop against the floor: a bare mj_step loop in C of the same model, in turns, medians.
 
-    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N]
+    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N] [--full]
 
-Ratios hold on a noisy machine, microseconds do not.
+Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a batch, 100 000 runs
+for linearity, and a stability map.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
+import os
 import platform
 import statistics
+import subprocess
+import sys
+import tempfile
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
+import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
-from hapticclay import leapfrog, record
+from hapticclay import leapfrog, record, sim
 
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
@@ -28,7 +38,7 @@ SCENES = {
 }
 
 
-def floor(scenario: hc.Scenario, steps: int) -> float:
+def floor(scenario: hc.Scenario, steps: int, clock: Callable[[], float] = time.perf_counter) -> float:
     """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
     model = hc.build(scenario)
     data = mujoco.MjData(model)
@@ -38,21 +48,42 @@ def floor(scenario: hc.Scenario, steps: int) -> float:
     spent = 0.0
     for _ in range(steps // 500):
         data.qvel[:] = (0.1, -0.2)
-        begin = time.perf_counter()
+        begin = clock()
         mujoco.mj_step(model, data, 500)
-        spent += time.perf_counter() - begin
+        spent += clock() - begin
     return spent / (steps // 500 * 500)
 
 
 def loop(scenario: hc.Scenario, steps: int, inlined: bool = True) -> float:
-    """Seconds a step of simulate(), every sample recorded."""
-    import dataclasses
-
+    """Seconds a step of the Python run, every sample recorded."""
     leapfrog.FUSE_FROM = 0 if inlined else 10**12
     leapfrog._fused.clear()
-    r = hc.simulate(dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None))
+    r = hc.simulate(lasting(scenario, steps), engine="python")
     assert r.steps >= steps, r.status
     return r.wall_time / r.steps
+
+
+def lasting(scenario: hc.Scenario, steps: int) -> hc.Scenario:
+    """The scenario, cut after so many steps."""
+    return dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None)
+
+
+def timed(function, *args, **kw) -> np.ndarray:
+    """Seconds that function(*args, **kw) takes, and processor seconds, on all cores together."""
+    begin = time.perf_counter(), time.process_time()
+    function(*args, **kw)
+    return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1]))
+
+
+def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
+    """The compiled run over the floor, from call to return: a summary alone, and every sample recorded.
+
+    In processor time, which others on the machine disturb less.
+    """
+    s = lasting(scenario, steps)
+    bare = steps * floor(scenario, steps, time.process_time)
+    short = timed(hc.simulate_batch, [s], keep="summaries", threads=1)[1]
+    return short / bare, timed(hc.simulate, s, engine="native")[1] / bare
 
 
 def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
@@ -61,7 +92,8 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     for name, scenario in SCENES.items():
         times = []
         for _ in range(rounds):
-            times.append((floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)))
+            one = floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)
+            times.append((*one, *(native(scenario, steps) if sim.has_numba() else ())))
         rows.append(
             {
                 "scene": name,
@@ -71,7 +103,89 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
                 "ratio_not_inlined": statistics.median(t[2] / t[0] for t in times),
             }
         )
+        for i, what in enumerate(("native", "native_recorded"), 3):
+            if len(times[0]) > i:
+                rows[-1][what] = statistics.median(t[i] for t in times)
     return rows
+
+
+def floor_on_all_cores(scenario: hc.Scenario, steps: int) -> np.ndarray:
+    """`timed` a step, of the engine alone, so many steps of it shared out over all cores at once."""
+    crew = [threading.Thread(target=floor, args=(scenario, steps // CORES)) for _ in range(CORES)]
+
+    def go():
+        for thread in crew:
+            thread.start()
+        for thread in crew:
+            thread.join()
+
+    return timed(go) / (steps // CORES * CORES)
+
+
+def jobs(n: int, steps: int) -> list[hc.Scenario]:
+    """Runs that differ in clay, gain and start, and cross a border."""
+    rng = np.random.default_rng(n)
+    b, gain, start = rng.uniform(10.0, 200.0, n), rng.uniform(0.2, 1.0, n), rng.uniform(0.0, 0.049, n)
+    cuts = (hc.constant_cut(b=x, gain=(k, 0.2), start=(p, 0.0)) for x, k, p in zip(b, gain, start, strict=True))
+    return [lasting(s, steps) for s in cuts]
+
+
+def batches(sizes: list[int], rounds: int, steps: int) -> list[dict[str, float]]:
+    """Batches over the floor on all cores, just before and after: time, and processor time (others disturb it less)."""
+    rows: list[dict[str, float]] = []
+    for n in sizes:
+        todo, ratios = jobs(n, steps), {}
+        for _ in range(rounds if n < 10_000 else 1):
+            for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
+                bare = floor_on_all_cores(todo[0], min(n, 256) * steps)
+                took = timed(hc.simulate_batch, todo, keep=keep) / (n * steps)
+                bare = 0.5 * (bare + floor_on_all_cores(todo[0], min(n, 256) * steps))
+                ratios.setdefault(keep, []).append(took / bare)
+        row = {"runs": n, "steps": steps}
+        for keep, x in ratios.items():
+            row[keep], row[f"{keep}_cpu"] = np.median(x, axis=0).tolist()
+        rows.append(row)
+    return rows
+
+
+def first_calls() -> dict[str, float]:
+    """Processor seconds of the first native call of a process, import of numba included: uncached, cached."""
+    code = (
+        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s); a = time.process_time(); "
+        "hc.simulate(s, engine='native'); print(time.process_time() - a)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        env = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        run = [subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, check=True) for _ in range(3)]
+    first, *rest = (float(r.stdout) for r in run)
+    return {"uncached_s": first, "cached_s": min(rest)}
+
+
+def linearity(sizes: list[int], steps: int) -> list[dict[str, float]]:
+    """Time a run, against the floor beside it, from the smallest batch to the largest."""
+    rows: list[dict[str, float]] = []
+    for n in sizes:
+        todo = jobs(n, steps)
+        bare = floor_on_all_cores(todo[0], 100_000)
+        took = timed(hc.simulate_batch, todo, keep="summaries")
+        bare = 0.5 * (bare + floor_on_all_cores(todo[0], 100_000))
+        ratio = took / (n * steps * bare)
+        rows.append({"runs": n, "us_a_run": 1e6 * took[0] / n, "over_floor": ratio[0], "over_floor_cpu": ratio[1]})
+    return rows
+
+
+def stability_map() -> dict[str, float]:
+    """50 dampings by 20 gains, 2 s each: seconds, and how many are unstable."""
+    grid = [(b, k) for b in np.geomspace(5.0, 500.0, 50) for k in np.linspace(0.2, 6.0, 20)]
+    todo = [hc.constant_cut(b=b, gain=(k, 0.2), start=(0.1, 0.0), t_max=2.0) for b, k in grid]
+    begin = time.perf_counter()
+    found = hc.simulate_batch(todo, keep="summaries")
+    wall = time.perf_counter() - begin
+    return {
+        "runs": len(todo),
+        "wall_s": wall,
+        "unstable": int(np.isin(found["code"], ["diverged", "limit cycle"]).sum()),
+    }
 
 
 def main() -> None:
@@ -79,14 +193,29 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--steps", type=int, default=20_000)
+    parser.add_argument("--full", action="store_true")
     args = parser.parse_args()
-    rows = measure(args.rounds, args.steps)
-    print(tabulate(rows, headers="keys", floatfmt=".2f", tablefmt="github"))
+
+    def show(rows):
+        print(tabulate(rows, headers="keys", floatfmt=".2f", tablefmt="github"), end="\n\n", flush=True)
+        return rows
+
+    found: dict[str, object] = {}
+    if sim.has_numba():
+        found["first_call"] = show([first_calls()])
+        hc.simulate_batch(jobs(2, 10), keep="summaries")
+    rows = show(measure(args.rounds, args.steps))
+    if sim.has_numba():
+        found["batch"] = show(batches([64, 1024, *([16384] if args.full else [])], min(args.rounds, 3), 1000))
+        if args.full:
+            found["linearity"] = show(linearity([1000, 10_000, 100_000], 200))
+            found["map"] = show([stability_map()])
     versions = record.versions()
-    print(f"\n{platform.machine()}, {', '.join(f'{k} {v}' for k, v in versions.items())}")
+    print(f"{platform.machine()}, {', '.join(f'{k} {v}' for k, v in versions.items())}")
     if args.out:
         with record.atomic(args.out / "throughput.json") as f:
-            f.write(json.dumps({"versions": versions, "machine": platform.machine(), "rows": rows}, indent=2).encode())
+            data = {"versions": versions, "machine": platform.machine(), "rows": rows, **found}
+            f.write(json.dumps(data, indent=2).encode())
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 from . import record, scene
 from .errors import ParameterError, choice, integer
 from .params import AXES, Scenario
-from .sim import NUMBA, fits, has_numba, simulate
+from .sim import NUMBA, compiled, fits, has_numba, simulate
 
 KEEP = ("records", "summaries")
 BORDERS = 8  # crossings that a summary has room for
@@ -70,20 +70,18 @@ def simulate_batch(
     out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
     finish = summary if summaries else lambda r: r
     native = [i for i, s in enumerate(jobs) if fits(s)]
-    if native and has_numba():
-        from .native import Pool  # only a batch that takes it pays for it
-
-        pool = Pool(every, summaries)
+    module = compiled() if native and has_numba() else None
+    if module:
+        pool = module.Pool(every, summaries)
 
         def run(i: int) -> None:
             out[i] = finish(pool.run(jobs[i]))
 
         with scene.warnings_caught():
             _spread(native, run, min(threads, len(native)))
-    elif native:
+    elif native and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
-        native = []
-    for i in sorted(set(range(len(jobs))) - set(native)):
+    for i in sorted(set(range(len(jobs))) - set(native if module else ())):
         out[i] = finish(simulate(jobs[i], every=every, engine="python"))
     return out
 

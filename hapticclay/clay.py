@@ -112,9 +112,8 @@ class Regions:
         self._settle(0.0)
 
     def _settle(self, t: float) -> None:
-        self.low, self.high, self.base, self.rate = (
-            (float(x), float(y)) for x, y in settle(self.table, *self.index, t)
-        )
+        found = settle(self.table, self.index[0], self.index[1], t)
+        self.low, self.high, self.base, self.rate = ((float(x), float(y)) for x, y in found)
 
     def b(self, t: float) -> tuple[float, float]:
         """Damping of the present region at time t [s] on each axis [N.s/m]."""

@@ -81,7 +81,8 @@ class Ledger:
         a = q[0] + q[1]
         columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
         r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
-        self.work += [x.sum() for x in spent(H, k, *before, *after, *tau, r1, r2 - r1, th.damper)]
+        around = before[0], before[1], after[0], after[1]
+        self.work += [x.sum() for x in spent(H, k, *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
             u1x, u1y, u2x, u2y = (x[j] for x in columns)

@@ -300,7 +300,7 @@ class Leapfrog(Run):
 
     def _whole(self, w, command, out, after: float) -> None:
         """Steps the engine by after, from joint rates w to those of out, whatever the length of the kick."""
-        self.write(self.drive, 0, *loop.entire(*w, *out[2:], *command[:2], after))
+        self.write(self.drive, 0, *loop.entire(w[0], w[1], out[2], out[3], command[0], command[1], after))
         self.model.opt.timestep = after
         mujoco.mj_step(self.model, self.data)
         self.model.opt.timestep = self.scenario.dt

@@ -70,9 +70,9 @@ def _call(typing, address, a, b):
     return types.void(address, a, b), build
 
 
-overload(stride.load)(lambda address: lambda address: _load(address))
-overload(stride.store)(lambda address, x: lambda address, x: _store(address, x))
-overload(stride.call)(lambda address, a, b: lambda address, a, b: _call(address, a, b))
+overload(stride.load)(lambda address: lambda address: _load(address))  # type: ignore
+overload(stride.store)(lambda address, x: lambda address, x: _store(address, x))  # type: ignore
+overload(stride.call)(lambda address, a, b: lambda address, a, b: _call(address, a, b))  # type: ignore
 
 
 def _compiled(*functions: Any) -> list[Any]:
@@ -123,22 +123,21 @@ class Bench:
 
     def __init__(self, models: dict[bool, mujoco.MjModel]):
         self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.Engine]] = {}
-        for clay, model in models.items():
-            self._take(clay, copy.copy(model))
+        for with_clay, model in models.items():
+            self._take(with_clay, copy.copy(model))
         self.rows = np.empty((CHUNK - 1, stride.ROW))
 
-    def _take(self, clay: bool, model: mujoco.MjModel) -> None:
+    def _take(self, with_clay: bool, model: mujoco.MjModel) -> None:
         data = mujoco.MjData(model)
         views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(model)
         at = STEP, model._address, data._address, *(x.ctypes.data for x in views)
-        self.engines[clay] = model, data, stride.Engine(*at)
+        self.engines[with_clay] = model, data, stride.Engine(*at)
 
     def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The engine as scene.build(s) would make it, at rest."""
-        clay = s.clay is not None
-        if clay not in self.engines:
-            self._take(clay, scene.build(s))
-        model, data, _ = self.engines[clay]
+        if (s.clay is not None) not in self.engines:
+            self._take(s.clay is not None, scene.build(s))
+        model, data, _ = self.engines[s.clay is not None]
         model.opt.timestep = s.dt
         for i, limit in enumerate(s.torque_limit):
             model.actuator_ctrlrange[i] = -limit, limit

@@ -6,6 +6,7 @@ import importlib.util
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 from . import record, scene
 from .errors import ParameterError, choice, integer
@@ -63,10 +64,20 @@ def _kind(scenario: Scenario, engine: str) -> type[Run]:
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
     if engine == "native" or (engine == "auto" and scenario.t_max / scenario.dt >= NATIVE_FROM and has_numba()):
-        from .native import Native  # only a run that takes it pays for it
-
-        return Native
+        native = compiled()
+        return native.Native if native else Leapfrog
     return Leapfrog
+
+
+def compiled() -> Any:
+    """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails."""
+    try:
+        from . import native
+
+        return native
+    except (ImportError, OSError, StopIteration, AttributeError) as error:  # of numba, or the engine's library
+        print(f"hapticclay: Python runs what native cannot: {error or type(error).__name__}", file=sys.stderr)
+        return None
 
 
 def fits(scenario: Scenario) -> bool:

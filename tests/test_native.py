@@ -132,6 +132,19 @@ def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
         same(r, hc.simulate(s, engine="python"))
 
 
+@fast
+def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
+    monkeypatch.delitem(sys.modules, "hapticclay.native", raising=False)
+    monkeypatch.delattr(hc, "native", raising=False)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    r = hc.simulate(CASES["plain"], engine="native")
+    assert capsys.readouterr().err.count("\n") == 1
+    (b,) = hc.simulate_batch([CASES["plain"]])
+    assert capsys.readouterr().err.count("\n") == 1
+    same(r, hc.simulate(CASES["plain"], engine="python"))
+    same(r, b)
+
+
 def test_auto_takes_native_for_long_runs_only():
     assert sim._kind(hc.constant_cut(), "auto") is leapfrog.Leapfrog
     long = hc.constant_cut(dt=1e-4)
