@@ -76,13 +76,15 @@ def timed(function, *args, **kw) -> np.ndarray:
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
-    """The compiled run over the floor, from call to return: a summary alone, and every sample recorded.
+    """The compiled run over the floor: one of a batch of summaries; alone, from call to return, all samples recorded.
 
     In processor time, which others on the machine disturb less.
     """
-    s = lasting(scenario, steps)
+    from hapticclay.native import Pool
+
+    s, pool = lasting(scenario, steps), Pool(1, True)
     bare = steps * floor(scenario, steps, time.process_time)
-    short = timed(hc.simulate_batch, [s], keep="summaries", threads=1)[1]
+    short = timed(pool.run, s)[1]
     return short / bare, timed(hc.simulate, s, engine="native")[1] / bare
 
 
