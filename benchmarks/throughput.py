@@ -1,21 +1,28 @@
 """Closed loop against the floor: a bare mj_step loop in C of the same model, in turns, medians.
 
-    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N]
+    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N] [--full]
 
-Ratios hold on a noisy machine, microseconds do not. Writes throughput.json; benchmarks/bench.py makes the page.
+Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a batch, 100 000 runs
+for linearity, and a stability map. Writes throughput.json; benchmarks/bench.py makes the page.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import os
 import statistics
+import subprocess
 import sys
+import tempfile
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -23,8 +30,9 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import leapfrog  # noqa: E402
+from hapticclay import leapfrog, sim  # noqa: E402
 
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
@@ -33,7 +41,7 @@ SCENES = {
 }
 
 
-def floor(scenario: hc.Scenario, steps: int) -> float:
+def floor(scenario: hc.Scenario, steps: int, clock: Callable[[], float] = time.perf_counter) -> float:
     """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
     model = hc.build(scenario)
     data = mujoco.MjData(model)
@@ -43,22 +51,47 @@ def floor(scenario: hc.Scenario, steps: int) -> float:
     spent = 0.0
     for _ in range(steps // 500):
         data.qvel[:] = (0.1, -0.2)
-        begin = time.perf_counter()
+        begin = clock()
         mujoco.mj_step(model, data, 500)
-        spent += time.perf_counter() - begin
+        spent += clock() - begin
     return spent / (steps // 500 * 500)
 
 
 def loop(scenario: hc.Scenario, steps: int, inlined: bool = True) -> float:
-    """Seconds a step of simulate(), every sample recorded."""
+    """Seconds a step of the Python run, every sample recorded."""
     usual, leapfrog.FUSE_FROM = leapfrog.FUSE_FROM, 0 if inlined else 10**12
     leapfrog._fused.clear()
     try:
-        r = hc.simulate(dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None))
+        r = hc.simulate(lasting(scenario, steps), engine="python")
     finally:
         leapfrog.FUSE_FROM = usual
     assert r.steps >= steps, r.status
     return r.wall_time / r.steps
+
+
+def lasting(scenario: hc.Scenario, steps: int) -> hc.Scenario:
+    """The scenario, cut after so many steps."""
+    return dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None)
+
+
+def timed(function, *args, **kw) -> np.ndarray:
+    """Seconds that function(*args, **kw) takes, and processor seconds, on all cores together."""
+    begin = time.perf_counter(), time.process_time()
+    function(*args, **kw)
+    return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1]))
+
+
+def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
+    """The compiled run over the floor: one of a batch of summaries; alone, from call to return, all samples recorded.
+
+    In processor time, which others on the machine disturb less.
+    """
+    from hapticclay.native import Pool
+
+    s, pool = lasting(scenario, steps), Pool(1, True)
+    bare = steps * floor(scenario, steps, time.process_time)
+    short = timed(pool.run, s)[1]
+    return short / bare, timed(hc.simulate, s, engine="native")[1] / bare
 
 
 def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
@@ -67,7 +100,8 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     for name, scenario in SCENES.items():
         times = []
         for _ in range(rounds):
-            times.append((floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)))
+            one = floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)
+            times.append((*one, *(native(scenario, steps) if sim.has_numba() else ())))
         rows.append(
             {
                 "scene": name,
@@ -77,28 +111,134 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
                 "ratio_not_inlined": statistics.median(t[2] / t[0] for t in times),
             }
         )
+        for i, what in enumerate(("native", "native_recorded"), 3):
+            if len(times[0]) > i:
+                rows[-1][what] = statistics.median(t[i] for t in times)
     return rows
+
+
+def floor_on_all_cores(scenario: hc.Scenario, steps: int) -> np.ndarray:
+    """`timed` a step, of the engine alone, so many steps of it shared out over all cores at once."""
+    crew = [threading.Thread(target=floor, args=(scenario, steps // CORES)) for _ in range(CORES)]
+
+    def go():
+        for thread in crew:
+            thread.start()
+        for thread in crew:
+            thread.join()
+
+    return timed(go) / (steps // CORES * CORES)
+
+
+def jobs(n: int, steps: int) -> list[hc.Scenario]:
+    """Runs that differ in clay, gain and start, and cross a border."""
+    rng = np.random.default_rng(n)
+    b, gain, start = rng.uniform(10.0, 200.0, n), rng.uniform(0.2, 1.0, n), rng.uniform(0.0, 0.049, n)
+    cuts = (hc.constant_cut(b=x, gain=(k, 0.2), start=(p, 0.0)) for x, k, p in zip(b, gain, start, strict=True))
+    return [lasting(s, steps) for s in cuts]
+
+
+def batches(sizes: list[int], rounds: int, steps: int) -> list[dict[str, float]]:
+    """Batches over the floor on all cores, just before and after: time, and processor time (others disturb it less)."""
+    rows: list[dict[str, float]] = []
+    for n in sizes:
+        todo, ratios = jobs(n, steps), {}
+        for _ in range(rounds if n < 10_000 else 1):
+            for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
+                bare = floor_on_all_cores(todo[0], min(n, 256) * steps)
+                took = timed(hc.simulate_batch, todo, keep=keep) / (n * steps)
+                bare = 0.5 * (bare + floor_on_all_cores(todo[0], min(n, 256) * steps))
+                ratios.setdefault(keep, []).append(took / bare)
+        row = {"runs": n, "steps": steps}
+        for keep, x in ratios.items():
+            row[keep], row[f"{keep}_cpu"] = np.median(x, axis=0).tolist()
+        rows.append(row)
+    return rows
+
+
+def first_calls() -> dict[str, float]:
+    """Processor seconds of the first native call of a process, import of numba included: uncached, cached."""
+    code = (
+        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s); a = time.process_time(); "
+        "hc.simulate(s, engine='native'); print(time.process_time() - a)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        env = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        run = [subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, check=True) for _ in range(3)]
+    first, *rest = (float(r.stdout) for r in run)
+    return {"uncached_s": first, "cached_s": min(rest)}
+
+
+def linearity(sizes: list[int], steps: int) -> list[dict[str, float]]:
+    """Time a run, against the floor beside it, from the smallest batch to the largest."""
+    rows: list[dict[str, float]] = []
+    for n in sizes:
+        todo = jobs(n, steps)
+        bare = floor_on_all_cores(todo[0], 100_000)
+        took = timed(hc.simulate_batch, todo, keep="summaries")
+        bare = 0.5 * (bare + floor_on_all_cores(todo[0], 100_000))
+        ratio = took / (n * steps * bare)
+        rows.append({"runs": n, "us_a_run": 1e6 * took[0] / n, "over_floor": ratio[0], "over_floor_cpu": ratio[1]})
+    return rows
+
+
+def stability_map() -> dict[str, float]:
+    """50 dampings by 20 gains, 2 s each: seconds, and how many are unstable."""
+    grid = [(b, k) for b in np.geomspace(5.0, 500.0, 50) for k in np.linspace(0.2, 6.0, 20)]
+    todo = [hc.constant_cut(b=b, gain=(k, 0.2), start=(0.1, 0.0), t_max=2.0) for b, k in grid]
+    begin = time.perf_counter()
+    found = hc.simulate_batch(todo, keep="summaries")
+    wall = time.perf_counter() - begin
+    return {
+        "runs": len(todo),
+        "wall_s": wall,
+        "unstable": int(np.isin(found["code"], ["diverged", "limit cycle"]).sum()),
+    }
+
+
+TITLES = {
+    "first_call": "The first native call of a process, import of numba included, in processor seconds.",
+    "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same "
+    "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
+    "batch": "Batches over the floor on all cores: wall time, and processor time (others disturb it less).",
+    "linearity": "Time a run, from a small batch to a large one.",
+    "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
+}
 
 
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
-    cells = [[format(x, ".2f") if isinstance(x, float) else x for x in r.values()] for r in data["rows"]]
-    head = ["scene", "bare engine [us/step]", "closed loop [us/step]", "ratio", "ratio, loop not inlined"]
-    return [
-        "## Throughput",
-        "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same model, "
-        f"in turns; medians of {data['rounds']} rounds of {data['steps']} steps. Ratios hold on a noisy machine, "
-        "microseconds do not.",
-        tabulate(cells, head, tablefmt="github", disable_numparse=True),
-    ]  # fmt: skip
+    out = ["## Throughput"]
+    for name, title in TITLES.items():
+        if data.get(name):
+            cells = [
+                {k.replace("_", " "): format(x, ".2f") if isinstance(x, float) else x for k, x in r.items()}
+                for r in data[name]
+            ]
+            out += [title, tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)]
+    return out
 
 
 def main(
-    out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None, steps: int | None = None
-) -> dict[str, Any]:
+    out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None, steps: int | None = None,
+    full: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
-    return write(out, "throughput", {"rounds": rounds, "steps": steps, "rows": measure(rounds, steps)})
+    data: dict[str, Any] = {"rounds": rounds, "steps": steps}
+    native = sim.has_numba()
+    if native and not quick:
+        data["first_call"] = [first_calls()]
+    if native:
+        hc.simulate_batch(jobs(2, 10), keep="summaries")
+    data["rows"] = measure(rounds, steps)
+    if native:
+        sizes = [64] if quick else [64, 1024, *([16384] if full else [])]
+        data["batch"] = batches(sizes, 1 if quick else min(rounds, 3), 1000)
+    if native and full:
+        data["linearity"] = linearity([1000, 10_000, 100_000], 200)
+        data["map"] = [stability_map()]
+    return write(out, "throughput", data)
 
 
 if __name__ == "__main__":
@@ -106,5 +246,6 @@ if __name__ == "__main__":
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
+    parser.add_argument("--full", action="store_true")
     args = parser.parse_args()
-    print("\n\n".join(sections(main(args.out, rounds=args.rounds, steps=args.steps))))
+    print("\n\n".join(sections(main(args.out, rounds=args.rounds, steps=args.steps, full=args.full))))

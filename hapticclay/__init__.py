@@ -11,6 +11,7 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
+from .batch import simulate_batch
 from .design import Design, compare, design_gain, transparency_error
 from .drift import Drift, drift_map
 from .errors import ParameterError
@@ -79,6 +80,7 @@ __all__ = [
     "passivity",
     "port_energy",
     "simulate",
+    "simulate_batch",
     "small_gain",
     "stability_test",
     "transparency",

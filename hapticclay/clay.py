@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import bisect
+import math
+
+import numpy as np
 
 from .params import AXES, B_MAX, Clay, Profile
 
@@ -42,44 +45,75 @@ def slab(b: float, start: float, end: float) -> Clay:
     return Clay(x=profile, y=profile)
 
 
+# Rows of a table, two each: borders on x and y between -inf and inf [m]; damping of the x and y axis and its growth
+# [N.s/m, N.s/m per s], by region of the coordinate that decides; region of the axis's own profile in which that one
+# lies; time at which this was first entered [s], NaN before. Then, in one row: which coordinate decides on the x
+# and on the y axis, and where the path ends [m], inf if nowhere.
+EDGE, VALUE, RATE, OWN, ENTERED, MORE = 0, 2, 4, 6, 8, 10
+
+
+def table(clay: Clay | None, length: float | None) -> np.ndarray:
+    """Tabulates clay and the end of the path, length [m], for `settle`: shape (11, n)."""
+    profiles = (clay.x, clay.y) if clay else ()
+    end = math.inf if length is None else length
+    edges = [sorted({e for f in profiles if f.along == axis for e in f.edges}) for axis in AXES]
+    if length is not None:
+        edges[0] = sorted({e for e in edges[0] if e < end} | {end})
+    out = np.zeros((MORE + 1, max(map(len, edges)) + 3))
+    out[EDGE : EDGE + 2, 1:], out[EDGE : EDGE + 2, 0], out[ENTERED : ENTERED + 2] = math.inf, -math.inf, math.nan
+    for i, e in enumerate(edges):
+        out[EDGE + i, 1 : len(e) + 1] = e
+    for i, f in enumerate(profiles):
+        out[MORE, i] = along = AXES.index(f.along)
+        for k, low in enumerate([-math.inf, *edges[along]]):
+            j = bisect.bisect_right(f.edges, low)
+            out[[VALUE + i, RATE + i, OWN + i], k] = f.values[j], f.growth[j] if f.growth else 0.0, j
+    out[MORE, 2] = end
+    return out
+
+
+def settle(table, ix, iy, t):
+    """The region with these indices along x and y, which the handle enters at time t [s].
+
+    Returns:
+        (low, high, base, rate), x and y each: its borders [m] and its clay, see `at`.
+    """
+    basex, ratex = _law(table, 0, iy if table[MORE, 0] else ix, t)
+    basey, ratey = _law(table, 1, iy if table[MORE, 1] else ix, t)
+    low = (table[EDGE, ix], table[EDGE + 1, iy])
+    high = (table[EDGE, ix + 1], table[EDGE + 1, iy + 1])
+    return low, high, (basex, basey), (ratex, ratey)
+
+
+def _law(table, axis, k, t):
+    value, rate = table[VALUE + axis, k], table[RATE + axis, k]
+    if rate:
+        j = int(table[OWN + axis, k])
+        if table[ENTERED + axis, j] != table[ENTERED + axis, j]:
+            table[ENTERED + axis, j] = t
+        value -= rate * table[ENTERED + axis, j]
+    return value, rate
+
+
 class Regions:
     """Which region of the clay the handle is in, and how far that region reaches.
 
     Attributes:
+        table: the clay. index: of the region along x and y.
         low, high: borders of the present region on each coordinate [m].
         base, rate: the clay there is b = base + rate t on each axis [N.s/m, N.s/m per s].
         grows: whether any region's clay grows.
     """
 
     def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
-        inf = float("inf")
-        self._profiles = (clay.x, clay.y) if clay else ()
-        self._edges = [sorted({e for f in self._profiles if f.along == axis for e in f.edges}) for axis in AXES]
-        self._end = length
-        if length is not None:
-            self._edges[0] = sorted({e for e in self._edges[0] if e < length} | {length})
-        self._index = [bisect.bisect_right(self._edges[i], p[i]) for i in (0, 1)]
-        self._entered: dict[tuple[int, int], float] = {}  # (axis, region of its profile) -> time [s]
-        self.grows = any(f.growth for f in self._profiles)
-        self.low, self.high = [-inf, -inf], [inf, inf]
-        self.base = self.rate = (0.0, 0.0)
+        self.table = table(clay, length)
+        self.index = [bisect.bisect_right(row[1:].tolist(), x) for row, x in zip(self.table, p, strict=False)]
+        self.grows = bool(self.table[RATE : RATE + 2].any())
         self._settle(0.0)
 
     def _settle(self, t: float) -> None:
-        for i in (0, 1):
-            edges, k = self._edges[i], self._index[i]
-            self.low[i] = edges[k - 1] if k else -float("inf")
-            self.high[i] = edges[k] if k < len(edges) else float("inf")
-        if self._profiles:
-            laws = [self._law(i, f, t) for i, f in enumerate(self._profiles)]
-            self.base = laws[0][0], laws[1][0]
-            self.rate = laws[0][1], laws[1][1]
-
-    def _law(self, axis: int, profile: Profile, t: float) -> tuple[float, float]:
-        low = self.low[AXES.index(profile.along)]
-        j = sum(1 for e in profile.edges if e <= low)
-        value, rate = profile.values[j], profile.growth[j] if profile.growth else 0.0
-        return value - rate * self._entered.setdefault((axis, j), t) if rate else value, rate
+        found = settle(self.table, self.index[0], self.index[1], t)
+        self.low, self.high, self.base, self.rate = ((float(x), float(y)) for x, y in found)
 
     def b(self, t: float) -> tuple[float, float]:
         """Damping of the present region at time t [s] on each axis [N.s/m]."""
@@ -88,18 +122,18 @@ class Regions:
     def cross(self, i: int, up: bool, t: float) -> float:
         """Steps over the border of coordinate i at time t [s], upwards or downwards; returns its place [m]."""
         border = self.high[i] if up else self.low[i]
-        self._index[i] += 1 if up else -1
+        self.index[i] += 1 if up else -1
         self._settle(t)
         return border
 
     def at_end(self, i: int, up: bool) -> bool:
         """True if the border ahead on coordinate i is the end of the path."""
-        return i == 0 and up and self._end is not None and self.high[0] == self._end
+        return i == 0 and up and self.high[0] == self.table[MORE, 2]
 
 
 def at(base: tuple[float, float], rate: tuple[float, float], t: float) -> tuple[float, float]:
     """b = base + rate t on each axis [N.s/m]; growth ends at the largest damping there is."""
-    if rate == (0.0, 0.0):
-        return base
-    x, y = (min(b + r * t, B_MAX) for b, r in zip(base, rate, strict=True))
+    x, y = base
+    if rate[0] or rate[1]:
+        x, y = min(x + rate[0] * t, B_MAX), min(y + rate[1] * t, B_MAX)
     return x, y

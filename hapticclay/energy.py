@@ -37,6 +37,22 @@ def balance(work: Sequence[float], first: tuple[float, float], last: tuple[float
     }
 
 
+def spent(H, k, bx, by, ax, ay, t1, t2, w1, w2, damper):
+    """Work done in a kick [J]: of muscle, motors, clay, hand's damper, and throughput. Floats, or arrays over kicks.
+
+    Args:
+        H: length of the kick [s]. k: from loop.inputs. bx, by, ax, ay: handle velocity before and after it [m/s].
+        t1, t2: motor torques [N.m]. w1, w2: mean joint rates [rad/s]. damper: of the hand [N.s/m].
+    """
+    vx = 0.5 * (bx + ax)
+    vy = 0.5 * (by + ay)
+    muscle = H * (k[5] * vx + k[6] * vy)
+    motors = H * (t1 * w1 + t2 * w2)
+    clay = H * ((k[0] * bx + k[1] * ax) * vx + (k[2] * by + k[3] * ay) * vy)
+    hand = H * damper * (vx * vx + vy * vy)
+    return muscle, motors, clay, hand, abs(muscle) + abs(motors)
+
+
 class Ledger:
     """Adds up the work done in the kicks of a run; each force times the mean of the velocities around it.
 
@@ -65,12 +81,8 @@ class Ledger:
         a = q[0] + q[1]
         columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
         r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
-        muscle = H * (k[5] * v[0] + k[6] * v[1])
-        motors = H * (tau[0] * r1 + tau[1] * (r2 - r1))
-        clay = H * ((k[0:4:2] * before + k[1:4:2] * after) * v).sum(axis=0)
-        hand = H * th.damper * (v * v).sum(axis=0)
-        through = np.abs(muscle) + np.abs(motors)
-        self.work += [x.sum() for x in (muscle, motors, clay, hand, through)]
+        around = before[0], before[1], after[0], after[1]
+        self.work += [x.sum() for x in spent(H, k, *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
             u1x, u1y, u2x, u2y = (x[j] for x in columns)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from .params import Operator
 
 
-def kick(
-    operator: Operator | None, H: float, L: float, R: float, step: float | None = None
-) -> tuple[float, float, float, float]:
+def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> tuple[float, float, float, float]:
     """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
 
     The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
@@ -16,17 +14,17 @@ def kick(
     Args:
         operator: Th; None for Th = 0.
         H: length of the kick [s]. L, R: its shares before and after the sample.
-        step: h [s] if the kick is but a part of one between steps of h; None for H.
+        h: length of the steps [s]; H, unless the kick is but a part of one between them.
 
     Returns:
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
         -(spring p - mass c + before v- + after v+), c the centripetal acceleration.
     """
-    if operator is None:
-        return 0.0, 0.0, 0.0, 0.0
-    h = H if step is None else step
-    mass = operator.mass + 0.25 * operator.spring * h * h
-    return operator.spring, mass, operator.damper * L - mass / H, operator.damper * R + mass / H
+    mass, damper, spring = 0.0, 0.0, 0.0
+    if operator is not None:
+        mass, damper, spring = operator.mass, operator.damper, operator.spring
+    mass = mass + 0.25 * spring * h * h
+    return spring, mass, damper * L - mass / H, damper * R + mass / H
 
 
 def impedance(spring: float, mass: float, before: float, p: float, c: float, v: float) -> float:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from . import arm, energy, loop
+from . import energy, loop
 from .clay import at
 from .inline import inline
 from .params import Scenario
@@ -301,9 +301,7 @@ class Leapfrog(Run):
 
     def _whole(self, w, command, out, after: float) -> None:
         """Steps the engine by after, from joint rates w to those of out, whatever the length of the kick."""
-        t1, t2 = command[:2]
-        a1, a2 = (out[2] - w[0]) / after, (out[2] + out[3] - w[0] - w[1]) / after
-        self.write(self.drive, 0, t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2)
+        self.write(self.drive, 0, *loop.entire(w[0], w[1], out[2], out[3], command[0], command[1], after))
         self.model.opt.timestep = after
         mujoco.mj_step(self.model, self.data)
         self.model.opt.timestep = self.scenario.dt

@@ -35,16 +35,19 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     """
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
+    keepx, takex, nx, mx, kpx = servo.kick(G[0], S[0], H, L, R)
+    keepy, takey, ny, my, kpy = servo.kick(G[1], S[1], H, L, R)
     keep, take = lti.kick(C_POLE, H, L, R)
-    half = None if before and after else max(before, after)  # at start and end the kick is half of one
+    step = H if before > 0.0 and after > 0.0 else max(before, after)  # at start and end the kick is half of one
+    spring, mass, behind, ahead = human.kick(scenario.operator, H, L, R, step)
+    limit1, limit2 = scenario.torque_limit
+    held = 1.0 if scenario.operator is not None else 0.0
+    shaped = 1.0 if scenario.shaping else 0.0
     return (
-        H, after, 0.5 * before,
-        *servo.kick(G[0], S[0], H, L, R), *servo.kick(G[1], S[1], H, L, R),
+        H, after, 0.5 * before, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy,
         keep, take * scenario.gain[0], take * scenario.gain[1],
         scenario.origin[0], -scenario.origin[1],
-        *scenario.torque_limit, *(limit * limit for limit in scenario.torque_limit),
-        *human.kick(scenario.operator, H, L, R, half),
-        1.0 if scenario.operator else 0.0, 1.0 if scenario.shaping else 0.0,
+        limit1, limit2, limit1 * limit1, limit2 * limit2, spring, mass, behind, ahead, held, shaped,
     )  # fmt: skip
 
 
@@ -57,7 +60,9 @@ def inputs(
         b0, b1: clay before and after the sample [N.s/m]. uh: muscle force [N]. before, after: as above [s].
     """
     span = before + after
-    return *clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W), *uh
+    cx0, cx1, cy0, cy1, felt = clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W)
+    uhx, uhy = uh
+    return cx0, cx1, cy0, cy1, felt, uhx, uhy
 
 
 def measure(q1, q2, w1, w2, d1, d2, ox, noy):
@@ -248,6 +253,16 @@ def push(c, k, q1, q2, w1, w2, t1, t2):
         (px, py, vx, vy, fx - dx * ux, fy - dy * uy, ax - cx, ay - cy),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )
+
+
+def entire(w1, w2, n1, n2, t1, t2, step):
+    """Command that takes the engine from joint rates w to n [rad/s] in one step [s], however long the kick was.
+
+    Args:
+        t1, t2: torques of it that the motors give [N.m].
+    """
+    a1, a2 = (n1 - w1) / step, (n1 + n2 - w1 - w2) / step
+    return t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2
 
 
 def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):

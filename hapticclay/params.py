@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from .errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 
@@ -18,18 +19,12 @@ CONTROLS = ("continuous", "sampled")
 RENDERS = ("held", "implicit")
 
 
-@dataclass(frozen=True)
-class SecondOrder:
+class SecondOrder(NamedTuple):
     """gain / (s^2 + damping s + stiffness); damping in 1/s, stiffness in 1/s^2."""
 
     gain: float
     damping: float
     stiffness: float
-
-    def __post_init__(self):
-        object.__setattr__(self, "gain", number("gain", self.gain, 0.0, above=True))
-        object.__setattr__(self, "damping", number("damping", self.damping, 0.0, unit="1/s"))
-        object.__setattr__(self, "stiffness", number("stiffness", self.stiffness, 0.0, above=True, unit="1/s^2"))
 
 
 CM = 1e-2  # the paper prints lengths in centimetres

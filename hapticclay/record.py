@@ -265,7 +265,7 @@ def _scenario(d: dict[str, Any]) -> Scenario:
     return Scenario(**d)
 
 
-@functools.cache
+@functools.cache  # some milliseconds
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages a run depends on."""
     out = {"python": platform.python_version()}

@@ -35,8 +35,7 @@ class Run:
                 "mjcb_control", mujoco.get_mjcb_control(), "the engine must be free of control callbacks"
             )
         self.scenario, self.every = scenario, every
-        self.model = scene.build(scenario)
-        self.data = mujoco.MjData(self.model)
+        self.model, self.data = self.engine()
         q1, q2 = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
         self.data.qpos[:] = q1, q2
         r1, r2 = arm.rates(*scenario.velocity, *arm.columns(*_trigonometry(q1, q2)), 1.0)
@@ -54,6 +53,11 @@ class Run:
         self.crossings: list[record.Crossing] = []
         self.outcome: record.Outcome | None = None
         self.end_time: float | None = None
+
+    def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The engine's model of the scenario, and a state of it."""
+        model = scene.build(self.scenario)
+        return model, mujoco.MjData(model)
 
     def advance(self) -> bool:
         """Makes a step or many; True if it is time to look at what came of them."""
@@ -104,14 +108,7 @@ class Run:
 
     def target(self) -> tuple[float, float, bool]:
         """(time of the next sample [s], length of the step to it [s], whether now is a sample); length 0 at the end."""
-        s = self.scenario
-        on_grid = self.t == self.i * s.dt
-        if self.i > self.last:
-            return self.t, 0.0, on_grid
-        whole = self.i < self.last
-        target = (self.i + 1) * s.dt if whole else s.t_max
-        after = s.dt if on_grid and whole else target - self.t
-        return target, after if after > 1e-9 * s.dt else 0.0, on_grid
+        return aim(self.t, self.i, self.last, self.scenario.dt, self.scenario.t_max)
 
     def inside(self, i: int, p: float) -> bool:
         """Whether coordinate i at p [m] is in the present region (a NaN is: it is judged later)."""
@@ -183,15 +180,25 @@ def _signal(multisine: Multisine | None) -> Any:
     return Signal(multisine)
 
 
-def root(f: Callable[[float], float], b: float, fb: float) -> float:
-    """Where f, of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding."""
+def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, float, bool]:
+    """Run.target, for the run at time t [s], at or after sample i, that has `last` whole steps."""
+    on_grid = t == i * dt
+    if i > last:
+        return t, 0.0, on_grid
+    target = (i + 1) * dt if i < last else t_max
+    after = dt if on_grid and i < last else target - t
+    return target, after if after > 1e-9 * dt else 0.0, on_grid
+
+
+def root(f: Callable[..., float], b: float, fb: float, *args: Any) -> float:
+    """Where f(x, *args), of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding."""
     a = 1e-9 * b
-    fa, end = f(a), b
+    fa, end = f(a, *args), b
     if fa == 0.0 or (fa > 0.0) == (fb > 0.0):
         return a
     for _ in range(60):
         h = b - fb * (b - a) / (fb - fa)
-        fh = f(h)
+        fh = f(h, *args)
         if (fh > 0.0) != (fb > 0.0):
             a, fa = b, fb
         else:

@@ -9,6 +9,11 @@ import numpy as np
 from .params import Multisine
 
 
+def line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
+    """Mean over [t - h, t + h] [s] of cos(omega t + phase): numbers, or arrays of them."""
+    return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
+
+
 class Signal:
     """A multisine, ready to be evaluated.
 
@@ -31,10 +36,8 @@ class Signal:
         """Mean over [begin, end] [s], shape (n, 2) for n spans, or (2,) for one; the value where they are equal."""
         begin, end = np.asarray(begin), np.asarray(end)
         t, h = 0.5 * (begin + end)[..., None], 0.5 * (end - begin)[..., None]
-        weight = np.sinc(self.omega * h / np.pi)
-        return np.stack(
-            [(weight * np.cos(self.omega * t + self.phase[:, i])).sum(-1) * self.amplitude[i] for i in (0, 1)], -1
-        )
+        lines = (line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
+        return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
     def __call__(self, t: Any) -> np.ndarray:
         """Value at t [s], shape (n, 2) or (2,)."""

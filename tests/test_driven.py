@@ -136,10 +136,8 @@ def test_clay_hit_at_speed(b, speed, control):
 def test_command_alone_moves_the_handle_through_g():
     """K = 0 opens the loop: p = G command, and the compensator's own output stays."""
     command = Multisine(rms=(1e-3, 0.0), low=1.0, high=2.0, period=1.0, seed=2)
-    s = dataclasses.replace(
-        hc.free(gain=(0.0, 0.0), force=(0.0, 0.0), shaping=True, t_max=3.0), length=None, command=command
-    )
-    r = hc.simulate(s)
+    s = dataclasses.replace(hc.free(force=(0.0, 0.0), shaping=True, t_max=3.0), gain=(0.0, 0.0), length=None)
+    r = hc.simulate(dataclasses.replace(s, command=command))
     sig = Signal(command)
     np.testing.assert_allclose(r.delta, sig(r.t) - sig(0.0), atol=1e-12)
 

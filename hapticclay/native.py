@@ -1,0 +1,277 @@
+"""The leapfrog compiled: `stride` and the laws it calls, by numba, into one function that steps whole runs.
+
+It calls the engine's own mj_step at its address and holds no lock, so runs go on side by side in threads. The
+compiled code is kept on disk, in a folder named after the sources it was made from.
+"""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import hashlib
+import os
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numba
+import numpy as np
+from numba.core import cgutils, types
+from numba.extending import intrinsic, overload
+
+from . import clay, energy, loop, record, run, scene, signals, stride
+from .clay import slab
+from .inline import inline
+from .params import AXES, NO_HAND, Scenario
+from .run import CHUNK, Run
+
+FLAT = (  # laws that are compiled with their own laws written into them
+    clay.at, clay.settle, loop.coefficients, loop.entire, loop.tick,
+    stride.around, stride.enter, stride.kick, stride.place,
+)  # fmt: skip
+PLAIN = (
+    run.aim, run.root, signals.line, stride.heading, stride.land, stride.mean, stride.miss, stride.move,
+    stride.note, stride.side, stride.write,
+)  # fmt: skip
+ROOM = 64  # crossings between two looks at them
+
+
+def _pointer(builder, address, kind):
+    return builder.inttoptr(address, cgutils.ir.PointerType(kind))
+
+
+@intrinsic
+def _load(typing, address):
+    def build(context, builder, signature, args):
+        return builder.load(_pointer(builder, args[0], cgutils.ir.DoubleType()))
+
+    return types.float64(address), build
+
+
+@intrinsic
+def _store(typing, address, x):
+    def build(context, builder, signature, args):
+        builder.store(args[1], _pointer(builder, args[0], cgutils.ir.DoubleType()))
+        return context.get_dummy_value()
+
+    return types.void(address, x), build
+
+
+@intrinsic
+def _call(typing, address, a, b):
+    def build(context, builder, signature, args):
+        byte = cgutils.ir.IntType(8)
+        kind = cgutils.ir.FunctionType(cgutils.ir.VoidType(), [byte.as_pointer()] * 2)
+        builder.call(_pointer(builder, args[0], kind), [_pointer(builder, x, byte) for x in args[1:]])
+        return context.get_dummy_value()
+
+    return types.void(address, a, b), build
+
+
+overload(stride.load)(lambda address: lambda address: _load(address))  # type: ignore
+overload(stride.store)(lambda address, x: lambda address, x: _store(address, x))  # type: ignore
+overload(stride.call)(lambda address, a, b: lambda address, a, b: _call(address, a, b))  # type: ignore
+
+
+def _compiled(*functions: Any) -> list[Any]:
+    """The functions, each to be compiled when first called, or taken from the disk."""
+    for law in (*PLAIN, *FLAT):
+        body = inline(law) if law in FLAT else law
+        overload(law, jit_options={"error_model": "numpy"}, strict=False)(lambda *args, body=body: body)
+    options: Any = {"nogil": True, "error_model": "numpy"}
+    before = numba.config.CACHE_DIR
+    try:
+        numba.config.CACHE_DIR = str(folder())
+        return [numba.njit(cache=True, **options)(f) for f in functions]
+    except (OSError, RuntimeError):  # nowhere to keep it
+        return [numba.njit(**options)(f) for f in functions]
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def folder() -> Path:
+    """Where compiled code is kept: NUMBA_CACHE_DIR or the user's cache folder, by the sources it is made from."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+_stride, _calm = _compiled(stride.stride, stride.calm)
+
+
+def _mj_step() -> int:
+    """Address of the engine's mj_step."""
+    library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+    address = ctypes.cast(library.mj_step, ctypes.c_void_p).value
+    assert address
+    return address
+
+
+STEP = _mj_step()
+
+
+class Bench:
+    """Engines of one thread, used again by run after run: one with clay, one without.
+
+    Args:
+        models: to copy, by whether there is clay; those that lack are built when needed.
+    """
+
+    def __init__(self, models: dict[bool, mujoco.MjModel]):
+        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.Engine]] = {}
+        for with_clay, model in models.items():
+            self._take(with_clay, copy.copy(model))
+        self.rows = np.empty((CHUNK - 1, stride.ROW))
+
+    def _take(self, with_clay: bool, model: mujoco.MjModel) -> None:
+        data = mujoco.MjData(model)
+        views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(model)
+        at = STEP, model._address, data._address, *(x.ctypes.data for x in views)
+        self.engines[with_clay] = model, data, stride.Engine(*at)
+
+    def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The engine as scene.build(s) would make it, at rest."""
+        if (s.clay is not None) not in self.engines:
+            self._take(s.clay is not None, scene.build(s))
+        model, data, _ = self.engines[s.clay is not None]
+        model.opt.timestep = s.dt
+        for i, limit in enumerate(s.torque_limit):
+            model.actuator_ctrlrange[i] = -limit, limit
+        mujoco.mj_resetData(model, data)
+        return model, data
+
+
+class Native(Run):
+    """The leapfrog, compiled: a chunk of steps at a time, borders included.
+
+    Args:
+        bench: engines to use; None for its own.
+        quiet: keep the last row only, and raise Suspicious where outcome.Watch would have to look closer.
+    """
+
+    def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
+        self.bench = bench or Bench({})
+        super().__init__(scenario, every)
+        s, engine = scenario, self.bench.engines[scenario.clay is not None][2]
+        th = s.operator or NO_HAND
+        given = stride.Given(
+            s.gain, s.force, s.origin, s.torque_limit, stride.Hand(th.mass, th.damper, th.spring),
+            s.shaping, s.operator is not None, s.clay is not None, s.dt, s.t_max, self.last,
+        )  # fmt: skip
+        self.now = np.zeros(1, stride.STATE)
+        self.now["loop"] = loop.initial_state(s.start, s.velocity)
+        self.now["clay"] = *self.regions.base, *self.regions.rate
+        self.now["index"] = self.regions.index
+        self.rows, self.filled = self.bench.rows, 0
+        self.crossed = np.empty((ROOM, 4))
+        given = given, _lines(self.muscle), _lines(self.command), self.regions.table, engine
+        self.given = (*given, self.now, self.rows, self.crossed)
+        w1, w2 = self.data.qvel
+        self.first = energy.stored(th, w1, w1 + w2, np.array(s.start), np.array(s.velocity))
+        self.before = self._state()  # at the last look
+        self.quiet = quiet
+        self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
+
+    def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        return self.bench.engine(self.scenario)
+
+    def _state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.now.copy(), self.data.qpos.copy(), self.data.qvel.copy()
+
+    def advance(self) -> bool:
+        self.before = self._state()
+        code, self.filled, n = _stride(*self.given, CHUNK - 1, CHUNK - 1)
+        now = self.now[0]
+        self.t, self.i, self.steps = float(now["t"]), int(now["i"]), int(now["steps"])
+        for axis, *crossing in self.crossed[:n].tolist():
+            self.crossings.append(record.Crossing(AXES[int(axis)], *crossing))
+        if code == stride.NOT_FINITE:
+            raise ArithmeticError
+        if code:
+            self.finish("finished" if code == stride.FINISHED else "time limit")
+        return True
+
+    def flush(self) -> None:
+        n, self.filled = self.filled, 0
+        if self.quiet:
+            return self._glance(n)
+        rows = self.rows[:n].T.copy()
+        good = self.judge(rows[:12], lambda: rows[12:])
+        if self.outcome is not None and self.end_time is None:  # the ledger ends with the good rows
+            self.now[:], self.data.qpos[:], self.data.qvel[:] = self.before
+            _stride(*self.given, CHUNK - 1, good)
+        return None
+
+    def _glance(self, n: int) -> None:
+        """Makes sure that nothing is amiss, and keeps the last row."""
+        if not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
+            raise Suspicious
+        if self.outcome is not None:
+            watch = self.watch
+            watch.seen, watch.moved, watch.unbound, watch.often = self.seen.tolist()
+            self.outcome = watch.end(self.outcome)
+            rows = self.rows[n - 1 : n].T.copy()
+            self.kept = [(np.array([watch.seen - 1]), rows[:12], rows[12:])]
+        self.looked += n
+
+    def balance(self) -> dict[str, float]:
+        p, v, w = self.now["last"].reshape(3, 2)
+        last = energy.stored(self.scenario.operator or NO_HAND, w[0], w[0] + w[1], p, v)
+        made = self.looked > 0
+        return energy.balance(self.now["work"][0].tolist(), self.first if made else last, last)
+
+
+class Suspicious(Exception):
+    """A run to be made again, and watched."""
+
+
+class Pool:
+    """What the threads of a batch share, and what each has of its own.
+
+    Args:
+        every: keep each every-th sample, and the last. brief: keep the last alone.
+    """
+
+    def __init__(self, every: int, brief: bool):
+        self.every, self.brief = 1_000_000_000 if brief else every, brief
+        self.own = threading.local()
+        self.models = {x.clay is not None: scene.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
+
+    def run(self, scenario: Scenario) -> record.Record:
+        """The record of a run that native can make; without its samples if it is to be brief."""
+        if not hasattr(self.own, "bench"):
+            self.own.bench = Bench(self.models)
+        try:
+            return self._go(scenario, self.brief and scenario.stop)
+        except Suspicious:
+            return self._go(scenario, False)
+
+    def _go(self, scenario: Scenario, quiet: bool) -> record.Record:
+        run = Native(scenario, self.every, self.own.bench, quiet)
+        begin = time.perf_counter()
+        run.go(None)
+        return run.result(time.perf_counter() - begin)
+
+
+def _timestep(model: mujoco.MjModel) -> np.ndarray:
+    """A view of model.opt.timestep, shape (1,)."""
+    head = np.ctypeslib.as_array((ctypes.c_double * 256).from_address(model._address))
+    before = model.opt.timestep
+    found = np.ones(256, dtype=bool)
+    for mark in (0.0123456789, 0.00987654321):
+        model.opt.timestep = mark
+        found &= head == mark
+    model.opt.timestep = before
+    (at,) = np.flatnonzero(found)
+    return head[at : at + 1]
+
+
+def _lines(signal: Any) -> np.ndarray:
+    """A signals.Signal, one row a line: omega [rad/s], phase x, y [rad], amplitude x, y; none for None."""
+    if signal is None:
+        return np.zeros((0, 5))
+    return np.column_stack((signal.omega, signal.phase, np.tile(signal.amplitude, (len(signal.omega), 1))))

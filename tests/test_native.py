@@ -1,0 +1,228 @@
+"""The compiled loop against the Python one, and batches against single runs."""
+
+import dataclasses
+import importlib.util
+import os
+import random
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from test_loop import CASES
+
+import hapticclay as hc
+from hapticclay import batch, leapfrog, sim
+from hapticclay.params import Clay, Multisine, Profile
+
+fast = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]")
+FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+GROWING = Clay(Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)), Profile((0.01,), (50.0, 100.0), growth=(9.0, 0.0)))
+WAVE = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
+LAYERS = Clay(Profile((0.01, 0.02, 0.03), (0.0, 50.0, 500.0, 5.0)), Profile((0.001,), (10.0, 90.0), along="y"))
+MORE = {
+    "whole cut": hc.constant_cut(),
+    "muscle": dataclasses.replace(hc.free(impedance=True, t_max=1.0), clay=GROWING, length=None, muscle=WAVE),
+    "command": dataclasses.replace(hc.free(t_max=1.0), command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3))),
+    "growth": dataclasses.replace(hc.free(t_max=2.0), clay=GROWING),
+    "layers": dataclasses.replace(hc.free(t_max=1.0, force=(1.0, 0.3)), clay=LAYERS),
+    "at speed": dataclasses.replace(hc.constant_cut(b=1e4, t_max=0.3, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)),
+    "backwards": hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), t_max=1.0),
+    "along a border": hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.3),
+    "diverged": hc.constant_cut(gain=(1.0, 1.0)),
+    "thrown out of reach": hc.constant_cut(gain=(1e4, 1e4), torque_limit=(1e6, 1e6)),
+    "unstable, goes on": dataclasses.replace(hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop=False),
+    "stretched": hc.constant_cut(force=(1.0, 50.0)),
+    "stalled": hc.constant_cut(force=(0.0, 0.0), t_max=2.0),
+    "one short step": hc.constant_cut(t_max=1e-5),
+    "not on the grid": hc.constant_cut(t_max=0.1001),
+    "coarse": hc.constant_cut(dt=0.02, t_max=3.0),
+}
+ALL = {**CASES, **MORE}
+
+
+def same(a, b):
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(a, field), getattr(b, field), err_msg=field)
+    assert a.outcome == b.outcome and a.crossings == b.crossings and a.steps == b.steps and a.energy == b.energy
+
+
+@fast
+@pytest.mark.parametrize("name", ALL)
+def test_native_is_python_within_rounding(name):
+    """The same operations in the same order: equal but for sums of sines, which NumPy adds up pairwise."""
+    python, native = (hc.simulate(ALL[name], engine=engine) for engine in ("python", "native"))
+    assert native.outcome == python.outcome and native.steps == python.steps
+    for a, b in zip(native.crossings, python.crossings, strict=True):
+        assert (a.axis, a.border) == (b.axis, b.border)
+        assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=1e-12)
+    for field in FIELDS:
+        x, y = getattr(native, field), getattr(python, field)
+        np.testing.assert_allclose(x, y, rtol=0.0, atol=1e-12 * max(1.0, np.abs(y).max()), err_msg=field)
+    for key, value in python.energy.items():
+        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=1e-12 * python.energy["throughput"])
+
+
+@fast
+def test_every_and_progress():
+    s = hc.constant_cut(t_max=2.0)
+    seen = []
+    thin = hc.simulate(s, every=7, engine="native", progress=lambda t, x: seen.append((t, x)))
+    full = hc.simulate(s, engine="native")
+    np.testing.assert_array_equal(thin.p[:-1], full.p[:-1][::7][: len(thin.p) - 1])
+    assert len(seen) >= 2 and seen == sorted(seen)
+
+
+@fast
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_batch_is_the_single_run_bit_for_bit_at_any_number_of_threads_and_order(threads):
+    names = list(ALL)
+    random.Random(threads).shuffle(names)
+    records = hc.simulate_batch([ALL[n] for n in names], threads=threads)
+    for name, r in zip(names, records, strict=True):
+        same(r, hc.simulate(ALL[name], engine="native"))
+
+
+@fast
+def test_summaries_are_those_of_the_records():
+    records = hc.simulate_batch(ALL.values())
+    short = hc.simulate_batch(ALL.values(), keep="summaries")
+    assert short.dtype == batch.SUMMARY
+    for i, r in enumerate(records):
+        assert short[i].tobytes() == np.array([batch.summary(r)], batch.SUMMARY)[0].tobytes(), list(ALL)[i]
+        assert short["code"][i] == r.outcome.code and short["residual"][i] == r.energy["residual"]
+        np.testing.assert_array_equal(short["p"][i], r.p[-1])
+
+
+@fast
+def test_a_run_that_diverges_changes_no_other():
+    good = [hc.constant_cut(b=b, t_max=0.5) for b in (10.0, 50.0, 90.0)]
+    alone = hc.simulate_batch(good)
+    mixed = hc.simulate_batch([good[0], MORE["diverged"], good[1], MORE["thrown out of reach"], good[2]])
+    assert [mixed[i].outcome.code for i in (1, 3)] == ["diverged", "diverged"]
+    for a, b in zip(alone, mixed[::2], strict=True):
+        same(a, b)
+
+
+@fast
+def test_what_native_cannot_run_python_does(capsys):
+    scenes = [hc.constant_cut(t_max=0.05, **kw) for kw in (dict(control="sampled"), dict(integrator="accurate"))]
+    mixed = hc.simulate_batch([*scenes, CASES["plain"]])
+    assert capsys.readouterr().err == ""
+    for s, r in zip(scenes, mixed, strict=False):
+        same(r, hc.simulate(s, engine="python"))
+        assert capsys.readouterr().err == ""
+        same(r, hc.simulate(s, engine="native"))
+        said = capsys.readouterr().err
+        assert "Python does" in said and said.count("\n") == 1
+
+
+def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
+    monkeypatch.setattr(sim.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(hc.ParameterError, match=r"hapticclay\[fast\]"):
+        hc.simulate(hc.free(t_max=0.1), engine="native")
+    long = hc.free(force=(0.0, 0.0), dt=1e-6, t_max=1.0)
+    assert sim._kind(long, "auto") is leapfrog.Leapfrog
+    scenes = [hc.free(t_max=0.1), hc.constant_cut(t_max=0.1)]
+    records = hc.simulate_batch(scenes)
+    said = capsys.readouterr().err
+    assert "hapticclay[fast]" in said and said.count("\n") == 1
+    for s, r in zip(scenes, records, strict=True):
+        same(r, hc.simulate(s, engine="python"))
+
+
+@fast
+def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "hapticclay.native", None)
+    monkeypatch.delattr(hc, "native", raising=False)
+    r = hc.simulate(CASES["plain"], engine="native")
+    assert capsys.readouterr().err.count("\n") == 1
+    (b,) = hc.simulate_batch([CASES["plain"]])
+    assert capsys.readouterr().err.count("\n") == 1
+    same(r, hc.simulate(CASES["plain"], engine="python"))
+    same(r, b)
+
+
+def test_auto_takes_native_for_long_runs_only():
+    assert sim._kind(hc.constant_cut(), "auto") is leapfrog.Leapfrog
+    long = hc.constant_cut(dt=1e-4)
+    assert (sim._kind(long, "auto") is leapfrog.Leapfrog) == (not sim.has_numba())
+    assert sim._kind(long, "python") is leapfrog.Leapfrog
+
+
+@pytest.mark.parametrize("kw", [dict(threads=0), dict(every=0), dict(keep="all")])
+def test_batch_refuses_what_makes_no_sense(kw):
+    with pytest.raises(hc.ParameterError, match=next(iter(kw))):
+        hc.simulate_batch([hc.free(t_max=0.01)], **kw)
+
+
+def test_batch_names_what_is_no_scenario():
+    with pytest.raises(hc.ParameterError, match=r"scenarios\[1\]"):
+        hc.simulate_batch([hc.free(), "constant"])  # type: ignore[list-item]
+    with pytest.raises(hc.ParameterError, match="engine"):
+        hc.simulate(hc.free(), engine="nativ")
+
+
+def test_empty_batch():
+    assert hc.simulate_batch([]) == []
+    assert len(hc.simulate_batch(iter(()), keep="summaries")) == 0
+
+
+@fast
+def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):
+    from hapticclay import native
+
+    def broken(self):
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(native.Native, "advance", broken)
+    with pytest.raises(RuntimeError, match="broken"):
+        hc.simulate_batch([hc.free(t_max=0.1)] * 5, threads=2)
+
+
+@fast
+def test_engine_hears_nothing_and_keeps_nothing():
+    """No callback is installed, no warning written, and the engine's time step is found where it is."""
+    import mujoco
+
+    from hapticclay import native
+
+    before = mujoco.get_mju_user_warning()
+    hc.simulate_batch([MORE["thrown out of reach"]] * 3)
+    assert mujoco.get_mjcb_control() is None and mujoco.get_mju_user_warning() is before
+    model = hc.build(hc.free())
+    native._timestep(model)[0] = 0.5
+    assert model.opt.timestep == 0.5
+
+
+@fast
+def test_compiled_code_is_kept_on_disk(tmp_path):
+    """A second process takes it from there, in a fraction of the time."""
+    code = (
+        "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
+        "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
+        "from hapticclay import native; print(sum(native._stride.stats.cache_hits.values()))"
+    )
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    took = []
+    for hits in (0, 1):
+        out = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+        took.append(float(out.stdout.split()[0]))
+        assert out.stdout.split()[1] == str(hits)
+    assert took[1] < 0.5 * took[0]
+
+
+@fast
+def test_native_is_faster():
+    """A guard, not the measurement: benchmarks/throughput.py measures 2.4."""
+    s = hc.constant_cut(start=(0.06, 0.0), t_max=3.0)
+    hc.simulate(s, engine="native")
+    ratio = []
+    for _ in range(3):
+        begin = time.process_time()
+        hc.simulate(s, engine="python")
+        middle = time.process_time()
+        hc.simulate(s, engine="native")
+        ratio.append((middle - begin) / (time.process_time() - middle))
+    assert max(ratio) > 1.5
