@@ -40,6 +40,7 @@ SATURATED = 0.1  # share of the last WHILE in the torque limits from which an os
 STIFF = 3e3  # [1/s] rate from which LSODA is used
 RTOL = {DOP853: 1e-10, LSODA: 1e-10}
 ATOL = 1e-13
+LONG = 1e3  # [s] a run so long is for its verdict; tolerances are 1e4 times as wide
 
 
 @dataclass
@@ -280,7 +281,16 @@ class Run:
         low, high = self.laws(t)
         stiff = (max(*low(t), *high(t)) + self.loop.d) * 0.93 > STIFF
         kind = LSODA if stiff else DOP853
-        return kind(self.rhs(t), t, z, self.s.t_max, rtol=RTOL[kind], atol=ATOL, max_step=max(self.s.t_max / 50, 0.05))
+        scale = 1.0 if self.s.t_max < LONG else 1e4
+        return kind(
+            self.rhs(t),
+            t,
+            z,
+            self.s.t_max,
+            rtol=RTOL[kind] * scale,
+            atol=ATOL * scale,
+            max_step=max(self.s.t_max / 50, 0.05),
+        )
 
     def events(self, z, t, low, high) -> list[float]:
         """Functions of the state that are positive until something happens."""
