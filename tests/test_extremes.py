@@ -21,8 +21,14 @@ from hapticclay.params import Clay, Multisine, Profile
 CASES = extremes.cases()
 LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",
           "sampled", "accurate")  # fmt: skip
-# a step of 1e-2 s, or torque limits that are hit and left between samples, are the only ones worse than 10 um
-COARSE, FINE = 5e-5, 1e-5
+
+
+def tolerance(case):
+    """[m] At 0.36 ms all but a few um of stiff borders; more where motors go into their limits between two samples."""
+    s = case.scenario
+    if case.group == "reach" or s.gain[0] > 1e3:  # thrown into the singularity, where any torque is too little
+        return 2e-4
+    return 5e-5 if s.dt > 1e-3 or min(s.torque_limit) < 1.0 else 1e-5
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}")
@@ -33,8 +39,7 @@ def test_verdict_is_the_reference_s_and_energy_is_bounded(case, tmp_path, monkey
     assert row["nan"] == 0 and row["warnings"] == 0 and not list(tmp_path.iterdir())
     if row["reference"] not in ("unstable", "limit cycle"):
         assert row["energy"] is None and "force: none" in f"{case.group}: {case.name}" or row["energy"] < 1.01, row
-        coarse = case.scenario.dt > 1e-3 or case.scenario.torque_limit[0] < 1.0 or case.scenario.gain[0] > 1e3
-        assert row["position"] < (2e-4 if case.scenario.gain[0] > 1e3 else COARSE if coarse else FINE), row
+        assert row["position"] < tolerance(case), row
     if case.scenario.operator is None and case.scenario.integrator == "fast":
         assert row["residual"] < 1e-10, row
 
