@@ -112,18 +112,18 @@ def cases() -> list[Case]:
 
     g = "step dt"
     add(g, "dt = 1e-5", cut(dt=1e-5, t_max=1.0, force=(1.5, 0.0)))
-    add(g, "dt = 1e-2", cut(dt=1e-2), True)
+    add(g, "dt = 1e-2", cut(dt=1e-2))
     add(g, "dt = 1e-2, b = 1e9 hit at 2 m/s", cut((2.0, 0.0), b=1e9, dt=1e-2, t_max=1.0), True)
     add(g, "dt = 1e-2, spring 1e7 N/m, mass 0", cut(dt=1e-2, t_max=1.5, operator=STRONG, gain=(1e-3, 1e-3)))
 
     g = "torque limits"
-    add(g, "0.1 N.m, 1 N", cut(torque_limit=(0.1, 0.1)), True)
+    add(g, "0.1 N.m, 1 N", cut(torque_limit=(0.1, 0.1)))
     add(g, "0.1 N.m, 3 N aslant", cut(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0))
     add(g, "0.1 N.m, held by the motors' limit", cut(torque_limit=(0.1, 0.1), force=(0.0, 5.0), b=1e3, t_max=1.5), True)
     add(g, "0.1 N.m, b = 1e4 hit at 2 m/s", cut((2.0, 0.0), torque_limit=(0.1, 0.1), b=1e4, t_max=1.0))
 
     g = "start"
-    add(g, "at rest inside b = 90", cut(start=(0.1, 0.0)), True)
+    add(g, "at rest inside b = 90", cut(start=(0.1, 0.0)))
     add(g, "at rest inside b = 1e9", cut(start=(0.1, 0.0), b=1e9, t_max=2.0))
     add(g, "on the near border", cut(start=(0.05, 0.0), t_max=4.0))
     add(g, "on the far border", cut(start=(0.15, 0.0), t_max=4.0))

@@ -16,7 +16,7 @@ def kick(
     Args:
         operator: Th; None for Th = 0.
         H: length of the kick [s]. L, R: its shares before and after the sample.
-        step: h [s] if the kick is but a part of one between steps of h; None for H.
+        step: h [s] if the kick is but a part of one between steps of h, as at start and end; None for H.
 
     Returns:
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
