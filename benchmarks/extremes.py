@@ -34,6 +34,7 @@ from hapticclay.params import Clay, Multisine, Operator, Profile, Scenario  # no
 # Ours is right if the reference says one of these; "diverged" ends a run where the reference may go on into the limits
 AGREE = {"diverged": ("unstable", "limit cycle"), "limit cycle": ("limit cycle",)}
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+NOTHING = 1e-20  # [J] of rounding
 SAMPLES = 2000  # of position, compared with the reference
 
 
@@ -58,7 +59,7 @@ NONE = Profile((), (0.0,))
 WALL = Clay(Profile((0.0,), (0.0, 90.0), along="y"), Profile((0.0,), (0.0, 90.0), along="y"))  # clay for y > 0
 CORNER = Clay(Profile((0.05,), (0.0, 200.0)), Profile((0.02,), (0.0, 200.0), along="y"))  # own borders on each axis
 EVERYWHERE = Clay(Profile((), (100.0,)), Profile((), (100.0,)))
-STRIPES = Clay(*[Profile(tuple(0.02 + 1e-3 * i for i in range(100)), (0.0, 500.0) * 50 + (0.0,))] * 2)
+STRIPES = Clay(*[Profile(tuple(0.02 + 1e-3 * i for i in range(100)), (50.0, 100.0) * 50 + (50.0,))] * 2)
 HEAVY, STRONG = Operator(100.0, 0.0, 0.0), Operator(0.0, 0.0, 1e7)
 
 
@@ -111,18 +112,18 @@ def cases() -> list[Case]:
 
     g = "step dt"
     add(g, "dt = 1e-5", cut(dt=1e-5, t_max=1.0, force=(1.5, 0.0)))
-    add(g, "dt = 1e-2", cut(dt=1e-2), True)
+    add(g, "dt = 1e-2", cut(dt=1e-2))
     add(g, "dt = 1e-2, b = 1e9 hit at 2 m/s", cut((2.0, 0.0), b=1e9, dt=1e-2, t_max=1.0), True)
     add(g, "dt = 1e-2, spring 1e7 N/m, mass 0", cut(dt=1e-2, t_max=1.5, operator=STRONG, gain=(1e-3, 1e-3)))
 
     g = "torque limits"
-    add(g, "0.1 N.m, 1 N", cut(torque_limit=(0.1, 0.1)), True)
+    add(g, "0.1 N.m, 1 N", cut(torque_limit=(0.1, 0.1)))
     add(g, "0.1 N.m, 3 N aslant", cut(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0))
     add(g, "0.1 N.m, held by the motors' limit", cut(torque_limit=(0.1, 0.1), force=(0.0, 5.0), b=1e3, t_max=1.5), True)
     add(g, "0.1 N.m, b = 1e4 hit at 2 m/s", cut((2.0, 0.0), torque_limit=(0.1, 0.1), b=1e4, t_max=1.0))
 
     g = "start"
-    add(g, "at rest inside b = 90", cut(start=(0.1, 0.0)), True)
+    add(g, "at rest inside b = 90", cut(start=(0.1, 0.0)))
     add(g, "at rest inside b = 1e9", cut(start=(0.1, 0.0), b=1e9, t_max=2.0))
     add(g, "on the near border", cut(start=(0.05, 0.0), t_max=4.0))
     add(g, "on the far border", cut(start=(0.15, 0.0), t_max=4.0))
@@ -142,7 +143,7 @@ def cases() -> list[Case]:
         muscle=Multisine(rms=(2.0, 0.0), low=1.0, high=3.0, period=4.0, seed=3)), True)  # fmt: skip
     add(g, "grazing a corner", cut(clay=CORNER, force=(1.0, 0.8), t_max=5.0), True)
     add(g, "through the corner itself", cut((0.5, 0.2), clay=CORNER, force=(0.0, 0.0), t_max=1.0))
-    add(g, "100 layers of 1 mm", cut(clay=STRIPES), True)
+    add(g, "100 layers of 1 mm", cut(clay=STRIPES, force=(3.0, 0.0)), True)
 
     g = "reach"
     add(g, "stretched along x", hc.free(force=(-1.0, 0.0), gain=(0.5, 0.5), t_max=120.0), True)
@@ -161,11 +162,17 @@ def cases() -> list[Case]:
     add(
         g,
         "1 h in b = 1e6, dt = 1e-2",
-        cut(b=1e6, t_max=3600.0, dt=1e-2, force=(10.0, 0.0), start=(0.1, 0.0)),
+        cut(b=1e6, t_max=3600.0, dt=1e-2, force=(5.0, 0.0), start=(0.1, 0.0)),
         True,
         100,
     )
-    add(g, "1 h in b = 1e6", cut(b=1e6, t_max=3600.0, force=(20.0, 0.0), start=(0.06, 0.0)), False, 1000)
+    add(
+        g,
+        "1 h in b = 1e6, dt = 2e-3",
+        cut(b=1e6, t_max=3600.0, dt=2e-3, force=(20.0, 0.0), start=(0.06, 0.0)),
+        False,
+        1000,
+    )
     add(g, "1 h on the hand's spring", cut(b=1.0, t_max=3600.0, dt=1e-2, impedance=True, force=(0.5, 0.0)), False, 100)
 
     g = "sampled"
@@ -227,7 +234,8 @@ def run(case: Case) -> dict[str, Any]:
         n = min(len(x.p), len(index))
         kinetic = 0.5 * (I1 * r.qd[:, 0] ** 2 + I2 * (r.qd[:, 0] + r.qd[:, 1]) ** 2)
         row["position"] = float(np.max(np.linalg.norm(r.p[index[:n]] - x.p[:n], axis=1)))
-        row["energy"] = float(np.max(kinetic)) / x.kinetic if x.kinetic else (0.0 if not np.any(kinetic) else None)
+        if max(np.max(kinetic), x.kinetic) > NOTHING:
+            row["energy"] = float(np.max(kinetic) / x.kinetic) if x.kinetic else None
     return row
 
 
@@ -249,9 +257,9 @@ def sections(data: dict[str, Any]) -> list[str]:
     agreed = sum(r["agree"] for r in rows)
     return [
         "## Stiff and extreme",
-        f"{agreed} of {len(rows)} verdicts are those of the reference: the arm in joint space under DOP853 (1e-10), or "
-        "LSODA (1e-10) where stiff, borders found in both directions, Filippov's sliding motion where a border holds "
-        "the handle, torques clipped; sampled scenes as the hybrid system. Its verdict is its own: the poles of the loop "
+        f"{agreed} of {len(rows)} verdicts are those of the reference: the arm in joint space under DOP853, or LSODA "
+        "where stiff (1e-10), borders found in both directions, Filippov's sliding motion where a border holds the "
+        "handle, torques clipped; sampled scenes as the hybrid system. Its verdict is its own: the poles of the loop "
         "linearised along the way (sigma, the largest real part of an oscillating one), speeds and torques of the last "
         "second. Where hapticclay stops an unstable run as diverged, the reference may say unstable or limit cycle: it "
         "goes on into the torque limits. Position error and peak of kinetic energy (over the reference's) are of the "

@@ -188,7 +188,7 @@ def draw(rows: list[dict], problem: str):
         for ax in axes[len(kinds) :]:
             ax.remove()
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8, handlelength=4.0)
         figure.suptitle(f"{problem}: down and left is better", fontsize=11)
     return figure
 
@@ -206,7 +206,10 @@ def machine() -> list[str]:
     if info.is_file():
         names = [x.split(":", 1)[1].strip() for x in info.read_text().splitlines() if x.startswith("model name")]
         cpu = names[0] if names else cpu
-    return [f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}", ", ".join(found)]
+    load = (
+        f"load average {os.getloadavg()[1]:.1f} at the end; run times are those of a quiet machine only where it is low"
+    )
+    return [f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}", ", ".join(found), load]
 
 
 def number(x: float | None) -> str:
@@ -232,9 +235,10 @@ def sections(data: dict[str, Any]) -> list[str]:
         tabulate(dominance(rows), headers="keys", tablefmt="github"),
         "### Sampled control",
         "hapticclay's rows `sampled` are another system, the hardware's: measured and held every Ts, here Ts = dt. "
-        "What the diagrams show of them is the delay of the hold, half a sample, of first order in Ts: a property of "
-        "the hardware and not of the numbers. How well that system is computed is seen against the hybrid system, "
-        f"exact between samples (default cut, largest position error up to {HYBRID_END:g} s):",
+        "What the diagrams show of them is the delay of the hold, half a sample, and borders noticed up to a sample "
+        "late, both of first order in Ts: a property of the hardware and not of the numbers. How well that system is "
+        "computed is seen against the hybrid system, exact between samples (default cut, largest position error up to "
+        f"{HYBRID_END:g} s):",
         table_of_hybrid(data["hybrid"]),
     ]
     for problem in dict.fromkeys(r["problem"] for r in rows):

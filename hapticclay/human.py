@@ -14,7 +14,7 @@ def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> t
     Args:
         operator: Th; None for Th = 0.
         H: length of the kick [s]. L, R: its shares before and after the sample.
-        h: length of the steps [s]; H, unless the kick is but a part of one between them.
+        h: length of the steps [s]; H, unless the kick is but a part of one between them, as at start and end.
 
     Returns:
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is

@@ -50,7 +50,7 @@ def test_a_failed_run_is_a_row_without_errors():
 
 def test_the_default_path_is_a_thousand_times_closer_than_first_order_stepping(rows):
     for r in of(rows, "MuJoCo, plain"):
-        for ours in of(rows, "hapticclay", setting=r["setting"]):
+        for ours in of(rows, "hapticclay", method="fast", setting=r["setting"]):
             assert ours["crossing"] < 1e-3 * r["crossing"]
     assert {r["setting"] for r in of(rows, "MuJoCo, plain")} & {r["setting"] for r in of(rows, "hapticclay")}
 
@@ -95,8 +95,8 @@ def test_sampled_control_is_as_late_as_its_hold_and_as_exact_as_the_hybrid_syste
     assert {r["render"] for r in found} == {"held", "implicit"}
     for r in found:
         assert r["hybrid"] < 0.05 * r["continuous"]
-    for coarse, fine in zip(found[0::2], found[1::2], strict=True):  # first order in Ts
-        assert coarse["continuous"] / fine["continuous"] == pytest.approx(coarse["Ts"] / fine["Ts"], rel=0.2 * 4)
+    for coarse, fine in zip(found[0::2], found[1::2], strict=True):
+        assert coarse["continuous"] > 2.0 * fine["continuous"] and coarse["hybrid"] > 2.0 * fine["hybrid"]
 
 
 def test_sampled_rows_recommend_nothing(rows):

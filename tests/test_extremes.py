@@ -21,8 +21,14 @@ from hapticclay.params import Clay, Multisine, Profile
 CASES = extremes.cases()
 LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",
           "sampled", "accurate")  # fmt: skip
-# a step of 1e-2 s, or torque limits that are hit and left between samples, are the only ones worse than 10 um
-COARSE, FINE = 5e-5, 1e-5
+
+
+def tolerance(case):
+    """[m] At 0.36 ms all but a few um of stiff borders; more where motors go into their limits between two samples."""
+    s = case.scenario
+    if case.group == "reach" or s.gain[0] > 1e3:  # thrown into the singularity, where any torque is too little
+        return 2e-4
+    return 5e-5 if s.dt > 1e-3 or min(s.torque_limit) < 1.0 else 1e-5
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}")
@@ -32,9 +38,8 @@ def test_verdict_is_the_reference_s_and_energy_is_bounded(case, tmp_path, monkey
     assert row["agree"], row
     assert row["nan"] == 0 and row["warnings"] == 0 and not list(tmp_path.iterdir())
     if row["reference"] not in ("unstable", "limit cycle"):
-        assert row["energy"] < 1.01, row
-        coarse = case.scenario.dt > 1e-3 or case.scenario.torque_limit[0] < 1.0 or case.scenario.gain[0] > 1e3
-        assert row["position"] < (2e-4 if case.scenario.gain[0] > 1e3 else COARSE if coarse else FINE), row
+        assert row["energy"] is None and "force: none" in f"{case.group}: {case.name}" or row["energy"] < 1.01, row
+        assert row["position"] < tolerance(case), row
     if case.scenario.operator is None and case.scenario.integrator == "fast":
         assert row["residual"] < 1e-10, row
 
@@ -101,3 +106,15 @@ def test_reference_crosses_borders_both_ways():
     assert min(ways) < 0.0 < max(ways)
     r = hc.simulate(s)
     assert np.max(np.abs(np.interp(t, r.t, r.p[:, 0]) - x.p[:, 0])) < 1e-5
+
+
+def test_sliding_is_where_the_bounces_on_a_border_tend_to(monkeypatch):
+    """Taken to slide from 0.1 um of bounce on, far sooner than usual, the handle stays where it bounces otherwise."""
+    s = next(c.scenario for c in CASES if c.name == "along the border, from on it")
+    s = dataclasses.replace(s, t_max=0.6)
+    t = np.linspace(0.0, 0.599, 600)
+    bounces = reference.solve(s, t)
+    monkeypatch.setattr(reference, "BOUNCE", 1e-7)
+    slides = reference.solve(s, t)
+    assert not bounces.slides and slides.slides and len(slides.crossings) < len(bounces.crossings)
+    assert np.max(np.abs(slides.p - bounces.p)) < 2e-5
