@@ -22,10 +22,11 @@ from . import limits
 from .errors import ParameterError
 from .params import AXES
 from .record import Record, atomic
-from .sim import simulate
+from .sim import fits, has_numba, simulate
 from .space import Sweep
 
 BORDERS = 3  # crossings that have columns of their own
+NATIVE_FROM = 10_000_000  # steps in the whole sweep from which the compiled loop pays in every process
 STALE = 3600.0  # [s] after which an unfinished file is taken for a killed writer's
 
 
@@ -68,7 +69,9 @@ def run_chunk(sweep: Sweep, number: int, out: str) -> int:
     names, rows = list(sweep.vary), []
     for index, point in zip(itertools.count(first), sweep.points(first, last)):
         try:
-            rows.append(row(index, names, point, simulate(sweep.scenario(point))))
+            scenario = sweep.scenario(point)
+            compiled = len(sweep) * scenario.t_max / scenario.dt >= NATIVE_FROM and fits(scenario) and has_numba()
+            rows.append(row(index, names, point, simulate(scenario, engine="native" if compiled else "python")))
         except ParameterError as error:
             rows.append(row(index, names, point, None, str(error)))
     table = pa.Table.from_pylist(rows)
