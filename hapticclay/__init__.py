@@ -14,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from .design import Design, compare, design_gain, transparency_error
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
+from .hardware import Coupling, Interface
 from .limits import gain_limit
 from .lti import Compensator, closed_loop_poles
 from .params import Clay, Multisine, Operator, Profile, Scenario
@@ -42,8 +43,10 @@ __all__ = [
     "Box",
     "Clay",
     "Compensator",
+    "Coupling",
     "Crossing",
     "Design",
+    "Interface",
     "Margins",
     "Multisine",
     "Nyquist",

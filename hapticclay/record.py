@@ -17,6 +17,7 @@ import numpy as np
 
 from . import lti
 from .errors import ParameterError
+from .hardware import Coupling, Interface
 from .params import AXES, Clay, Multisine, Operator, Profile, Scenario
 
 SCHEMA = "hapticclay-record-1"
@@ -261,6 +262,9 @@ def _scenario(d: dict[str, Any]) -> Scenario:
     for field in ("muscle", "command"):
         if d.get(field):
             d[field] = Multisine(**d[field])
+    if d.get("interface"):
+        coupling = d["interface"].get("coupling")
+        d["interface"] = Interface(**{**d["interface"], "coupling": Coupling(**coupling) if coupling else None})
     return Scenario(**d)
 
 
