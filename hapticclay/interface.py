@@ -128,13 +128,13 @@ def guarded(energy: float, f: float, v: float, Ts: float, W: float) -> float:
         energy: that the clay took until now [J]. f: force asked for [N]. v: velocity [m/s]. Ts: hold [s].
         W: mobility of the handle [1/kg].
     """
-    most = v / (Ts * W)
-    root = v * v + 2.0 * W * min(energy, 0.0)
-    if root <= 0.0:
+    most, lack = v / (Ts * W), min(energy, 0.0)
+    left = v * v + 2.0 * W * lack
+    if lack and left <= 0.0:
         return most
-    low, high = (abs(v) - sqrt(root)) / (Ts * W), (abs(v) + sqrt(root)) / (Ts * W)
-    along = copysign(1.0, v) * f
-    if along > high:
+    root = sqrt(left) if lack else abs(v)
+    along, low = copysign(1.0, v) * f, -2.0 * lack / (Ts * (abs(v) + root)) if lack else 0.0
+    if along * Ts * W > abs(v) + root:
         return most
     return copysign(low, v) if along < low else f
 
