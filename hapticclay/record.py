@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -277,6 +278,25 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             out[package] = "unknown"
     return out
+
+
+def writable(folder: Path) -> None:
+    """Refuses a folder that cannot be made or written, before any work is done.
+
+    Raises:
+        ParameterError: as said.
+    """
+    made = [p for p in (folder, *folder.parents) if not p.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
+    finally:
+        for p in made:  # left for the run itself to make
+            with contextlib.suppress(OSError):
+                p.rmdir()
 
 
 class atomic:

@@ -23,6 +23,7 @@ LEVELS = [
     {"wired"},
     {"sim"},
     {"experiments", "boundary"},
+    {"maps"},
     {"plot"},
     {"plot_stability"},
     {"plot_boundary"},
@@ -33,8 +34,8 @@ LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
     "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled"},
     "matplotlib": {"plot", "plot_stability", "plot_boundary"},
-    "tyro": {"cli", "cli_stability"},
-    "tqdm": {"cli"},
+    "tyro": {"cli"},
+    "tqdm": {"cli", "cli_stability"},
     "tabulate": {"cli", "cli_stability"},
     "scipy": {"lti", "limits", "design", "interface"},
     "imageio": set(),
