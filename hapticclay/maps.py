@@ -153,7 +153,6 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> Map:
     cells = _cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
     return Map("gain-pose", loop, *names, lines, found, exact, cells, notes)
-    )
 
 
 def _cells(loops, x, put, ys, progress) -> tuple[Cell, ...]:
