@@ -1,9 +1,11 @@
 """Each part of the hardware alone against its analytic effect; all off, the run of today."""
 
+import json
 import math
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -436,3 +438,27 @@ def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():
     inside = (r.p[:, 0] > 0.08) & (r.p[:, 0] < 0.14)
     v, fe = r.v[inside, 0].mean(), r.fe[inside, 0].mean()
     assert fe / v == pytest.approx(90.0, rel=0.02)
+
+
+def test_published_resolution_page_was_made_from_the_published_data():
+    folder = Path(__file__).parents[1]
+    sys.path.insert(0, str(folder / "benchmarks"))
+    import resolution
+
+    rows = json.loads((folder / "docs" / "bench" / "resolution.json").read_text())["rows"]
+    page = (folder / "docs" / "bench" / "resolution.md").read_text()
+    assert resolution.page(rows).split("## Machine")[0] == page.split("## Machine")[0]
+    assert all(r["status"] == "finished" for r in rows)
+    fine = [r for r in rows if r["counts"] and r["counts"] >= 65536]
+    assert all(r["rms"] < 0.5 * r["least"] for r in fine)  # n or n + 1 counts in a window: half a count at most
+    assert all(abs(r["mean"]) < 1e-3 for r in fine)
+
+
+def test_resolution_is_measured(monkeypatch):
+    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+    import resolution
+
+    monkeypatch.setattr(resolution, "WITHIN", (0.0501, 0.052))
+    monkeypatch.setattr(resolution, "END", 0.053)
+    row = resolution.run(262144, 16)
+    assert row["status"] == "finished" and 1e-4 < row["rms"] < 0.1
