@@ -212,20 +212,22 @@ def pose_matrix(loop: Loop) -> np.ndarray:
 def pose_limit(loop: Loop, most: float = 200.0) -> float:
     """Smallest K at which the linear loop at the handle's pose is unstable; inf if there is none up to `most`."""
 
-    def rate(K: float) -> float:
-        z = np.linalg.eigvals(pose_matrix(replace(loop, K=K)))
-        return float(z[np.abs(z) > 1e-4].real.max())
+    first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))  # it is linear in K
 
-    grid = np.geomspace(1e-3, most, 400)
-    bad = [i for i, K in enumerate(grid) if rate(float(K)) > 0.0]
-    if not bad:
+    def unstable(K: np.ndarray) -> np.ndarray:
+        z = np.linalg.eigvals(first + np.multiply.outer(K - 1.0, second - first))
+        return np.max(np.where(np.abs(z) > 1e-4, z.real, -np.inf), axis=-1) > 0.0
+
+    grid = np.geomspace(1e-3, most, 200)
+    bad = np.flatnonzero(unstable(grid))
+    if not len(bad):
         return math.inf
     if bad[0] == 0:
         return 0.0
     low, high = float(grid[bad[0] - 1]), float(grid[bad[0]])
     while high / low > 1.0 + 1e-10:
         middle = math.sqrt(low * high)
-        low, high = (low, middle) if rate(middle) > 0.0 else (middle, high)
+        low, high = (low, middle) if unstable(np.array([middle]))[0] else (middle, high)
     return high
 
 

@@ -59,7 +59,8 @@ class Map:
     def gap(self) -> float:
         """Largest relative difference between the runs and the exact line of the same loop; NaN if there is none."""
         pairs = [(a, b) for name, (_, y) in self.found.items() for a, b in zip(y, self.exact[name], strict=True)]
-        return max((abs(a / b - 1.0) for a, b in pairs if math.isfinite(a) and math.isfinite(b)), default=math.nan)
+        gaps = [abs(a / b - 1.0) if b else math.inf for a, b in pairs if math.isfinite(a + b) and a != b]
+        return max(gaps, default=0.0 if pairs else math.nan)
 
 
 def chart(kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter) -> Map:
@@ -97,7 +98,7 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     middle = _limit(replace(loop, Ts=None, delay=0.0))
     ys = np.geomspace(0.25 * middle, 4.0 * middle, rows).tolist()
     if loop.Ts and damper:
-        lines["left of it held clay is passive behind the hand's damper"] = ([damper, damper], [ys[0], ys[-1]])
+        lines["held clay passive left of it (Colgate, Schenkel)"] = ([damper, damper], [ys[0], ys[-1]])
     elif loop.Ts:
         notes.append(UNDAMPED)
     found = {"runs": (x, [boundary.simulated_gain(at(b)) for b in progress(x)])}
@@ -120,7 +121,7 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     notes = []
     damper = loop.operator.damper if loop.operator else 0.0
     if damper:
-        name = "passive behind the hand's damper (Colgate, Schenkel)"
+        name = "held clay passive (Colgate, Schenkel)"
         lines[name] = (fine, [_passive_damping(loop.Ts, d, damper) for d in fine])
     else:
         notes.append(UNDAMPED)

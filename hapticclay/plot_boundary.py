@@ -28,7 +28,7 @@ def boundaries(chart: Map) -> Figure:
     """Analytic boundaries as lines, those from runs as dots; what each cell's run did, ringed where theory errs."""
     factor, unit, shown = SCALE.get(chart.kind, (1.0, "", ""))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 5.6))
+        figure = Figure(figsize=(7.4, 5.6))
         ax = figure.add_subplot()
         ax.set_yscale("log")
         if chart.kind != "gain-pose":
@@ -45,7 +45,7 @@ def boundaries(chart: Map) -> Figure:
         wrong = [c for c in chart.cells if c.cause]
         if wrong:
             x, y = [factor * c.x for c in wrong], [c.y for c in wrong]
-            label = "not as in continuous time, nominal pose"
+            label = "not as in continuous time at the nominal pose"
             ax.plot(x, y, ls="none", marker="o", mfc="none", color=ORANGE, ms=12, mew=1.2, label=label)
         ys = [c.y for c in chart.cells]
         top = 1.5 * max(ys)
@@ -57,7 +57,7 @@ def boundaries(chart: Map) -> Figure:
             side.set_minor_formatter(ticker.NullFormatter())
         ax.set_xlabel(chart.x_name.replace(unit, shown) if unit else chart.x_name)
         ax.set_ylabel(chart.y_name)
-        figure.legend(loc="outside upper center", ncols=2, fontsize=9)
+        figure.legend(loc="outside upper center", ncols=2, fontsize=8)
         ax.set_title(_title(chart), fontsize=9, loc="left", color="#555555")
     return figure
 

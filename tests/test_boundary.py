@@ -135,7 +135,7 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
     shown = {line.get_label(): line for line in ax.lines}
     np.testing.assert_allclose(shown["boundary found by runs"].get_ydata(), poses.found["runs"][1])
     np.testing.assert_allclose(shown["boundary found by runs"].get_xdata(), [-10.0, 10.0])
-    ringed = shown["not as in continuous time, nominal pose"]
+    ringed = shown["not as in continuous time at the nominal pose"]
     assert len(ringed.get_xdata()) == sum(bool(c.cause) for c in poses.cells)
     figure.savefig(tmp_path / "a.png")
 
@@ -167,10 +167,10 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
         boundary, "behaviour", lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges"
     )
-    args = "stability --axis y --b 50 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
+    args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
     assert cli.main(args) == 0
     out = capsys.readouterr().out
-    assert "sampled every 0.36 ms" in out and f"{hc.gain_limit('y', 50.0) / 0.5:.4g}" in out
+    assert "sampled every 0.36 ms" in out and f"{hc.gain_limit('x', 90.0) / 0.5:.4g}" in out
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     data = json.loads((tmp_path / "o" / "stability.json").read_text())
     assert data["map"]["kind"] == "gain-pose" and len(data["verdicts"]) > 10
