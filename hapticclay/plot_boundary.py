@@ -51,7 +51,7 @@ def boundaries(chart: Map) -> Figure:
         top = 1.5 * max(ys)
         ys += [y for _, v in chart.lines.values() for y in v if 0.0 < y < top]
         ax.set_ylim(0.7 * min(ys), top)
-        ax.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
         for side in (ax.xaxis, ax.yaxis):
             side.set_major_formatter(ticker.FormatStrFormatter("%g"))
             side.set_minor_formatter(ticker.NullFormatter())
