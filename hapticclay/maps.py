@@ -126,9 +126,9 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     else:
         notes.append(UNDAMPED)
     exact = [_damping(at(d), d) for d in x]
-    runs = [boundary.simulated_damping(at(d), min(b, MOST)) for d, b in zip(progress(x), exact, strict=True)]
+    runs = [boundary.simulated_damping(at(d), min(b, MOST) or 1.0) for d, b in zip(progress(x), exact, strict=True)]
     found = {"runs": (x, runs)}
-    finite = [b for b in exact if math.isfinite(b)] or [1000.0]
+    finite = [b for b in exact if 0.0 < b < math.inf] or [1000.0]
     ys = np.geomspace(0.5 * min(finite), 2.0 * max(finite), rows).tolist()
     cells = _cells([at(d) for d in x], x, lambda c, b: replace(c, b=b), ys, progress)
     names = "delay of the motors [s]", "damping b of the clay [N.s/m]"
@@ -192,13 +192,15 @@ def _largest(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e
 
 
 def _damping(loop: Loop, delay: float) -> float:
-    """Smallest b at which the linear loop with its motors late is unstable [N.s/m]; inf if there is none up to MOST."""
+    """Smallest b at which the late linear loop is unstable [N.s/m]; inf if there is none up to MOST, 0 if from 1 on."""
     stable = lambda b: limits.is_stable(loop.axis, loop.K, b, loop.operator, loop.Ts, delay)  # noqa: E731
     grid = np.geomspace(1.0, MOST, 60)
     bad = next((i for i, b in enumerate(grid) if not stable(float(b))), None)
     if bad is None:
         return math.inf
-    low, high = float(grid[max(bad - 1, 0)]), float(grid[bad])
+    if bad == 0:
+        return 0.0
+    low, high = float(grid[bad - 1]), float(grid[bad])
     while high / low > 1.0 + 1e-6:
         middle = math.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)

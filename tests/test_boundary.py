@@ -145,6 +145,7 @@ def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     b = maps._damping(Loop(K=1.0, Ts=Ts), delay)
     assert limits.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
     assert not limits.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
+    assert maps._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0  # the servo itself does not bear it
 
 
 def test_colgate_schenkel_with_a_whole_delay_is_its_formula():
