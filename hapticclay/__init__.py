@@ -16,6 +16,7 @@ from .design import Design, compare, design_gain, transparency_error
 from .drift import Drift, drift_map
 from .errors import ParameterError
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
+from .hardware import Coupling, Interface
 from .identify import Identified, Noise, identify
 from .limits import gain_limit
 from .lti import Compensator, closed_loop_poles
@@ -45,10 +46,12 @@ __all__ = [
     "Box",
     "Clay",
     "Compensator",
+    "Coupling",
     "Crossing",
     "Design",
     "Drift",
     "Identified",
+    "Interface",
     "Margins",
     "Multisine",
     "Noise",

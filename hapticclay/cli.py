@@ -7,7 +7,6 @@ import io
 import os
 import re
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +14,11 @@ from typing import Annotated, Literal
 
 import tyro
 
+from .cli_stability import Stability
 from .errors import ParameterError, choice
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
 from .params import AXES, Scenario
-from .record import Record, atomic, versions
+from .record import Record, atomic, versions, writable
 from .sim import simulate
 from .sweep_command import SweepCommand
 
@@ -158,31 +158,13 @@ class Identify:
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Stability, tyro.conf.subcommand("stability")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
     | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Version, tyro.conf.subcommand("version")]
 )
-
-
-def writable(folder: Path) -> None:
-    """Refuses a folder that cannot be made or written, before any work is done.
-
-    Raises:
-        ParameterError: as said.
-    """
-    made = [p for p in (folder, *folder.parents) if not p.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
-    finally:
-        for p in made:  # left for the run itself to make
-            with contextlib.suppress(OSError):
-                p.rmdir()
 
 
 def simulate_with_progress(scenario: Scenario, every: int) -> Record:
@@ -298,7 +280,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "reproduce", "identify", "sweep", "bench", "version"))
+        choice("command", words[0], ("run", "reproduce", "stability", "identify", "sweep", "bench", "version"))
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 

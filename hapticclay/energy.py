@@ -10,6 +10,8 @@ import numpy as np
 from . import arm
 from .params import NO_HAND, Operator, Scenario
 
+MEMO = ("friction", "passivity_controller", "coupling")  # entries of an interface; the last two are part of motors
+
 
 def stored(th: Operator, r1: float, r2: float, p: np.ndarray, v: np.ndarray) -> tuple[float, float]:
     """Energy [J] of the arm at link rates r1, r2 [rad/s], and of mass and spring of the hand at p [m], v [m/s]."""
@@ -60,8 +62,10 @@ class Ledger:
     the engine did what the loop reckoned with.
     """
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, extra: list[tuple[float, ...]] | None = None):
         self.scenario = scenario
+        self.extra = extra  # of each kick, where there is an interface: see `_memo`
+        self.memo = np.zeros(len(MEMO))
         self.work = np.zeros(5)  # muscle, motors, clay, hand's damper, throughput
         self.first: tuple[float, float] | None = None  # energy of arm and hand at the start
         self.last = (0.0, 0.0)
@@ -83,6 +87,8 @@ class Ledger:
         r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
         around = before[0], before[1], after[0], after[1]
         self.work += [x.sum() for x in spent(H, k, *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
+        if self.extra is not None:
+            self._memo(H, v, r1, r2)
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
             u1x, u1y, u2x, u2y = (x[j] for x in columns)
@@ -93,6 +99,26 @@ class Ledger:
             self.first = held(before, 0)
         self.last = held(after, -1)
 
+    def _memo(self, H: np.ndarray, v: np.ndarray, r1: np.ndarray, r2: np.ndarray) -> None:
+        """Enters what an interface takes in each kick.
+
+        Its extra row: torques of the friction [N.m], what the passivity controller adds to the resisting force [N],
+        force of the coupling [N], velocity of its tool [m/s]; two axes each.
+        """
+        assert self.extra is not None
+        e = np.array(self.extra[: v.shape[1]]).T
+        self.extra.clear()
+        friction = -H * (e[0] * r1 + e[1] * (r2 - r1))
+        guard = H * (e[2:4] * v).sum(axis=0)
+        coupling = H * (e[4:6] * (v - e[6:8])).sum(axis=0)
+        self.memo += [x.sum() for x in (friction, guard, coupling)]
+
     def close(self) -> dict[str, float]:
         """The balance of all kicks entered."""
-        return balance(self.work.tolist(), self.first or self.last, self.last)
+        out = balance(self.work.tolist(), self.first or self.last, self.last)
+        parts = self.scenario.interface
+        if parts:
+            used = (any(parts.friction), parts.passivity, parts.coupling is not None)
+            out |= {name: float(x) for name, x, on in zip(MEMO, self.memo, used, strict=True) if on}
+            out["residual"] -= out.get("friction", 0.0)
+        return out

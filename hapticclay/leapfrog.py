@@ -226,16 +226,19 @@ class Leapfrog(Run):
         self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
         if landing is None:
-            self.i += 1
-            self.t = target
+            self._arrive(target)
         else:
             self.landings += 1
             self.t += after
             if target - self.t <= 1e-9 * self.scenario.dt:  # the border lies at the sample itself
-                self.i += 1
-                self.t = target
+                self._arrive(target)
             self._cross(*landing)
         return None
+
+    def _arrive(self, target: float) -> None:
+        """The time that `target` gave has come [s]."""
+        self.i += 1
+        self.t = target
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         s = self.scenario

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from .errors import ParameterError, choice, flag, integer, number, numbers_of, pair
+from .hardware import Interface
 
 AXES = ("x", "y")
 INTEGRATORS = ("fast", "accurate")
@@ -197,6 +198,7 @@ class Scenario:
         Ts: control sample [s], a whole multiple of dt; None for dt.
         render: where control is sampled, the clay is "held" (its force computed from the sample and held by
             the motors) or "implicit" (physical, there all the time).
+        interface: the hardware of a sampled loop; None for an ideal one.
     """
 
     name: str = "free"
@@ -219,6 +221,7 @@ class Scenario:
     muscle: Multisine | None = None
     command: Multisine | None = None
     stop: bool = True
+    interface: Interface | None = None
 
     def __post_init__(self):
         def put(field, value):
@@ -248,6 +251,7 @@ class Scenario:
             if self.control != "sampled" or abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
                 bound = f"must be a whole multiple of dt = {self.dt:g} s, and None unless control is 'sampled'"
                 raise ParameterError("Ts", self.Ts, bound)
+        self._check_interface()
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
         put("velocity", pair("velocity", self.velocity, -10.0, 10.0, unit="m/s"))
@@ -260,6 +264,19 @@ class Scenario:
             if self.length <= self.start[0]:
                 raise ParameterError("length", self.length, f"must lie ahead of start x = {self.start[0]:g} m")
             self._check_reach("length", (self.length, self.start[1]))
+
+    def _check_interface(self) -> None:
+        given, Ts = self.interface, self.Ts or self.dt
+        if given is None:
+            return
+        if not isinstance(given, Interface):
+            raise ParameterError("interface", given, "must be an Interface or None")
+        if self.control != "sampled":
+            raise ParameterError("interface", given, "must be None unless control is 'sampled'")
+        if (given.passivity or given.coupling) and self.render != "held":
+            raise ParameterError("render", self.render, "must be 'held' for a passivity controller or a coupling")
+        number("interface.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
+        number("interface.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 
     def _check_reach(self, field: str, p: tuple[float, float]) -> None:
         """Refuses p, or a straight path from start to p, beyond the reach or too near the shoulder."""

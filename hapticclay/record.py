@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import json
@@ -18,6 +19,7 @@ import numpy as np
 
 from . import lti
 from .errors import ParameterError
+from .hardware import Coupling, Interface
 from .params import AXES, Clay, Multisine, Operator, Profile, Scenario
 
 SCHEMA = "hapticclay-record-1"
@@ -262,6 +264,9 @@ def _scenario(d: dict[str, Any]) -> Scenario:
     for field in ("muscle", "command"):
         if d.get(field):
             d[field] = Multisine(**d[field])
+    if d.get("interface"):
+        coupling = d["interface"].get("coupling")
+        d["interface"] = Interface(**{**d["interface"], "coupling": Coupling(**coupling) if coupling else None})
     return Scenario(**d)
 
 
@@ -275,6 +280,25 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             out[package] = "unknown"
     return out
+
+
+def writable(folder: Path) -> None:
+    """Refuses a folder that cannot be made or written, before any work is done.
+
+    Raises:
+        ParameterError: as said.
+    """
+    made = [p for p in (folder, *folder.parents) if not p.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
+    finally:
+        for p in made:  # left for the run itself to make
+            with contextlib.suppress(OSError):
+                p.rmdir()
 
 
 class atomic:

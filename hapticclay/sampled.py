@@ -82,10 +82,13 @@ class Sampled(Leapfrog):
 
     def _control(self, q, w, x, y, force):
         """Torques to hold and the net force that the compensator is given, from what is measured now."""
-        s = self.scenario
         u, p, v, c = self._measure(q, w)
         bx, by = self.regions.b(self.t)
-        fe = (bx * v[0], by * v[1])
+        return self._torques(u, p, v, c, x, y, force, (bx * v[0], by * v[1]))
+
+    def _torques(self, u: tuple[float, float, float, float], p: Pair, v: Pair, c: Pair, x, y, force: Pair, fe: Pair):
+        """The same from handle position [m], velocity, acceleration, hand force and the clay's force [N]."""
+        s = self.scenario
         f = (force[0] - fe[0], force[1] - fe[1])
         a = []
         for i, (g, h, z) in enumerate(zip(G, S, (x, y), strict=True)):

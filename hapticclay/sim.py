@@ -60,6 +60,10 @@ def _kind(scenario: Scenario, engine: str) -> type[Run]:
     if not fits(scenario):
         if engine == "native":
             print("hapticclay: native runs neither sampled control nor 'accurate'; Python does", file=sys.stderr)
+        if scenario.interface:
+            from .wired import Wired  # only a run with hardware pays for it
+
+            return Wired
         return Sampled if scenario.control == "sampled" else RungeKutta
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)

@@ -55,6 +55,7 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
     (["run", "constant", "--nonsense", "1"], ["--nonsense"]),
     (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
     (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
+    (["stabilty"], ["stabilty", "did you mean 'stability'"]),
     (["run"], ["constant"]),
     ([], ["run"]),
     (["run", "constant", "--every", "0"], ["every = 0"]),

@@ -1,0 +1,188 @@
+"""The boundary found by runs against the exact one; the growth that it is read from against known modes."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles import Linear
+
+import hapticclay as hc
+from hapticclay import boundary, cli, limits, lti, maps, plot_boundary
+from hapticclay.boundary import Loop
+from hapticclay.errors import ParameterError
+from hapticclay.params import Operator
+
+
+@settings(max_examples=10)
+@given(st.floats(-2.0, 2.0), st.floats(20.0, 2000.0), st.floats(-30.0, -8.0), st.floats(0.0, math.tau))
+def test_growth_is_that_of_the_least_damped_mode(sigma, omega, fast, phase):
+    t = np.arange(1250) * 1e-3
+    omega = min(omega, 0.9 * math.pi / 1e-3)
+    v = np.exp(sigma * t) * np.cos(omega * t + phase) + 3.0 * np.exp(fast * t) + 0.2 * np.exp(-0.06 * t)
+    rec = SimpleNamespace(t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None)
+    assert boundary.growth(rec, "x") == pytest.approx(sigma, abs=1e-3)  # the mode above it starts 30 times as large
+
+
+def test_growth_sees_half_the_sampling_frequency():
+    t = np.arange(1250) * 1e-3
+    v = 1.0005 ** np.arange(1250) * (-1.0) ** np.arange(1250)
+    rec = SimpleNamespace(t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None)
+    assert boundary.growth(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("K", [2.0, 4.5])
+def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
+    r = hc.simulate(Loop(K=K).scenario())
+    poles = Linear(0, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles()
+    pole = poles[np.abs(poles.imag) > 1.0].real.max()
+    assert boundary.growth(r, "x") == pytest.approx(pole, abs=2e-3)  # second order: (omega dt)^2/12 of omega
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
+    found = boundary.simulated_gain(Loop(axis=axis), guess=3.0 if axis == "x" else 1.0)  # not told where
+    assert found == pytest.approx(lti.gain_limit(axis, 90.0, Operator()), rel=3e-3)  # CLOSE, and the step
+
+
+def test_boundary_of_the_sampled_arm():
+    exact = hc.gain_limit("x", 90.0, Ts=2e-3)
+    assert boundary.simulated_gain(Loop(Ts=2e-3)) == pytest.approx(exact, rel=5e-3)
+    assert abs(exact / hc.gain_limit("x", 90.0) - 1.0) > 0.1  # it would tell the two apart
+
+
+def test_boundary_with_a_delay_and_no_hand():
+    loop = Loop(axis="y", operator=None, Ts=2e-3, delay=3e-3)
+    exact = hc.gain_limit("y", 90.0, impedance=False, Ts=2e-3, delay=3e-3)
+    assert boundary.simulated_gain(loop) == pytest.approx(exact, rel=5e-3)
+
+
+def test_without_shaping_the_gap_is_that_of_the_pose():
+    loop = Loop(shaping=False, pose=(0.10, 0.0))
+    exact = boundary.pose_limit(loop)
+    found = boundary.simulated_gain(loop, exact)
+    nominal = lti.gain_limit("x", 90.0, Operator())
+    assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
+    assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
+    assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
+
+
+def test_pose_matrix_has_the_poles_of_both_axes_where_they_are_decoupled():
+    A = boundary.pose_matrix(Loop(K=2.0, shaping=False))
+    parts = [Linear(i, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles() for i, K in ((0, 2.0), (1, 0.0))]
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.concatenate(parts)), atol=1e-6)
+
+
+def test_crossing_by_bisection_alone_and_where_there_is_none():
+    assert boundary.crossing(lambda x: -1.0 if x < 7.3 else math.inf, 1.0, 100.0) == pytest.approx(7.3, rel=2e-3)
+    assert boundary.crossing(lambda x: x - 0.2, 5.0, 100.0) == pytest.approx(0.2, rel=2e-3)
+    assert boundary.crossing(lambda x: -1.0, 1.0, 100.0) == math.inf
+    assert boundary.crossing(lambda x: 1.0, 1.0, 100.0) == 0.0
+
+
+@pytest.mark.parametrize("K,said", [(2.0, "stable"), (12.0, "limit cycle")])
+def test_divergence_and_limit_cycles_are_told_apart(K, said):
+    assert boundary.behaviour(Loop(K=K, push=boundary.LARGE)) == said
+
+
+def test_a_slow_growth_is_still_a_divergence():
+    assert boundary.behaviour(Loop(K=4.2, push=1e-5)) == "diverges"
+
+
+def test_causes():
+    push = dict(push=boundary.LARGE)
+    assert boundary.cause(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False) == "pose-dependent Lambda"
+    Ts = 4e-3
+    K = 0.5 * (hc.gain_limit("x", 90.0) + hc.gain_limit("x", 90.0, Ts=Ts))
+    assert boundary.cause(Loop(K=K, Ts=Ts, **push), False) == "sampling"
+    K = 0.5 * (hc.gain_limit("x", 90.0, Ts=1e-3) + hc.gain_limit("x", 90.0, Ts=1e-3, delay=4e-3))
+    assert boundary.cause(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
+
+
+@pytest.mark.parametrize("kw,field", [(dict(axis="z"), "axis"), (dict(K=0.0), "K"), (dict(delay=1e-3), "delay"),
+                                      (dict(b=-1.0), "b"), (dict(pose=(0.0,)), "pose")])  # fmt: skip
+def test_bad_loops_are_refused(kw, field):
+    with pytest.raises(ParameterError) as e:
+        Loop(**kw)
+    assert e.value.field == field
+
+
+# ---- maps --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def poses():
+    return maps._gain_pose(Loop(shaping=False), 2, 3, iter)
+
+
+def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(poses):
+    assert poses.gap() < 0.02
+    wrong = [c for c in poses.cells if c.cause]
+    assert wrong and {c.cause for c in wrong} == {"pose-dependent Lambda"}
+    for c in poses.cells:
+        assert (c.cause == "") == (c.theory == (c.simulated == "stable"))
+        exact = np.interp(c.x, *poses.lines["linear loop at this pose, continuous"])
+        assert (c.simulated == "stable") == (c.y < exact)
+
+
+def test_picture_shows_the_map_with_units(poses, tmp_path):
+    figure = plot_boundary.boundaries(poses)
+    ax = figure.axes[0]
+    assert "[cm]" in ax.get_xlabel() and "[1/kg]" in ax.get_ylabel()
+    shown = {line.get_label(): line for line in ax.lines}
+    np.testing.assert_allclose(shown["boundary found by runs"].get_ydata(), poses.found["runs"][1])
+    np.testing.assert_allclose(shown["boundary found by runs"].get_xdata(), [-10.0, 10.0])
+    ringed = shown["not as in continuous time at the nominal pose"]
+    assert len(ringed.get_xdata()) == sum(bool(c.cause) for c in poses.cells)
+    figure.savefig(tmp_path / "a.png")
+
+
+def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
+    Ts, delay = 1e-3, 2e-3
+    b = maps._damping(Loop(K=1.0, Ts=Ts), delay)
+    assert limits.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
+    assert not limits.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
+    assert maps._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0  # the servo itself does not bear it
+
+
+def test_colgate_schenkel_with_a_whole_delay_is_its_formula():
+    Ts, d = 1e-3, 2.0
+    b = maps._passive_damping(Ts, 3 * Ts, d)
+    theta = np.linspace(0.0, math.pi, 2001)[1:]
+    z = np.exp(1j * theta)
+    need = 0.5 * Ts / (1 - np.cos(theta)) * ((1 - 1 / z) * b * (1 - 1 / z) / Ts * z**-3.0).real
+    assert need.max() == pytest.approx(d, rel=1e-9)
+
+
+def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
+    import json
+
+    def small(kind, loop, quick, progress):
+        return maps._gain_pose(replace(loop, Ts=None, delay=0.0), 2, 3, progress)
+
+    monkeypatch.setattr(maps, "chart", small)
+    monkeypatch.setattr(boundary, "simulated_gain", lambda loop, guess=None: boundary.pose_limit(loop))
+    monkeypatch.setattr(
+        boundary, "behaviour", lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges"
+    )
+    args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
+    assert cli.main(args) == 0
+    out = capsys.readouterr().out
+    assert "sampled every 0.36 ms" in out and f"{hc.gain_limit('x', 90.0) / 0.5:.4g}" in out
+    assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
+    data = json.loads((tmp_path / "o" / "stability.json").read_text())
+    assert data["map"]["kind"] == "gain-pose" and len(data["verdicts"]) > 10
+    assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
+
+
+@pytest.mark.parametrize(
+    "args,word",
+    [(["--map", "gain"], "--map"), (["--b", "-1"], "b = -1"), (["--gain", "0"], "K = 0"), (["--axis", "z"], "--axis")],
+)
+def test_command_refuses_bad_input_in_one_line(args, word, tmp_path, capsys):
+    assert cli.main(["stability", *args, "--out", str(tmp_path / "o")]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and word in err and not (tmp_path / "o").exists()
