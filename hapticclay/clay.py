@@ -42,6 +42,24 @@ def slab(b: float, start: float, end: float) -> Clay:
     return Clay(x=profile, y=profile)
 
 
+def there_is(clay: Clay | None, i: int) -> list[tuple[float, float]]:
+    """Where coordinate i alone says that there is clay: disjoint spans of it [m], ascending, perhaps infinite."""
+    inf = float("inf")
+    out: list[tuple[float, float]] = []
+    for profile in (clay.x, clay.y) if clay else ():
+        if profile.along == AXES[i]:
+            edges = (-inf, *profile.edges, inf)
+            grown = profile.growth or (0.0,) * len(profile.values)
+            out += [s for *s, b, g in zip(edges, edges[1:], profile.values, grown, strict=False) if b > 0.0 or g > 0.0]
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(out):
+        if merged and low <= merged[-1][1]:
+            low, high = merged[-1][0], max(high, merged[-1][1])
+            merged.pop()
+        merged.append((low, high))
+    return merged
+
+
 class Regions:
     """Which region of the clay the handle is in, and how far that region reaches.
 
@@ -84,6 +102,11 @@ class Regions:
     def b(self, t: float) -> tuple[float, float]:
         """Damping of the present region at time t [s] on each axis [N.s/m]."""
         return at(self.base, self.rate, t)
+
+    def change(self, clay: Clay, t: float) -> None:
+        """Puts other damping between the same borders, from time t [s] on."""
+        self._profiles = clay.x, clay.y
+        self._settle(t)
 
     def cross(self, i: int, up: bool, t: float) -> float:
         """Steps over the border of coordinate i at time t [s], upwards or downwards; returns its place [m]."""
