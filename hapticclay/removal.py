@@ -18,7 +18,7 @@ from .errors import ParameterError, number
 from .params import Scenario
 from .record import Record
 
-CELL = 1e-3  # [m] of the map
+CELL = 2e-3  # [m] of the map
 MARGIN = 0.02  # of a block without borders, before the start and beyond the end of the path [m]
 HALF = 0.08  # half the breadth of a block without borders, where the path has none [m]
 
