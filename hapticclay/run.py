@@ -67,10 +67,10 @@ class Run:
         """The energy ledger, as record.Record.energy."""
         raise NotImplementedError
 
-    def go(self, progress: Callable[[float, float], None] | None) -> None:
-        """Runs to the end."""
+    def go(self, progress: Callable[[float, float], None] | None, until: int | None = None) -> None:
+        """Runs to the end, or to sample `until`; whoever stops it there flushes."""
         try:
-            while self.outcome is None:
+            while self.outcome is None and (until is None or self.i < until):
                 if self.advance() or self.outcome:
                     self.flush()
                     if progress:
