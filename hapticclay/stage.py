@@ -57,6 +57,12 @@ class Stage:
         self.stale |= gained > 0.0
         return gained
 
+    def whole(self) -> None:
+        """Makes the clay whole again."""
+        self.removal.cut[:] = 0.0
+        self.removal.volume = 0.0
+        self.place, self.stale = None, True
+
     def relief(self) -> bool:
         """Brings the heightfield up to the map; True if there was something to bring, for the renderer to upload."""
         if not self.stale or self.field < 0:

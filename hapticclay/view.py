@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import queue
@@ -78,8 +77,8 @@ class Window:
             raise ParameterError("display", str(error), "the window cannot be opened: try --web") from None
         try:
             with viewer.lock():
-                viewer.cam.lookat[:] = (0.27, 0.19, -0.03)
-                viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.85, 90.0, -52.0
+                viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
+                viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.80, 90.0, -55.0
                 viewer.opt.sitegroup[:] = 0
             player.start()
             self._loop(viewer, player)
@@ -140,7 +139,7 @@ class Window:
             play.paused = not play.paused
         elif key == BACKSPACE:
             play.restart()
-            self.stage = _again(self.stage)
+            self.stage.whole()
             self.shown, self.drawn = 1, -1.0
             for plot in self.plots:
                 plot.clear()
@@ -198,14 +197,6 @@ def _angles(play: Session | Replay) -> list[float]:
     return list(play.run.angles) if isinstance(play, Session) else play.source.q[play.n].tolist()
 
 
-def _again(stage: Stage) -> Stage:
-    """The same stage, its clay whole."""
-    stage.removal.cut[:] = 0.0
-    stage.removal.volume = 0.0
-    stage.place, stage.stale = None, True
-    return stage
-
-
 def _ratio(force: tuple[float, float], v: tuple[float, float]) -> tuple[float, float]:
     """force/v on each axis [N.s/m], 0 where the handle stands still."""
     x, y = (f / u if abs(u) > 1e-4 else 0.0 for f, u in zip(force, v, strict=True))
@@ -213,16 +204,16 @@ def _ratio(force: tuple[float, float], v: tuple[float, float]) -> tuple[float, f
 
 
 def _plots(play: Session | Replay) -> list[tuple]:
-    """Title, label of x, names, colours and points (x, y...) of a frame, for each plot."""
+    """Title, label of x, colours and points (x, y...) of a frame, for each plot."""
     blue, green = (0.0, 0.45, 0.70), (0.0, 0.62, 0.45)
     clay = play.scenario.clay
     ways = (clay.x.along, clay.y.along) if clay else "xx"
     i = 1 if ways == ("y", "y") else 0
     a = AXES[i]
     return [
-        ("velocity [m/s]", f"{a} [cm]", ("v",), (blue,), lambda f: (100 * f[1][i], f[2][i])),
-        ("fe/v [N.s/m]", f"{a} [cm]", ("fe/v",), (blue,), lambda f: (100 * f[1][i], _ratio(f[3], f[2])[i])),
-        ("force [N]", "t [s]", ("fh", "fe"), (green, blue), lambda f: (f[0], f[4][i], f[3][i])),
+        (f"velocity along {a} [cm/s]", f"{a} [cm]", (blue,), lambda f: (100 * f[1][i], 100 * f[2][i])),
+        ("clay, fe/v [N.s/m]", f"{a} [cm]", (blue,), lambda f: (100 * f[1][i], _ratio(f[3], f[2])[i])),
+        ("force of hand (green), of clay (blue) [N]", "time [s]", (green, blue), lambda f: (f[0], f[4][i], f[3][i])),
     ]
 
 
@@ -232,7 +223,6 @@ class _Plot:
 
     title: str
     xlabel: str
-    names: tuple[str, ...]
     colors: tuple[tuple[float, float, float], ...]
     point: Any
 
@@ -240,19 +230,15 @@ class _Plot:
         figure = self.figure = mujoco.MjvFigure()
         mujoco.mjv_defaultFigure(figure)
         figure.title, figure.xlabel = self.title, self.xlabel
-        figure.flg_extend, figure.flg_legend = 1, int(len(self.names) > 1)
+        figure.flg_extend = figure.flg_legend = 0
         figure.flg_ticklabel[:] = 1
-        figure.gridsize[:] = (4, 4)
-        figure.xformat, figure.yformat = "%.1f", "%.3g"
+        figure.xformat, figure.yformat = "%.3g", "%.3g"
         figure.figurergba[:] = (1.0, 1.0, 1.0, 0.88)
         figure.panergba[:] = (1.0, 1.0, 1.0, 1.0)
-        figure.legendrgba[:] = (1.0, 1.0, 1.0, 0.6)
         figure.gridrgb[:] = (0.85, 0.85, 0.85)
         figure.textrgb[:] = (0.1, 0.1, 0.1)
         figure.linewidth = 2.0
-        for j, (name, color) in enumerate(zip(self.names, self.colors, strict=True)):
-            with contextlib.suppress(TypeError, ValueError):
-                figure.linename[j] = name
+        for j, color in enumerate(self.colors):
             figure.linergb[j] = color
         self.clear()
 
@@ -272,11 +258,19 @@ class _Plot:
             return
         data = np.array(self.points)
         n = len(data)
-        for j in range(len(self.names)):
+        for j in range(len(self.colors)):
             self.figure.linepnt[j] = n
             self.figure.linedata[j, 0 : 2 * n : 2] = data[:, 0]
             self.figure.linedata[j, 1 : 2 * n : 2] = data[:, 1 + j]
-        for axis, values, least in ((0, data[:, 0], 1.0), (1, data[:, 1:], 1e-3)):
-            low, high = float(values.min()), float(values.max())
-            margin = 0.05 * max(high - low, least)
-            self.figure.range[axis] = (low - margin, high + margin)
+        for axis, values, least in ((0, data[:, 0], 5.0), (1, data[:, 1:], 1.0)):
+            low, high, lines = _round(float(values.min()), float(values.max()), least)
+            self.figure.range[axis], self.figure.gridsize[axis] = (low, high), lines
+
+
+def _round(low: float, high: float, least: float) -> tuple[float, float, int]:
+    """Round limits around a range of at least that size, and the number of grid lines at round steps."""
+    high = max(high, low + least)
+    step = 10.0 ** math.floor(math.log10(high - low))
+    step *= next(f for f in (0.2, 0.5, 1.0, 2.0) if (high - low) / (f * step) <= 5.0)
+    first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
+    return first * step, last * step, last - first + 1
