@@ -29,9 +29,7 @@ class Gate:
         self._loop = asyncio.new_event_loop()
         self._tasks: set[asyncio.Task] = set()
         try:
-            self._server = self._loop.run_until_complete(
-                asyncio.start_server(self._meet, host, port, limit=HEAD)
-            )
+            self._server = self._loop.run_until_complete(asyncio.start_server(self._meet, host, port, limit=HEAD))
         except OSError as error:
             self._loop.close()
             raise ParameterError("host", f"{host}:{port}", f"cannot be listened on ({error.strerror})") from None
@@ -80,7 +78,9 @@ class Gate:
             return ""
         if self._right(parse_qs(urlsplit(target).query).get("token", [""])[0]):
             cookie = f"Set-Cookie: {COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-            return f"HTTP/1.1 303 See Other\r\nLocation: /\r\n{cookie}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+            return (
+                f"HTTP/1.1 303 See Other\r\nLocation: /\r\n{cookie}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+            )
         text = "hapticclay: the address lacks the token that was printed at start\n"
         return (
             "HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\n"

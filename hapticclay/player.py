@@ -79,4 +79,3 @@ class Player(threading.Thread):
         self.join()
         if self.error is not None:
             raise self.error
-

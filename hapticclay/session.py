@@ -205,6 +205,11 @@ class Session:
         return "" if self.run.outcome is None else str(self.run.outcome)
 
     @property
+    def recorded(self) -> bool:
+        """Whether there is anything to make a record of."""
+        return bool(self.run.kept)
+
+    @property
     def b(self) -> tuple[float, float]:
         """Damping of the clay where the handle is [N.s/m]."""
         return self.run.regions.b(self.run.t)
@@ -236,10 +241,12 @@ class Session:
     def advance(self, seconds: float) -> np.ndarray:
         """Makes a slice of simulated time, but nothing while paused; returns where the handle went, (n, 2) [m]."""
         run, dt = self.run, self.scenario.dt
-        steps = 0 if self.paused or run.outcome else math.floor((seconds + self._carry) / dt + 1e-9)
+        if self.paused or run.outcome:
+            return np.empty((0, 2))
+        steps = math.floor((seconds + self._carry) / dt + 1e-9)
+        self._carry += seconds - steps * dt
         if not steps:
             return np.empty((0, 2))
-        self._carry += seconds - steps * dt
         if self.point is None:
             run.muscle.jump(run.t, *self._state())
         else:

@@ -82,4 +82,6 @@ class Stage:
             b = np.maximum(b, along[None, :] if f.along == "x" else along[:, None])
         rng = np.random.default_rng(0)  # a little grain, as clay has
         grain = 1.0 + 0.03 * rng.standard_normal(b.shape)[..., None]
-        return np.clip((PALE + (b / top)[..., None] ** 2 * (DEEP - PALE)) * grain, 0, 255)[::-1]  # images start at the top
+        return np.clip((PALE + (b / top)[..., None] ** 2 * (DEEP - PALE)) * grain, 0, 255)[
+            ::-1
+        ]  # images start at the top

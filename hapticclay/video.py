@@ -178,7 +178,9 @@ def _write(path: Path, images: Iterator[np.ndarray], kind: str, fps: int) -> Non
     try:
         writer = imageio.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7)  # type: ignore[arg-type]
     except (ImportError, ValueError, RuntimeError):
-        raise ParameterError("out", path.suffix, "mp4 needs a codec: pip install 'imageio[ffmpeg]'; or take .webp") from None
+        raise ParameterError(
+            "out", path.suffix, "mp4 needs a codec: pip install 'imageio[ffmpeg]'; or take .webp"
+        ) from None
     with writer:
         for image in images:
             writer.append_data(image)

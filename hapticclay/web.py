@@ -183,7 +183,9 @@ class Page:
     def _press(self) -> None:
         fx, fy = self.session.given.force
         size = math.hypot(fx, fy)
-        self.session.push((self.force.value * fx / size, self.force.value * fy / size) if size else (self.force.value, 0.0))
+        self.session.push(
+            (self.force.value * fx / size, self.force.value * fy / size) if size else (self.force.value, 0.0)
+        )
 
     def _hold(self) -> None:
         if self.hold.value:
@@ -224,7 +226,10 @@ class Page:
             self.stage.carve(new)
         with self.server.atomic():
             self.link1.wxyz = _about_z(q[0])
-            self.link2.wxyz, self.link2.position = _about_z(q[0] + q[1]), (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0)
+            self.link2.wxyz, self.link2.position = (
+                _about_z(q[0] + q[1]),
+                (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0),
+            )
             if point is None:
                 self.updating = True
                 x, y = (a + b for a, b in zip(frame[1], session.scenario.origin, strict=True))
@@ -258,7 +263,9 @@ def _sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x, y = (np.concatenate((a[:1], a, a[-1:])) for a in (x, y))
     plan = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     a = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
-    faces = np.concatenate((np.column_stack((a, a + 1, a + len(x))), np.column_stack((a + 1, a + len(x) + 1, a + len(x)))))
+    faces = np.concatenate(
+        (np.column_stack((a, a + 1, a + len(x))), np.column_stack((a + 1, a + len(x) + 1, a + len(x))))
+    )
     return plan, faces.astype(np.uint32)
 
 

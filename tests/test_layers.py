@@ -15,25 +15,29 @@ LEVELS = [
     {"params"},
     {"arm", "lti", "clay", "human", "signals"},
     {"servo", "record", "energy", "limits"},
-    {"loop", "scene", "outcome", "stability"},
-    {"run", "robust", "design", "passive"},
+    {"loop", "scene", "outcome", "stability", "removal"},
+    {"run", "robust", "design", "passive", "stage"},
     {"leapfrog", "rungekutta"},
-    {"sampled"},
+    {"sampled", "session"},
     {"sim"},
     {"experiments"},
     {"plot"},
     {"plot_stability"},
+    {"gate", "player", "running"},
+    {"video", "view", "web"},
+    {"cli_view"},
     {"cli"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 HEAVY = {  # outside package -> the only modules that may import it
-    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled"},
-    "matplotlib": {"plot", "plot_stability"},
+    "mujoco": {"scene", "run", "leapfrog", "rungekutta", "sampled", "stage", "video", "view"},
+    "matplotlib": {"plot", "plot_stability", "running"},
     "tyro": {"cli"},
-    "tqdm": {"cli"},
+    "tqdm": {"cli", "cli_view"},
     "tabulate": {"cli"},
     "scipy": {"lti", "limits", "design"},
-    "imageio": set(),
+    "imageio": {"video"},
+    "viser": {"web"},
     "numba": set(),
     "dask": set(),
 }
@@ -77,7 +81,7 @@ def test_no_module_is_long(module):
 def test_importing_the_package_and_running_a_scene_loads_nothing_else():
     code = (
         "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01)); "
-        "print([m for m in ('matplotlib', 'imageio', 'numba', 'dask', 'tyro', 'tqdm', 'scipy') if m in sys.modules])"
+        "print([m for m in ('matplotlib', 'imageio', 'viser', 'numba', 'dask', 'tyro', 'tqdm', 'scipy', 'mujoco.viewer') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
