@@ -50,7 +50,8 @@ def there_is(clay: Clay | None, i: int) -> list[tuple[float, float]]:
         if profile.along == AXES[i]:
             edges = (-inf, *profile.edges, inf)
             grown = profile.growth or (0.0,) * len(profile.values)
-            out += [s for *s, b, g in zip(edges, edges[1:], profile.values, grown, strict=False) if b > 0.0 or g > 0.0]
+            spans = zip(edges, edges[1:], profile.values, grown, strict=False)
+            out += [(low, high) for low, high, b, g in spans if b > 0.0 or g > 0.0]
     merged: list[tuple[float, float]] = []
     for low, high in sorted(out):
         if merged and low <= merged[-1][1]:

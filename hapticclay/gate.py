@@ -73,8 +73,8 @@ class Gate:
         request, *lines = head.split("\r\n")
         target = (request.split(" ") + ["", ""])[1]
         fields = {k.strip().lower(): v.strip() for k, _, v in (line.partition(":") for line in lines)}
-        cookies = dict(c.strip().partition("=")[::2] for c in fields.get("cookie", "").split(";"))
-        if self._right(cookies.get(COOKIE, "")):
+        cookies = [c.strip() for c in fields.get("cookie", "").split(";")]
+        if any(self._right(c[len(COOKIE) + 1 :]) for c in cookies if c.startswith(f"{COOKIE}=")):
             return ""
         if self._right(parse_qs(urlsplit(target).query).get("token", [""])[0]):
             cookie = f"Set-Cookie: {COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"

@@ -43,7 +43,7 @@ TOOL = Tool()
 
 
 def block(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner of the block of clay to be seen, shape (2,) each [m]; of the work area if there is none.
+    """Lowest and highest corner of the block of clay to be seen, shape (2,) each [m]; without clay, of the work area.
 
     Where the clay has borders they are the block's; where it has none, the block reaches a little beyond the path.
     """
@@ -54,7 +54,7 @@ def block(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
         low, high[0] = low.copy(), length + MARGIN
         low[0] = start[0] - MARGIN
         if across:
-            low[1], high[1] = start[1] - MARGIN, start[1] + 1.4 * (length - start[0]) + MARGIN
+            low[1], high[1] = start[1] - MARGIN, start[1] + 2.1 * (length - start[0]) + MARGIN
     for i in (0, 1):
         spans = there_is(scenario.clay, i)
         if scenario.clay and spans and all(f != math.inf for span in spans for f in map(abs, span)):

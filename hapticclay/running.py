@@ -55,7 +55,7 @@ class Running:
             canvas = FigureCanvasAgg(figure)
             canvas.draw()
             self.image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        curves = (
+        curves: Any = (
             (panels[0], x, v, BLUE), (panels[1], x, ratio, BLUE),
             (panels[2], r.t, force, GREEN), (panels[2], r.t, r.fe[:, i], BLUE),
         )  # fmt: skip

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -102,7 +103,7 @@ def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
 
 GROUND = -0.06  # height of the table under the plane of the arm [m], as in room.xml
 THICKNESS = 0.03  # of a block of clay [m]
-SKIN = (  # body ("" for the world), shape, from, to [m], radius [m], material
+SKIN: Any = (  # body ("" for the world), shape, from, to [m], radius [m], material
     ("", "cylinder", (0.0, 0.0, GROUND), (0.0, 0.0, -0.03), 0.060, "dark"),
     ("", "cylinder", (0.0, 0.0, -0.03), (0.0, 0.0, 0.022), 0.042, "steel"),
     ("link1", "cylinder", (0.0, 0.0, 0.022), (0.0, 0.0, 0.034), 0.034, "dark"),

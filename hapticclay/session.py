@@ -78,9 +78,8 @@ class _Live(Leapfrog):
 
     def slice(self, steps: int) -> None:
         """Makes so many steps, unless the run ends."""
-        self.last = min(self.i + steps, self.limit)
-        if self.i < self.last:
-            self.go(None, until=self.last)
+        self.last = self.pause = min(self.i + steps, self.limit)
+        self.go(None)
         if self.filled:
             self.flush()
 
@@ -302,7 +301,8 @@ class Session:
 
     def _within_reach(self, point: tuple[float, float]) -> tuple[float, float]:
         x, y = (a + o for a, o in zip(point, self.scenario.origin, strict=True))
-        r = math.hypot(x, y) or 1e-9
+        x = x or 1e-9  # the shoulder itself lies in no direction
+        r = math.hypot(x, y)
         scale = min(max(r, REACH[0]), REACH[1]) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
 

@@ -28,9 +28,9 @@ class Stage:
         grid, origin = self.removal, np.array(scenario.origin)
         clay = None
         if scenario.clay is not None:
-            low, high = (np.array([grid.x[j], grid.y[j]]) + origin for j in (0, -1))
-            rows, columns = grid.cut.shape
-            clay = scene.Block(tuple(low), tuple(high), rows, columns, scene.THICKNESS, self._colors())
+            low, high = [np.array([grid.x[j], grid.y[j]]) + origin for j in (0, -1)]
+            rows, columns = len(grid.y), len(grid.x)
+            clay = scene.Block((low[0], low[1]), (high[0], high[1]), rows, columns, scene.THICKNESS, self._colors())
         self.model = scene.picture(clay, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if clay else -1

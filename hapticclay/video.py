@@ -10,6 +10,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -98,7 +99,8 @@ def frames(
 
     Args:
         record: of the run. camera: "room", "top" or "close". speed: of the film, 1 for real time.
-        size: width and height [pixels]. plots: whether plots run on the right. tool: at the handle. fps: frames a second.
+        size: width and height [pixels]. plots: whether plots run on the right.
+        tool: at the handle. fps: frames a second.
     """
     width, height = size
     beside = 2 * round(0.5 * PLOTS * width) if plots else 0
@@ -158,7 +160,7 @@ def film(
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "must hold samples")
     fps = FPS[kind]
-    images = frames(record, camera, speed, size, plots, tool, fps)
+    images: Any = frames(record, camera, speed, size, plots, tool, fps)
     if progress:
         images = progress(images, len(shots(record, speed, fps)))
     with tempfile.TemporaryDirectory() as folder, contextlib.closing(images):

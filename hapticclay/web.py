@@ -16,7 +16,7 @@ from .gate import Gate
 from .params import AXES, L1, L2
 from .player import Player
 from .session import Session
-from .stage import DEEP, Stage
+from .stage import Stage
 
 FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
@@ -119,7 +119,7 @@ class Page:
             x, y = grid.x + self.session.scenario.origin[0], grid.y + self.session.scenario.origin[1]
             self.plan, faces = _sheet(x, y)
             self.clay = add.add_mesh_simple(
-                "/clay", self._vertices(), faces, color=tuple(int(c) for c in DEEP), flat_shading=True, side="double"
+                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="double"
             )  # fmt: skip
         self.target = add.add_transform_controls(
             "/hand", scale=0.12, active_axes=(True, True, False), disable_rotations=True

@@ -81,7 +81,8 @@ def test_no_module_is_long(module):
 def test_importing_the_package_and_running_a_scene_loads_nothing_else():
     code = (
         "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01)); "
-        "print([m for m in ('matplotlib', 'imageio', 'viser', 'numba', 'dask', 'tyro', 'tqdm', 'scipy', 'mujoco.viewer') if m in sys.modules])"
+        "print([m for m in ('matplotlib', 'imageio', 'viser', 'numba', 'dask', 'tyro', 'tqdm', 'scipy', "
+        "'mujoco.viewer') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
