@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes.util
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -120,3 +121,9 @@ def _window_possible() -> None:
         raise ParameterError("display", "", f"there is none: {instead}")
     if not ctypes.util.find_library("GL"):
         raise ParameterError("OpenGL", "", f"libGL is missing: apt-get install libgl1, or {instead}")
+    with warnings.catch_warnings():  # the viewer itself would end the process here
+        warnings.simplefilter("ignore")
+        import glfw
+
+        if not glfw.init():
+            raise ParameterError("display", os.environ.get("DISPLAY", ""), f"does not answer: {instead}")

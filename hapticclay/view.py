@@ -80,6 +80,8 @@ class Window:
                 viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
                 viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.80, 90.0, -55.0
                 viewer.opt.sitegroup[:] = 0
+                for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # the target is shown as a ball of our own
+                    viewer.opt.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 0
             player.start()
             self._loop(viewer, player)
         finally:

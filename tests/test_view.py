@@ -20,12 +20,12 @@ def screen():
     """The environment of a screen of its own."""
     reading, writing = os.pipe()
     x = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24"],
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-noreset"],
         pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     os.close(writing)
-    number = os.read(reading, 20).decode().strip()
-    os.close(reading)
+    with os.fdopen(reading) as f:
+        number = f.readline().strip()
     yield {**os.environ, "DISPLAY": f":{number}"}
     x.terminate()
     x.wait()
@@ -41,11 +41,15 @@ class Mouse:
             cwd=folder, env=screen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         for _ in range(240):
-            found = subprocess.run(["xdotool", "search", "--name", "MuJoCo"], env=screen, capture_output=True, text=True)
+            found = subprocess.run(
+                ["xdotool", "search", "--name", "MuJoCo"], env=screen, capture_output=True, text=True
+            )
             if found.stdout or self.program.poll() is not None:
                 break
             time.sleep(0.25)
-        self.window = found.stdout.split()[0] if found.stdout else pytest.fail(f"no window: {self.program.communicate()}")
+        self.window = (
+            found.stdout.split()[0] if found.stdout else pytest.fail(f"no window: {self.program.communicate()}")
+        )
         time.sleep(5.0)  # for the first pictures
 
     def do(self, *words):
