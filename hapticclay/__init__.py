@@ -23,6 +23,7 @@ from .lti import Compensator, closed_loop_poles
 from .params import Clay, Multisine, Operator, Profile, Scenario
 from .passive import clay_passivity, observed_passivity, passivity, port_energy
 from .record import Crossing, Outcome, Record
+from .removal import removed
 from .robust import Box, WorstCase, worst_case
 from .scene import build
 from .sim import simulate
@@ -82,6 +83,7 @@ __all__ = [
     "observed_passivity",
     "passivity",
     "port_energy",
+    "removed",
     "simulate",
     "simulate_batch",
     "small_gain",

@@ -45,6 +45,25 @@ def slab(b: float, start: float, end: float) -> Clay:
     return Clay(x=profile, y=profile)
 
 
+def there_is(clay: Clay | None, i: int) -> list[tuple[float, float]]:
+    """Where coordinate i alone says that there is clay: disjoint spans of it [m], ascending, perhaps infinite."""
+    inf = float("inf")
+    out: list[tuple[float, float]] = []
+    for profile in (clay.x, clay.y) if clay else ():
+        if profile.along == AXES[i]:
+            edges = (-inf, *profile.edges, inf)
+            grown = profile.growth or (0.0,) * len(profile.values)
+            spans = zip(edges, edges[1:], profile.values, grown, strict=False)
+            out += [(low, high) for low, high, b, g in spans if b > 0.0 or g > 0.0]
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(out):
+        if merged and low <= merged[-1][1]:
+            low, high = merged[-1][0], max(high, merged[-1][1])
+            merged.pop()
+        merged.append((low, high))
+    return merged
+
+
 # Rows of a table, two each: borders on x and y between -inf and inf [m]; damping of the x and y axis and its growth
 # [N.s/m, N.s/m per s], by region of the coordinate that decides; region of the axis's own profile in which that one
 # lies; time at which this was first entered [s], NaN before. Then, in one row: which coordinate decides on the x
@@ -118,6 +137,13 @@ class Regions:
     def b(self, t: float) -> tuple[float, float]:
         """Damping of the present region at time t [s] on each axis [N.s/m]."""
         return at(self.base, self.rate, t)
+
+    def change(self, clay: Clay, t: float) -> None:
+        """Puts other damping between the same borders, from time t [s] on."""
+        end, entered = self.table[MORE, 2], self.table[ENTERED : ENTERED + 2]
+        self.table = table(clay, float(end) if end < math.inf else None)
+        self.table[ENTERED : ENTERED + 2] = entered
+        self._settle(t)
 
     def cross(self, i: int, up: bool, t: float) -> float:
         """Steps over the border of coordinate i at time t [s], upwards or downwards; returns its place [m]."""

@@ -14,11 +14,13 @@ from typing import Annotated, Literal
 
 import tyro
 
+from . import cli_view
 from .cli_stability import Stability
 from .errors import ParameterError, choice
 from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
 from .params import AXES, Scenario
 from .record import Record, atomic, versions, writable
+from .removal import TOOL, Tool
 from .sim import simulate
 from .sweep_command import SweepCommand
 
@@ -28,6 +30,18 @@ Experiment = (
     | Annotated[Scenario, tyro.conf.subcommand("stability", constructor=stability_test)]
     | Annotated[Scenario, tyro.conf.subcommand("free", constructor=free)]
 )
+
+
+def recorded(path: tyro.conf.Positional[Path]) -> Record:
+    """A saved record.
+
+    Args:
+        path: its folder, or its record.npz.
+    """
+    return Record.load(path)
+
+
+Recorded = Annotated[Record, tyro.conf.subcommand("record", constructor=recorded)]
 
 
 @dataclass(frozen=True)
@@ -87,6 +101,84 @@ class Reproduce:
         print(f"{agree} of {agree + len(wrong)} numbers agree; {len(rows) - agree - len(wrong)} more are explained")
         print(f"report: {(self.out / 'report.html').resolve()}")
         return 1 if wrong else 0
+
+
+@dataclass(frozen=True)
+class View:
+    """Take part: pull the handle with the mouse, in a window or a browser; or replay a record (its folder).
+
+    The person is the muscle: force, length and t_max of the experiment do not count. On exit the record, its
+    summary and its plots are written.
+    """
+
+    scenario: Experiment | Recorded
+    stiffness: float = 10.0
+    """Of the hand, as a multiple of the spring of Th (Eq. 19): 1 is the paper's arm at rest."""
+    tool_width: float = TOOL.width
+    """Width of the tool [m]."""
+    tool_depth: float = TOOL.depth
+    """Depth of the cut [m]."""
+    out: Path = Path("out")
+    """Folder for record.npz, summary.json and the plots."""
+    every: int = 10
+    """Keep every n-th sample in the record."""
+    plots: bool = True
+    """Draw the plots."""
+    web: bool = False
+    """Show it in a browser, without a display of our own."""
+    host: str = "127.0.0.1"
+    """Address to serve the browser on; other than this machine's, a token guards it."""
+    port: int = 8080
+    """Port to serve the browser on."""
+
+    def __call__(self) -> int:
+        tool = Tool(self.tool_width, self.tool_depth)
+        if isinstance(self.scenario, Record):
+            if self.web:
+                raise ParameterError("web", True, "shows sessions only: make a film of a record with hapticclay video")
+            cli_view.replay(self.scenario, tool)
+            return 0
+        writable(self.out)
+        record = cli_view.look(self.scenario, self.stiffness, tool, self.every, self.web, self.host, self.port)
+        if record is None:
+            print("nothing was recorded")
+            return 0
+        record.save(self.out)
+        if self.plots:
+            draw(record, self.out)
+        print(table(record))
+        print(f"written to {self.out}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Video:
+    """Film a record (its folder) or an experiment: arm, clay and running plots side by side."""
+
+    scenario: Experiment | Recorded
+    out: Path = Path("out/film.mp4")
+    """The file: .mp4, .webp or .gif."""
+    camera: Literal["room", "top", "close"] = "room"
+    """Where to look from."""
+    speed: float = 1.0
+    """1 is real time, 2 twice as fast."""
+    size: tuple[int, int] = (960, 480)
+    """Width and height [pixels]."""
+    plots: bool = True
+    """Run the plots on the right."""
+    tool_width: float = TOOL.width
+    """Width of the tool [m]."""
+    tool_depth: float = TOOL.depth
+    """Depth of the cut [m]."""
+
+    def __call__(self) -> int:
+        tool = Tool(self.tool_width, self.tool_depth)
+        writable(self.out.parent)
+        s = self.scenario
+        record = s if isinstance(s, Record) else simulate_with_progress(s, 1)
+        made = cli_view.film(record, self.out, self.camera, self.speed, self.size, self.plots, tool)
+        print(f"written to {made}")
+        return 0
 
 
 @dataclass(frozen=True)
@@ -163,6 +255,8 @@ Command = (
     | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
     | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[Video, tyro.conf.subcommand("video")]
     | Annotated[Version, tyro.conf.subcommand("version")]
 )
 
@@ -241,6 +335,7 @@ def draw(record: Record, folder: Path) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line; returns its exit status: 0, 2 for bad input, 130 for Ctrl-C."""
     complaint = io.StringIO()
+    argv = list(sys.argv[1:] if argv is None else argv)
     with contextlib.suppress(AttributeError, ValueError):
         sys.stdout.reconfigure(errors="replace")  # a terminal that knows no frames or bullets
     try:
@@ -250,13 +345,13 @@ def main(argv: Sequence[str] | None = None) -> int:
                     Command,
                     prog="hapticclay",
                     description="Virtual clay, cut with a simulated haptic arm.",
-                    args=argv,
+                    args=cli_view.complete(argv),
                     config=MARKERS,
                 )
         except SystemExit as stop:
             if stop.code in (0, None):
                 return 0
-            _check_names(list(sys.argv[1:] if argv is None else argv))
+            _check_names(argv)
             raise ParameterError("arguments", "", _one_line(complaint.getvalue())) from None
         code = command()
         sys.stdout.flush()
@@ -280,7 +375,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _check_names(words: list[str]) -> None:
     """Says which command or experiment was meant, where a word is none of them."""
     if words and not words[0].startswith("-"):
-        choice("command", words[0], ("run", "reproduce", "stability", "identify", "sweep", "bench", "version"))
+        choice(
+            "command",
+            words[0],
+            ("run", "view", "video", "reproduce", "stability", "identify", "sweep", "bench", "version"),
+        )
     if words[:1] == ["run"] and not any(w in SCENARIOS for w in words) and words[1:2] and words[1][:1] != "-":
         choice("experiment", words[1], tuple(SCENARIOS))
 

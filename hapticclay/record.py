@@ -35,6 +35,12 @@ ARRAYS = {
     "tau": "N.m",
     "delta": "m",
 }
+EXTRA = {  # arrays that some records have
+    "removed": "m^3",
+    "removal_rate": "m^3/s",
+    "target": "m",
+    "gain": "1/kg",
+}
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -90,6 +96,8 @@ class Record:
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
             damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored); what is
             left over (residual) and what went through (throughput) [J].
+        extra: of runs that asked for them, by name: removed clay (n,) and its rate (n,); of sessions, the point that
+            the hand pulled to (n, 2) and the gain K (n, 2). notes: of sessions, how well they kept real time.
         steps: engine steps made. wall_time: seconds they took. versions: of the packages used.
     """
 
@@ -110,6 +118,8 @@ class Record:
     steps: int = 0
     wall_time: float = 0.0
     versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
+    extra: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    notes: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -185,6 +195,8 @@ class Record:
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
         end = float(self.t[-1]) if len(self.t) else 0.0
+        more = {"notes": self.notes} if self.notes else {}
+        extra = {name: EXTRA[name] for name in self.extra}
         return {
             "schema": SCHEMA,
             "status": self.status,
@@ -198,8 +210,9 @@ class Record:
             "simulated_time_s": end,
             "wall_time_s": self.wall_time,
             "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
-            "units": {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS},
+            "units": {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS, **extra},
             "versions": self.versions,
+            **more,
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -213,7 +226,7 @@ class Record:
         """
         folder = Path(path)
         head = {k: v for k, v in self.summary().items() if k != "regions"}
-        arrays = {name: getattr(self, name) for name in ARRAYS}
+        arrays = {name: getattr(self, name) for name in ARRAYS} | self.extra
         with atomic(folder / "record.npz") as f:
             np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
@@ -233,6 +246,7 @@ class Record:
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
+                extra = {name: z[name] for name in EXTRA if name in z}
             schema = head["schema"]
             if schema == SCHEMA:
                 return cls(
@@ -244,6 +258,8 @@ class Record:
                     steps=head["steps"],
                     wall_time=head["wall_time_s"],
                     versions=head["versions"],
+                    extra=extra,
+                    notes=head.get("notes", {}),
                 )
         except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
             what = " ".join(str(error).split()) or type(error).__name__

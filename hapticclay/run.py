@@ -26,7 +26,7 @@ class Run:
 
     Attributes:
         i: index of the sample at or before now. t: now [s]. last: number of whole steps.
-        steps: engine steps made.
+        steps: engine steps made. pause: index of the sample to pause at.
     """
 
     def __init__(self, scenario: Scenario, every: int):
@@ -47,6 +47,7 @@ class Run:
         self.varies = bool(self.muscle or self.command or self.regions.grows)  # from step to step
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
         self.i, self.t, self.steps = 0, 0.0, 0
+        self.pause = math.inf
         self.watch = outcome.Watch(scenario)
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
@@ -72,9 +73,9 @@ class Run:
         raise NotImplementedError
 
     def go(self, progress: Callable[[float, float], None] | None) -> None:
-        """Runs to the end."""
+        """Runs to the end, or until sample `pause`; whoever paused it flushes."""
         try:
-            while self.outcome is None:
+            while self.outcome is None and self.i < self.pause:
                 if self.advance() or self.outcome:
                     self.flush()
                     if progress:

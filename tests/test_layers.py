@@ -16,18 +16,19 @@ LEVELS = [
     {"params", "interface"},
     {"arm", "lti", "clay", "human", "signals", "estimate"},
     {"servo", "record", "energy", "limits"},
-    {"loop", "scene", "outcome", "stability"},
-    {"run", "robust", "design", "passive"},
+    {"loop", "scene", "outcome", "stability", "removal"},
+    {"run", "robust", "design", "passive", "stage"},
     {"leapfrog", "rungekutta"},
-    {"sampled", "stride"},
+    {"sampled", "stride", "session"},
     {"native", "wired"},
     {"sim"},
     {"batch"},
     {"experiments", "identify", "boundary"},
     {"plot", "entries", "space", "drift", "maps"},
     {"plot_stability", "plot_identify", "paper_model", "paper_cuts", "sweep"},
-    {"ledger", "plot_sweep", "plot_boundary", "identify_command"},
-    {"report", "sweep_command", "cli_stability"},
+    {"ledger", "plot_sweep", "plot_boundary", "identify_command", "gate", "player", "running"},
+    {"report", "sweep_command", "cli_stability", "video", "view", "web"},
+    {"cli_view"},
     {"cli"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
@@ -35,13 +36,25 @@ HEAVY = {  # outside package -> the only modules that may import it
     "jinja2": {"report"},
     "pyarrow": {"sweep"},
     "distributed": {"sweep"},
-    "mujoco": {"paper_model", "scene", "run", "leapfrog", "rungekutta", "sampled", "native"},
-    "matplotlib": {"plot", "plot_stability", "plot_identify", "plot_sweep", "plot_boundary"},
+    "mujoco": {
+        "paper_model",
+        "scene",
+        "run",
+        "leapfrog",
+        "rungekutta",
+        "sampled",
+        "native",
+        "stage",
+        "video",
+        "view",
+    },
+    "matplotlib": {"plot", "plot_stability", "plot_identify", "plot_sweep", "plot_boundary", "running"},
     "tyro": {"cli", "sweep_command"},
-    "tqdm": {"cli", "sweep_command", "identify_command", "cli_stability"},
+    "tqdm": {"cli", "sweep_command", "identify_command", "cli_stability", "cli_view"},
     "tabulate": {"cli", "identify_command", "cli_stability"},
     "scipy": {"lti", "limits", "design", "space", "estimate", "identify", "interface"},
-    "imageio": set(),
+    "imageio": {"video"},
+    "viser": {"web"},
     "numba": {"native"},
     "dask": set(),
 }
@@ -85,7 +98,8 @@ def test_no_module_is_long(module):
 def test_importing_the_package_and_running_a_scene_loads_nothing_else():
     code = (
         "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01)); "
-        "print([m for m in ('matplotlib', 'imageio', 'numba', 'dask', 'tyro', 'tqdm', 'scipy') if m in sys.modules])"
+        "print([m for m in ('matplotlib', 'imageio', 'viser', 'numba', 'dask', 'tyro', 'tqdm', 'scipy', "
+        "'mujoco.viewer') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"

@@ -1,0 +1,129 @@
+"""What the commands `view` and `video` do: windows, pages and films around sessions, scenarios and records."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from .errors import ParameterError, choice
+from .experiments import SCENARIOS
+from .params import Scenario
+from .record import Record
+from .removal import Tool
+from .session import Session
+
+COMMANDS = ("view", "video")
+
+
+def complete(words: list[str]) -> list[str]:
+    """Command line words with what may be left out: the experiment ("constant"), the word "record" before a path.
+
+    Raises:
+        ParameterError: a word is neither an experiment nor a file.
+    """
+    if words[:1] not in [[c] for c in COMMANDS] or "--help" in words[:2] or "-h" in words[:2]:
+        return words
+    command, *rest = words
+    if not rest or rest[0].startswith("-"):
+        return [command, "constant", *rest]
+    if rest[0] in SCENARIOS or rest[0] == "record":
+        return words
+    if not Path(rest[0]).exists() and os.sep not in rest[0]:
+        choice("experiment", rest[0], tuple(SCENARIOS))
+    return [command, "record", *rest]
+
+
+def look(
+    scenario: Scenario, stiffness: float, tool: Tool, every: int, web: bool, host: str, port: int
+) -> Record | None:
+    """A session in a window or a browser, until it is closed; what was recorded, None if nothing was.
+
+    Raises:
+        ParameterError: there is no display, no OpenGL, or no viser.
+    """
+    session = Session(scenario, stiffness, tool, every)
+    if web:
+        _serve(session, host, port)
+    else:
+        _window_possible()
+        from .view import Window
+
+        while True:
+            window = Window(session)
+            try:
+                window.show()
+            except KeyboardInterrupt:
+                break
+            if not window.wanted:
+                break
+            session.start(SCENARIOS[window.wanted]())
+    return session.record() if session.recorded else None
+
+
+def replay(record: Record, tool: Tool) -> None:
+    """Shows a record in a window, in real time, until it is closed.
+
+    Raises:
+        ParameterError: there is no display, no OpenGL, or nothing in the record.
+    """
+    if not len(record.t):
+        raise ParameterError("record", record.scenario.name, "holds no samples")
+    _window_possible()
+    from .player import Replay
+    from .view import Window
+
+    try:
+        Window(Replay(record, tool)).show()
+    except KeyboardInterrupt:
+        pass
+
+
+def film(record: Record, out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool) -> Path:
+    """Writes a film under a progress bar."""
+    from tqdm import tqdm
+
+    from . import video
+
+    def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
+        return iter(tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False))
+
+    return video.film(record, out, camera, speed, size, plots, tool, progress)
+
+
+def _serve(session: Session, host: str, port: int) -> None:
+    from .web import LOCAL, Page
+
+    page = Page(session, host, port)
+    if host not in LOCAL:
+        print(
+            f"warning: {host} can be reached from other machines, unencrypted; only this address lets anyone in:",
+            file=sys.stderr,
+        )
+    print(f"open {page.url} in a browser; Ctrl-C ends the session", flush=True)
+    try:
+        page.serve()
+    except KeyboardInterrupt:
+        pass
+
+
+def _window_possible() -> None:
+    """Raises ParameterError where no window can be opened, and says what to do instead."""
+    if not sys.platform.startswith("linux"):
+        return
+    instead = "use --web for a browser, or hapticclay video for a film"
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ParameterError("display", "", f"there is none: {instead}")
+    if not ctypes.util.find_library("GL"):
+        raise ParameterError("OpenGL", "", f"libGL is missing: apt-get install libgl1, or {instead}")
+    with warnings.catch_warnings():  # the viewer itself would end the process here
+        warnings.simplefilter("ignore")
+        import glfw
+
+        if not glfw.init():
+            raise ParameterError("display", os.environ.get("DISPLAY", ""), f"does not answer: {instead}")

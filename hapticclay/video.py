@@ -1,0 +1,188 @@
+"""A film of a run: the arm and the clay being cut, the plots running beside them."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from .errors import ParameterError, choice, integer, number
+from .record import Record, atomic
+from .removal import TOOL, Tool
+from .stage import CAMERAS, Stage
+
+FPS = {".mp4": 30, ".webp": 20, ".gif": 20}  # frames a second, by kind of file
+ASPECT = 1.2  # width over height that the cameras are made for, at least
+PLOTS = 0.375  # share of the width that the plots take
+GL = "apt-get install libegl1 libgl1 (or libosmesa6 and MUJOCO_GL=osmesa)"
+
+
+class Lens:
+    """Photographs a stage without a display.
+
+    Raises:
+        ParameterError: there is no OpenGL to do it with.
+    """
+
+    def __init__(self, stage: Stage, width: int, height: int, camera: str):
+        self.stage = stage
+        model = stage.model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._gl = _context(width, height)
+        self._gl.make_current()
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(model, maxgeom=1000)
+        self._option, self._perturb = mujoco.MjvOption(), mujoco.MjvPerturb()
+        self._option.sitegroup[:] = 0
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._camera.fixedcamid = which = model.camera(camera).id
+        if width < ASPECT * height:  # a narrow picture holds as much from left to right
+            half = math.tan(math.radians(0.5 * model.cam_fovy[which])) * ASPECT * height / width
+            model.cam_fovy[which] = math.degrees(2.0 * math.atan(half))
+        self._rect = mujoco.MjrRect(0, 0, width, height)
+        self._pixels = np.zeros((height, width, 3), dtype=np.uint8)
+
+    def photograph(self, title: str = "") -> np.ndarray:
+        """The stage as it is, shape (height, width, 3) of bytes, under a title; the next call reuses the memory."""
+        stage = self.stage
+        if stage.relief():
+            mujoco.mjr_uploadHField(stage.model, self._context, stage.field)
+        mujoco.mjv_updateScene(
+            stage.model, stage.data, self._option, self._perturb, self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value, self._scene,
+        )  # fmt: skip
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        if title:
+            font, corner = mujoco.mjtFont.mjFONT_NORMAL.value, mujoco.mjtGridPos.mjGRID_TOPLEFT.value
+            mujoco.mjr_overlay(font, corner, self._rect, title, "", self._context)
+        mujoco.mjr_readPixels(self._pixels, None, self._rect, self._context)
+        return self._pixels[::-1]
+
+    def close(self) -> None:
+        """Gives graphics memory and context back."""
+        self._context.free()
+        self._gl.free()
+
+
+def _context(width: int, height: int):
+    """An OpenGL context that needs no display: what MUJOCO_GL says, or EGL on Linux."""
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    try:
+        if sys.platform.startswith("linux") and wanted in ("", "egl"):
+            from mujoco.egl import GLContext
+        elif wanted == "osmesa":
+            from mujoco.osmesa import GLContext
+        else:
+            GLContext = mujoco.GLContext
+        return GLContext(width, height)
+    except Exception as error:  # each backend fails in its own ways: ImportError, AttributeError, GLError, FatalError
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise ParameterError("OpenGL", what, f"no rendering without it: {GL}") from None
+
+
+def frames(
+    record: Record, camera: str = "room", speed: float = 1.0, size: tuple[int, int] = (960, 480), plots: bool = True,
+    tool: Tool = TOOL, fps: int = 30,
+) -> Iterator[np.ndarray]:  # fmt: skip
+    """The frames of a film, shape (height, width, 3) of bytes each; the next one reuses the memory.
+
+    Args:
+        record: of the run. camera: "room", "top" or "close". speed: of the film, 1 for real time.
+        size: width and height [pixels]. plots: whether plots run on the right.
+        tool: at the handle. fps: frames a second.
+    """
+    width, height = size
+    beside = 2 * round(0.5 * PLOTS * width) if plots else 0
+    stage = Stage(record.scenario, tool)
+    lens = Lens(stage, width - beside, height, choice("camera", camera, CAMERAS))
+    running = None
+    if plots:
+        from .running import Running
+
+        running = Running(record, beside, height)
+    image = np.empty((height, width, 3), dtype=np.uint8)
+    try:
+        done = 0
+        for n in shots(record, speed, fps):
+            stage.carve(_thinned(record.p[done:n]))
+            stage.pose(record.q[n - 1])
+            title = f"t = {record.t[n - 1]:.2f} s"
+            if stage.field >= 0:
+                title += f"   removed {1e6 * stage.removal.volume:.1f} cm3"
+            image[:, : width - beside] = lens.photograph(title)
+            if running:
+                image[:, width - beside :] = running.upto(n)
+            done = n
+            yield image
+    finally:
+        lens.close()
+
+
+def shots(record: Record, speed: float, fps: int) -> np.ndarray:
+    """Number of samples that each frame has seen."""
+    end = float(record.t[-1]) if len(record.t) else 0.0
+    at = np.append(np.arange(0.0, end, speed / fps), end)
+    return np.searchsorted(record.t, at, "right").clip(1)
+
+
+def _thinned(p: np.ndarray) -> np.ndarray:
+    """At most eight of the points between two frames, the last among them."""
+    return p[:: -max(1, len(p) // 8)][::-1]
+
+
+def film(
+    record: Record, out: Path, camera: str = "room", speed: float = 1.0, size: tuple[int, int] = (960, 480),
+    plots: bool = True, tool: Tool = TOOL, progress: Callable[[Iterator[np.ndarray], int], Iterator] | None = None,
+) -> Path:  # fmt: skip
+    """Writes a film of a run: .mp4, .webp or .gif.
+
+    Args:
+        out: the file; other arguments as in `frames`. progress: wraps the iterator over so many frames.
+
+    Raises:
+        ParameterError: a value is out of its bounds, the file cannot be written, or OpenGL or a codec is missing.
+    """
+    kind = choice("out", out.suffix.lower(), tuple(FPS))
+    speed = number("speed", speed, 1e-3, 1e3, above=True)
+    width, height = (integer(f"size[{name}]", n, 160, 4096) for name, n in zip(("w", "h"), size, strict=True))
+    size = width - width % 2, height - height % 2  # as the codec wants
+    if not len(record.t):
+        raise ParameterError("record", record.scenario.name, "must hold samples")
+    fps = FPS[kind]
+    images: Any = frames(record, camera, speed, size, plots, tool, fps)
+    if progress:
+        images = progress(images, len(shots(record, speed, fps)))
+    with tempfile.TemporaryDirectory() as folder, contextlib.closing(images):
+        temporary = Path(folder) / f"film{kind}"
+        _write(temporary, images, kind, fps)
+        with atomic(out) as f, open(temporary, "rb") as made:
+            shutil.copyfileobj(made, f)
+    return out
+
+
+def _write(path: Path, images: Iterator[np.ndarray], kind: str, fps: int) -> None:
+    import imageio.v2 as imageio
+
+    if kind != ".mp4":
+        imageio.mimwrite(path, [x.copy() for x in images], duration=1000 // fps, loop=0)
+        return
+    try:
+        writer = imageio.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7)  # type: ignore[arg-type]
+    except (ImportError, ValueError, RuntimeError):
+        raise ParameterError(
+            "out", path.suffix, "mp4 needs a codec: pip install 'imageio[ffmpeg]'; or take .webp"
+        ) from None
+    with writer:
+        for image in images:
+            writer.append_data(image)

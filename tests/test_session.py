@@ -1,0 +1,196 @@
+"""A session without graphics: a scripted hand instead of a mouse."""
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.player import Player, Replay
+from hapticclay.session import FRAME, MOST, Clock, Session, played
+
+
+def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
+    end = session.t + seconds
+    while session.t < end - 1e-6 and not session.ended:
+        session.pull(way(session.t))
+        session.advance(FRAME)
+    return session
+
+
+@pytest.mark.parametrize("scenario", [hc.constant_cut(), hc.variable_cut()], ids=["constant", "variable"])
+def test_hand_feels_the_clay(scenario):
+    session = drag(Session(scenario, stiffness=10.0), 4.0, lambda t: (0.04 * t, 0.0))
+    record = session.record()
+    moving = (np.abs(record.v) > 1e-3) & (record.b > 0.0)
+    assert moving.sum() > 1000
+    np.testing.assert_allclose(record.ratio(record.fe)[moving], record.b[moving], rtol=1e-9)
+    assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME)
+    assert abs(record.energy["residual"]) < 1e-4 * record.energy["throughput"]  # second order in the step
+
+
+def test_pull_is_the_impedance_towards_the_point():
+    """fh = k (target - p) - d v - m a, from the record's own arrays; a by differences."""
+    scenario = hc.constant_cut()
+    record = drag(Session(scenario, stiffness=10.0), 2.0, lambda t: (0.03 * t, 0.01 * t)).record()
+    th = record.scenario.operator
+    assert (th.spring, th.mass) == (60.0, 0.25) and th.damper == pytest.approx(2.0 * 10**0.5)
+    a = np.gradient(record.v, record.t, axis=0)
+    expected = th.spring * (record.extra["target"] - record.p) - th.damper * record.v - th.mass * a
+    quiet = slice(50, -50)
+    still = np.abs(np.gradient(a, record.t, axis=0)).max(axis=1)[quiet] < 50.0  # not at a border or a new slice
+    assert still.sum() > 3000
+    # 2e-3 N: m a by differences across one step
+    np.testing.assert_allclose(record.fh[quiet][still], expected[quiet][still], atol=2e-3)
+
+
+def test_slices_are_no_part_of_the_result():
+    """A still target: slices of 1/60 s, of 1/200 s and one headless run with the same muscle force agree."""
+    ends = []
+    for frame in (FRAME, 0.005, MOST):
+        session = Session(hc.constant_cut(), stiffness=10.0)
+        session.pull((0.0, 0.0))
+        session.push((2.0, 0.0))
+        while session.t < 3.0 - 1e-9:
+            session.advance(min(frame, 3.0 - session.t + 1e-9))
+        ends.append(session.record())
+    still = dataclasses.replace(played(hc.constant_cut(), 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1])
+    reference = hc.simulate(still)
+    for record in ends:
+        n = min(len(record.t), len(reference.t)) - 2
+        np.testing.assert_allclose(record.p[:n], reference.p[:n], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(record.fh[:n], reference.fh[:n], rtol=1e-8, atol=1e-8)
+
+
+def test_gain_and_damping_change_while_it_runs():
+    session = Session(hc.constant_cut(), stiffness=10.0)
+    drag(session, 1.0, lambda t: (0.1, 0.0))
+    session.change(b=2.0)
+    assert session.b == (180.0, 180.0)
+    drag(session, 0.5, lambda t: (0.1, 0.0))
+    session.change(gain=(2.0, 0.25))
+    drag(session, 0.5, lambda t: (0.1, 0.0))
+    record = session.record()
+    assert set(np.unique(record.b[:, 0])) == {0.0, 90.0, 180.0}
+    assert set(np.unique(record.extra["gain"][:, 0])) == {1.0, 2.0}
+    moving = np.abs(record.v[:, 0]) > 1e-3
+    np.testing.assert_allclose(record.ratio(record.fe)[moving, 0], record.b[moving, 0], rtol=1e-9)
+
+
+def test_letting_go_leaves_the_handle_to_itself():
+    """No force of the hand but its mass and damper: 10/K and d slow the handle down, no spring calls it back."""
+    session = drag(Session(hc.free(), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
+    session.pull(None)
+    for _ in range(120):
+        session.advance(FRAME)
+    p, v = session.frames[-1][1:3]
+    assert abs(v[0]) < 1e-4 and p[0] > 0.03
+
+
+def test_pause_restart_and_record_switch():
+    session = drag(Session(hc.constant_cut(), stiffness=10.0), 0.5)
+    session.paused = True
+    assert len(session.advance(FRAME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME)
+    session.paused, session.recording = False, False
+    drag(session, 0.5)
+    session.recording = True
+    drag(session, 0.5)
+    record = session.record()
+    gap = np.diff(record.t).max()
+    assert gap == pytest.approx(0.5, abs=2 * FRAME)
+    session.restart()
+    assert session.t == 0.0 and not session.recorded
+    with pytest.raises(hc.ParameterError, match="nothing was recorded"):
+        session.record()
+
+
+def test_record_keeps_its_extras(tmp_path):
+    record = drag(Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, lambda t: (0.06 * t, 0.0)).record()
+    back = hc.Record.load(record.save(tmp_path))
+    assert set(back.extra) == {"removed", "removal_rate", "target", "gain"}
+    for name, array in record.extra.items():
+        np.testing.assert_array_equal(back.extra[name], array)
+        assert len(array) == len(record.t)
+    assert back.notes == record.notes and record.notes["tool"] == {"width": 0.02, "depth": 0.01}
+    assert record.extra["removed"][-1] == pytest.approx(0.02 * 0.01 * 0.10, rel=1e-2)
+
+
+def test_records_of_headless_runs_have_none(tmp_path):
+    record = hc.simulate(hc.constant_cut(t_max=0.1))
+    assert record.extra == {} and "notes" not in record.summary()
+    assert hc.Record.load(record.save(tmp_path)).extra == {}
+
+
+def test_out_of_reach_ends_it_with_a_reason():
+    session = Session(hc.free(), stiffness=1.0)
+    session.push((30.0, 0.0))
+    for _ in range(600):
+        session.advance(FRAME)
+    assert "stretched" in session.ended and session.record().outcome.code == "out of reach"
+
+
+def test_point_stays_within_reach():
+    session = Session(hc.constant_cut())
+    for far in ((5.0, 0.0), (-0.25, -0.24)):
+        session.pull(far)
+        x, y = np.add(session.point, session.scenario.origin)
+        assert 0.15 < np.hypot(x, y) < 0.58
+
+
+@pytest.mark.parametrize("field,value", [("control", "sampled"), ("integrator", "accurate")])
+def test_other_ways_to_step_are_refused(field, value):
+    with pytest.raises(hc.ParameterError, match=field):
+        Session(hc.constant_cut(**{field: value}))
+
+
+def test_clock_keeps_real_time_whatever_the_frames():
+    clock, now, made = Clock(), 100.0, 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(2000):
+        made += clock.due(now)
+        now += rng.uniform(0.005, 0.04)
+    assert made == pytest.approx(now - 100.0, abs=0.06) and not clock.slow
+    assert clock.factor == pytest.approx(1.0, abs=0.02)
+    assert clock.late.sum() == clock.frames == 2000
+
+
+def test_slow_machine_slows_the_clock_evenly():
+    """Frames of 0.2 s: each makes MOST, the factor is 1/4, and it says so."""
+    clock, made = Clock(), []
+    for k in range(100):
+        made.append(clock.due(0.2 * k))
+    assert clock.slow and set(np.round(made[1:], 12)) == {MOST}
+    assert clock.factor == pytest.approx(0.25, rel=0.02)
+    clock.rest()
+    assert clock.due(1000.0) <= MOST  # a pause is not made good
+
+
+def test_player_plays_and_stops():
+    session = Session(hc.constant_cut(), stiffness=10.0)
+    player = Player(session)
+    player.start()
+    deadline = time.monotonic() + 20.0
+    while session.t < 0.3 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    player.stop()
+    assert session.t >= 0.3 and not player.is_alive()
+
+
+def test_player_hands_on_what_it_died_of(monkeypatch):
+    session = Session(hc.constant_cut())
+    monkeypatch.setattr(session, "advance", lambda s: 1 / 0)
+    player = Player(session)
+    player.start()
+    with pytest.raises(ZeroDivisionError):
+        time.sleep(0.1)
+        player.stop()
+
+
+def test_replay_follows_the_record():
+    record = hc.simulate(hc.constant_cut(), every=10)
+    replay, went = Replay(record), [record.p[:1]]
+    while not replay.ended:
+        went.append(replay.advance(FRAME))
+    assert replay.ended == record.status
+    np.testing.assert_array_equal(np.concatenate(went)[-1], record.p[-1])

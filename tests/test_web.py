@@ -1,0 +1,129 @@
+"""The page in a real headless browser, and the gate that guards it from other machines."""
+
+import http.client
+import shutil
+import socket
+import threading
+import time
+
+import pytest
+
+import hapticclay as hc
+from hapticclay.gate import Gate
+from hapticclay.session import Session
+
+viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")  # of websockets
+
+
+@pytest.fixture
+def page():
+    from hapticclay.web import Page
+
+    made, done = Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0), threading.Event()
+    thread = threading.Thread(target=made.serve, args=(done.is_set,))
+    thread.start()
+    yield made
+    done.set()
+    thread.join(timeout=30.0)
+    assert not thread.is_alive()
+
+
+@pytest.mark.skipif(not CHROMIUM, reason="needs chromium (apt-get install chromium)")
+def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
+    playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
+    troubles = []
+    with playwright.sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        tab = browser.new_page(viewport={"width": 900, "height": 600})
+        tab.set_default_timeout(150_000)  # software drawing, about a picture a second
+        tab.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
+        tab.on("pageerror", lambda e: troubles.append(str(e)))
+        tab.goto(page.url)
+        sliders = tab.locator("[role=slider]")
+        sliders.nth(2).wait_for()
+        sliders.nth(2).focus()
+        for _ in range(15):
+            tab.keyboard.press("ArrowRight")
+        sliders.nth(0).focus()
+        for _ in range(10):
+            tab.keyboard.press("ArrowLeft")
+        deadline = time.monotonic() + 90.0
+        while time.monotonic() < deadline and page.session.frames[-1][1][0] < 0.06:
+            tab.wait_for_timeout(500)
+        picture = tab.screenshot(path=tmp_path / "page.png")
+        browser.close()
+    assert troubles == []
+    assert page.session.run.muscle.force == pytest.approx((1.5, 0.0))
+    assert page.session.scenario.clay.x.values[1] == pytest.approx(80.0)
+    assert page.session.frames[-1][1][0] > 0.06  # the force moved the handle into the clay
+
+    import imageio.v3 as iio
+
+    image = iio.imread(picture)[..., :3].astype(int)
+    clay = (image[..., 0] - image[..., 2] > 60) & (image[..., 0] > image[..., 1])
+    assert clay[:, :600].sum() > 500  # clay and knob are in the picture
+    record = page.session.record()
+    inside = (record.b[:, 0] > 0.0) & (abs(record.v[:, 0]) > 1e-3)
+    assert record.ratio(record.fe)[inside, 0] == pytest.approx(record.b[inside, 0], rel=0.01)
+
+
+def test_page_listens_on_this_machine_alone(page):
+    port = page.server.get_port()
+    assert page.url == f"http://127.0.0.1:{port}" and page.gate is None
+    elsewhere = "127.0.0.2"  # another address of this machine: open only to who listens on all of them
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection((elsewhere, port), timeout=5.0)
+
+
+def answer(port, path="/", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0)
+    connection.request("GET", path, headers=headers)
+    response = connection.getresponse()
+    body = response.read()
+    connection.close()
+    return response.status, response.headers, body
+
+
+def test_other_machines_need_the_token():
+    from hapticclay.web import Page
+
+    page = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
+    try:
+        port, token = page.gate.port, page.url.partition("token=")[2]
+        assert len(token) >= 20
+        assert answer(port)[0] == 403
+        assert answer(port, "/?token=wrong")[0] == 403
+        assert answer(port, Cookie="hapticclay=wrong")[0] == 403
+        assert answer(port, Upgrade="websocket", Connection="Upgrade")[0] == 403
+        status, headers, _ = answer(port, f"/?token={token}")
+        assert status == 303 and headers["Location"] == "/"
+        cookie = headers["Set-Cookie"].partition(";")[0]
+        status, _, body = answer(port, Cookie=cookie)
+        assert status == 200 and b"<html" in body.lower()
+        inner = page.server.get_port()
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.2", inner), timeout=5.0)
+    finally:
+        page.close()
+
+
+def test_gate_survives_noise():
+    gate = Gate("127.0.0.1", 0, 9, "secret")
+    try:
+        for noise in (b"\r\n\r\n", b"\xff" * 100 + b"\r\n\r\n", b"GET\r\n\r\n", b"x" * 100_000):
+            with socket.create_connection(("127.0.0.1", gate.port), timeout=5.0) as s:
+                s.sendall(noise)
+        assert answer(gate.port)[0] == 403
+    finally:
+        gate.close()
+
+
+def test_taken_address_is_refused():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        s.listen()
+        with pytest.raises(hc.ParameterError, match="cannot be listened on"):
+            Gate("127.0.0.1", s.getsockname()[1], 9, "secret")
