@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import functools
 import hashlib
 import os
+import signal
 import threading
 import time
 from pathlib import Path
@@ -275,3 +277,19 @@ def _lines(signal: Any) -> np.ndarray:
     if signal is None:
         return np.zeros((0, 5))
     return np.column_stack((signal.omega, signal.phase, np.tile(signal.amplitude, (len(signal.omega), 1))))
+
+
+@functools.cache
+def warm() -> None:
+    """Compiles, or fetches what has been compiled, before the first run; Ctrl-C, which numba may lose, comes after it."""
+    caught: list[object] = []
+    mine = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
+    try:
+        for damping in (None, slab(1.0, 0.0, 1.0)):
+            Native(Scenario(clay=damping, t_max=1e-2), 1).go(None)
+    finally:
+        if mine:
+            signal.signal(signal.SIGINT, before)
+    if caught:
+        raise KeyboardInterrupt

@@ -78,6 +78,7 @@ def compiled() -> Any:
     try:
         from . import native
 
+        native.warm()
         return native
     except (ImportError, OSError, StopIteration, AttributeError) as error:  # of numba, or the engine's library
         print(f"hapticclay: Python runs what native cannot: {error or type(error).__name__}", file=sys.stderr)

@@ -31,6 +31,16 @@ def page():
     assert not thread.is_alive()
 
 
+def press(slider, key, times):
+    """One after the other: a key that comes before the last one is drawn starts from the value before it."""
+    from playwright.sync_api import expect
+
+    for _ in range(times):
+        shown = slider.get_attribute("aria-valuenow")
+        slider.press(key)
+        expect(slider).not_to_have_attribute("aria-valuenow", shown, timeout=30_000)
+
+
 @pytest.mark.skipif(not CHROMIUM, reason="needs chromium (apt-get install chromium)")
 def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
@@ -44,12 +54,9 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
         tab.goto(page.url)
         sliders = tab.locator("[role=slider]")
         sliders.nth(2).wait_for()
-        sliders.nth(2).focus()
-        for _ in range(15):
-            tab.keyboard.press("ArrowRight")
-        sliders.nth(0).focus()
-        for _ in range(10):
-            tab.keyboard.press("ArrowLeft")
+        press(sliders.nth(2), "ArrowRight", 15)
+        tab.wait_for_timeout(2000)  # the page sends at most 20 values a second, of all sliders together: the last
+        press(sliders.nth(0), "ArrowLeft", 10)
         deadline = time.monotonic() + 90.0
         while time.monotonic() < deadline and page.session.frames[-1][1][0] < 0.06:
             tab.wait_for_timeout(500)
