@@ -281,7 +281,7 @@ def _lines(signal: Any) -> np.ndarray:
 
 @functools.cache
 def warm() -> None:
-    """Compiles, or fetches what has been compiled, before the first run; Ctrl-C, which numba may lose, comes after it."""
+    """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
@@ -289,7 +289,7 @@ def warm() -> None:
         for damping in (None, slab(1.0, 0.0, 1.0)):
             Native(Scenario(clay=damping, t_max=1e-2), 1).go(None)
     finally:
-        if mine:
+        if before is not None:
             signal.signal(signal.SIGINT, before)
     if caught:
         raise KeyboardInterrupt
