@@ -88,9 +88,9 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
     """
     from hapticclay.native import Pool
 
-    s, pool = lasting(scenario, steps), Pool(1, True)
+    s, pool = lasting(scenario, steps), Pool(1)
     bare = steps * floor(scenario, steps, time.process_time)
-    short = timed(pool.run, s)[1]
+    short = timed(pool.brief, s)[1]
     return short / bare, timed(hc.simulate, s, engine="native")[1] / bare
 
 

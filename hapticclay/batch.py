@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,21 +68,21 @@ def simulate_batch(
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
     out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
-    finish = summary if summaries else lambda r: r
     native = [i for i, s in enumerate(jobs) if fits(s)]
     module = compiled() if native and has_numba() else None
     if module:
-        pool = module.Pool(every, summaries)
+        pool = module.Pool(every)
 
         def run(i: int) -> None:
-            out[i] = finish(pool.run(jobs[i]))
+            out[i] = entry(*pool.brief(jobs[i])) if summaries else pool.run(jobs[i])
 
         with scene.warnings_caught():
             _spread(native, run, min(threads, len(native)))
     elif native and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
     for i in sorted(set(range(len(jobs))) - set(native if module else ())):
-        out[i] = finish(simulate(jobs[i], every=every, engine="python"))
+        r = simulate(jobs[i], every=every, engine="python")
+        out[i] = entry(*record.brief(r)) if summaries else r
     return out
 
 
@@ -117,15 +117,20 @@ def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
         raise failed[0]
 
 
-def summary(r: record.Record) -> tuple[Any, ...]:
-    """A record's entry among summaries."""
-    first = r.crossings[:BORDERS]
+def entry(
+    o: record.Outcome, steps: int, crossings: Sequence[record.Crossing], last: Sequence[Any], energy: dict[str, float]
+) -> tuple[Any, ...]:
+    """A run's entry among summaries; of a record, entry(*record.brief(r)).
+
+    Args:
+        o: how it ended. steps: of the engine. crossings: of borders. last: p, v, fh, fe, b at the last good sample.
+        energy: as Record.energy.
+    """
+    first = crossings[:BORDERS]
     rest = BORDERS - len(first)
-    last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
-    o = r.outcome
     return (
-        o.code, o.axis, o.time, o.step, r.steps, len(r.crossings),
+        o.code, o.axis, o.time, o.step, steps, len(crossings),
         [AXES.index(c.axis) for c in first] + [-1] * rest,
         [c.time for c in first] + [np.nan] * rest, [c.speed for c in first] + [np.nan] * rest,
-        *last, *(r.energy[name] for name in WORKS),
+        *last, *(energy[name] for name in WORKS),
     )  # fmt: skip

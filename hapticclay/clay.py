@@ -78,17 +78,18 @@ def table(clay: Clay | None, length: float | None) -> np.ndarray:
     edges = [sorted({e for f in profiles if f.along == axis for e in f.edges}) for axis in AXES]
     if length is not None:
         edges[0] = sorted({e for e in edges[0] if e < end} | {end})
-    out = np.zeros((MORE + 1, max(map(len, edges)) + 3))
-    out[EDGE : EDGE + 2, 1:], out[EDGE : EDGE + 2, 0], out[ENTERED : ENTERED + 2] = math.inf, -math.inf, math.nan
-    for i, e in enumerate(edges):
-        out[EDGE + i, 1 : len(e) + 1] = e
+    width = max(map(len, edges)) + 3
+    out = [[-math.inf, *e] + [math.inf] * (width - 1 - len(e)) for e in edges]
+    out += [[0.0] * width for _ in range(ENTERED - VALUE)] + [[math.nan] * width for _ in AXES] + [[0.0] * width]
     for i, f in enumerate(profiles):
-        out[MORE, i] = along = AXES.index(f.along)
+        along = AXES.index(f.along)
+        out[MORE][i] = float(along)
         for k, low in enumerate([-math.inf, *edges[along]]):
             j = bisect.bisect_right(f.edges, low)
-            out[[VALUE + i, RATE + i, OWN + i], k] = f.values[j], f.growth[j] if f.growth else 0.0, j
-    out[MORE, 2] = end
-    return out
+            out[VALUE + i][k], out[OWN + i][k] = f.values[j], float(j)
+            out[RATE + i][k] = f.growth[j] if f.growth else 0.0
+    out[MORE][2] = end
+    return np.array(out)
 
 
 def settle(table, ix, iy, t):

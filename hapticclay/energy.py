@@ -13,9 +13,9 @@ from .params import NO_HAND, Operator, Scenario
 MEMO = ("friction", "passivity_controller", "coupling")  # entries of an interface; the last two are part of motors
 
 
-def stored(th: Operator, r1: float, r2: float, p: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+def stored(th: Operator, r1: float, r2: float, p: Sequence[float], v: Sequence[float]) -> tuple[float, float]:
     """Energy [J] of the arm at link rates r1, r2 [rad/s], and of mass and spring of the hand at p [m], v [m/s]."""
-    at_hand = 0.5 * (th.mass * (v @ v) + th.spring * (p @ p))
+    at_hand = 0.5 * (th.mass * (v[0] * v[0] + v[1] * v[1]) + th.spring * (p[0] * p[0] + p[1] * p[1]))
     return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), float(at_hand)
 
 
@@ -93,7 +93,7 @@ class Ledger:
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
             u1x, u1y, u2x, u2y = (x[j] for x in columns)
             r = arm.rates(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
-            return stored(th, r[0], r[1], p[:, j], v[:, j])
+            return stored(th, r[0], r[1], p[:, j].tolist(), v[:, j].tolist())
 
         if self.first is None:
             self.first = held(before, 0)

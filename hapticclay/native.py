@@ -6,6 +6,7 @@ compiled code is kept on disk, in a folder named after the sources it was made f
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import ctypes
 import functools
@@ -37,6 +38,7 @@ PLAIN = (
     run.aim, run.root, signals.line, stride.heading, stride.land, stride.mean, stride.miss, stride.move,
     stride.note, stride.side, stride.write,
 )  # fmt: skip
+LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 ROOM = 64  # crossings between two looks at them
 
 
@@ -152,7 +154,7 @@ class Native(Run):
 
     Args:
         bench: engines to use; None for its own.
-        quiet: keep the last row only, and raise Suspicious where outcome.Watch would have to look closer.
+        quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look closer.
     """
 
     def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
@@ -173,26 +175,23 @@ class Native(Run):
         given = given, _lines(self.muscle), _lines(self.command), self.regions.table, engine
         self.given = (*given, self.now, self.rows, self.crossed)
         w1, w2 = self.data.qvel
-        self.first = energy.stored(th, w1, w1 + w2, np.array(s.start), np.array(s.velocity))
-        self.before = self._state()  # at the last look
+        self.first = energy.stored(th, w1, w1 + w2, s.start, s.velocity)
         self.quiet = quiet
         self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
 
     def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         return self.bench.engine(self.scenario)
 
-    def _state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.now.copy(), self.data.qpos.copy(), self.data.qvel.copy()
-
     def advance(self) -> bool:
-        self.before = self._state()
+        if not self.quiet:
+            self.before = self.now.copy(), self.data.qpos.copy(), self.data.qvel.copy()
         code, self.filled, n = _stride(*self.given, CHUNK - 1, CHUNK - 1)
         now = self.now[0]
         self.t, self.i, self.steps = float(now["t"]), int(now["i"]), int(now["steps"])
         for axis, *crossing in self.crossed[:n].tolist():
             self.crossings.append(record.Crossing(AXES[int(axis)], *crossing))
         if code == stride.NOT_FINITE:
-            raise ArithmeticError
+            raise Suspicious if self.quiet else ArithmeticError
         if code:
             self.finish("finished" if code == stride.FINISHED else "time limit")
         return True
@@ -209,20 +208,25 @@ class Native(Run):
         return None
 
     def _glance(self, n: int) -> None:
-        """Makes sure that nothing is amiss, and keeps the last row."""
-        if not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
+        """Makes sure that nothing is amiss."""
+        if not n or not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
             raise Suspicious
         if self.outcome is not None:
             watch = self.watch
             watch.seen, watch.moved, watch.unbound, watch.often = self.seen.tolist()
             self.outcome = watch.end(self.outcome)
-            rows = self.rows[n - 1 : n].T.copy()
-            self.kept = [(np.array([watch.seen - 1]), rows[:12], rows[12:])]
+            self.end = self.rows[n - 1, 2:].tolist()
         self.looked += n
 
+    def brief(self) -> tuple[Any, ...]:
+        """What batch.entry takes."""
+        px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.end
+        last = (px, py), (vx, vy), (fx, fy), (bx * vx, by * vy), (bx, by)
+        return self.outcome, self.steps, self.crossings, last, self.balance()
+
     def balance(self) -> dict[str, float]:
-        p, v, w = self.now["last"].reshape(3, 2)
-        last = energy.stored(self.scenario.operator or NO_HAND, w[0], w[0] + w[1], p, v)
+        px, py, vx, vy, w1, w2 = self.now["last"][0].tolist()
+        last = energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
         made = self.looked > 0
         return energy.balance(self.now["work"][0].tolist(), self.first if made else last, last)
 
@@ -235,28 +239,35 @@ class Pool:
     """What the threads of a batch share, and what each has of its own.
 
     Args:
-        every: keep each every-th sample, and the last. brief: keep the last alone.
+        every: keep each every-th sample, and the last.
     """
 
-    def __init__(self, every: int, brief: bool):
-        self.every, self.brief = 1_000_000_000 if brief else every, brief
+    def __init__(self, every: int):
+        self.every = every
         self.own = threading.local()
         self.models = {x.clay is not None: scene.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
 
-    def run(self, scenario: Scenario) -> record.Record:
-        """The record of a run that native can make; without its samples if it is to be brief."""
+    def _go(self, scenario: Scenario, every: int, quiet: bool) -> tuple[Native, float]:
+        """The run, made, and the seconds it took."""
         if not hasattr(self.own, "bench"):
             self.own.bench = Bench(self.models)
-        try:
-            return self._go(scenario, self.brief and scenario.stop)
-        except Suspicious:
-            return self._go(scenario, False)
-
-    def _go(self, scenario: Scenario, quiet: bool) -> record.Record:
-        run = Native(scenario, self.every, self.own.bench, quiet)
+        run = Native(scenario, every, self.own.bench, quiet)
         begin = time.perf_counter()
         run.go(None)
-        return run.result(time.perf_counter() - begin)
+        return run, time.perf_counter() - begin
+
+    def run(self, scenario: Scenario) -> record.Record:
+        """The record of a run that native can make."""
+        run, wall = self._go(scenario, self.every, False)
+        return run.result(wall)
+
+    def brief(self, scenario: Scenario) -> tuple[Any, ...]:
+        """What batch.entry takes, of a run that native can make."""
+        if scenario.stop:
+            with contextlib.suppress(Suspicious):
+                return self._go(scenario, LAST, True)[0].brief()
+        run, wall = self._go(scenario, LAST, False)
+        return record.brief(run.result(wall))
 
 
 def _timestep(model: mujoco.MjModel) -> np.ndarray:

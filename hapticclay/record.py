@@ -267,6 +267,12 @@ class Record:
         raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {schema}")
 
 
+def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
+    """What is left of a record without its samples: outcome, steps, crossings, the last p, v, fh, fe, b, energy."""
+    last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
+    return r.outcome, r.steps, r.crossings, last, r.energy
+
+
 def _spread(x: np.ndarray) -> dict[str, float] | None:
     x = x[np.isfinite(x)]
     return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None

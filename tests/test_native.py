@@ -13,7 +13,7 @@ import pytest
 from test_loop import CASES
 
 import hapticclay as hc
-from hapticclay import batch, leapfrog, sim
+from hapticclay import batch, leapfrog, record, sim
 from hapticclay.params import Clay, Multisine, Profile
 
 fast = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]")
@@ -90,7 +90,7 @@ def test_summaries_are_those_of_the_records():
     short = hc.simulate_batch(ALL.values(), keep="summaries")
     assert short.dtype == batch.SUMMARY
     for i, r in enumerate(records):
-        assert short[i].tobytes() == np.array([batch.summary(r)], batch.SUMMARY)[0].tobytes(), list(ALL)[i]
+        assert short[i].tobytes() == np.array([batch.entry(*record.brief(r))], batch.SUMMARY)[0].tobytes(), list(ALL)[i]
         assert short["code"][i] == r.outcome.code and short["residual"][i] == r.energy["residual"]
         np.testing.assert_array_equal(short["p"][i], r.p[-1])
 
