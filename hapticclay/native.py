@@ -32,13 +32,14 @@ from .run import CHUNK, Run
 
 FLAT = (  # laws that are compiled with their own laws written into them
     clay.at, clay.settle, loop.coefficients, loop.entire, loop.tick,
-    stride.around, stride.enter, stride.kick, stride.place,
+    stride.around, stride.enter, stride.place,
 )  # fmt: skip
 PLAIN = (
-    run.aim, run.root, signals.line, stride.heading, stride.land, stride.mean, stride.miss, stride.move,
-    stride.note, stride.side, stride.write,
+    run.aim, run.root, signals.line, stride.heading, stride.kick, stride.land, stride.mean, stride.miss, stride.move,
+    stride.note, stride.side, stride.stride, stride.write,
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
+LAW = {"error_model": "numpy", "no_cfunc_wrapper": True}
 ROOM = 64  # crossings between two looks at them
 
 
@@ -83,7 +84,7 @@ def _compiled(*functions: Any) -> list[Any]:
     """The functions, each to be compiled when first called, or taken from the disk."""
     for law in (*PLAIN, *FLAT):
         body = inline(law) if law in FLAT else law
-        overload(law, jit_options={"error_model": "numpy"}, strict=False)(lambda *args, body=body: body)
+        overload(law, jit_options=LAW, strict=False)(lambda *args, body=body: body)
     options: Any = {"nogil": True, "error_model": "numpy"}
     before = numba.config.CACHE_DIR
     try:
@@ -95,6 +96,11 @@ def _compiled(*functions: Any) -> list[Any]:
         numba.config.CACHE_DIR = before
 
 
+def _whole(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
+    """stride.stride, compiled as the laws are: each law once, for it and for the others."""
+    return stride.stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room)
+
+
 def folder() -> Path:
     """Where compiled code is kept: NUMBA_CACHE_DIR or the user's cache folder, by the sources it is made from."""
     digest = hashlib.sha256(numba.__version__.encode())
@@ -104,7 +110,7 @@ def folder() -> Path:
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
 
 
-_stride, _calm = _compiled(stride.stride, stride.calm)
+_stride, _calm = _compiled(_whole, stride.calm)
 
 
 def _mj_step() -> int:
