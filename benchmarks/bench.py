@@ -16,6 +16,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import extremes  # noqa: E402
+import parts  # noqa: E402
+import scaling  # noqa: E402
 import stiffness  # noqa: E402
 import throughput  # noqa: E402
 import work_precision  # noqa: E402
@@ -27,6 +29,8 @@ PARTS: dict[str, Any] = {
     "stiffness": stiffness,
     "extremes": extremes,
     "throughput": throughput,
+    "parts": parts,
+    "scaling": scaling,
 }
 BEGIN, END = "<!-- recommend: benchmarks/bench.py --readme -->", "<!-- end -->"
 

@@ -39,7 +39,7 @@ PLAIN = (
     stride.note, stride.side, stride.stride, stride.write,
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
-LAW = {"error_model": "numpy", "no_cfunc_wrapper": True}
+LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
 ROOM = 64  # crossings between two looks at them
 
 

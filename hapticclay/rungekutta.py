@@ -139,8 +139,8 @@ class RungeKutta(Run):
     def _stored(self) -> tuple[float, float]:
         """Energy of the arm, and of mass and spring of the hand [J]."""
         w1, w2 = self.rates
-        p, v = np.array(self._derivative(self.t)[2][:4]).reshape(2, 2)
-        return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, p, v)
+        px, py, vx, vy, *_ = self._derivative(self.t)[2]
+        return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
 
     def balance(self) -> dict[str, float]:
         return energy.balance(self.act[8:13].tolist(), self.start, self._stored())

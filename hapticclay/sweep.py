@@ -26,7 +26,7 @@ from .sim import fits, has_numba, simulate
 from .space import Sweep
 
 BORDERS = 3  # crossings that have columns of their own
-NATIVE_FROM = 10_000_000  # steps in the whole sweep from which the compiled loop pays in every process
+NATIVE_FROM = 2_000_000  # steps in the whole sweep from which the compiled loop pays in every process
 STALE = 3600.0  # [s] after which an unfinished file is taken for a killed writer's
 
 

@@ -12,7 +12,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import bench
 import extremes
+import parts
 import problems
+import scaling
 import stiffness
 import throughput
 import work_precision as wp
@@ -109,6 +111,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
     monkeypatch.setattr(throughput, "SCENES", {"free space": throughput.SCENES["free space"]})
+    for table in ("ENGINE", "LOOP"):
+        monkeypatch.setattr(parts, table, dict(list(getattr(parts, table).items())[:2]))
     some = [c for c in extremes.cases() if c.name in ("none", "held", "folded") and c.quick][:2]
     monkeypatch.setattr(extremes, "cases", lambda: some)
     readme = tmp_path / "README.md"
@@ -116,7 +120,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
     assert files == [
-        "bench.md", "default_cut.png", "extremes.json", "stiffness.json", "throughput.json", "work_precision.json"
+        "bench.md", "default_cut.png", "extremes.json", "parts.json", "scaling.json", "scaling.png", "stiffness.json",
+        "throughput.json", "work_precision.json",
     ]  # fmt: skip
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
@@ -153,3 +158,21 @@ def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
 def test_published_stiff_clay_breaks_nothing_of_ours():
     rows = bench.load(Path(__file__).parents[1] / "docs" / "bench")["stiffness"]["rows"]
     assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in rows)
+
+
+def test_scaling_is_measured_and_its_projection_is_bounded(tmp_path):
+    pytest.importorskip("distributed", reason="pip install 'hapticclay[cluster]'")
+    data = scaling.main(tmp_path, quick=True)
+    assert [r["workers"] for r in data["rows"]] == list(range(1, scaling.CORES + 1))
+    assert data["rows"][0]["speedup"] == 1.0 and all(r["runs_per_s"] > 0.0 for r in data["rows"])
+    bound = data["asked_s"] / data["task_s"]
+    assert all(r["speedup"] == min(r["workers"], bound) for r in data["projection"])
+    page = "".join(scaling.sections(data))
+    assert f"{data['runs']} runs" in page and (tmp_path / "scaling.png").stat().st_size > 5000
+
+
+def test_parts_are_compared_with_the_plain_scene(tmp_path):
+    cost = iter([1.0, 1.0, 3.0, 1.0, 2.0, 8.0, 2.0])  # warming up; two rounds: before, part, after
+    plain, part = parts.compare(["plain", "part"], lambda _: next(cost), 2)
+    assert part["ratio"] == 3.5 and plain["ratio"] == 1.0
+    assert part["us"] == pytest.approx(3.5 * plain["us"])

@@ -1,11 +1,14 @@
 """The MJCF files compile without a warning and mean what they say."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
 
 import hapticclay as hc
 from hapticclay import scene
+from hapticclay.params import Multisine
 
 
 def test_operational_inertia_at_home_is_read_from_the_engine():
@@ -45,6 +48,37 @@ def test_headless_scene_holds_nothing_that_it_does_not_need(scenario):
                   "neq", "nflex", "nskin", "na", "nplugin", "nuserdata"):  # fmt: skip
         assert getattr(m, count) == 0, count
     assert (m.nq, m.nv, m.nbody) == (2, 2, 3)
+
+
+def binary(model):
+    out = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, out)
+    return out.tobytes()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"operator": hc.Operator()},
+        {"shaping": True},
+        {"muscle": Multisine(rms=(1.0, 1.0), low=0.2, high=3.0, period=5.0, seed=1)},
+        {"control": "sampled"},
+        {"control": "sampled", "interface": hc.Interface(encoder=4096, friction=(0.1, 0.1), passivity=True)},
+    ],
+    ids=lambda part: "-".join(part),
+)
+def test_parts_that_live_in_the_loop_leave_the_model_as_it_is(part):
+    """Whoever leaves them out pays nothing for them, and whoever has them pays nothing in the engine."""
+    plain = hc.constant_cut()
+    assert binary(hc.build(dataclasses.replace(plain, **part))) == binary(hc.build(plain))
+
+
+def test_looking_at_a_run_leaves_its_model_as_it_is():
+    """Pictures have a model of their own."""
+    s = hc.constant_cut()
+    before = binary(hc.build(s))
+    scene.picture(None, (0.01, 0.005))
+    assert binary(hc.build(s)) == before
 
 
 def test_clay_is_two_dampers_that_free_space_does_without():

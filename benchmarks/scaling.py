@@ -1,0 +1,159 @@
+"""How a sweep scales: dask workers on the cores of this machine, and what limits it on many.
+
+    python benchmarks/scaling.py [--out DIR] [--rounds N]
+
+A real scheduler and worker processes, as on a cluster; worker counts in turns. Writes scaling.json and scaling.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from tabulate import tabulate  # noqa: E402
+from work_precision import write  # noqa: E402
+
+from hapticclay import sweep  # noqa: E402
+from hapticclay.record import atomic  # noqa: E402
+from hapticclay.space import Sweep, parse_grid  # noqa: E402
+
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+NEEDS = ("distributed", "pyarrow")
+TASKS = 2000  # empty ones, by which the scheduler is timed
+ASKED = 10.0  # [s] that docs/sweep.md advises for a chunk
+
+
+def job(quick: bool) -> Sweep:
+    """Chunks of equal work: runs to the time limit."""
+    n = 4 if quick else 32
+    return Sweep("constant", parse_grid(f"b=20:200:{n}log gain.x=0.2:1:4"), {"t_max": 0.2 if quick else 2.0}, chunk=4)
+
+
+def nothing(n: int) -> int:
+    """A task without work."""
+    return n
+
+
+def measure(quick: bool, rounds: int) -> dict[str, Any]:
+    """Seconds of the sweep by number of workers, of a chunk, of a task for the scheduler; bytes of a chunk."""
+    from distributed import Client, LocalCluster
+
+    todo, times = job(quick), {n: [] for n in range(1, CORES + 1)}
+    bytes_ = 0
+    with tempfile.TemporaryDirectory() as folder, LocalCluster(
+        n_workers=CORES, threads_per_worker=1, dashboard_address="", local_directory=folder
+    ) as cluster, Client(cluster) as client:  # fmt: skip
+        crew = sorted(client.scheduler_info(n_workers=-1)["workers"])
+        for k in range(rounds + 1):
+            for n in times:
+                out = Path(folder) / f"{k}-{n}"
+                sweep.begin(todo, out)
+                begin = time.perf_counter()
+                jobs = client.map(
+                    sweep.run_chunk, [todo] * todo.chunks, range(todo.chunks), [str(out)] * todo.chunks,
+                    workers=crew[:n], pure=False,
+                )  # fmt: skip
+                client.gather(jobs)
+                if k:  # the first time the workers import and compile
+                    times[n].append(time.perf_counter() - begin)
+                bytes_ = sum(f.stat().st_size for f in (out / "data").iterdir()) / todo.chunks
+        begin = time.perf_counter()
+        client.gather(client.map(nothing, range(TASKS), pure=False))
+        task = (time.perf_counter() - begin) / TASKS
+    return {"chunks": todo.chunks, "runs": len(todo), "times": times, "task_s": task, "chunk_bytes": bytes_}
+
+
+def rows(found: dict[str, Any]) -> list[dict[str, float]]:
+    """Workers, time, rate and efficiency, medians of ratios within a round."""
+    alone = found["times"][1]
+    out = []
+    for n, taken in found["times"].items():
+        gain = statistics.median(a / b for a, b in zip(alone, taken, strict=True))
+        wall = statistics.median(taken)
+        out.append({"workers": n, "wall_s": wall, "runs_per_s": found["runs"] / wall, "speedup": gain,
+                    "efficiency": gain / n})  # fmt: skip
+    return out
+
+
+def projection(found: dict[str, Any]) -> list[dict[str, float]]:
+    """Upper bounds for many machines: chunks of ASKED seconds, a scheduler that hands out one task at a time."""
+    full = ASKED / found["task_s"]
+    out = []
+    for n in (16, 128, 1024, 8192, 65536):
+        out.append(
+            {
+                "workers": n,
+                "speedup": min(n, full),
+                "writes_kB_per_s": 1e-3 * found["chunk_bytes"] * min(n, full) / ASKED,
+            }
+        )
+    return out
+
+
+def sections(data: dict[str, Any]) -> list[str]:
+    """The paragraphs of the page."""
+    if not data.get("rows"):
+        return []
+
+    def table(found: list[dict[str, float]]) -> str:
+        cells = [{k.replace("_", " "): (f"{x:.3g}" if x < 1e3 else f"{x:.0f}") for k, x in r.items()} for r in found]
+        return tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)
+
+    return [
+        "## Scaling",
+        f"A sweep of {data['runs']} runs in {data['chunks']} chunks on dask workers of one thread, up to all "
+        f"{data['cores']} cores of this machine: measured, medians of ratios.",
+        table(data["rows"]),
+        "![scaling of a sweep](scaling.png)",
+        "Beyond these cores nothing was measured. Chunks do not talk to each other, so what bounds many machines is "
+        f"the scheduler, {1e3 * data['task_s']:.2f} ms a task here beside busy workers, and the shared folder, "
+        f"{1e-3 * data['chunk_bytes']:.0f} kB a chunk. With chunks of {data['asked_s']:.0f} s that gives, at best:",
+        table(data["projection"]),
+    ]
+
+
+def draw(data: dict[str, Any], out: Path) -> None:
+    """Speed-up measured, beside the ideal and the bound by the scheduler."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    ax = figure.add_subplot()
+    many = [1, *(r["workers"] for r in data["projection"])]
+    ax.plot(many, many, color="0.7", lw=1.0, label="ideal")
+    bound = [1.0, *(r["speedup"] for r in data["projection"])]
+    ax.plot(many, bound, "--", color="#D55E00", label=f"bound by the scheduler, chunks of {ASKED:.0f} s: projected")
+    ax.plot([r["workers"] for r in data["rows"]], [r["speedup"] for r in data["rows"]], "o", color="#0072B2",
+            label="measured")  # fmt: skip
+    ax.set(xscale="log", yscale="log", xlabel="workers [1]", ylabel="speed-up over one worker [1]")
+    ax.grid(color="0.9")
+    ax.legend(frameon=False, fontsize=9)
+    with atomic(out / "scaling.png") as f:
+        figure.savefig(f, dpi=150)
+
+
+def main(out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None) -> dict[str, Any]:
+    """Measures, writes the data and the diagram; returns the data."""
+    missing = [name for name in NEEDS if not importlib.util.find_spec(name)]
+    if missing:
+        return write(out, "scaling", {"rows": [], "omissions": [f"scaling: {x} is not installed" for x in missing]})
+    found = measure(quick, rounds or (1 if quick else 5))
+    data = {**found, "cores": CORES, "asked_s": ASKED, "rows": rows(found), "projection": projection(found)}
+    draw(data, out)
+    return write(out, "scaling", data)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--rounds", type=int)
+    args = parser.parse_args()
+    print("\n\n".join(sections(main(args.out, rounds=args.rounds))))
