@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import math
 import struct
 from collections.abc import Callable
@@ -57,8 +58,8 @@ class _Stretch(NamedTuple):
 
     n: int
     is_sample: bool  # False at a border between two samples
-    b: np.ndarray  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all
-    k: np.ndarray  # loop.inputs, (7, n) or (7, 1)
+    b: Any  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all; of one row a tuple
+    k: Any  # loop.inputs, (7, n), (7, 1) or a tuple
     H: float  # length of the kick [s]
 
 
@@ -70,11 +71,16 @@ def _window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tup
     return view, struct.Struct(f"2d{gap}x2d").unpack_from
 
 
-def _spread(columns: list[np.ndarray], counts: list[int]) -> np.ndarray:
-    """Columns side by side, those of one column repeated to its count."""
-    if not columns:
-        return np.empty((2, 0))
-    return np.concatenate([np.broadcast_to(x, (len(x), n)) for x, n in zip(columns, counts, strict=True)], axis=1)
+def _spread(columns: list[Any], counts: list[int]) -> np.ndarray:
+    """Columns side by side, those of one column repeated to its count; a tuple is a column of its own."""
+    out: list[np.ndarray] = []
+    pairs = zip(columns, counts, strict=True)
+    for single, some in itertools.groupby(pairs, key=lambda pair: isinstance(pair[0], tuple)):
+        if single:  # of careful runs there are thousands
+            out.append(np.array([x for x, _ in some]).T)
+        else:
+            out += [np.broadcast_to(x, (len(x), n)) for x, n in some]
+    return np.concatenate(out, axis=1) if out else np.empty((2, 0))
 
 
 def _sampled(raw: np.ndarray, k: np.ndarray, scenario: Scenario) -> np.ndarray:
@@ -289,7 +295,7 @@ class Leapfrog(Run):
         """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
         _row.pack_into(self.rows, self.filled * loop.ROW, *row)
         b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
-        self.stretches.append(_Stretch(1, is_sample, np.reshape(b, (2, 1)), np.reshape(k, (7, 1)), H))
+        self.stretches.append(_Stretch(1, is_sample, b, k, H))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
@@ -315,7 +321,7 @@ class Leapfrog(Run):
         pieces, self.stretches = self.stretches, []
         k, H, which = np.empty((7, 0)), np.array([x.H for x in pieces]), slice(n)
         if len(pieces) == 1:
-            k = pieces[0].k
+            k = np.reshape(pieces[0].k, (7, -1))
         elif pieces:
             counts = [x.n for x in pieces]
             k, H = _spread([x.k for x in pieces], counts), np.repeat(H, counts)
