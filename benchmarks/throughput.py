@@ -32,6 +32,7 @@ from work_precision import write  # noqa: E402
 import hapticclay as hc  # noqa: E402
 from hapticclay import leapfrog, sim  # noqa: E402
 
+LONG = 5555  # steps of 2 s, as the runs of the map
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
@@ -138,10 +139,10 @@ def jobs(n: int, steps: int) -> list[hc.Scenario]:
     return [lasting(s, steps) for s in cuts]
 
 
-def batches(sizes: list[int], rounds: int, steps: int) -> list[dict[str, float]]:
-    """Batches over the floor on all cores, just before and after: time, and processor time (others disturb it less)."""
-    rows: list[dict[str, float]] = []
-    for n in sizes:
+def batches(sizes: list[tuple[int, int]], rounds: int) -> list[dict[str, Any]]:
+    """Batches of n runs of so many steps over the floor on all cores, just before and after: time, processor time."""
+    rows: list[dict[str, Any]] = []
+    for n, steps in sizes:
         todo, ratios = jobs(n, steps), {}
         for _ in range(rounds if n < 10_000 else 1):
             for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
@@ -149,7 +150,7 @@ def batches(sizes: list[int], rounds: int, steps: int) -> list[dict[str, float]]
                 took = timed(hc.simulate_batch, todo, keep=keep) / (n * steps)
                 bare = 0.5 * (bare + floor_on_all_cores(todo[0], min(n, 256) * steps))
                 ratios.setdefault(keep, []).append(took / bare)
-        row = {"runs": n, "steps": steps}
+        row: dict[str, Any] = {"runs": n, "steps": steps}
         for keep, x in ratios.items():
             row[keep], row[f"{keep}_cpu"] = np.median(x, axis=0).tolist()
         rows.append(row)
@@ -169,16 +170,27 @@ def first_calls() -> dict[str, float]:
     return {"uncached_s": first, "cached_s": min(rest)}
 
 
-def linearity(sizes: list[int], steps: int) -> list[dict[str, float]]:
+def memory() -> float | str:
+    """The most memory that this process has taken [MiB]; "unknown" where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return "unknown"
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
     """Time a run, against the floor beside it, from the smallest batch to the largest."""
-    rows: list[dict[str, float]] = []
+    rows: list[dict[str, Any]] = []
     for n in sizes:
         todo = jobs(n, steps)
         bare = floor_on_all_cores(todo[0], 100_000)
         took = timed(hc.simulate_batch, todo, keep="summaries")
         bare = 0.5 * (bare + floor_on_all_cores(todo[0], 100_000))
         ratio = took / (n * steps * bare)
-        rows.append({"runs": n, "us_a_run": 1e6 * took[0] / n, "over_floor": ratio[0], "over_floor_cpu": ratio[1]})
+        peak = memory()
+        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * took[0] / n, "over_floor": ratio[0],
+                     "over_floor_cpu": ratio[1], "peak_MiB": peak})  # fmt: skip
     return rows
 
 
@@ -201,7 +213,7 @@ TITLES = {
     "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same "
     "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
     "batch": "Batches over the floor on all cores: wall time, and processor time (others disturb it less).",
-    "linearity": "Time a run, from a small batch to a large one.",
+    "linearity": "Time a run, from a small batch to a large one, and the most memory the process has taken so far.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
@@ -233,8 +245,8 @@ def main(
         hc.simulate_batch(jobs(2, 10), keep="summaries")
     data["rows"] = measure(rounds, steps)
     if native:
-        sizes = [64] if quick else [64, 1024, *([16384] if full else [])]
-        data["batch"] = batches(sizes, 1 if quick else min(rounds, 3), 1000)
+        sizes = [(64, 1000)] if quick else [(64, 1000), (1024, 1000), (64, LONG), (1024, LONG)]
+        data["batch"] = batches(sizes + full * [(16384, LONG)], 1 if quick else min(rounds, 5))
     if native and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]
