@@ -8,7 +8,7 @@ from typing import Any
 from . import arm, human, loop, lti, servo
 from .clay import at
 from .leapfrog import CHUNK, Leapfrog
-from .params import AXES, G, Operator, S, Scenario
+from .params import AXES, G, S, Scenario
 
 NONE = (0.0, 0.0)
 Pair = tuple[float, float]
@@ -46,13 +46,13 @@ class Sampled(Leapfrog):
         before, s = self.before, self.scenario
         self.row, new, shown = None, self.state, (x[0], y[0])
         if after > 0.0 and self._is_sample():
-            force = self.uh(self.t, self.t)
             if before:
                 at, out = loop.push(loop.plant(s, before, 0.0), self._inputs(before, 0.0), q[0], q[1], w[0], w[1], *tau)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown)
                 w = out[2:]
-                if s.operator:
-                    force = self._felt(s.operator, q, w, tau)
+                force = self._felt(q, w, tau)
+            else:
+                force = self._first(q, w)
             tau, f = self._control(q, w, x, y, force)
             shift = self.shift(self.t, self.t + self.n * s.dt)
             new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
@@ -66,11 +66,21 @@ class Sampled(Leapfrog):
         u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
         return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
 
-    def _felt(self, th: Operator, q, w, tau) -> tuple[float, float]:
+    def _first(self, q, w) -> Pair:
+        """The operator's force that the sensor shows while the handle does not accelerate [N], as before the start."""
+        uh, th = self.uh(self.t, self.t), self.scenario.operator
+        if th is None:
+            return uh
+        _, p, v, _ = self._measure(q, w)
+        return uh[0] - th.spring * p[0] - th.damper * v[0], uh[1] - th.spring * p[1] - th.damper * v[1]
+
+    def _felt(self, q, w, tau) -> Pair:
         """The operator's force that the sensor shows at the sample, before the torques change [N]."""
+        uh, th = self.uh(self.t, self.t), self.scenario.operator
+        if th is None:
+            return uh
         u, p, v, c = self._measure(q, w)
         b = at(*self.clay, self.t) if self.physical else NONE
-        uh = self.uh(self.t, self.t)
         rest = [uh[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
         # a kick of one second from rest, in which the velocity after it is the acceleration
         fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]

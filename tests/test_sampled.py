@@ -37,6 +37,25 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     np.testing.assert_allclose(r.tau[: n - 1], T[: n - 1], atol=1e-3)
 
 
+@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize(
+    "kw", [dict(), dict(start=(0.06, 0.0), velocity=(0.05, -0.02)), dict(shaping=True), dict(interface=hc.Interface())]
+)
+def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
+    """Spring and damper of the hand act from the start; its mass does not: nothing accelerated before it."""
+    cut = hc.constant_cut(
+        control="sampled", force=(0.5, 0.2), impedance=True, t_max=0.2, render=render, start=(0.06, 0.02)
+    )
+    s = dataclasses.replace(cut, **kw)
+    at = dict(p0=s.start, v0=s.velocity)
+    P, V, T = hybrid(lambda x: 90.0, s.dt, s.gain, s.force, (0.25, 2.0, 6.0), s.shaping, render, 0.15, (), **at)
+    r = hc.simulate(s)
+    n = len(P)
+    np.testing.assert_allclose(r.tau[0], T[0], atol=1e-12)
+    np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
+    np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
+
+
 def test_substeps_converge_to_the_hybrid_system_at_second_order():
     Ts = 4e-3
     kw = dict(force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="implicit", Ts=Ts, t_max=0.45)
