@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from typing import Any
+
+import numpy as np
 
 from . import arm, human, loop, lti, servo
 from .clay import at
@@ -31,6 +34,8 @@ class Sampled(Leapfrog):
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
+        # of each sample kept since the last look: fh over the kick before the torques change [N], and its weight
+        self.early: list[tuple[float, float, float]] = []
 
     def advance(self) -> bool:
         self._careful()
@@ -121,9 +126,13 @@ class Sampled(Leapfrog):
         return delta + shift, *rest
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        before = self.before
+        before, early = self.before, (0.0, 0.0, 0.0)
         if self.row:
-            self._put(False, self.row, self._inputs(before, 0.0), 0.5 * before, False)
+            k = self._inputs(before, 0.0)
+            self._put(False, self.row, k, 0.5 * before, False)
+            _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_ = self.row
+            # the means of both kicks, half of the step before and half of the one after, interpolated at the sample
+            early = fx + k[0] * v0x + k[1] * v1x, fy + k[2] * v0y + k[3] * v1y, after / (before + after)
             before = 0.0
             self.fresh = self.i
         elif after and self._is_sample():
@@ -131,6 +140,14 @@ class Sampled(Leapfrog):
         row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
         k = self._inputs(before, after)
         self._put(is_sample, row, k, 0.5 * (before + after), after > 0.0)
+        if is_sample:
+            self.early.append(early)
+
+    def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
+        early = np.array(self.early).T
+        self.early.clear()
+        rows[6:8] += early[2] * (early[:2] - rows[6:8])
+        return super().judge(rows, b)
 
     def _engine(self, w, command, out, after: float) -> None:
         self.steps += 1

@@ -9,6 +9,8 @@ from oracles import hybrid
 import hapticclay as hc
 from hapticclay import lti
 from hapticclay.errors import ParameterError
+from hapticclay.params import Multisine, Operator
+from hapticclay.signals import Signal
 
 CASES = {
     "held": dict(),
@@ -54,6 +56,26 @@ def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
     np.testing.assert_allclose(r.tau[0], T[0], atol=1e-12)
     np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
     np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
+
+
+@pytest.mark.parametrize("operator,late", [(None, 0.0), (Operator(), 0.0), (None, 0.3)])
+def test_the_recorded_force_belongs_to_its_sample(operator, late):
+    """Off by second order in the sample: fh = uh(t) without a hand, uh - Th p with one, by central differences."""
+    drive = Multisine((1.0, 0.5), low=2.0, high=8.0, period=1.0, seed=2)
+    error, lead = [], []
+    for Ts in (2e-3, 1e-3):
+        parts = hc.Interface(delay=late * Ts) if late else None
+        s = hc.constant_cut(control="sampled", dt=Ts, t_max=0.5, force=(0.0, 0.0))
+        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, interface=parts))
+        want = Signal(drive)(r.t)[1:-1]
+        if operator:
+            want -= 6.0 * r.p[1:-1] + 2.0 * r.v[1:-1] + 0.25 * np.diff(r.p, 2, axis=0) / Ts**2
+        rate = np.gradient(want, Ts, axis=0)
+        off = r.fh[1:-1] - want
+        error.append(np.max(np.abs(off)))
+        lead.append(np.sum(off * rate) / np.sum(rate**2) / Ts)
+    assert np.max(np.abs(lead)) < 0.01  # in samples
+    assert 1.8 < np.log2(error[0] / error[1]) < 2.2, error
 
 
 def test_substeps_converge_to_the_hybrid_system_at_second_order():
