@@ -59,7 +59,7 @@ class Sampled(Leapfrog):
             else:
                 force = self._first(q, w)
             tau, f = self._control(q, w, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt)
+            shift = self.shift(self.t, self.t + self.n * s.dt).tolist()
             new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
             before = 0.0
         at, out = loop.push(loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau)
