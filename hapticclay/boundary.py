@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .sim import simulate
 SMALL = 1e-4  # [m/s] a push that leaves the arm linear
 LARGE = 0.05  # [m/s] one that a hand gives
 SPAN = 1.2  # [s] a run that is to be judged by its growth ...
-LONG = 2.0  # ... and one that is to be told apart
+LONG = (2.0, 8.0, 32.0)  # ... and one that is to be told apart, longer while its motors are in their limits
 FIT = 0.7  # share of a run, its end, that growth is read from
 STEP = 4e-3  # [s] between the samples that it is read from
 RANK = 1e-7  # singular values below this share of the largest are rounding
@@ -114,14 +115,21 @@ def _least_damped(v: np.ndarray, dt: float) -> float:
 
 
 def behaviour(loop: Loop) -> str:
-    """What a run of it does: "stable", "limit cycle" (bounded by the motors' torque) or "diverges"."""
-    record = simulate(loop.scenario(LONG, stop=False))
-    code = record.outcome.code
-    if code in ("limit cycle", "saturated"):
-        return "limit cycle"
-    if code in ("diverged", "out of reach", "singular"):
-        return "diverges"
-    return "diverges" if growth(record, loop.axis) > 0.0 else "stable"
+    """What a run of it does: "stable", "limit cycle" (bounded by the motors' torque) or "diverges".
+
+    Growth is that of a linear motion, so a run whose motors were in their limits at its end goes on for longer.
+    """
+    limit = (1.0 - 1e-9) * np.array(loop.torque_limit)
+    for t_max in LONG:
+        record = simulate(loop.scenario(t_max, stop=False))
+        code = record.outcome.code
+        if code in ("diverged", "out of reach", "singular"):
+            return "diverges"
+        if code in ("limit cycle", "saturated"):
+            break
+        if not np.any(np.abs(record.tau[int((1.0 - FIT) * len(record.tau)) :]) >= limit):
+            return "diverges" if growth(record, loop.axis) > 0.0 else "stable"
+    return "limit cycle"
 
 
 def crossing(rate: Callable[[float], float], guess: float, most: float) -> float:
@@ -231,29 +239,26 @@ def pose_limit(loop: Loop, most: float = 200.0) -> float:
     return high
 
 
-def linear(loop: Loop, *, sampled: bool = True, late: bool = True) -> bool:
-    """Whether the linear loop at the nominal pose is stable, in continuous time unless sampled, on time unless late."""
-    Ts = loop.Ts if sampled else None
-    return limits.is_stable(loop.axis, loop.K, loop.b, loop.operator, Ts, loop.delay if late else 0.0)
+def linear(loop: Loop) -> bool:
+    """Whether the linear loop at the nominal pose is stable in continuous time."""
+    return limits.is_stable(loop.axis, loop.K, loop.b, loop.operator)
 
 
 def cause(loop: Loop, stable: bool) -> str:
     """Why a run does (stable) or does not (not stable) settle, against what continuous time at the nominal pose says.
 
-    One thing is changed at a time, until theory and run agree.
+    One thing is changed in the run at a time, and two if none will do alone, until it does what theory says.
     """
-    if loop.Ts and linear(loop, late=False) == stable:
-        return "sampling"
-    if loop.Ts and linear(loop) == stable:
-        return "delay"
-
-    def settles(**change) -> bool:
-        return (behaviour(replace(loop, **change)) == "stable") != stable
-
-    if not loop.shaping and settles(shaping=True):
-        return "pose-dependent Lambda"
-    if settles(torque_limit=(1e6, 1e6)):
-        return "saturation"
-    if settles(push=SMALL):
-        return "size of the motion"
+    changes: list[tuple[str, dict]] = [
+        ("delay", dict(delay=0.0)) if loop.delay else ("", {}),
+        ("sampling", dict(Ts=None, delay=0.0)) if loop.Ts else ("", {}),
+        ("pose-dependent Lambda", dict(shaping=True)) if not loop.shaping else ("", {}),
+        ("saturation", dict(torque_limit=(1e6, 1e6))),
+        ("size of the motion", dict(push=SMALL)),
+    ]
+    for n in (1, 2):
+        for some in combinations([c for c in changes if c[0]], n):
+            change = {field: value for _, fields in some for field, value in fields.items()}
+            if (behaviour(replace(loop, **change)) == "stable") != stable:
+                return " and ".join(name for name, _ in some)
     return "not found"

@@ -161,7 +161,7 @@ def _cells(loops, x, put, ys, progress) -> tuple[Cell, ...]:
     for loop, at in zip(progress(loops), x, strict=True):
         for y in ys:
             tried = replace(put(loop, y), push=boundary.LARGE)
-            theory, run = boundary.linear(tried, sampled=False, late=False), boundary.behaviour(tried)
+            theory, run = boundary.linear(tried), boundary.behaviour(tried)
             agree = theory == (run == "stable")
             out.append(Cell(at, y, theory, run, "" if agree else boundary.cause(tried, run == "stable")))
     return tuple(out)

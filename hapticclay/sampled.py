@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from typing import Any
+
+import numpy as np
 
 from . import arm, human, loop, lti, servo
 from .clay import at
 from .leapfrog import CHUNK, Leapfrog
-from .params import AXES, G, Operator, S, Scenario
+from .params import AXES, G, S, Scenario
 
 NONE = (0.0, 0.0)
 Pair = tuple[float, float]
@@ -31,6 +34,8 @@ class Sampled(Leapfrog):
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
+        # of each sample kept since the last look: fh over the kick before the torques change [N], and its weight
+        self.early: list[tuple[float, float, float]] = []
 
     def advance(self) -> bool:
         self._careful()
@@ -46,15 +51,15 @@ class Sampled(Leapfrog):
         before, s = self.before, self.scenario
         self.row, new, shown = None, self.state, (x[0], y[0])
         if after > 0.0 and self._is_sample():
-            force = self.uh(self.t, self.t)
             if before:
                 at, out = loop.push(loop.plant(s, before, 0.0), self._inputs(before, 0.0), q[0], q[1], w[0], w[1], *tau)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown)
                 w = out[2:]
-                if s.operator:
-                    force = self._felt(s.operator, q, w, tau)
+                force = self._felt(q, w, tau)
+            else:
+                force = self._first(q, w)
             tau, f = self._control(q, w, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt)
+            shift = self.shift(self.t, self.t + self.n * s.dt).tolist()
             new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
             before = 0.0
         at, out = loop.push(loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau)
@@ -66,11 +71,21 @@ class Sampled(Leapfrog):
         u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
         return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
 
-    def _felt(self, th: Operator, q, w, tau) -> tuple[float, float]:
+    def _first(self, q, w) -> Pair:
+        """The operator's force that the sensor shows while the handle does not accelerate [N], as before the start."""
+        uh, th = self.uh(self.t, self.t), self.scenario.operator
+        if th is None:
+            return uh
+        _, p, v, _ = self._measure(q, w)
+        return uh[0] - th.spring * p[0] - th.damper * v[0], uh[1] - th.spring * p[1] - th.damper * v[1]
+
+    def _felt(self, q, w, tau) -> Pair:
         """The operator's force that the sensor shows at the sample, before the torques change [N]."""
+        uh, th = self.uh(self.t, self.t), self.scenario.operator
+        if th is None:
+            return uh
         u, p, v, c = self._measure(q, w)
         b = at(*self.clay, self.t) if self.physical else NONE
-        uh = self.uh(self.t, self.t)
         rest = [uh[i] - human.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
         # a kick of one second from rest, in which the velocity after it is the acceleration
         fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
@@ -111,9 +126,13 @@ class Sampled(Leapfrog):
         return delta + shift, *rest
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        before = self.before
+        before, early = self.before, (0.0, 0.0, 0.0)
         if self.row:
-            self._put(False, self.row, self._inputs(before, 0.0), 0.5 * before, False)
+            k = self._inputs(before, 0.0)
+            self._put(False, self.row, k, 0.5 * before, False)
+            _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_ = self.row
+            # the means of both kicks, half of the step before and half of the one after, interpolated at the sample
+            early = fx + k[0] * v0x + k[1] * v1x, fy + k[2] * v0y + k[3] * v1y, after / (before + after)
             before = 0.0
             self.fresh = self.i
         elif after and self._is_sample():
@@ -121,6 +140,14 @@ class Sampled(Leapfrog):
         row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
         k = self._inputs(before, after)
         self._put(is_sample, row, k, 0.5 * (before + after), after > 0.0)
+        if is_sample:
+            self.early.append(early)
+
+    def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
+        early = np.array(self.early).T
+        self.early.clear()
+        rows[6:8] += early[2] * (early[:2] - rows[6:8])
+        return super().judge(rows, b)
 
     def _engine(self, w, command, out, after: float) -> None:
         self.steps += 1

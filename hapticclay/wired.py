@@ -106,15 +106,14 @@ class Wired(Sampled):
         self.row, shown = None, (x[0], y[0])
         sample = after > 0.0 and self._when(hw.k) <= now
         if sample or after > 0.0 and hw.queue and hw.queue[0][0] <= now:
-            force = self.uh(self.t, self.t)
             if before:
                 at, out, slip = self._push(before, 0.0, q, w, held)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *held.torque, *shown)
                 self.extras = (_memo(slip, held), ())
                 w = out[2:]
-                if self.scenario.operator:
-                    tau = held.torque[0] + slip[0], held.torque[1] + slip[1]
-                    force = self._felt(self.scenario.operator, q, w, tau)
+                force = self._felt(q, w, (held.torque[0] + slip[0], held.torque[1] + slip[1]))
+            else:
+                force = self._first(q, w)
             if sample:
                 x, y, hw = self._sample(q, w, x, y, force, hw)
             while hw.queue and hw.queue[0][0] <= now:
@@ -154,7 +153,7 @@ class Wired(Sampled):
             t1, t2 = (interface.converted(t, parts.dac_bits, r) for t, r in zip(tau, span, strict=True))
             due = self._when(k) + parts.delay
             hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
-        shift = self.shift(self.t, self.t + self.Ts)
+        shift = self.shift(self.t, self.t + self.Ts).tolist()
         x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
         return x, y, hw
 

@@ -195,13 +195,26 @@ def nonlinear_pieces(
     return out
 
 
-def hybrid(b_of_x, Ts, K, uh, th=None, shaping=False, render="held", t_end=1.0, edges=(0.05, 0.15)):
+def hybrid(
+    b_of_x,
+    Ts,
+    K,
+    uh,
+    th=None,
+    shaping=False,
+    render="held",
+    t_end=1.0,
+    edges=(0.05, 0.15),
+    p0=(0.0, 0.0),
+    v0=(0.0, 0.0),
+):
     """The sampled loop: measured and held every Ts, the arm exact (DOP853 at 1e-12) in between.
 
     b_of_x(x) is the damping on both axes. render "held": the clay's force is the motors', held too; "implicit": it is
-    physical. Returns positions at the samples (n, 2), the velocities there (n, 2), and the torques held (n, 2).
+    physical. It starts at p0 and moves with v0 as it had before t = 0, without acceleration.
+    Returns positions at the samples (n, 2), the velocities there (n, 2), and the torques held (n, 2).
     """
-    K, uh = np.array(K), np.array(uh)
+    K, uh, p0, v0 = np.array(K), np.array(uh), np.array(p0, float), np.array(v0, float)
     m, d, k = th or (0.0, 0.0, 0.0)
     blocks = []
     for i in (0, 1):
@@ -210,7 +223,8 @@ def hybrid(b_of_x, Ts, K, uh, th=None, shaping=False, render="held", t_end=1.0, 
         A[1, 1], A[1, 4] = -10, K[i]
         A[3] = [G0[i], 0, -G0[i], -G1[i], 0]
         blocks.append(expm(A * Ts))
-    q, w, z = Arm.start(np.zeros(2)), np.zeros(2), np.zeros((2, 4))
+    q = Arm.start(p0)
+    w, z = np.linalg.solve(Arm.jacobian(q), v0), np.column_stack((p0 + G1 / G0 * v0, v0, p0, v0))
     tau = None
     P, V, T = [], [], []
 

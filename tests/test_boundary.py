@@ -92,12 +92,42 @@ def test_a_slow_growth_is_still_a_divergence():
     assert boundary.behaviour(Loop(K=4.2, push=1e-5)) == "diverges"
 
 
+def saturating(K, share):
+    """Rightmost pole of the y axis, b = 90 with the hand, whose motors give but a share of what they are asked for."""
+    s = np.poly1d([1.0, 0.0])
+    D, C, T = s**2 + 32.4 * s + 492.46, s * (s + 10.0), 0.25 * s**2 + 92.0 * s + 6.0
+    Dg = s**2 + 30.3 * s + 765.5
+    asked = C * Dg * (32.4 * s + 492.46) + D * 765.5 * K * T
+    return (C * Dg * (s**2 + 0.131 * T) + share * asked).roots.real.max()
+
+
+SHARES = np.linspace(0.02, 1.0, 99)
+
+
+def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
+    """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it: a large push stays."""
+    loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
+    assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
+    assert boundary.linear(loop) and boundary.behaviour(loop) == "limit cycle"
+    assert boundary.cause(loop, False) == "saturation"
+    assert boundary.behaviour(replace(loop, torque_limit=(40.0, 40.0))) == "stable"
+    assert boundary.behaviour(replace(loop, push=1e-4)) == "stable"
+
+
+def test_motors_that_leave_their_limits_late_are_no_divergence():
+    """K = 0.8 is stable whatever share of it the motors give."""
+    assert max(saturating(0.8, n) for n in SHARES) < 0.0
+    assert boundary.behaviour(Loop("y", 0.8, push=0.05, torque_limit=(1.0, 1.0))) == "stable"
+
+
 def test_causes():
     push = dict(push=boundary.LARGE)
     assert boundary.cause(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False) == "pose-dependent Lambda"
     Ts = 4e-3
     K = 0.5 * (hc.gain_limit("x", 90.0) + hc.gain_limit("x", 90.0, Ts=Ts))
     assert boundary.cause(Loop(K=K, Ts=Ts, **push), False) == "sampling"
+    both = Loop(K=K, Ts=Ts, shaping=False, pose=(0.1, 0.0), **push)
+    assert boundary.cause(both, False) == "sampling and pose-dependent Lambda"
     K = 0.5 * (hc.gain_limit("x", 90.0, Ts=1e-3) + hc.gain_limit("x", 90.0, Ts=1e-3, delay=4e-3))
     assert boundary.cause(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 

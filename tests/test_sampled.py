@@ -9,6 +9,8 @@ from oracles import hybrid
 import hapticclay as hc
 from hapticclay import lti
 from hapticclay.errors import ParameterError
+from hapticclay.params import Multisine, Operator
+from hapticclay.signals import Signal
 
 CASES = {
     "held": dict(),
@@ -35,6 +37,45 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
     np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
     np.testing.assert_allclose(r.tau[: n - 1], T[: n - 1], atol=1e-3)
+
+
+@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize(
+    "kw", [dict(), dict(start=(0.06, 0.0), velocity=(0.05, -0.02)), dict(shaping=True), dict(interface=hc.Interface())]
+)
+def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
+    """Spring and damper of the hand act from the start; its mass does not: nothing accelerated before it."""
+    cut = hc.constant_cut(
+        control="sampled", force=(0.5, 0.2), impedance=True, t_max=0.2, render=render, start=(0.06, 0.02)
+    )
+    s = dataclasses.replace(cut, **kw)
+    at = dict(p0=s.start, v0=s.velocity)
+    P, V, T = hybrid(lambda x: 90.0, s.dt, s.gain, s.force, (0.25, 2.0, 6.0), s.shaping, render, 0.15, (), **at)
+    r = hc.simulate(s)
+    n = len(P)
+    np.testing.assert_allclose(r.tau[0], T[0], atol=1e-12)
+    np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
+    np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
+
+
+@pytest.mark.parametrize("operator,late", [(None, 0.0), (Operator(), 0.0), (None, 0.3)])
+def test_the_recorded_force_belongs_to_its_sample(operator, late):
+    """Off by second order in the sample: fh = uh(t) without a hand, uh - Th p with one, by central differences."""
+    drive = Multisine((1.0, 0.5), low=2.0, high=8.0, period=1.0, seed=2)
+    error, lead = [], []
+    for Ts in (2e-3, 1e-3):
+        parts = hc.Interface(delay=late * Ts) if late else None
+        s = hc.constant_cut(control="sampled", dt=Ts, t_max=0.5, force=(0.0, 0.0))
+        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, interface=parts))
+        want = Signal(drive)(r.t)[1:-1]
+        if operator:
+            want -= 6.0 * r.p[1:-1] + 2.0 * r.v[1:-1] + 0.25 * np.diff(r.p, 2, axis=0) / Ts**2
+        rate = np.gradient(want, Ts, axis=0)
+        off = r.fh[1:-1] - want
+        error.append(np.max(np.abs(off)))
+        lead.append(np.sum(off * rate) / np.sum(rate**2) / Ts)
+    assert np.max(np.abs(lead)) < 0.01  # in samples
+    assert 1.8 < np.log2(error[0] / error[1]) < 2.2, error
 
 
 def test_substeps_converge_to_the_hybrid_system_at_second_order():
