@@ -27,7 +27,11 @@ class Sampled(Leapfrog):
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
         self.n = round((scenario.Ts or scenario.dt) / scenario.dt)
-        self.blocks = [lti.held(axis, K, self.n * scenario.dt) for axis, K in zip(AXES, scenario.gain, strict=True)]
+        # rows of (A, B) of each axis, as floats: a product of so small matrices costs more in NumPy
+        self.blocks = [
+            np.column_stack(lti.held(axis, K, self.n * scenario.dt)).tolist()
+            for axis, K in zip(AXES, scenario.gain, strict=True)
+        ]
         s = self.state
         # (delta, delta', y, y') of each axis, and the torques held
         self.state = (s[0:8:2], s[1:8:2], NONE)
@@ -59,7 +63,7 @@ class Sampled(Leapfrog):
             else:
                 force = self._first(q, w)
             tau, f = self._control(q, w, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt).tolist()
+            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else NONE
             new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
             before = 0.0
         at, out = loop.push(loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau)
@@ -121,8 +125,8 @@ class Sampled(Leapfrog):
 
     @staticmethod
     def _hold(z, block, f: float, shift: float) -> tuple[float, ...]:
-        A, B = block
-        delta, *rest = (A @ z + B * f).tolist()
+        z0, z1, z2, z3 = z
+        delta, *rest = [a0 * z0 + a1 * z1 + a2 * z2 + a3 * z3 + b * f for a0, a1, a2, a3, b in block]
         return delta + shift, *rest
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:

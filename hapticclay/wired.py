@@ -153,7 +153,7 @@ class Wired(Sampled):
             t1, t2 = (interface.converted(t, parts.dac_bits, r) for t, r in zip(tau, span, strict=True))
             due = self._when(k) + parts.delay
             hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
-        shift = self.shift(self.t, self.t + self.Ts).tolist()
+        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else NONE
         x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
         return x, y, hw
 
