@@ -6,7 +6,7 @@ import ctypes.util
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +84,15 @@ def replay(record: Record, tool: Tool) -> None:
         pass
 
 
-def film(record: Record, out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool) -> Path:
-    """Writes a film under a progress bar."""
+def film(
+    record: Callable[[], Record], out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool,
+    smooth: bool,
+) -> Path:  # fmt: skip
+    """Writes a film, under a progress bar, of a record that is made once it is sure that it can be filmed.
+
+    Raises:
+        ParameterError: as video.film.
+    """
     from tqdm import tqdm
 
     from . import video
@@ -93,7 +100,8 @@ def film(record: Record, out: Path, camera: str, speed: float, size: tuple[int, 
     def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
         return iter(tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False))
 
-    return video.film(record, out, camera, speed, size, plots, tool, progress)
+    video.ready(out, speed, size)
+    return video.film(record(), out, camera, speed, size, plots, tool, progress, smooth)
 
 
 def _serve(session: Session, host: str, port: int) -> None:
