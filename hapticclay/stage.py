@@ -14,6 +14,12 @@ PALE, DEEP = np.array([222, 168, 132]), np.array([186, 100, 62])  # clay of the 
 HIDDEN = (0.0, 0.0, -5.0)  # where the target is when nobody pulls [m]
 
 
+def along(scenario: Scenario) -> int:
+    """The axis that plots beside a picture show: 1 where all clay is laid out along y, else 0."""
+    clay = scenario.clay
+    return int(clay is not None and clay.x.along == clay.y.along == "y")
+
+
 class Stage:
     """A picture of one scenario.
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import queue
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ from .errors import ParameterError
 from .params import AXES
 from .player import Player, Replay
 from .session import FRAME, Session
-from .stage import Stage
+from .stage import Stage, along
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
 NAMES = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
@@ -38,13 +36,6 @@ HELP = (
 )
 
 
-def display() -> str:
-    """Why no window can be opened here; empty if one can."""
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return "there is no display"
-    return ""
-
-
 class Window:
     """The viewer's window on one scenario, until it is closed or another scenario is asked for.
 
@@ -53,8 +44,6 @@ class Window:
     """
 
     def __init__(self, play: Session | Replay):
-        if display():
-            raise ParameterError("display", "", f"{display()}: use --web for a browser, or hapticclay video for a film")
         self.play, self.wanted = play, ""
         self.stage = Stage(play.scenario, play.tool)
         self.stage.pose(_angles(play))
@@ -208,9 +197,7 @@ def _ratio(force: tuple[float, float], v: tuple[float, float]) -> tuple[float, f
 def _plots(play: Session | Replay) -> list[tuple]:
     """Title, label of x, colours and points (x, y...) of a frame, for each plot."""
     blue, green = (0.0, 0.45, 0.70), (0.0, 0.62, 0.45)
-    clay = play.scenario.clay
-    ways = (clay.x.along, clay.y.along) if clay else "xx"
-    i = 1 if ways == ("y", "y") else 0
+    i = along(play.scenario)
     a = AXES[i]
     return [
         (f"velocity along {a} [cm/s]", f"{a} [cm]", (blue,), lambda f: (100 * f[1][i], 100 * f[2][i])),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from . import scene
-from .errors import ParameterError
+from .errors import ParameterError, integer
 from .gate import Gate
 from .params import AXES, L1, L2
 from .player import Player
 from .session import Session
-from .stage import Stage
+from .stage import Stage, along
 
 FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
@@ -43,30 +44,32 @@ class Page:
             ParameterError: viser is missing, or the address cannot be listened on.
         """
         try:
+            import rich
             import viser
         except ImportError:
             raise ParameterError("web", "viser", "is not installed: pip install 'hapticclay[web]'") from None
         self.session, self.gate = session, None
-        local = host in LOCAL
+        port, local = integer("port", port, 0, 65535), host in LOCAL
+        self.console = rich.get_console()
+        self.quiet, self.console.quiet = self.console.quiet, True  # viser's boxes name the port behind the gate
         self.server = viser.ViserServer(
-            host=host if local else "127.0.0.1", port=port if local and port else _free(), verbose=False,
-            label="hapticclay",
+            host=host if local else "127.0.0.1", port=_free(host, port) if local else _free(LOCAL[0], 0),
+            verbose=False, label="hapticclay",
         )  # fmt: skip
         inner = self.server.get_port()
-        self.url = f"http://{host}:{inner}"
+        self.url = f"http://{_name(host)}:{inner}"
         if not local:
             token = secrets.token_urlsafe(16)
             try:
                 self.gate = Gate(host, port, inner, token)
             except ParameterError:
-                self.server.stop()
+                self._stop()
                 raise
-            self.url = f"http://{host}:{self.gate.port}/?token={token}"
+            self.url = f"http://{_name(host)}:{self.gate.port}/?token={token}"
         self.player = Player(session)
         self.stage = Stage(session.scenario, session.tool)
         self.shown = 1  # frames that the clay is cut by
         self.cut = self.plotted = -math.inf  # when, in real time [s]
-        self.updating = False  # whether a change of the page is ours
         self._scene()
         self._controls(viser.uplot)
 
@@ -82,12 +85,18 @@ class Page:
             self.close()
 
     def close(self) -> None:
-        """Stops playing and serving."""
-        if self.player.ident:
-            self.player.stop()
-        if self.gate:
-            self.gate.close()
+        """Stops playing and serving; raises what the player died of, if it did."""
+        try:
+            if self.player.ident:
+                self.player.stop()
+        finally:
+            if self.gate:
+                self.gate.close()
+            self._stop()
+
+    def _stop(self) -> None:
         self.server.stop()
+        self.console.quiet = self.quiet
 
     def _scene(self) -> None:
         add, ground = self.server.scene, scene.GROUND
@@ -144,7 +153,7 @@ class Page:
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
         nothing = (np.array([0.0, 1.0]), np.zeros(2))
-        a = self.axis = 1 if s.clay and s.clay.x.along == "y" else 0
+        a = self.axis = along(s)
         self.velocity = gui.add_uplot(
             nothing,
             (uplot.Series(label=f"position {AXES[a]} [cm]"), uplot.Series(label="v [cm/s]", stroke="#0072B2", width=2)),
@@ -195,9 +204,8 @@ class Page:
             self.session.pull(None)
 
     def _dragged(self, _: Any) -> None:
-        if not self.updating:
-            self.hold.value = True
-            self._locked(self._hold)
+        self.hold.value = True  # itself a change that is acted upon, but only the first
+        self._locked(self._hold)
 
     def _toggle(self, _: Any) -> None:
         with self.player.lock:
@@ -208,7 +216,6 @@ class Page:
         with self.player.lock:
             self.session.restart()
             self._press()
-            self.session.recording = self.keep.value
             self.stage.whole()
             self.shown, self.cut = 1, -math.inf
             self.run.label, self.hold.value = "Pause", False
@@ -231,10 +238,8 @@ class Page:
                 (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0),
             )
             if point is None:
-                self.updating = True
                 x, y = (a + b for a, b in zip(frame[1], session.scenario.origin, strict=True))
                 self.target.position = (x, y, 0.052)
-                self.updating = False
             if self.clay and now - self.cut > CUT_EVERY and (self.stage.stale or self.cut == -math.inf):
                 self.stage.stale, self.cut = False, now
                 self.clay.vertices = self._vertices()
@@ -280,10 +285,27 @@ def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, out
 
 
-def _free() -> int:
-    """A port that nobody listens on."""
-    import socket
+def _free(host: str, port: int) -> int:
+    """The port, which nobody listens on; of port 0, one that nobody does.
 
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+    Raises:
+        ParameterError: somebody does; viser would go on to another, or wait for ever.
+    """
+    try:
+        with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET) as s:
+            return s.getsockname()[1]
+    except OSError as error:
+        why = error.strerror.lower() if error.strerror else str(error)
+        raise ParameterError("port", port, f"{host} cannot be listened on ({why}): try --port 0, for any") from None
+
+
+def _name(host: str) -> str:
+    """What to write in an address: of "all addresses" the one by which others know this machine."""
+    if host in ("", "0.0.0.0", "::"):
+        try:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+                s.connect(("192.0.2.1", 9))  # nowhere; asks for a route, sends nothing
+                host = s.getsockname()[0]
+        except OSError:
+            host = socket.gethostname()
+    return f"[{host}]" if ":" in host else host
