@@ -257,9 +257,16 @@ class _Plot:
 
 
 def _round(low: float, high: float, least: float) -> tuple[float, float, int]:
-    """Round limits around a range of at least that size, and the number of grid lines at round steps."""
+    """Whole limits, as the engine makes them in any case, around a range of at least that size, at least 1.
+
+    Returns:
+        (low, high, number of grid lines), the lines at round steps.
+    """
     high = max(high, low + least)
     step = 10.0 ** math.floor(math.log10(high - low))
     step *= next(f for f in (0.2, 0.5, 1.0, 2.0) if (high - low) / (f * step) <= 5.0)
-    first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
-    return first * step, last * step, last - first + 1
+    whole = max(step, 1.0)
+    first, last = (n * whole for n in (math.floor(low / whole + 0.05), math.ceil(high / whole - 0.05)))
+    if step < 1.0:
+        step = 0.2 if last - first <= 1.0 else 0.5
+    return first, last, round((last - first) / step) + 1

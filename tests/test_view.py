@@ -111,6 +111,17 @@ def test_a_record_is_replayed(screen, tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["r"]
 
 
+@pytest.mark.parametrize("low,high", [(0.0, 1.06), (-0.001, 2.06), (0.0, 0.3), (-0.4, 0.2), (0.0, 90.0), (3.0, 31.0)])
+def test_axes_have_round_ticks(low, high):
+    """The engine widens limits to whole numbers and divides evenly: others than whole give ticks such as 0.667."""
+    from hapticclay.view import _round
+
+    first, last, lines = _round(low, high, 1.0)
+    assert first == round(first) and last == round(last) and 3 <= lines <= 9
+    assert first <= low + 0.06 * (high - low) and last >= high - 0.06 * (high - low)
+    assert (last - first) / (lines - 1) in (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+
+
 def test_without_a_display_it_says_what_to_do(tmp_path):
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     out = subprocess.run(
