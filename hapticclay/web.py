@@ -23,6 +23,7 @@ FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
 POINTS = 400  # of a plot
 LOCAL = ("127.0.0.1", "localhost", "::1")
+SKY, GROUND = (236, 240, 245), (214, 220, 228)  # behind the scene, above and below
 DARK, STEEL, BLUE, ORANGE = (56, 64, 74), (178, 186, 196), (15, 110, 173), (230, 107, 13)
 
 
@@ -100,12 +101,15 @@ class Page:
 
     def _scene(self) -> None:
         add, ground = self.server.scene, scene.GROUND
-        self.server.initial_camera.position = (0.27, -0.32, 0.52)
-        self.server.initial_camera.look_at = (0.27, 0.17, -0.04)
+        camera = self.server.initial_camera
+        camera.position, camera.look_at, camera.fov = (0.29, -0.60, 0.60), (0.25, 0.15, -0.04), 0.52
+        add.set_background_image(np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)
-        add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.9)
-        add.add_light_directional("/lamp", color=(255, 250, 240), intensity=1.7, position=(-0.6, 1.0, 0.9))
+        add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.5)
+        add.add_light_directional(
+            "/lamp", color=(255, 250, 240), intensity=1.2, position=(-0.4, 0.6, 1.1), cast_shadow=True
+        )
         add.world_axes.visible = False
         add.add_box("/table", (205, 211, 216), (0.92, 0.88, 0.02), position=(0.22, 0.12, ground - 0.012))
         add.add_grid("/grid", 0.92, 0.88, plane="xy", cell_size=0.1, section_size=0.1, cell_color=(180, 188, 196),
@@ -128,7 +132,8 @@ class Page:
             x, y = grid.x + self.session.scenario.origin[0], grid.y + self.session.scenario.origin[1]
             self.plan, faces = _sheet(x, y)
             self.clay = add.add_mesh_simple(
-                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="double"
+                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="front",
+                cast_shadow=False, receive_shadow=0.45,  # on itself it would be all stripes
             )  # fmt: skip
         self.target = add.add_transform_controls(
             "/hand", scale=0.12, active_axes=(True, True, False), disable_rotations=True
@@ -153,17 +158,18 @@ class Page:
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
         nothing = (np.array([0.0, 1.0]), np.zeros(2))
+        form: Any = {"mode": 1, "scales": {"x": uplot.Scale(time=False)}, "aspect": 2.0, "padding": (12, 4, 0, 0)}
         a = self.axis = along(s)
         self.velocity = gui.add_uplot(
             nothing,
             (uplot.Series(label=f"position {AXES[a]} [cm]"), uplot.Series(label="v [cm/s]", stroke="#0072B2", width=2)),
-            mode=1, scales={"x": uplot.Scale(time=False)}, title="velocity against position", aspect=1.6,
+            title="velocity against position", **form,
         )  # fmt: skip
         self.forces = gui.add_uplot(
             (*nothing, np.zeros(2)),
             (uplot.Series(label="t [s]"), uplot.Series(label="hand fh [N]", stroke="#009E73", width=2),
              uplot.Series(label="clay fe [N]", stroke="#0072B2", width=2)),
-            mode=1, scales={"x": uplot.Scale(time=False)}, title="force against time", aspect=1.6,
+            title="force against time", **form,
         )  # fmt: skip
         self.run.on_click(self._toggle)
         reset.on_click(self._reset)
@@ -254,7 +260,7 @@ class Page:
             b = session.b
             self.status.content = (
                 f"**{state}** {frame[0]:.1f} s, {clock.factor:.2f} x real{slow}  \n"
-                f"b = {b[0]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N, "
+                f"b = {b[0]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N  \n"
                 f"removed {1e6 * self.stage.removal.volume:.2f} cm³"
             )
 

@@ -1,5 +1,6 @@
 """The page in a real headless browser, and the gate that guards it from other machines."""
 
+import contextlib
 import http.client
 import shutil
 import signal
@@ -158,29 +159,34 @@ def test_player_that_dies_leaves_no_server(monkeypatch):
         socket.create_connection(("127.0.0.1", page.server.get_port()), timeout=5.0)
 
 
+@contextlib.contextmanager
 def started(folder, *args, before="pass"):
-    """`hapticclay view --web` as a person starts it, and what it says first."""
+    """`hapticclay view --web` as a person starts it."""
     code = f"import sys; {before}; from hapticclay import cli; sys.exit(cli.main(sys.argv[1:]))"
     words = [sys.executable, "-c", code, "view", "constant", "--web", "--no-plots", "--out", "o", *args]
-    return subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as p:
+        try:
+            yield p
+        finally:
+            p.kill()
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
-    p = started(tmp_path, "--host", host, "--port", "0")
-    said = p.stdout.readline()
-    assert said.startswith("open http://") and ("?token=" in said) == (host == "0.0.0.0")  # nothing else before
-    time.sleep(2.0)
-    p.send_signal(signal.SIGINT)
-    out, err = p.communicate(timeout=60)
+    with started(tmp_path, "--host", host, "--port", "0") as p:
+        said = p.stdout.readline()
+        assert said.startswith("open http://") and ("?token=" in said) == (host == "0.0.0.0")  # nothing else before
+        time.sleep(2.0)
+        p.send_signal(signal.SIGINT)
+        out, err = p.communicate(timeout=60)
     assert p.returncode == 0 and "written to o" in out and "viser" not in out
     assert err.count("\n") == (host == "0.0.0.0") and ("warning" in err) == (host == "0.0.0.0")
     assert hc.Record.load(tmp_path / "o").outcome.code == "finished"
 
 
 def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
-    p = started(tmp_path, before="sys.modules['viser'] = None")
-    out, err = p.communicate(timeout=60)
+    with started(tmp_path, before="sys.modules['viser'] = None") as p:
+        out, err = p.communicate(timeout=60)
     assert (p.returncode, out) == (2, "") and err.count("\n") == 1 and "pip install 'hapticclay[web]'" in err
     assert list(tmp_path.iterdir()) == []
 
