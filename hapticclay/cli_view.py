@@ -31,11 +31,17 @@ def complete(words: list[str]) -> list[str]:
         return words
     command, *rest = words
     if not rest or rest[0].startswith("-"):
+        late = [w for before, w in zip(rest, rest[1:], strict=False) if w in SCENARIOS and before != "--out"]
+        if late:
+            raise ParameterError("arguments", "", f"the experiment comes first: hapticclay {command} {late[0]} ...")
         return [command, "constant", *rest]
     if rest[0] in SCENARIOS or rest[0] == "record":
         return words
     if not Path(rest[0]).exists() and os.sep not in rest[0]:
-        choice("experiment", rest[0], tuple(SCENARIOS))
+        try:
+            choice("experiment", rest[0], tuple(SCENARIOS))
+        except ParameterError as error:
+            raise ParameterError(error.field, error.value, f"{error.bound}; or the folder of a record") from None
     return [command, "record", *rest]
 
 

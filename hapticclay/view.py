@@ -17,7 +17,7 @@ from .errors import ParameterError
 from .params import AXES
 from .player import Player, Replay
 from .session import FRAME, Session
-from .stage import Stage, along
+from .stage import Stage, along, hardest
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
 NAMES = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
@@ -163,7 +163,7 @@ class Window:
             ("time", f"{t:.1f} s, {play.clock.factor:.2f} x real{', machine too slow' if play.clock.slow else ''}"),
             ("state", play.ended or state),
             ("K", f"{s.gain[0]:.3g}, {s.gain[1]:.3g}"),
-            ("b", f"{b[0]:.4g} N.s/m"),
+            ("b", f"{b[0]:.4g} N.s/m; clay {hardest(s):.4g}"),
             ("fh", f"{math.hypot(*fh):.2f} N"),
             ("removed", f"{1e6 * self.stage.removal.volume:.2f} cm3"),
         ]

@@ -17,7 +17,7 @@ from .gate import Gate
 from .params import AXES, L1, L2
 from .player import Player
 from .session import Session
-from .stage import Stage, along
+from .stage import Stage, along, hardest
 
 FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
@@ -153,7 +153,7 @@ class Page:
         reset = gui.add_button("Reset")
         self.keep = gui.add_checkbox("Record", True)
         self.hold = gui.add_checkbox("Hand holds", False, hint="The hand pulls to the arrows' centre; drag it.")
-        top = self._top()
+        top = hardest(self.session.given)
         self.b = gui.add_slider("Clay b [N.s/m]", 0.0, max(3.0 * top, 1.0), 1.0, top, disabled=not top)
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
@@ -181,11 +181,6 @@ class Page:
             (self.hold, self._hold),
         ):
             handle.on_update(lambda _, act=act: self._locked(act))
-
-    def _top(self) -> float:
-        """The most damping that the scenario has [N.s/m]."""
-        clay = self.session.given.clay
-        return max(max(f.values) for f in (clay.x, clay.y)) if clay else 0.0
 
     def _locked(self, act: Callable[[], None]) -> None:
         with self.player.lock:

@@ -148,6 +148,9 @@ def test_smooth_pictures_have_soft_edges():
     (["video", "constnat"], "did you mean 'constant'"),
     (["video", "no/such"], "must be a saved record"),
     (["view", "constant", "--tool-width", "0"], "tool.width"),
+    (["view", "constant", "--every", "0"], "every = 0: must be a whole number"),
+    (["view", "--web", "variable"], "the experiment comes first: hapticclay view variable"),
+    (["view", "constant", "--web", "--port", "99999"], "port = 99999: must be a whole number"),
 ])  # fmt: skip
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
