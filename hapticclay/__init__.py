@@ -11,6 +11,7 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
+from . import engine  # noqa: F401, before whatever else imports mujoco
 from .batch import simulate_batch
 from .design import Design, compare, design_gain, transparency_error
 from .drift import Drift, drift_map

@@ -166,6 +166,8 @@ class Video:
     """Width and height [pixels]."""
     plots: bool = True
     """Run the plots on the right."""
+    smooth: bool = False
+    """Soften edges and shadows; takes twice as long without a graphics card."""
     tool_width: float = TOOL.width
     """Width of the tool [m]."""
     tool_depth: float = TOOL.depth
@@ -175,8 +177,10 @@ class Video:
         tool = Tool(self.tool_width, self.tool_depth)
         writable(self.out.parent)
         s = self.scenario
-        record = s if isinstance(s, Record) else simulate_with_progress(s, 1)
-        made = cli_view.film(record, self.out, self.camera, self.speed, self.size, self.plots, tool)
+        made = cli_view.film(
+            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1),
+            self.out, self.camera, self.speed, self.size, self.plots, tool, self.smooth,
+        )  # fmt: skip
         print(f"written to {made}")
         return 0
 

@@ -6,7 +6,7 @@ import ctypes.util
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +31,17 @@ def complete(words: list[str]) -> list[str]:
         return words
     command, *rest = words
     if not rest or rest[0].startswith("-"):
+        late = [w for before, w in zip(rest, rest[1:], strict=False) if w in SCENARIOS and before != "--out"]
+        if late:
+            raise ParameterError("arguments", "", f"the experiment comes first: hapticclay {command} {late[0]} ...")
         return [command, "constant", *rest]
     if rest[0] in SCENARIOS or rest[0] == "record":
         return words
     if not Path(rest[0]).exists() and os.sep not in rest[0]:
-        choice("experiment", rest[0], tuple(SCENARIOS))
+        try:
+            choice("experiment", rest[0], tuple(SCENARIOS))
+        except ParameterError as error:
+            raise ParameterError(error.field, error.value, f"{error.bound}; or the folder of a record") from None
     return [command, "record", *rest]
 
 
@@ -84,8 +90,15 @@ def replay(record: Record, tool: Tool) -> None:
         pass
 
 
-def film(record: Record, out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool) -> Path:
-    """Writes a film under a progress bar."""
+def film(
+    record: Callable[[], Record], out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool,
+    smooth: bool,
+) -> Path:  # fmt: skip
+    """Writes a film, under a progress bar, of a record that is made once it is sure that it can be filmed.
+
+    Raises:
+        ParameterError: as video.film.
+    """
     from tqdm import tqdm
 
     from . import video
@@ -93,7 +106,8 @@ def film(record: Record, out: Path, camera: str, speed: float, size: tuple[int, 
     def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
         return iter(tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False))
 
-    return video.film(record, out, camera, speed, size, plots, tool, progress)
+    video.ready(out, speed, size)
+    return video.film(record(), out, camera, speed, size, plots, tool, progress, smooth)
 
 
 def _serve(session: Session, host: str, port: int) -> None:

@@ -54,7 +54,7 @@ class Player(threading.Thread):
 
     def __init__(self, play: Session | Replay):
         super().__init__(name="player", daemon=True)
-        self.play, self.lock = play, threading.Lock()
+        self.play, self.lock = play, threading.RLock()  # what changes a page is told of the change at once
         self.error: Exception | None = None
         self._stop_now = threading.Event()
 

@@ -38,17 +38,17 @@ class Running:
             figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI)
             panels: Any = figure.subplots(3, 1)
             _frame(panels[0], x, v, f"position {self.axis} [cm]", f"velocity v$_{self.axis}$ [m/s]")
-            _frame(panels[1], x, np.array([0.0, 1.2 * top]), f"position {self.axis} [cm]", "f$_e$/v [N$\\cdot$s/m]")
+            _frame(panels[1], x, np.array([0.0, 1.25 * top]), f"position {self.axis} [cm]", "f$_e$/v [N$\\cdot$s/m]")
             force = r.fh[:, i]
             usual = np.percentile(np.concatenate((force, r.fe[:, i])), (1.0, 99.0))  # not the spike at a border
-            _frame(panels[2], r.t, np.append(usual, 0.0), "time [s]", "force [N]")
+            _frame(panels[2], r.t, np.append(1.15 * usual, 0.0), "time [s]", "force [N]")
             for ax in panels[:2]:
                 _clay(ax, r, i)
             b = np.unique(r.b[:, i])
             for value in b[b > 0.0] if len(b) <= 4 else ():
                 panels[1].axhline(value, color=ORANGE, ls="--", lw=0.9)
-                panels[1].annotate("b", (1.0, value), (2, -2), xycoords=("axes fraction", "data"),
-                                   textcoords="offset points", color=ORANGE)  # fmt: skip
+                panels[1].annotate("b", (1.0, value), (-2, 2), xycoords=("axes fraction", "data"),
+                                   textcoords="offset points", color=ORANGE, ha="right")  # fmt: skip
             title = "operator f$_h$, clay f$_e$"
             panels[2].set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
             panels[0].set_title(s.name, fontsize=7.5, color=GREY, pad=2, loc="left")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from . import loop, outcome, record
-from .errors import ParameterError, number
+from .errors import ParameterError, integer, number
 from .leapfrog import Leapfrog, _written_out
 from .params import B_MAX, L1, L2, Clay, Multisine, Operator, Profile, Scenario
 from .removal import TOOL, Tool, removed
@@ -168,7 +168,8 @@ class Session:
         Raises:
             ParameterError: a value is out of its bounds; or the scenario is sampled, or accurate.
         """
-        self.tool, self.every, self.stiffness = tool, every, stiffness
+        self.tool, self.stiffness = tool, stiffness
+        self.every = integer("every", every, 1, 1_000_000)
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
@@ -188,10 +189,11 @@ class Session:
         self._look()
 
     def restart(self) -> None:
-        """Begins the same scenario anew, with the gain and damping as they are now."""
-        gain, b = self.scenario.gain, self._damping
+        """Begins the same scenario anew, with the gain and damping as they are now, recording if it is now."""
+        gain, b, recording = self.scenario.gain, self._damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
+        self.recording = recording
 
     @property
     def t(self) -> float:
@@ -264,7 +266,7 @@ class Session:
         if not run.kept:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
         out = run.result(max(self.clock.real, 1e-9))
-        volume, rate = removed(out, self.tool.width, self.tool.depth)
+        volume, rate = self._removed(out)
         knots = np.array(run.muscle.knots)
         index = np.rint(out.t / self.scenario.dt)
         which = np.searchsorted([i for i, _ in run.gains], index, "right") - 1
@@ -282,6 +284,19 @@ class Session:
             "late_ms": {"edges": list(JITTER), "frames": clock.late.tolist()},
         }
         return replace(out, extra=extra, notes=notes)
+
+    def _removed(self, out: record.Record) -> tuple[np.ndarray, np.ndarray]:
+        """As removal.removed, along the way that was really gone where recording was off."""
+        t, p, v = (np.array(x) for x in zip(*(f[:3] for f in self.frames), strict=True))
+        after = np.searchsorted(out.t, t)
+        begin = out.t[np.maximum(after - 1, 0)]
+        end = np.append(out.t, math.inf)[after]
+        off = (t < out.t[-1]) & ((after == 0) | (end - begin > 1.5 * self.every * self.scenario.dt)) & (t != end)
+        order = np.argsort(np.concatenate((out.t, t[off])), kind="stable")
+        way = replace(out, p=np.concatenate((out.p, p[off]))[order], v=np.concatenate((out.v, v[off]))[order])
+        kept = np.argsort(order)[: len(out.t)]
+        volume, rate = removed(way, self.tool.width, self.tool.depth)
+        return volume[kept], rate[kept]
 
     def _state(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Handle position [m] and velocity [m/s], half a step ago."""

@@ -14,6 +14,18 @@ PALE, DEEP = np.array([222, 168, 132]), np.array([186, 100, 62])  # clay of the 
 HIDDEN = (0.0, 0.0, -5.0)  # where the target is when nobody pulls [m]
 
 
+def along(scenario: Scenario) -> int:
+    """The axis that plots beside a picture show: 1 where all clay is laid out along y, else 0."""
+    clay = scenario.clay
+    return int(clay is not None and clay.x.along == clay.y.along == "y")
+
+
+def hardest(scenario: Scenario) -> float:
+    """The most damping that the clay has by its profiles, growth aside [N.s/m]; 0 without clay."""
+    clay = scenario.clay
+    return max(*clay.x.values, *clay.y.values) if clay is not None else 0.0
+
+
 class Stage:
     """A picture of one scenario.
 
@@ -75,7 +87,7 @@ class Stage:
         """The clay from above, darker where it damps more, shape (ny, nx, 3) of bytes."""
         clay = self.scenario.clay
         assert clay is not None
-        top = max(max(f.values) for f in (clay.x, clay.y)) or 1.0
+        top = hardest(self.scenario) or 1.0
         b = np.zeros(self.removal.cut.shape)
         for f in (clay.x, clay.y):
             along = np.array(f.values)[np.searchsorted(f.edges, self.removal.x if f.along == "x" else self.removal.y)]

@@ -8,6 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,23 +24,30 @@ from .stage import CAMERAS, Stage
 FPS = {".mp4": 30, ".webp": 20, ".gif": 20}  # frames a second, by kind of file
 ASPECT = 1.2  # width over height that the cameras are made for, at least
 PLOTS = 0.375  # share of the width that the plots take
+SAMPLES, SHADOW = 4, 2048  # a pixel, and the width of the shadow's map [pixels], where edges are softened
+ON, OFF = ("enable", "enabled", "on", "true", "1"), ("disable", "disabled", "off", "false", "0")  # MUJOCO_GL
 GL = "apt-get install libegl1 libgl1 (or libosmesa6 and MUJOCO_GL=osmesa)"
 
 
 class Lens:
-    """Photographs a stage without a display.
+    """Photographs a stage without a display."""
 
-    Raises:
-        ParameterError: there is no OpenGL to do it with.
-    """
+    def __init__(self, stage: Stage, width: int, height: int, camera: str, smooth: bool = False):
+        """Sets up.
 
-    def __init__(self, stage: Stage, width: int, height: int, camera: str):
+        Args:
+            stage: to be photographed. width, height: of the picture [pixels]. camera: one of the room's.
+            smooth: whether edges and shadows are softened; a picture then takes twice as long.
+
+        Raises:
+            ParameterError: there is no OpenGL to do it with.
+        """
         self.stage = stage
         model = stage.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-        self._gl = _context(width, height)
-        self._gl.make_current()
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        if smooth:
+            model.vis.quality.offsamples, model.vis.quality.shadowsize = SAMPLES, SHADOW
+        self._gl, self._context = _opened(model, width, height)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._scene = mujoco.MjvScene(model, maxgeom=1000)
         self._option, self._perturb = mujoco.MjvOption(), mujoco.MjvPerturb()
@@ -75,42 +83,99 @@ class Lens:
         self._gl.free()
 
 
-def _context(width: int, height: int):
-    """An OpenGL context that needs no display: what MUJOCO_GL says, or EGL on Linux."""
-    wanted = os.environ.get("MUJOCO_GL", "").lower()
+def _opened(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco.MjrContext]:
+    """An OpenGL context that needs no display (what MUJOCO_GL says, or EGL on Linux), and the renderer's own in it."""
+    wanted = os.environ.get("MUJOCO_GL", "").lower().strip()
+    linux = sys.platform.startswith("linux")
+    if wanted in OFF:
+        raise ParameterError("MUJOCO_GL", wanted, "switches rendering off: unset it")
+    if linux and wanted not in ("", "egl", "osmesa", "glfw", "glx", *ON):
+        raise ParameterError("MUJOCO_GL", wanted, "must be egl or osmesa, or unset")
     try:
-        if sys.platform.startswith("linux") and wanted in ("", "egl"):
+        if linux and wanted in ("", "egl"):
             from mujoco.egl import GLContext
         elif wanted == "osmesa":
             from mujoco.osmesa import GLContext
         else:
             GLContext = mujoco.GLContext
-        return GLContext(width, height)
+        with warnings.catch_warnings():  # GLFW's, where there is no display
+            warnings.simplefilter("ignore")
+            gl = GLContext(width, height)
+            gl.make_current()
+        return gl, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     except Exception as error:  # each backend fails in its own ways: ImportError, AttributeError, GLError, FatalError
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise ParameterError("OpenGL", what, f"no rendering without it: {GL}") from None
+        if wanted not in ("", "egl", "osmesa"):
+            raise ParameterError("MUJOCO_GL", wanted, "needs a display: unset it, or set egl or osmesa") from None
+        lacks = isinstance(error, AttributeError | ImportError)  # PyOpenGL's way to say that it found no library
+        why = "no library or driver" if lacks else " ".join(str(error).split()) or type(error).__name__
+        raise ParameterError("OpenGL", wanted or "egl", f"cannot be started ({why}): {GL}") from None
+
+
+def ready(out: Path, speed: float = 1.0, size: tuple[int, int] = (960, 480)) -> tuple[str, float, tuple[int, int]]:
+    """Whether a film can be made here, to be asked before a long run.
+
+    Args:
+        out: the file. speed, size: as in `frames`.
+
+    Returns:
+        (kind of file, speed, size) as they will be used.
+
+    Raises:
+        ParameterError: a value is out of its bounds, or OpenGL or a codec is missing; says what to install.
+    """
+    kind = choice("out", out.suffix.lower(), tuple(FPS))
+    speed = number("speed", speed, 1e-3, 1e3, above=True)
+    width, height = (integer(f"size[{name}]", n, 160, 4096) for name, n in zip(("w", "h"), size, strict=True))
+    _codec(kind)
+    gl, context = _opened(mujoco.MjSpec().compile(), 64, 64)
+    context.free()
+    gl.free()
+    return kind, speed, (width - width % 2, height - height % 2)  # as the codec wants
+
+
+def _codec(kind: str) -> None:
+    """Refuses a kind of file that nothing here can write."""
+    if kind == ".mp4":
+        try:
+            import imageio_ffmpeg
+
+            imageio_ffmpeg.get_ffmpeg_exe()
+        except (ImportError, RuntimeError):
+            raise ParameterError(
+                "out", kind, "needs a codec: pip install 'imageio[ffmpeg]'; or take .webp, which needs none"
+            ) from None
+        return
+    try:
+        from PIL import features
+
+        if kind == ".webp" and not features.check("webp"):
+            raise ImportError
+    except ImportError:
+        raise ParameterError("out", kind, f"needs a codec: pip install --upgrade pillow, with {kind[1:]}") from None
 
 
 def frames(
     record: Record, camera: str = "room", speed: float = 1.0, size: tuple[int, int] = (960, 480), plots: bool = True,
-    tool: Tool = TOOL, fps: int = 30,
+    tool: Tool = TOOL, fps: int = 30, smooth: bool = False,
 ) -> Iterator[np.ndarray]:  # fmt: skip
     """The frames of a film, shape (height, width, 3) of bytes each; the next one reuses the memory.
 
     Args:
         record: of the run. camera: "room", "top" or "close". speed: of the film, 1 for real time.
         size: width and height [pixels]. plots: whether plots run on the right.
-        tool: at the handle. fps: frames a second.
+        tool: at the handle. fps: frames a second. smooth: whether edges are softened, at twice the time.
+
+    Raises:
+        ParameterError: there is no such camera, or no OpenGL.
     """
     width, height = size
     beside = 2 * round(0.5 * PLOTS * width) if plots else 0
-    stage = Stage(record.scenario, tool)
-    lens = Lens(stage, width - beside, height, choice("camera", camera, CAMERAS))
-    running = None
+    stage, running = Stage(record.scenario, tool), None
     if plots:
         from .running import Running
 
         running = Running(record, beside, height)
+    lens = Lens(stage, width - beside, height, choice("camera", camera, CAMERAS), smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
     try:
         done = 0
@@ -144,6 +209,7 @@ def _thinned(p: np.ndarray) -> np.ndarray:
 def film(
     record: Record, out: Path, camera: str = "room", speed: float = 1.0, size: tuple[int, int] = (960, 480),
     plots: bool = True, tool: Tool = TOOL, progress: Callable[[Iterator[np.ndarray], int], Iterator] | None = None,
+    smooth: bool = False,
 ) -> Path:  # fmt: skip
     """Writes a film of a run: .mp4, .webp or .gif.
 
@@ -153,14 +219,11 @@ def film(
     Raises:
         ParameterError: a value is out of its bounds, the file cannot be written, or OpenGL or a codec is missing.
     """
-    kind = choice("out", out.suffix.lower(), tuple(FPS))
-    speed = number("speed", speed, 1e-3, 1e3, above=True)
-    width, height = (integer(f"size[{name}]", n, 160, 4096) for name, n in zip(("w", "h"), size, strict=True))
-    size = width - width % 2, height - height % 2  # as the codec wants
+    kind, speed, size = ready(out, speed, size)
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "must hold samples")
     fps = FPS[kind]
-    images: Any = frames(record, camera, speed, size, plots, tool, fps)
+    images: Any = frames(record, camera, speed, size, plots, tool, fps, smooth)
     if progress:
         images = progress(images, len(shots(record, speed, fps)))
     with tempfile.TemporaryDirectory() as folder, contextlib.closing(images):
@@ -177,12 +240,7 @@ def _write(path: Path, images: Iterator[np.ndarray], kind: str, fps: int) -> Non
     if kind != ".mp4":
         imageio.mimwrite(path, [x.copy() for x in images], duration=1000 // fps, loop=0)
         return
-    try:
-        writer = imageio.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7)  # type: ignore[arg-type]
-    except (ImportError, ValueError, RuntimeError):
-        raise ParameterError(
-            "out", path.suffix, "mp4 needs a codec: pip install 'imageio[ffmpeg]'; or take .webp"
-        ) from None
+    writer = imageio.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7)  # type: ignore[arg-type]
     with writer:
         for image in images:
             writer.append_data(image)

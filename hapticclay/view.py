@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import queue
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ from .errors import ParameterError
 from .params import AXES
 from .player import Player, Replay
 from .session import FRAME, Session
-from .stage import Stage
+from .stage import Stage, along, hardest
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
 NAMES = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
@@ -38,13 +36,6 @@ HELP = (
 )
 
 
-def display() -> str:
-    """Why no window can be opened here; empty if one can."""
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return "there is no display"
-    return ""
-
-
 class Window:
     """The viewer's window on one scenario, until it is closed or another scenario is asked for.
 
@@ -53,8 +44,6 @@ class Window:
     """
 
     def __init__(self, play: Session | Replay):
-        if display():
-            raise ParameterError("display", "", f"{display()}: use --web for a browser, or hapticclay video for a film")
         self.play, self.wanted = play, ""
         self.stage = Stage(play.scenario, play.tool)
         self.stage.pose(_angles(play))
@@ -174,7 +163,7 @@ class Window:
             ("time", f"{t:.1f} s, {play.clock.factor:.2f} x real{', machine too slow' if play.clock.slow else ''}"),
             ("state", play.ended or state),
             ("K", f"{s.gain[0]:.3g}, {s.gain[1]:.3g}"),
-            ("b", f"{b[0]:.4g} N.s/m"),
+            ("b", f"{b[0]:.4g} N.s/m; clay {hardest(s):.4g}"),
             ("fh", f"{math.hypot(*fh):.2f} N"),
             ("removed", f"{1e6 * self.stage.removal.volume:.2f} cm3"),
         ]
@@ -208,9 +197,7 @@ def _ratio(force: tuple[float, float], v: tuple[float, float]) -> tuple[float, f
 def _plots(play: Session | Replay) -> list[tuple]:
     """Title, label of x, colours and points (x, y...) of a frame, for each plot."""
     blue, green = (0.0, 0.45, 0.70), (0.0, 0.62, 0.45)
-    clay = play.scenario.clay
-    ways = (clay.x.along, clay.y.along) if clay else "xx"
-    i = 1 if ways == ("y", "y") else 0
+    i = along(play.scenario)
     a = AXES[i]
     return [
         (f"velocity along {a} [cm/s]", f"{a} [cm]", (blue,), lambda f: (100 * f[1][i], 100 * f[2][i])),
@@ -270,9 +257,16 @@ class _Plot:
 
 
 def _round(low: float, high: float, least: float) -> tuple[float, float, int]:
-    """Round limits around a range of at least that size, and the number of grid lines at round steps."""
+    """Whole limits, as the engine makes them in any case, around a range of at least that size, at least 1.
+
+    Returns:
+        (low, high, number of grid lines), the lines at round steps.
+    """
     high = max(high, low + least)
     step = 10.0 ** math.floor(math.log10(high - low))
     step *= next(f for f in (0.2, 0.5, 1.0, 2.0) if (high - low) / (f * step) <= 5.0)
-    first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
-    return first * step, last * step, last - first + 1
+    whole = max(step, 1.0)
+    first, last = (n * whole for n in (math.floor(low / whole + 0.05), math.ceil(high / whole - 0.05)))
+    if step < 1.0:
+        step = 0.2 if last - first <= 1.0 else 0.5
+    return first, last, round((last - first) / step) + 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from . import scene
-from .errors import ParameterError
+from .errors import ParameterError, integer
 from .gate import Gate
 from .params import AXES, L1, L2
 from .player import Player
 from .session import Session
-from .stage import Stage
+from .stage import Stage, along, hardest
 
 FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
 POINTS = 400  # of a plot
 LOCAL = ("127.0.0.1", "localhost", "::1")
+SKY, GROUND = (236, 240, 245), (214, 220, 228)  # behind the scene, above and below
 DARK, STEEL, BLUE, ORANGE = (56, 64, 74), (178, 186, 196), (15, 110, 173), (230, 107, 13)
 
 
@@ -43,30 +45,32 @@ class Page:
             ParameterError: viser is missing, or the address cannot be listened on.
         """
         try:
+            import rich
             import viser
         except ImportError:
             raise ParameterError("web", "viser", "is not installed: pip install 'hapticclay[web]'") from None
         self.session, self.gate = session, None
-        local = host in LOCAL
+        port, local = integer("port", port, 0, 65535), host in LOCAL
+        self.console = rich.get_console()
+        self.quiet, self.console.quiet = self.console.quiet, True  # viser's boxes name the port behind the gate
         self.server = viser.ViserServer(
-            host=host if local else "127.0.0.1", port=port if local and port else _free(), verbose=False,
-            label="hapticclay",
+            host=host if local else "127.0.0.1", port=_free(host, port) if local else _free(LOCAL[0], 0),
+            verbose=False, label="hapticclay",
         )  # fmt: skip
         inner = self.server.get_port()
-        self.url = f"http://{host}:{inner}"
+        self.url = f"http://{_name(host)}:{inner}"
         if not local:
             token = secrets.token_urlsafe(16)
             try:
                 self.gate = Gate(host, port, inner, token)
             except ParameterError:
-                self.server.stop()
+                self._stop()
                 raise
-            self.url = f"http://{host}:{self.gate.port}/?token={token}"
+            self.url = f"http://{_name(host)}:{self.gate.port}/?token={token}"
         self.player = Player(session)
         self.stage = Stage(session.scenario, session.tool)
         self.shown = 1  # frames that the clay is cut by
         self.cut = self.plotted = -math.inf  # when, in real time [s]
-        self.updating = False  # whether a change of the page is ours
         self._scene()
         self._controls(viser.uplot)
 
@@ -82,21 +86,30 @@ class Page:
             self.close()
 
     def close(self) -> None:
-        """Stops playing and serving."""
-        if self.player.ident:
-            self.player.stop()
-        if self.gate:
-            self.gate.close()
+        """Stops playing and serving; raises what the player died of, if it did."""
+        try:
+            if self.player.ident:
+                self.player.stop()
+        finally:
+            if self.gate:
+                self.gate.close()
+            self._stop()
+
+    def _stop(self) -> None:
         self.server.stop()
+        self.console.quiet = self.quiet
 
     def _scene(self) -> None:
         add, ground = self.server.scene, scene.GROUND
-        self.server.initial_camera.position = (0.27, -0.32, 0.52)
-        self.server.initial_camera.look_at = (0.27, 0.17, -0.04)
+        camera = self.server.initial_camera
+        camera.position, camera.look_at, camera.fov = (0.29, -0.60, 0.60), (0.25, 0.15, -0.04), 0.52
+        add.set_background_image(np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)
-        add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.9)
-        add.add_light_directional("/lamp", color=(255, 250, 240), intensity=1.7, position=(-0.6, 1.0, 0.9))
+        add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.5)
+        add.add_light_directional(
+            "/lamp", color=(255, 250, 240), intensity=1.2, position=(-0.4, 0.6, 1.1), cast_shadow=True
+        )
         add.world_axes.visible = False
         add.add_box("/table", (205, 211, 216), (0.92, 0.88, 0.02), position=(0.22, 0.12, ground - 0.012))
         add.add_grid("/grid", 0.92, 0.88, plane="xy", cell_size=0.1, section_size=0.1, cell_color=(180, 188, 196),
@@ -119,7 +132,8 @@ class Page:
             x, y = grid.x + self.session.scenario.origin[0], grid.y + self.session.scenario.origin[1]
             self.plan, faces = _sheet(x, y)
             self.clay = add.add_mesh_simple(
-                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="double"
+                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="front",
+                cast_shadow=False, receive_shadow=0.45,  # on itself it would be all stripes
             )  # fmt: skip
         self.target = add.add_transform_controls(
             "/hand", scale=0.12, active_axes=(True, True, False), disable_rotations=True
@@ -139,22 +153,23 @@ class Page:
         reset = gui.add_button("Reset")
         self.keep = gui.add_checkbox("Record", True)
         self.hold = gui.add_checkbox("Hand holds", False, hint="The hand pulls to the arrows' centre; drag it.")
-        top = self._top()
+        top = hardest(self.session.given)
         self.b = gui.add_slider("Clay b [N.s/m]", 0.0, max(3.0 * top, 1.0), 1.0, top, disabled=not top)
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
         nothing = (np.array([0.0, 1.0]), np.zeros(2))
-        a = self.axis = 1 if s.clay and s.clay.x.along == "y" else 0
+        form: Any = {"mode": 1, "scales": {"x": uplot.Scale(time=False)}, "aspect": 2.0, "padding": (12, 4, 0, 0)}
+        a = self.axis = along(s)
         self.velocity = gui.add_uplot(
             nothing,
             (uplot.Series(label=f"position {AXES[a]} [cm]"), uplot.Series(label="v [cm/s]", stroke="#0072B2", width=2)),
-            mode=1, scales={"x": uplot.Scale(time=False)}, title="velocity against position", aspect=1.6,
+            title="velocity against position", **form,
         )  # fmt: skip
         self.forces = gui.add_uplot(
             (*nothing, np.zeros(2)),
             (uplot.Series(label="t [s]"), uplot.Series(label="hand fh [N]", stroke="#009E73", width=2),
              uplot.Series(label="clay fe [N]", stroke="#0072B2", width=2)),
-            mode=1, scales={"x": uplot.Scale(time=False)}, title="force against time", aspect=1.6,
+            title="force against time", **form,
         )  # fmt: skip
         self.run.on_click(self._toggle)
         reset.on_click(self._reset)
@@ -166,11 +181,6 @@ class Page:
             (self.hold, self._hold),
         ):
             handle.on_update(lambda _, act=act: self._locked(act))
-
-    def _top(self) -> float:
-        """The most damping that the scenario has [N.s/m]."""
-        clay = self.session.given.clay
-        return max(max(f.values) for f in (clay.x, clay.y)) if clay else 0.0
 
     def _locked(self, act: Callable[[], None]) -> None:
         with self.player.lock:
@@ -195,9 +205,8 @@ class Page:
             self.session.pull(None)
 
     def _dragged(self, _: Any) -> None:
-        if not self.updating:
-            self.hold.value = True
-            self._locked(self._hold)
+        self.hold.value = True  # itself a change that is acted upon, but only the first
+        self._locked(self._hold)
 
     def _toggle(self, _: Any) -> None:
         with self.player.lock:
@@ -208,7 +217,6 @@ class Page:
         with self.player.lock:
             self.session.restart()
             self._press()
-            self.session.recording = self.keep.value
             self.stage.whole()
             self.shown, self.cut = 1, -math.inf
             self.run.label, self.hold.value = "Pause", False
@@ -231,10 +239,8 @@ class Page:
                 (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0),
             )
             if point is None:
-                self.updating = True
                 x, y = (a + b for a, b in zip(frame[1], session.scenario.origin, strict=True))
                 self.target.position = (x, y, 0.052)
-                self.updating = False
             if self.clay and now - self.cut > CUT_EVERY and (self.stage.stale or self.cut == -math.inf):
                 self.stage.stale, self.cut = False, now
                 self.clay.vertices = self._vertices()
@@ -249,7 +255,7 @@ class Page:
             b = session.b
             self.status.content = (
                 f"**{state}** {frame[0]:.1f} s, {clock.factor:.2f} x real{slow}  \n"
-                f"b = {b[0]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N, "
+                f"b = {b[0]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N  \n"
                 f"removed {1e6 * self.stage.removal.volume:.2f} cm³"
             )
 
@@ -280,10 +286,27 @@ def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, out
 
 
-def _free() -> int:
-    """A port that nobody listens on."""
-    import socket
+def _free(host: str, port: int) -> int:
+    """The port, which nobody listens on; of port 0, one that nobody does.
 
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+    Raises:
+        ParameterError: somebody does; viser would go on to another, or wait for ever.
+    """
+    try:
+        with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET) as s:
+            return s.getsockname()[1]
+    except OSError as error:
+        why = error.strerror.lower() if error.strerror else str(error)
+        raise ParameterError("port", port, f"{host} cannot be listened on ({why}): try --port 0, for any") from None
+
+
+def _name(host: str) -> str:
+    """What to write in an address: of "all addresses" the one by which others know this machine."""
+    if host in ("", "0.0.0.0", "::"):
+        try:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+                s.connect(("192.0.2.1", 9))  # nowhere; asks for a route, sends nothing
+                host = s.getsockname()[0]
+        except OSError:
+            host = socket.gethostname()
+    return f"[{host}]" if ":" in host else host

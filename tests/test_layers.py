@@ -11,7 +11,7 @@ import hapticclay
 
 PACKAGE = Path(hapticclay.__file__).parent
 LEVELS = [
-    {"errors", "inline"},
+    {"engine", "errors", "inline"},
     {"hardware"},
     {"params", "interface"},
     {"arm", "lti", "clay", "human", "signals", "estimate"},
@@ -37,6 +37,7 @@ HEAVY = {  # outside package -> the only modules that may import it
     "pyarrow": {"sweep"},
     "distributed": {"sweep"},
     "mujoco": {
+        "engine",
         "paper_model",
         "scene",
         "run",
@@ -54,6 +55,8 @@ HEAVY = {  # outside package -> the only modules that may import it
     "tabulate": {"cli", "identify_command", "cli_stability"},
     "scipy": {"lti", "limits", "design", "space", "estimate", "identify", "interface"},
     "imageio": {"video"},
+    "imageio_ffmpeg": {"video"},
+    "PIL": {"video"},
     "viser": {"web"},
     "numba": {"native"},
     "dask": set(),

@@ -9,6 +9,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.player import Player, Replay
 from hapticclay.session import FRAME, MOST, Clock, Session, played
+from hapticclay.stage import Stage
 
 
 def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
@@ -99,8 +100,9 @@ def test_pause_restart_and_record_switch():
     record = session.record()
     gap = np.diff(record.t).max()
     assert gap == pytest.approx(0.5, abs=2 * FRAME)
+    session.recording = False
     session.restart()
-    assert session.t == 0.0 and not session.recorded
+    assert session.t == 0.0 and not session.recorded and not session.recording
     with pytest.raises(hc.ParameterError, match="nothing was recorded"):
         session.record()
 
@@ -114,6 +116,41 @@ def test_record_keeps_its_extras(tmp_path):
         assert len(array) == len(record.t)
     assert back.notes == record.notes and record.notes["tool"] == {"width": 0.02, "depth": 0.01}
     assert record.extra["removed"][-1] == pytest.approx(0.02 * 0.01 * 0.10, rel=1e-2)
+
+
+def straight(t):
+    return 0.06 * t, 0.0
+
+
+def test_removed_volume_is_width_times_depth_times_length_and_what_the_picture_shows():
+    """In the constant cut, to 1 %: the slab is 10 cm long, and a hand that pulls along x leaves it little."""
+    session = drag(Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, straight)
+    stage = Stage(session.scenario, session.tool)
+    stage.carve([f[1] for f in session.frames])
+    volume = session.record().extra["removed"][-1]
+    assert volume == pytest.approx(0.02 * 0.01 * 0.10, rel=1e-2)
+    assert stage.removal.volume == pytest.approx(volume, rel=2e-3)  # chords of 1/60 s
+
+
+def test_clay_is_removed_while_recording_is_off_too():
+    """A way off the straight, and back, that the record does not hold: the volume is that of the picture."""
+    session = Session(hc.constant_cut(), stiffness=10.0, every=10)
+    for recording, y in ((False, 0.0), (True, 0.0), (False, 0.05), (False, 0.0), (True, 0.0)):
+        session.recording = recording
+        drag(session, 1.5, lambda t, y=y: (0.02 + 0.015 * t, y))
+    stage = Stage(session.scenario, session.tool)
+    stage.carve([f[1] for f in session.frames])
+    record = session.record()
+    assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME)
+    assert stage.removal.volume == pytest.approx(record.extra["removed"][-1], rel=5e-3)
+    straight_on = hc.removed(record)[0][-1]
+    assert record.extra["removed"][-1] > 1.1 * straight_on
+
+
+@pytest.mark.parametrize("every", [0, -1, 1.5])
+def test_bad_every_is_refused(every):
+    with pytest.raises(hc.ParameterError, match="every"):
+        Session(hc.constant_cut(), every=every)
 
 
 def test_records_of_headless_runs_have_none(tmp_path):

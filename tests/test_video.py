@@ -1,5 +1,6 @@
 """Films: what is in them, how long a frame takes, and what is said where something is missing."""
 
+import os
 import subprocess
 import sys
 import time
@@ -80,25 +81,63 @@ def test_film_can_be_read_back(record, tmp_path, kind):
     assert [p.name for p in tmp_path.iterdir()] == [f"film.{kind}"]
 
 
+def filmed(folder, blocked, out="x.mp4", **env):
+    """What `hapticclay video` says where a module is missing; a simulation would raise."""
+    code = (
+        f"import sys; sys.modules[{blocked!r}] = None\n"
+        "from hapticclay import cli; cli.simulate_with_progress = None\n"
+        f"sys.exit(cli.main(['video', 'constant', '--out', {out!r}]))"
+    )
+    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
+    p = subprocess.run([sys.executable, "-c", code], cwd=folder, env=env, capture_output=True, text=True, timeout=120)
+    assert p.returncode == 2 and p.stderr.count("\n") == 1, p.stderr
+    assert p.stdout == "" and list(folder.iterdir()) == []
+    return p.stderr
+
+
+@pytest.mark.parametrize("out,blocked,word", [
+    ("x.mp4", "imageio_ffmpeg", "pip install 'imageio[ffmpeg]'"),
+    ("x.webp", "PIL.features", "pip install --upgrade pillow"),
+    ("x.gif", "PIL.features", "pip install --upgrade pillow"),
+])  # fmt: skip
+def test_missing_codec_is_said_before_anything_is_simulated(tmp_path, out, blocked, word):
+    assert word in filmed(tmp_path, blocked, out)
+
+
+@pytest.mark.parametrize("env,word", [
+    ({}, "apt-get install libegl1"),
+    ({"MUJOCO_GL": "egl"}, "apt-get install libegl1"),
+    ({"MUJOCO_GL": "elg"}, "must be egl or osmesa"),
+    ({"MUJOCO_GL": "off"}, "unset it"),
+    ({"MUJOCO_GL": "glfw"}, "needs a display"),
+])  # fmt: skip
+def test_missing_gl_is_said_before_anything_is_simulated(tmp_path, env, word):
+    assert word in filmed(tmp_path, "mujoco.egl", "x.webp", **env)
+
+
+@pytest.mark.parametrize("wanted,blocked", [("elg", "nothing"), ("egl", "OpenGL"), ("osmesa", "OpenGL.GL")])
+def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
+    """MuJoCo itself refuses to be imported with such a setting."""
+    code = (
+        f"import os, sys; sys.modules[{blocked!r}] = None\n"
+        "import hapticclay as hc; print(hc.simulate(hc.constant_cut(t_max=0.1)).status, os.environ['MUJOCO_GL'])"
+    )
+    env = {**os.environ, "MUJOCO_GL": wanted}
+    p = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120)
+    assert p.stdout == f"time limit at 0.1000 s {wanted}\n", p.stderr
+
+
 @needs_gl
-def test_missing_codec_is_one_line_that_says_what_to_install(tmp_path):
-    code = (
-        "import sys; sys.modules['imageio_ffmpeg'] = None\n"
-        "from hapticclay import cli; sys.exit(cli.main(['video', 'constant', '--t-max', '0.1', '--out', 'x.mp4']))"
-    )
-    out = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert out.returncode == 2 and "imageio[ffmpeg]" in out.stderr and out.stderr.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_missing_gl_is_one_line_that_says_what_to_install(tmp_path):
-    code = (
-        "import sys; sys.modules['mujoco.egl'] = None\n"
-        "from hapticclay import cli; sys.exit(cli.main(['video', 'constant', '--t-max', '0.1', '--out', 'x.mp4']))"
-    )
-    out = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert out.returncode == 2 and "libegl1" in out.stderr and out.stderr.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+def test_smooth_pictures_have_soft_edges():
+    """Colours halfway between two things, of which a plain picture has but those of the shading."""
+    kinds = []
+    for smooth in (False, True):
+        stage = Stage(hc.free())
+        stage.pose((0.6, -0.9))
+        lens = video.Lens(stage, 320, 320, "room", smooth)
+        kinds.append(len(np.unique(lens.photograph().reshape(-1, 3), axis=0)))
+        lens.close()
+    assert kinds[1] > 1.2 * kinds[0]
 
 
 @pytest.mark.parametrize("args,word", [
@@ -109,6 +148,9 @@ def test_missing_gl_is_one_line_that_says_what_to_install(tmp_path):
     (["video", "constnat"], "did you mean 'constant'"),
     (["video", "no/such"], "must be a saved record"),
     (["view", "constant", "--tool-width", "0"], "tool.width"),
+    (["view", "constant", "--every", "0"], "every = 0: must be a whole number"),
+    (["view", "--web", "variable"], "the experiment comes first: hapticclay view variable"),
+    (["view", "constant", "--web", "--port", "99999"], "port = 99999: must be a whole number"),
 ])  # fmt: skip
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

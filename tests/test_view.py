@@ -1,10 +1,12 @@
 """The window under a real X server without a screen: a mouse drags, keys are pressed, the record tells."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,6 +111,52 @@ def test_a_record_is_replayed(screen, tmp_path):
     code, out, err = Mouse(screen, tmp_path, "view", "r").close()
     assert (code, err) == (0, "")
     assert sorted(os.listdir(tmp_path)) == ["r"]
+
+
+def test_every_key_of_the_page_does_what_it_says():
+    from hapticclay.session import FRAME, Session
+    from hapticclay.view import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
+
+    page = (Path(__file__).parents[1] / "docs" / "view.md").read_text()
+    named = [k for row in re.findall(r"^\| (?!key|---)(.+?) \|.*\|$", page, re.M) for k in row.split(", ")]
+    assert named == ["space", "backspace", "up", "down", "left", "right", "1", "2", "3", "R", "H"]
+    session = Session(hc.constant_cut(), stiffness=10.0)
+    window = Window(session)
+    press = window._key
+    press(SPACE)
+    assert session.paused and not len(session.advance(FRAME))
+    press(SPACE)
+    session.pull((0.1, 0.0))
+    while session.t < 3.0:
+        session.advance(FRAME)
+    window.stage.carve([f[1] for f in session.frames])
+    assert window.stage.removal.volume > 1e-6
+    for key, gain, b in ((UP, 1.25, 90.0), (RIGHT, 1.25, 112.5), (RIGHT, 1.25, 140.625), (DOWN, 1.0, 140.625),
+                         (LEFT, 1.0, 112.5)):  # fmt: skip
+        press(key)
+        assert session.scenario.gain == pytest.approx((gain, 0.5 * gain)) and session.b[0] == pytest.approx(b)
+    press(ord("R"))
+    assert not session.recording
+    press(BACKSPACE)
+    assert (session.t, session.recorded, session.recording, window.stage.removal.volume) == (0.0, False, False, 0.0)
+    assert session.scenario.clay.x.values[1] == pytest.approx(112.5)  # as it was set
+    press(ord("R"))
+    press(ord("H"))
+    assert session.recording and not window.help
+    for key, name in zip("123", ("constant", "variable", "free"), strict=True):
+        press(ord(key))
+        assert window.wanted == name
+
+
+@pytest.mark.parametrize("low,high", [(0.0, 1.06), (-0.001, 2.06), (0.0, 0.3), (-0.4, 0.2), (0.0, 90.0), (3.0, 31.0)])
+def test_axes_have_round_ticks(low, high):
+    """The engine widens limits to whole numbers and divides evenly: others than whole give ticks such as 0.667."""
+    from hapticclay.view import _round
+
+    first, last, lines = _round(low, high, 1.0)
+    assert first == round(first) and last == round(last) and 3 <= lines <= 9
+    assert first <= low + 0.06 * (high - low) and last >= high - 0.06 * (high - low)
+    assert (last - first) / (lines - 1) in (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 
 
 def test_without_a_display_it_says_what_to_do(tmp_path):

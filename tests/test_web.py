@@ -1,8 +1,12 @@
 """The page in a real headless browser, and the gate that guards it from other machines."""
 
+import contextlib
 import http.client
 import shutil
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 
@@ -115,6 +119,76 @@ def test_other_machines_need_the_token():
             socket.create_connection(("127.0.0.2", inner), timeout=5.0)
     finally:
         page.close()
+
+
+def test_address_is_one_that_others_can_open():
+    from hapticclay.web import _name
+
+    assert (_name("127.0.0.1"), _name("::1"), _name("box.example")) == ("127.0.0.1", "[::1]", "box.example")
+    assert _name("0.0.0.0") not in ("0.0.0.0", "")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_taken_or_impossible_port_is_refused(host):
+    from hapticclay.web import Page
+
+    with socket.create_server((host, 0)) as s, pytest.raises(hc.ParameterError, match="cannot be listened on"):
+        Page(Session(hc.constant_cut()), host=host, port=s.getsockname()[1])
+    with pytest.raises(hc.ParameterError, match="port = 99999: must be a whole number"):
+        Page(Session(hc.constant_cut()), host=host, port=99999)
+
+
+def test_reset_while_the_hand_holds_goes_on(page):
+    """The box is unticked by the reset, which is told to the session at once, by the thread that holds the lock."""
+    page.hold.value = True
+    assert page.session.point is not None
+    thread = threading.Thread(target=page._reset, args=(None,), daemon=True)
+    thread.start()
+    thread.join(timeout=10.0)
+    assert not thread.is_alive() and page.session.point is None and not page.hold.value
+
+
+def test_player_that_dies_leaves_no_server(monkeypatch):
+    from hapticclay.web import Page
+
+    page = Page(Session(hc.constant_cut()), port=0)
+    monkeypatch.setattr(page.session, "advance", lambda s: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        page.serve()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", page.server.get_port()), timeout=5.0)
+
+
+@contextlib.contextmanager
+def started(folder, *args, before="pass"):
+    """`hapticclay view --web` as a person starts it."""
+    code = f"import sys; {before}; from hapticclay import cli; sys.exit(cli.main(sys.argv[1:]))"
+    words = [sys.executable, "-c", code, "view", "constant", "--web", "--no-plots", "--out", "o", *args]
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as p:
+        try:
+            yield p
+        finally:
+            p.kill()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
+    with started(tmp_path, "--host", host, "--port", "0") as p:
+        said = p.stdout.readline()
+        assert said.startswith("open http://") and ("?token=" in said) == (host == "0.0.0.0")  # nothing else before
+        time.sleep(2.0)
+        p.send_signal(signal.SIGINT)
+        out, err = p.communicate(timeout=60)
+    assert p.returncode == 0 and "written to o" in out and "viser" not in out
+    assert err.count("\n") == (host == "0.0.0.0") and ("warning" in err) == (host == "0.0.0.0")
+    assert hc.Record.load(tmp_path / "o").outcome.code == "finished"
+
+
+def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
+    with started(tmp_path, before="sys.modules['viser'] = None") as p:
+        out, err = p.communicate(timeout=60)
+    assert (p.returncode, out) == (2, "") and err.count("\n") == 1 and "pip install 'hapticclay[web]'" in err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_gate_survives_noise():
