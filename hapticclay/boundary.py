@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from . import arm, limits
+from . import arm, limits, lti
 from .errors import choice, flag, number, pair
 from .hardware import Interface
 from .params import AXES, B_MAX, C_POLE, NO_HAND, NOMINAL, TORQUE_LIMIT, TS, Clay, G, Operator, Profile, S, Scenario
@@ -190,22 +190,33 @@ def simulated_damping(loop: Loop, guess: float, most: float = 1e5) -> float:
     return crossing(lambda b: growth(simulate(replace(loop, b=b).scenario()), loop.axis), guess, most)
 
 
-def pose_matrix(loop: Loop) -> np.ndarray:
-    """The continuous loop at the handle's pose: z' = A z, z of each axis (p, v, delta, delta', y, y'), shape (12, 12).
-
-    Without shaping W = Lambda^-1 of that pose takes the place of the gains of Sh, and couples the axes
-    (docs/equations.md, section 3).
-    """
-    th, i = loop.operator or NO_HAND, AXES.index(loop.axis)
+def _mobility(loop: Loop) -> np.ndarray:
+    """W = Lambda^-1 at the handle's pose [1/kg], shape (2, 2)."""
     q1, q2 = arm.inverse(NOMINAL[0] + loop.pose[0], NOMINAL[1] + loop.pose[1])
-    w = arm.mobility(*arm.columns(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)))
-    W = np.diag([S[0].gain, S[1].gain]) if loop.shaping else np.array([[w[0], w[1]], [w[1], w[2]]])
-    want, force = np.zeros((2, 12)), np.zeros((2, 12))  # acceleration without force; hand and clay without its mass
+    xx, xy, yy = arm.mobility(*arm.columns(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)))
+    return np.array([[xx, xy], [xy, yy]])
+
+
+def _wanted() -> np.ndarray:
+    """The servo's acceleration from (p, v, delta, delta', y, y') of each axis, shape (2, 12)."""
+    out = np.zeros((2, 12))
     for j, (g, s) in enumerate(zip(G, S, strict=True)):
         feedback = [-s.stiffness, -s.damping, g.stiffness, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
-        want[j, 6 * j : 6 * j + 6] = feedback
+        out[j, 6 * j : 6 * j + 6] = feedback
+    return out
+
+
+def pose_matrix(loop: Loop) -> np.ndarray:
+    """The loop at the handle's pose in continuous time: z' = A z, shape (12, 12).
+
+    z: (p, v, delta, delta', y, y') of each axis. Without shaping W = Lambda^-1 of that pose takes the place of the
+    gains of Sh, and couples the axes (docs/equations.md, section 3).
+    """
+    th, i, force = loop.operator or NO_HAND, AXES.index(loop.axis), np.zeros((2, 12))
+    W = np.diag([S[0].gain, S[1].gain]) if loop.shaping else _mobility(loop)
+    for j in (0, 1):  # hand and clay without the hand's mass
         force[j, 6 * j : 6 * j + 2] = -th.spring, -th.damper - loop.b
-    acceleration = np.linalg.solve(np.eye(2) + th.mass * W, want + W @ force)
+    acceleration = np.linalg.solve(np.eye(2) + th.mass * W, _wanted() + W @ force)
     A = np.zeros((12, 12))
     for j, g in enumerate(G):
         k = 6 * j
@@ -217,13 +228,50 @@ def pose_matrix(loop: Loop) -> np.ndarray:
     return A
 
 
+def pose_step(loop: Loop) -> np.ndarray:
+    """The sampled loop at the handle's pose: x(k+1) = M x(k), shape (m, m); limits.matrices for both axes at once.
+
+    x: z of `pose_matrix` and the motors' force on the handle, (x, y) for each of the last 1 + n samples, the newest
+    first; n whole samples of delay, m = 14 + 2 n.
+    """
+    assert loop.Ts
+    th, n = loop.operator or NO_HAND, math.floor(loop.delay / loop.Ts + 1e-9)
+    part, m = max(loop.delay - n * loop.Ts, 0.0), 14 + 2 * n
+    where, rate = [0, 6, 1, 7], np.zeros((6, 6))
+    inertia = np.linalg.inv(_mobility(loop))
+    rate[:2, 2:4] = np.eye(2)
+    rate[2:4] = np.linalg.solve(
+        inertia + th.mass * np.eye(2), np.hstack([-x * np.eye(2) for x in (th.spring, th.damper, -1.0)])
+    )
+    head, rest = (lti.exponential(span * rate) for span in (part, loop.Ts - part))
+    x = np.eye(m)
+    old, v = x[-2:], x[[1, 7]]
+    acceleration = rate[2:4] @ np.vstack((x[where], old))  # under the force before the sample, which the sensor feels
+    f = -th.spring * x[[0, 6]] - (th.damper + loop.b) * v - th.mass * acceleration
+    u = inertia @ np.pad(_wanted(), ((0, 0), (0, m - 12))) - loop.b * v
+    if loop.shaping:
+        u += (inertia @ np.diag([S[0].gain, S[1].gain]) - np.eye(2)) @ f
+    M = np.zeros((m, m))
+    half = head[:4] @ np.vstack((x[where], old))
+    M[where] = rest[:4] @ np.vstack((half, x[10 + 2 * n : 12 + 2 * n] if n else u))
+    for j, axis in enumerate(AXES):
+        A, B = lti.held(axis, loop.K if axis == loop.axis else 0.0, loop.Ts)
+        M[6 * j + 2 : 6 * j + 6] = A @ x[6 * j + 2 : 6 * j + 6] + np.outer(B, f[j])
+    M[12:14] = u
+    M[14:] = x[12 : m - 2]
+    return M
+
+
 def pose_limit(loop: Loop, most: float = 200.0) -> float:
     """Smallest K at which the linear loop at the handle's pose is unstable; inf if there is none up to `most`."""
 
-    first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))  # it is linear in K
+    matrix = pose_step if loop.Ts else pose_matrix
+    first, second = (matrix(replace(loop, K=K)) for K in (1.0, 2.0))  # it is linear in K
 
     def unstable(K: np.ndarray) -> np.ndarray:
         z = np.linalg.eigvals(first + np.multiply.outer(K - 1.0, second - first))
+        if loop.Ts:
+            return np.max(np.where(np.abs(z - 1.0) > 1e-4 * loop.Ts, np.abs(z), 0.0), axis=-1) > 1.0
         return np.max(np.where(np.abs(z) > 1e-4, z.real, -np.inf), axis=-1) > 0.0
 
     grid = np.geomspace(1e-3, most, 200)

@@ -36,15 +36,20 @@ def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         A, shape (4, 4), and B, shape (4,).
     """
-    from scipy.linalg import expm
-
     g = G[AXES.index(choice("axis", axis, AXES))]
     m = np.zeros((5, 5))
     m[0, 1] = m[2, 3] = 1.0
     m[1, 1], m[1, 4] = -C_POLE, K
     m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
-    e = expm(T * m)
+    e = exponential(T * m)
     return e[:4, :4], e[:4, 4]
+
+
+def exponential(a: np.ndarray) -> np.ndarray:
+    """Matrix exponential of a, shape (n, n)."""
+    from scipy.linalg import expm
+
+    return expm(a)
 
 
 def steady_speed(K: float, f: float, b: Any) -> Any:

@@ -80,10 +80,9 @@ def chart(kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterab
 def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     fine, x = np.geomspace(*DAMPINGS, FINE).tolist(), np.geomspace(*DAMPINGS, columns).tolist()
     at = lambda b: replace(loop, b=b)  # noqa: E731
-    lines = {"continuous time (Nyquist)": (fine, [_limit(replace(at(b), Ts=None, delay=0.0)) for b in fine])}
+    lines = {"continuous time": (fine, [_limit(replace(at(b), Ts=None, delay=0.0)) for b in fine])}
     if loop.Ts:
-        late = f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
-        lines[f"sampled every {1e3 * loop.Ts:g} ms{late}, exact"] = (fine, [_limit(at(b)) for b in fine])
+        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = (fine, [_limit(at(b)) for b in fine])
     notes = []
     for name, law in (
         ("small gain (Eq. 13)", lambda b: _largest(lambda K: bool(_small_gain(at(b), K)))),
@@ -115,8 +114,8 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     fine, x = np.geomspace(low, high, FINE // 2).tolist(), np.geomspace(low, high, columns).tolist()
     at = lambda d: replace(loop, delay=d)  # noqa: E731
     lines = {
-        "continuous time, late (exact)": (fine, [_damping(replace(at(d), Ts=None, delay=0.0), d) for d in fine]),
-        f"sampled every {1e3 * loop.Ts:g} ms and late (exact)": (fine, [_damping(at(d), d) for d in fine]),
+        "continuous time, late": (fine, [_damping(replace(at(d), Ts=None, delay=0.0), d) for d in fine]),
+        f"sampled every {1e3 * loop.Ts:g} ms and late": (fine, [_damping(at(d), d) for d in fine]),
     }
     notes = []
     damper = loop.operator.damper if loop.operator else 0.0
@@ -139,21 +138,21 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> Map:
     fine, x = np.linspace(-POSES, POSES, FINE).tolist(), np.linspace(-POSES, POSES, columns).tolist()
     at = lambda dx, shaping: replace(loop, pose=(dx, 0.0), shaping=shaping)  # noqa: E731
     nominal = _limit(loop)
+    how = f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
-        "linear loop at the nominal pose, exact": (fine, [nominal] * len(fine)),
-        "linear loop at this pose, continuous": (fine, [boundary.pose_limit(at(dx, False)) for dx in fine]),
+        f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
+        f"linear loop at this pose, {how}": (fine, [boundary.pose_limit(at(dx, False)) for dx in fine]),
     }
     here = [boundary.pose_limit(at(dx, False)) for dx in x]
     found = {
         "runs": (x, [boundary.simulated_gain(at(dx, False), g) for dx, g in zip(progress(x), here, strict=True)]),
         "runs, shaped": (x, [boundary.simulated_gain(at(dx, True)) for dx in x]),
     }
-    exact = {"runs": here, "runs, shaped": [nominal] * len(x)}
-    notes = () if not loop.Ts else ("the line of each pose is in continuous time, the runs are sampled",)
+    exact = {"runs": here, "runs, shaped": [boundary.pose_limit(at(dx, True)) for dx in x]}
     ys = np.geomspace(0.4 * nominal, 1.3 * nominal, rows).tolist()
     cells = _cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
-    return Map("gain-pose", loop, *names, lines, found, exact, cells, notes)
+    return Map("gain-pose", loop, *names, lines, found, exact, cells)
 
 
 def _cells(loops, x, put, ys, progress) -> tuple[Cell, ...]:
@@ -165,6 +164,10 @@ def _cells(loops, x, put, ys, progress) -> tuple[Cell, ...]:
             agree = theory == (run == "stable")
             out.append(Cell(at, y, theory, run, "" if agree else boundary.cause(tried, run == "stable")))
     return tuple(out)
+
+
+def _late(loop: Loop) -> str:
+    return f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
 
 
 def _hand(loop: Loop) -> dict:

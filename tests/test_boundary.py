@@ -70,6 +70,21 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
 
 
+@pytest.mark.parametrize("delay", [0.0, 7e-4, 2e-3, 5e-3])
+def test_sampled_loop_at_a_pose(delay):
+    loop = Loop(Ts=2e-3, delay=delay, pose=(0.10, 0.0))
+    for operator in (Operator(), None):
+        exact = limits.gain_limit("x", 90.0, impedance=bool(operator), Ts=2e-3, delay=delay)
+        for shaping in (True, False):
+            nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
+            assert boundary.pose_limit(nominal) == pytest.approx(exact, rel=1e-9)  # both are found to 1e-10
+    assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
+    loop = replace(loop, shaping=False)
+    exact = boundary.pose_limit(loop)
+    assert exact < 0.8 * limits.gain_limit("x", 90.0, Ts=2e-3, delay=delay)
+    assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
+
+
 def test_pose_matrix_has_the_poles_of_both_axes_where_they_are_decoupled():
     A = boundary.pose_matrix(Loop(K=2.0, shaping=False))
     parts = [Linear(i, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles() for i, K in ((0, 2.0), (1, 0.0))]
@@ -154,7 +169,7 @@ def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(po
     assert wrong and {c.cause for c in wrong} == {"pose-dependent Lambda"}
     for c in poses.cells:
         assert (c.cause == "") == (c.theory == (c.simulated == "stable"))
-        exact = np.interp(c.x, *poses.lines["linear loop at this pose, continuous"])
+        exact = np.interp(c.x, *poses.lines["linear loop at this pose, continuous time"])
         assert (c.simulated == "stable") == (c.y < exact)
 
 
@@ -165,7 +180,7 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
     shown = {line.get_label(): line for line in ax.lines}
     np.testing.assert_allclose(shown["boundary found by runs"].get_ydata(), poses.found["runs"][1])
     np.testing.assert_allclose(shown["boundary found by runs"].get_xdata(), [-10.0, 10.0])
-    ringed = shown["not as in continuous time at the nominal pose"]
+    ringed = shown["unlike continuous time at the nominal pose"]
     assert len(ringed.get_xdata()) == sum(bool(c.cause) for c in poses.cells)
     figure.savefig(tmp_path / "a.png")
 
