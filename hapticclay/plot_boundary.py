@@ -50,7 +50,7 @@ def boundaries(chart: Map) -> Figure:
         wrong = [c for c in chart.cells if c.cause]
         if wrong:
             x, y = [factor * c.x for c in wrong], [c.y for c in wrong]
-            label = "unlike continuous time at the nominal pose"
+            label = "unlike continuous time, no delay, nominal pose"
             ax.plot(x, y, ls="none", marker="o", mfc="none", color=ORANGE, ms=13, mew=1.5, label=label)
         for (name, (x, y)), dot in zip(chart.found.items(), DOTS, strict=False):
             ax.plot(factor * np.array(x), _finite(y), color=BLACK, ls="none", ms=7, zorder=5, label=_run(name), **dot)
