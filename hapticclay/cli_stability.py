@@ -119,7 +119,7 @@ def disagreements(chart: Map) -> str:
     wrong = [c for c in chart.cells if c.cause]
     lines = [f"boundary found by runs against the exact one of the same loop: within {100.0 * chart.gap():.2g} %"]
     lines += chart.notes
-    lines.append(f"{len(wrong)} of {len(chart.cells)} cells are not as continuous time without delay at the nominal pose says")
+    lines.append(f"{len(wrong)} of {len(chart.cells)} cells are not as continuous time says, no delay, nominal pose")
     if wrong:
         cells = [
             [f"{c.x:.4g}", f"{c.y:.4g}", "stable" if c.theory else "unstable", c.simulated, c.cause] for c in wrong
