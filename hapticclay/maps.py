@@ -138,7 +138,7 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> Map:
     fine, x = np.linspace(-POSES, POSES, FINE).tolist(), np.linspace(-POSES, POSES, columns).tolist()
     at = lambda dx, shaping: replace(loop, pose=(dx, 0.0), shaping=shaping)  # noqa: E731
     nominal = _limit(loop)
-    how = f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}" if loop.Ts else "continuous time"
+    how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
         f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
         f"linear loop at this pose, {how}": (fine, [boundary.pose_limit(at(dx, False)) for dx in fine]),
@@ -149,7 +149,7 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> Map:
         "runs, shaped": (x, [boundary.simulated_gain(at(dx, True)) for dx in x]),
     }
     exact = {"runs": here, "runs, shaped": [boundary.pose_limit(at(dx, True)) for dx in x]}
-    ys = np.geomspace(0.4 * nominal, 1.3 * nominal, rows).tolist()
+    ys = np.geomspace(0.4 * nominal, 1.2 * nominal, rows).tolist()
     cells = _cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
     return Map("gain-pose", loop, *names, lines, found, exact, cells)
