@@ -13,7 +13,7 @@ import numpy as np
 from . import record, scene
 from .errors import ParameterError, choice, integer
 from .params import AXES, Scenario
-from .sim import NUMBA, compiled, fits, has_numba, simulate
+from .sim import NUMBA, compiled, fits, has_numba, marches, simulate
 
 KEEP = ("records", "summaries")
 BORDERS = 8  # crossings that a summary has room for
@@ -44,8 +44,8 @@ def simulate_batch(
 ) -> Any:
     """Runs scenarios, which may differ in anything, side by side; each comes out as simulate(engine="native") has it.
 
-    Bit for bit, at any number of threads and in any order. Scenes that native cannot run, and all where numba is
-    not installed, run in Python, one after the other. A record takes 160 bytes a sample kept, a summary 500 bytes.
+    Bit for bit, at any number of threads and in any order. Accurate runs, scenes that native cannot run, and all where
+    numba is not installed, run one after the other. A record takes 160 bytes a sample kept, a summary 500 bytes.
 
     Args:
         scenarios: what to run.
@@ -81,7 +81,8 @@ def simulate_batch(
     elif native and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
     for i in sorted(set(range(len(jobs))) - set(native if module else ())):
-        r = simulate(jobs[i], every=every, engine="python")
+        engine = "native" if marches(jobs[i]) and has_numba() else "python"
+        r = simulate(jobs[i], every=every, engine=engine)
         out[i] = entry(*record.brief(r)) if summaries else r
     return out
 

@@ -192,8 +192,9 @@ def derivative(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-    hx = uhx - human.impedance(spring, mass, damper, px, cx, vx)
-    hy = uhy - human.impedance(spring, mass, damper, py, cy, vy)
+    hx, hy = uhx, uhy
+    hx -= human.impedance(spring, mass, damper, px, cx, vx)
+    hy -= human.impedance(spring, mass, damper, py, cy, vy)
     y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
     y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
     # a kick of one second from rest, in which u is the acceleration

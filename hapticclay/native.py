@@ -1,6 +1,6 @@
-"""The leapfrog compiled: `stride` and the laws it calls, by numba, into one function that steps whole runs.
+"""Runs compiled: `stride` and `march` and the laws they call, by numba, into functions that step whole runs.
 
-It calls the engine's own mj_step at its address and holds no lock, so runs go on side by side in threads. The
+They call the engine's own functions at their addresses and hold no lock, so runs go on side by side in threads. The
 compiled code is kept on disk, in a folder named after the sources it was made from.
 """
 
@@ -24,17 +24,19 @@ import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic, overload
 
-from . import clay, energy, loop, record, run, scene, signals, stride
+from . import arm, clay, energy, loop, march, record, run, scene, signals, stride
 from .clay import slab
 from .inline import inline
 from .params import AXES, NO_HAND, Scenario
 from .run import CHUNK, Run
+from .rungekutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    clay.at, clay.settle, loop.coefficients, loop.entire, loop.tick,
+    arm.position, clay.at, clay.settle, loop.coefficients, loop.derivative, loop.entire, loop.tick,
     stride.around, stride.enter, stride.place,
 )  # fmt: skip
 PLAIN = (
+    march.leap, march.slope,
     run.aim, run.root, signals.line, stride.heading, stride.kick, stride.land, stride.mean, stride.miss, stride.move,
     stride.note, stride.side, stride.stride, stride.write,
 )  # fmt: skip
@@ -110,18 +112,17 @@ def folder() -> Path:
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
 
 
-_stride, _calm = _compiled(_whole, stride.calm)
+_stride, _calm, _march, _once = _compiled(_whole, stride.calm, march.march, march.once)
 
 
-def _mj_step() -> int:
-    """Address of the engine's mj_step."""
+def _addresses(*names: str) -> list[int]:
+    """Addresses of functions of the engine."""
     library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
-    address = ctypes.cast(library.mj_step, ctypes.c_void_p).value
-    assert address
-    return address
+    found = [ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in names]
+    return [x for x in found if x is not None]
 
 
-STEP = _mj_step()
+STEP, FORWARD = _addresses("mj_step", "mj_forward")
 
 
 class Bench:
@@ -237,6 +238,48 @@ class Native(Run):
         return energy.balance(self.now["work"][0].tolist(), self.first if made else last, last)
 
 
+class March(RungeKutta):
+    """The accurate run, compiled: many samples at a time, and each step on the way to a border."""
+
+    def __init__(self, scenario: Scenario, every: int):
+        super().__init__(scenario, every)
+        views = (self.data.qpos, self.data.qvel, self.data.qacc, self.data.ctrl, self.data.qfrc_applied)
+        at = (x.ctypes.data for x in views)
+        self.arm = march.Engine(FORWARD, self.model._address, self.data._address, *at)
+        self.y, self.work = np.empty(march.STATES), np.empty((6, march.STATES))
+        self.room = np.empty((CHUNK, march.ROW))
+
+    def go(self, progress: Any) -> None:
+        Run.go(self, progress)
+
+    def _given(self) -> tuple[Any, ...]:
+        y = self.y
+        y[:2], y[2:4], y[4:] = self.data.qpos, self.data.qvel, self.data.act
+        return self.c, self.regions.b(self.t), self.scenario.force, self.scenario.clay is not None, self.arm
+
+    def _take(self) -> None:
+        self.data.qpos[:], self.data.qvel[:], self.data.act[:] = self.y[:2], self.y[2:4], self.y[4:]
+
+    def advance(self) -> bool:
+        i, dt = self.i, self.scenario.dt
+        n = min(self.last - i, CHUNK - len(self.rows)) if self.t == i * dt else 0
+        if n > 0:
+            low, high = tuple(self.regions.low), tuple(self.regions.high)
+            given, rows = self._given(), self.room[:n]
+            made = _march(*given, dt, self.substeps, low, high, self.scenario.origin, self.y, self.work, rows)
+            self._take()
+            if made:
+                self.rows += rows[:made].tolist()
+                self.b += [self.regions.b(self.t)] * made
+                self.i, self.t, self.steps = i + made, (i + made) * dt, self.steps + made * self.substeps
+                return len(self.rows) >= CHUNK
+        return super().advance()
+
+    def _leap(self, h: float) -> None:
+        _once(*self._given(), h, self.y, self.work)
+        self._take()
+
+
 class Suspicious(Exception):
     """A run to be made again, and watched."""
 
@@ -297,14 +340,15 @@ def _lines(signal: Any) -> np.ndarray:
 
 
 @functools.cache
-def warm() -> None:
+def warm(accurate: bool) -> None:
     """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
     try:
         for damping in (None, slab(1.0, 0.0, 1.0)):
-            Native(Scenario(clay=damping, t_max=1e-2), 1).go(None)
+            s = Scenario(clay=damping, t_max=1e-2, integrator="accurate" if accurate else "fast")
+            (March if accurate else Native)(s, 1).go(None)
     finally:
         if before is not None:
             signal.signal(signal.SIGINT, before)

@@ -94,8 +94,7 @@ class RungeKutta(Run):
             self.rates[0], self.rates[1] = before[1]
             for i, x in enumerate(before[2]):
                 self.act[i] = x
-            self.model.opt.timestep, self.data.time = h, self.t
-            mujoco.mj_step(self.model, self.data)
+            self._leap(h)
             self.steps += 1
             return self.position(self.angles, self.rates, 0.0)
 
@@ -124,6 +123,11 @@ class RungeKutta(Run):
             self.finish("finished")
             return True
         return False
+
+    def _leap(self, h: float) -> None:
+        """One step of h [s] from the state that the engine holds."""
+        self.model.opt.timestep, self.data.time = h, self.t
+        mujoco.mj_step(self.model, self.data)
 
     def _keep(self) -> None:
         command, _, sample = self._derivative(self.t)

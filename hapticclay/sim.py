@@ -17,6 +17,7 @@ from .rungekutta import RungeKutta
 from .sampled import Sampled
 
 ENGINES = ("auto", "python", "native")
+STAGES = 15  # steps of the fast run that one of the accurate run costs
 NATIVE_FROM = 300_000  # steps from which loading the compiled loop (a second, once per process) pays
 
 
@@ -33,7 +34,7 @@ def simulate(
         scenario: what to run.
         every: keep each every-th sample, and the last.
         engine: "python", "native" (compiled, needs hapticclay[fast]; what it cannot do, Python does, and says so) or
-            "auto": native where it is installed and the run may take 300000 steps or more.
+            "auto": native where it is installed and the run may take 300000 steps or more (20000 of "accurate").
         progress: called now and then with (simulated time [s], handle x [m]).
 
     Returns:
@@ -57,9 +58,9 @@ def simulate(
 
 def _kind(scenario: Scenario, engine: str) -> type[Run]:
     """What runs this scenario."""
-    if not fits(scenario):
+    if not fits(scenario) and not marches(scenario):
         if engine == "native":
-            print("hapticclay: native runs neither sampled control nor 'accurate'; Python does", file=sys.stderr)
+            print(f"hapticclay: native runs no {_beyond(scenario)}; Python does", file=sys.stderr)
         if scenario.interface:
             from .wired import Wired  # only a run with hardware pays for it
 
@@ -67,18 +68,30 @@ def _kind(scenario: Scenario, engine: str) -> type[Run]:
         return Sampled if scenario.control == "sampled" else RungeKutta
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
-    if engine == "native" or (engine == "auto" and scenario.t_max / scenario.dt >= NATIVE_FROM and has_numba()):
-        native = compiled()
-        return native.Native if native else Leapfrog
-    return Leapfrog
+    accurate = marches(scenario)
+    work = scenario.t_max / scenario.dt * (STAGES if accurate else 1)
+    compile_it = engine == "native" or (engine == "auto" and work >= NATIVE_FROM and has_numba())
+    native = compiled(accurate) if compile_it else None
+    if accurate:
+        return native.March if native else RungeKutta
+    return native.Native if native else Leapfrog
 
 
-def compiled() -> Any:
-    """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails."""
+def _beyond(scenario: Scenario) -> str:
+    """What native cannot do of this scenario."""
+    return "sampled control" if scenario.control == "sampled" else "'accurate' run that is driven or whose clay grows"
+
+
+def compiled(accurate: bool = False) -> Any:
+    """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails.
+
+    Args:
+        accurate: whether for an accurate run.
+    """
     try:
         from . import native
 
-        native.warm()
+        native.warm(accurate)
         return native
     except (ImportError, OSError, StopIteration, AttributeError) as error:  # of numba, or the engine's library
         print(f"hapticclay: Python runs what native cannot: {error or type(error).__name__}", file=sys.stderr)
@@ -86,8 +99,16 @@ def compiled() -> Any:
 
 
 def fits(scenario: Scenario) -> bool:
-    """Whether native can run this: continuous control, the fast integrator."""
+    """Whether native's leapfrog can run this: continuous control, the fast integrator."""
     return scenario.control == "continuous" and scenario.integrator == "fast"
+
+
+def marches(scenario: Scenario) -> bool:
+    """Whether native can run this accurately: nothing in it may change with time."""
+    clay = scenario.clay
+    grows = clay is not None and any((*(clay.x.growth or ()), *(clay.y.growth or ())))
+    driven = scenario.muscle is not None or scenario.command is not None
+    return scenario.control == "continuous" and scenario.integrator == "accurate" and not (grows or driven)
 
 
 NUMBA = "needs numba: pip install hapticclay[fast]"

@@ -64,6 +64,45 @@ def test_native_is_python_within_rounding(name):
         assert native.energy[key] == pytest.approx(value, rel=0.0, abs=1e-12 * python.energy["throughput"])
 
 
+STILL = {
+    "cut": hc.constant_cut(),
+    "shaping, Th": hc.constant_cut(impedance=True, shaping=True, force=(2.0, 0.0), t_max=3.0),
+    "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
+    "stiff: substeps": hc.constant_cut(b=2e4, t_max=0.8),
+    "free, not on the grid": hc.free(t_max=0.9007),
+    **{name: MORE[name] for name in ("layers", "at speed", "backwards", "diverged", "stretched", "one short step")},
+}
+
+
+@fast
+@pytest.mark.parametrize("name", STILL)
+def test_accurate_native_is_accurate_python_within_rounding(name):
+    """The engine adds up the stages itself in Python's run: roundings differ, over thousands of steps."""
+    s = dataclasses.replace(STILL[name], integrator="accurate", dt=2e-3)
+    python, native = (hc.simulate(s, engine=engine) for engine in ("python", "native"))
+    assert native.outcome.code == python.outcome.code and native.steps == python.steps
+    assert native.outcome.time == pytest.approx(python.outcome.time, rel=0.0, abs=1e-11)
+    for a, b in zip(native.crossings, python.crossings, strict=True):
+        assert (a.axis, a.border) == (b.axis, b.border)
+        assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=1e-11)
+    for field in FIELDS:
+        x, y = getattr(native, field), getattr(python, field)
+        np.testing.assert_allclose(x, y, rtol=0.0, atol=1e-10 * max(1.0, np.abs(y).max()), err_msg=field)
+    for key, value in python.energy.items():
+        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=1e-11 * python.energy["throughput"])
+
+
+@fast
+def test_accurate_native_leaves_the_engine_without_callback_and_needs_none():
+    import mujoco
+
+    seen = []
+    s = hc.constant_cut(integrator="accurate", dt=2e-3, t_max=2.0)
+    hc.simulate(s, engine="native", progress=lambda t, x: seen.append(mujoco.get_mjcb_control()))
+    assert seen and seen == [None] * len(seen)
+    same(hc.simulate_batch([s])[0], hc.simulate(s, engine="native"))
+
+
 @fast
 def test_every_and_progress():
     s = hc.constant_cut(t_max=2.0)
@@ -108,6 +147,7 @@ def test_a_run_that_diverges_changes_no_other():
 @fast
 def test_what_native_cannot_run_python_does(capsys):
     scenes = [hc.constant_cut(t_max=0.05, **kw) for kw in (dict(control="sampled"), dict(integrator="accurate"))]
+    scenes[1] = dataclasses.replace(scenes[1], muscle=WAVE)
     mixed = hc.simulate_batch([*scenes, CASES["plain"]])
     assert capsys.readouterr().err == ""
     for s, r in zip(scenes, mixed, strict=False):
