@@ -127,10 +127,11 @@ def draw(data: dict[str, Any], out: Path) -> None:
 
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     ax = figure.add_subplot()
-    many = [1, *(r["workers"] for r in data["projection"])]
+    full = data["asked_s"] / data["task_s"]  # workers that the scheduler keeps busy
+    many = sorted([1.0, full, *(r["workers"] for r in data["projection"])])
     ax.plot(many, many, color="0.7", lw=1.0, label="ideal")
-    bound = [1.0, *(r["speedup"] for r in data["projection"])]
-    ax.plot(many, bound, "--", color="#D55E00", label=f"bound by the scheduler, chunks of {ASKED:.0f} s: projected")
+    label = f"bound by the scheduler, chunks of {data['asked_s']:.0f} s: projected"
+    ax.plot(many, [min(n, full) for n in many], "--", color="#D55E00", label=label)
     ax.plot([r["workers"] for r in data["rows"]], [r["speedup"] for r in data["rows"]], "o", color="#0072B2",
             label="measured")  # fmt: skip
     ax.set(xscale="log", yscale="log", xlabel="workers [1]", ylabel="speed-up over one worker [1]")
