@@ -197,15 +197,8 @@ def parse_grid(text: str) -> dict[str, Range]:
     Raises:
         ParameterError: a word is not name=range, or a name stands twice.
     """
-    out: dict[str, Range] = {}
-    for word in text.split():
-        name, equals, values = word.partition("=")
-        if not equals or not name or name in out:
-            raise ParameterError(
-                "grid", word, "must be name=low:high:n, name=low:high:nlog or name=a,b,c, each name once"
-            )
-        out[name] = Range.parse(name, values)
-    return out
+    how = "must be name=low:high:n, name=low:high:nlog or name=a,b,c, each name once"
+    return {name: Range.parse(name, values) for name, values in _words("grid", text, how).items()}
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
@@ -214,12 +207,17 @@ def parse_fixed(text: str) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    out: dict[str, Any] = {}
+    return {name: _value(value) for name, value in _words("fixed", text, "must be name=value, each name once").items()}
+
+
+def _words(field: str, text: str, how: str) -> dict[str, str]:
+    """Words name=value, apart; how they must look."""
+    out: dict[str, str] = {}
     for word in text.split():
         name, equals, value = word.partition("=")
         if not equals or not name or name in out:
-            raise ParameterError("fixed", word, "must be name=value, each name once")
-        out[name] = _value(value)
+            raise ParameterError(field, word, how)
+        out[name] = value
     return out
 
 
