@@ -11,7 +11,7 @@ import numpy as np
 
 from . import arm, loop
 from .run import TOUCH
-from .stride import call, load, store
+from .stride import call, drive, load, store
 
 STATES = 17  # q, q', then the states of loop.derivative and the works
 ROW = 12  # floats of a row, as Run.judge takes them
@@ -45,13 +45,7 @@ def slope(c, b, uh, dampers, engine, y, dy):
     store(engine.q + 8, y[1])
     store(engine.w, y[2])
     store(engine.w + 8, y[3])
-    store(engine.ctrl, command[0])
-    store(engine.ctrl + 8, command[1])
-    if dampers:
-        store(engine.ctrl + 16, b[0])
-        store(engine.ctrl + 24, b[1])
-    store(engine.push, command[2])
-    store(engine.push + 8, command[3])
+    drive(engine, dampers, (command[0], command[1], b[0], b[1], command[2], command[3]))
     call(engine.forward, engine.model, engine.data)
     dy[0], dy[1] = y[2], y[3]
     dy[2], dy[3] = load(engine.acceleration), load(engine.acceleration + 8)

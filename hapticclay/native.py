@@ -36,9 +36,9 @@ FLAT = (  # laws that are compiled with their own laws written into them
     stride.around, stride.enter, stride.place,
 )  # fmt: skip
 PLAIN = (
-    march.leap, march.slope,
-    run.aim, run.root, signals.line, stride.heading, stride.kick, stride.land, stride.mean, stride.miss, stride.move,
-    stride.note, stride.side, stride.stride, stride.write,
+    march.leap, march.slope, run.aim, run.root, signals.line,
+    stride.drive, stride.heading, stride.kick, stride.land, stride.mean, stride.miss, stride.move, stride.note,
+    stride.side, stride.stride, stride.write,
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}

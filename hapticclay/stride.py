@@ -196,11 +196,8 @@ def enter(work, g, H, k, sample, command, out, w1, w2):
         work[j] += done[j]
 
 
-def move(engine, dampers, whole, dt, after, command, w1, w2, out):
-    """Steps the engine by after; where that is not the length of the kick, the kick goes in whole."""
-    if not whole:
-        command = loop.entire(w1, w2, out[2], out[3], command[0], command[1], after)
-        store(engine.timestep, after)
+def drive(engine, dampers, command):
+    """Gives the engine a command as of loop.tick; dampers: whether it has clay."""
     store(engine.ctrl, command[0])
     store(engine.ctrl + 8, command[1])
     if dampers:
@@ -208,6 +205,14 @@ def move(engine, dampers, whole, dt, after, command, w1, w2, out):
         store(engine.ctrl + 24, command[3])
     store(engine.push, command[4])
     store(engine.push + 8, command[5])
+
+
+def move(engine, dampers, whole, dt, after, command, w1, w2, out):
+    """Steps the engine by after; where that is not the length of the kick, the kick goes in whole."""
+    if not whole:
+        command = loop.entire(w1, w2, out[2], out[3], command[0], command[1], after)
+        store(engine.timestep, after)
+    drive(engine, dampers, command)
     call(engine.step, engine.model, engine.data)
     if not whole:
         store(engine.timestep, dt)

@@ -48,20 +48,24 @@ def same(a, b):
     assert a.outcome == b.outcome and a.crossings == b.crossings and a.steps == b.steps and a.energy == b.energy
 
 
+def close(native, python, times, samples, energy):
+    for a, b in zip(native.crossings, python.crossings, strict=True):
+        assert (a.axis, a.border) == (b.axis, b.border)
+        assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=times)
+    for field in FIELDS:
+        x, y = getattr(native, field), getattr(python, field)
+        np.testing.assert_allclose(x, y, rtol=0.0, atol=samples * max(1.0, np.abs(y).max()), err_msg=field)
+    for key, value in python.energy.items():
+        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=energy * python.energy["throughput"])
+
+
 @fast
 @pytest.mark.parametrize("name", ALL)
 def test_native_is_python_within_rounding(name):
     """The same operations in the same order: equal but for sums of sines, which NumPy adds up pairwise."""
     python, native = (hc.simulate(ALL[name], engine=engine) for engine in ("python", "native"))
     assert native.outcome == python.outcome and native.steps == python.steps
-    for a, b in zip(native.crossings, python.crossings, strict=True):
-        assert (a.axis, a.border) == (b.axis, b.border)
-        assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=1e-12)
-    for field in FIELDS:
-        x, y = getattr(native, field), getattr(python, field)
-        np.testing.assert_allclose(x, y, rtol=0.0, atol=1e-12 * max(1.0, np.abs(y).max()), err_msg=field)
-    for key, value in python.energy.items():
-        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=1e-12 * python.energy["throughput"])
+    close(native, python, times=1e-12, samples=1e-12, energy=1e-12)
 
 
 STILL = {
@@ -82,14 +86,7 @@ def test_accurate_native_is_accurate_python_within_rounding(name):
     python, native = (hc.simulate(s, engine=engine) for engine in ("python", "native"))
     assert native.outcome.code == python.outcome.code and native.steps == python.steps
     assert native.outcome.time == pytest.approx(python.outcome.time, rel=0.0, abs=1e-11)
-    for a, b in zip(native.crossings, python.crossings, strict=True):
-        assert (a.axis, a.border) == (b.axis, b.border)
-        assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=1e-11)
-    for field in FIELDS:
-        x, y = getattr(native, field), getattr(python, field)
-        np.testing.assert_allclose(x, y, rtol=0.0, atol=1e-10 * max(1.0, np.abs(y).max()), err_msg=field)
-    for key, value in python.energy.items():
-        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=1e-11 * python.energy["throughput"])
+    close(native, python, times=1e-11, samples=1e-10, energy=1e-11)
 
 
 @fast
