@@ -1,4 +1,5 @@
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -7,6 +8,8 @@ from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))  # oracles
 os.environ.setdefault("MPLBACKEND", "agg")
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a script's background job, whose children Ctrl-C would not reach
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing
 settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)
