@@ -8,7 +8,7 @@ from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))  # oracles
 os.environ.setdefault("MPLBACKEND", "agg")
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a script's background job, whose children Ctrl-C would not reach
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's, and then its children's
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing

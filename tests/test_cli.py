@@ -1,11 +1,13 @@
 """The command line as a newcomer would use it."""
 
+import contextlib
 import json
 import os
+import pty
 import signal
 import subprocess
 import sys
-import time
+import termios
 
 import pytest
 
@@ -99,15 +101,21 @@ def test_module_entry_point_runs_without_a_display(tmp_path):
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path):
-    p = subprocess.Popen(
+    terminal, end = pty.openpty()
+    termios.tcsetwinsize(end, (24, 80))
+    with open(terminal, "rb", buffering=0) as screen, subprocess.Popen(
         [sys.executable, "-m", "hapticclay", "run", "constant", "--dt", "1e-6", "--out", "o"],
-        cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    time.sleep(4.0)
-    p.send_signal(signal.SIGINT)
-    out, err = p.communicate(timeout=60)
-    assert p.returncode == 130, (out, err)
-    assert err.strip().splitlines()[-1].strip() == "hapticclay: interrupted"
+        cwd=tmp_path, stderr=end, stdout=subprocess.DEVNULL,
+    ) as p:  # fmt: skip
+        os.close(end)
+        assert b"constant" in screen.read(1000)  # the bar is there, so it runs
+        p.send_signal(signal.SIGINT)
+        said = b""
+        with contextlib.suppress(OSError):  # the end of a terminal
+            while True:
+                said += screen.read(1000)
+    assert p.returncode == 130
+    assert said.decode().split("\r")[-2:] == ["hapticclay: interrupted", "\n"]
     assert os.listdir(tmp_path) == []
 
 
