@@ -180,17 +180,42 @@ def memory() -> float | str:
 
 
 def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
-    """Time a run, against the floor beside it, from the smallest batch to the largest."""
+    """Time a run, from the smallest batch to the largest, against the floor, which its threads take turns with."""
+    from hapticclay import native
+
+    class Turns(native.Pool):
+        """Each thread steps the bare engine after every so many runs."""
+
+        each = 100
+
+        def brief(self, scenario: hc.Scenario) -> tuple[Any, ...]:
+            n = getattr(self.own, "n", 0)
+            if n % self.each == 0:
+                begin = time.thread_time()
+                if n:
+                    ran.append(begin - self.own.since)
+                bare.append(floor(scenario, 2000, time.thread_time))
+                self.own.since = time.thread_time()
+                aside.append(self.own.since - begin)
+            self.own.n = n + 1
+            return super().brief(scenario)
+
     rows: list[dict[str, Any]] = []
+    usual = native.Pool
     for n in sizes:
+        ran: list[float] = []  # processor seconds, of so many runs each time
+        bare: list[float] = []  # of a step
+        aside: list[float] = []  # of the turns of the floor
         todo = jobs(n, steps)
-        bare = floor_on_all_cores(todo[0], 100_000)
-        took = timed(hc.simulate_batch, todo, keep="summaries")
-        bare = 0.5 * (bare + floor_on_all_cores(todo[0], 100_000))
-        ratio = took / (n * steps * bare)
-        peak = memory()
-        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * took[0] / n, "over_floor": ratio[0],
-                     "over_floor_cpu": ratio[1], "peak_MiB": peak})  # fmt: skip
+        native.Pool = Turns
+        try:
+            wall = float(timed(hc.simulate_batch, todo, keep="summaries")[0])
+        finally:
+            native.Pool = usual
+        a_run = statistics.mean(ran) / Turns.each
+        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * (wall - sum(aside) / CORES) / n,
+                     "us_a_run_cpu": 1e6 * a_run, "over_floor": a_run / steps / statistics.mean(bare),
+                     "peak_MiB": memory()})  # fmt: skip
     return rows
 
 
@@ -213,7 +238,8 @@ TITLES = {
     "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same "
     "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
     "batch": "Batches over the floor on all cores: wall time, and processor time (others disturb it less).",
-    "linearity": "Time a run, from a small batch to a large one, and the most memory the process has taken so far.",
+    "linearity": "Time a run, from a small batch to a large one: wall time over all cores; processor time, and "
+    "that over the floor, which the threads of the batch take turns with; the most memory the process has taken so far.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
