@@ -239,7 +239,7 @@ TITLES = {
     "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
     "batch": "Batches over the floor on all cores: wall time, and processor time (others disturb it less).",
     "linearity": "Time a run, from a small batch to a large one: wall time over all cores; processor time, and "
-    "that over the floor, which the threads of the batch take turns with; the most memory the process has taken so far.",
+    "that over the floor, which the threads of the batch take turns with; the most memory taken so far.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
