@@ -33,6 +33,7 @@ import hapticclay as hc  # noqa: E402
 from hapticclay import leapfrog, sim  # noqa: E402
 
 LONG = 5555  # steps of 2 s, as the runs of the map
+OFTEN = 5  # compiled runs to one in Python, which takes as long
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
@@ -83,16 +84,20 @@ def timed(function, *args, **kw) -> np.ndarray:
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
-    """The compiled run over the floor: one of a batch of summaries; alone, from call to return, all samples recorded.
+    """The compiled run over the floor just before and after it: one of a batch of summaries; alone, from call to
+    return, all samples recorded.
 
     In processor time, which others on the machine disturb less.
     """
     from hapticclay.native import Pool
 
+    def bare() -> float:
+        return steps * floor(scenario, steps, time.process_time)
+
     s, pool = lasting(scenario, steps), Pool(1)
-    bare = steps * floor(scenario, steps, time.process_time)
-    short = timed(pool.brief, s)[1]
-    return short / bare, timed(hc.simulate, s, engine="native")[1] / bare
+    first, short, then = bare(), timed(pool.brief, s)[1], bare()
+    whole = timed(hc.simulate, s, engine="native")[1]
+    return short / (0.5 * (first + then)), whole / (0.5 * (then + bare()))
 
 
 def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
@@ -101,8 +106,8 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     for name, scenario in SCENES.items():
         times = []
         for _ in range(rounds):
-            one = floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)
-            times.append((*one, *(native(scenario, steps) if sim.has_numba() else ())))
+            times.append((floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)))
+        compiled = [native(scenario, steps) for _ in range(OFTEN * rounds)] if sim.has_numba() else []
         rows.append(
             {
                 "scene": name,
@@ -112,9 +117,8 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
                 "ratio_not_inlined": statistics.median(t[2] / t[0] for t in times),
             }
         )
-        for i, what in enumerate(("native", "native_recorded"), 3):
-            if len(times[0]) > i:
-                rows[-1][what] = statistics.median(t[i] for t in times)
+        for what, ratios in zip(("native", "native_recorded"), zip(*compiled, strict=True), strict=False):
+            rows[-1][what] = statistics.median(ratios)
     return rows
 
 
