@@ -161,7 +161,7 @@ class Native(Run):
 
     Args:
         bench: engines to use; None for its own.
-        quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look closer.
+        quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look.
     """
 
     def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
@@ -184,6 +184,7 @@ class Native(Run):
         w1, w2 = self.data.qvel
         self.first = energy.stored(th, w1, w1 + w2, s.start, s.velocity)
         self.quiet = quiet
+        self.calm = s.stop and (quiet or every == 1)  # so far; later `look` may want all rows once more
         self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
 
     def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -206,24 +207,37 @@ class Native(Run):
     def flush(self) -> None:
         n, self.filled = self.filled, 0
         if self.quiet:
-            return self._glance(n)
+            if not n or not self._still_calm(n):
+                raise Suspicious
+            if self.outcome is not None:
+                self.outcome = self.watch.end(self.outcome)
+                self.end = self.rows[n - 1, 2:].tolist()
+            self.looked += n
+            return
         rows = self.rows[:n].T.copy()
         good = self.judge(rows[:12], lambda: rows[12:])
         if self.outcome is not None and self.end_time is None:  # the ledger ends with the good rows
             self.now[:], self.data.qpos[:], self.data.qvel[:] = self.before
             _stride(*self.given, CHUNK - 1, good)
-        return None
 
-    def _glance(self, n: int) -> None:
-        """Makes sure that nothing is amiss."""
-        if not n or not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
-            raise Suspicious
+    def look(self, rows: np.ndarray) -> tuple[int, record.Outcome | None]:
+        """As Run.look, which sees the rows of a calm run only once that has ceased to be calm."""
+        if self.calm:
+            if self._still_calm(rows.shape[1]):
+                return rows.shape[1], None
+            self.calm = False
+            for index, earlier, _ in self.kept:
+                self.watch.look(earlier, int(index[0]))
+        return super().look(rows)
+
+    def _still_calm(self, n: int) -> bool:
+        """Whether n more rows hold nothing that Watch could have to say anything of but its counts, which it gets."""
+        if not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
+            return False
         if self.outcome is not None:
             watch = self.watch
             watch.seen, watch.moved, watch.unbound, watch.often = self.seen.tolist()
-            self.outcome = watch.end(self.outcome)
-            self.end = self.rows[n - 1, 2:].tolist()
-        self.looked += n
+        return True
 
     def brief(self) -> tuple[Any, ...]:
         """What batch.entry takes."""

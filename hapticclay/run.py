@@ -129,13 +129,17 @@ class Run:
         self.end_time = self.t
         self.outcome = record.Outcome(code, self.t, self.i)
 
+    def look(self, rows: np.ndarray) -> tuple[int, record.Outcome | None]:
+        """outcome.Watch.look at the next rows."""
+        return self.watch.look(rows, self.looked)
+
     def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
         """Takes samples into the record, up to where the run ceases to be one; returns how many.
 
         Args:
             rows: (q, p, v, fh, tau, delta), shape (12, n). b: gives the clay at each, shape (2, n).
         """
-        good, found = self.watch.look(rows, self.looked)
+        good, found = self.look(rows)
         if found is not None:
             self.outcome, self.end_time = found, None
             self.crossings = [c for c in self.crossings if c.time <= found.time]

@@ -101,6 +101,24 @@ def test_accurate_native_leaves_the_engine_without_callback_and_needs_none():
 
 
 @fast
+def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
+    from hapticclay import native
+
+    s = hc.constant_cut(gain=(4.2, 0.2), shaping=True, impedance=True, start=(0.05, 0.0), force=(0.5, 0.0))
+    late, watched = native.Native(s, 1), native.Native(s, 1)
+    watched.calm = False
+    for run in (late, watched):
+        run.go(None)
+    assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
+    same(late.result(0.0), watched.result(0.0))
+    assert late.watch.seen == watched.watch.seen >= late.looked
+    calm = native.Native(hc.constant_cut(), 1)
+    calm.watch.look = None  # is not called
+    calm.go(None)
+    same(calm.result(0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
+
+
+@fast
 def test_every_and_progress():
     s = hc.constant_cut(t_max=2.0)
     seen = []
