@@ -13,6 +13,7 @@ import functools
 import hashlib
 import os
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -42,6 +43,7 @@ PLAIN = (
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
+NOTICE = "hapticclay: compiling, this once"
 ROOM = 64  # crossings between two looks at them
 
 
@@ -356,6 +358,9 @@ def _lines(signal: Any) -> np.ndarray:
 @functools.cache
 def warm(accurate: bool) -> None:
     """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
+    entry = "march.march" if accurate else "native._whole"
+    told = NOTICE if sys.stderr and sys.stderr.isatty() and not any(folder().rglob(f"{entry}-*.nbi")) else ""
+    print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
@@ -364,6 +369,7 @@ def warm(accurate: bool) -> None:
             s = Scenario(clay=damping, t_max=1e-2, integrator="accurate" if accurate else "fast")
             (March if accurate else Native)(s, 1).go(None)
     finally:
+        print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
         if before is not None:
             signal.signal(signal.SIGINT, before)
     if caught:

@@ -253,18 +253,26 @@ def test_engine_hears_nothing_and_keeps_nothing():
 
 @fast
 def test_compiled_code_is_kept_on_disk(tmp_path):
-    """A second process takes it from there, in a fraction of the time."""
+    """A second process takes it from there, in a fraction of the time; who waits at a terminal is told why."""
     code = (
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
         "from hapticclay import native; print(sum(native._stride.stats.cache_hits.values()))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    took = []
+    took, said = [], []
     for hits in (0, 1):
-        out = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+        terminal, end = os.openpty()
+        out = subprocess.run([sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=end, check=True)
+        os.write(end, b".")  # a terminal without a word holds its reader up
+        said.append(b"")
+        while not said[-1].endswith(b"."):
+            said[-1] += os.read(terminal, 1000)
+        os.close(terminal)
+        os.close(end)
         took.append(float(out.stdout.split()[0]))
-        assert out.stdout.split()[1] == str(hits)
+        assert out.stdout.split()[1] == str(hits).encode()
+    assert said[0].startswith(b"hapticclay: compiling, this once\r") and said[0].endswith(b"\r.") and said[1] == b"."
     assert took[1] < 0.5 * took[0]
 
 
