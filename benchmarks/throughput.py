@@ -15,7 +15,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -122,19 +121,6 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     return rows
 
 
-def floor_on_all_cores(scenario: hc.Scenario, steps: int) -> np.ndarray:
-    """`timed` a step, of the engine alone, so many steps of it shared out over all cores at once."""
-    crew = [threading.Thread(target=floor, args=(scenario, steps // CORES)) for _ in range(CORES)]
-
-    def go():
-        for thread in crew:
-            thread.start()
-        for thread in crew:
-            thread.join()
-
-    return timed(go) / (steps // CORES * CORES)
-
-
 def jobs(n: int, steps: int) -> list[hc.Scenario]:
     """Runs that differ in clay, gain and start, and cross a border."""
     rng = np.random.default_rng(n)
@@ -143,20 +129,51 @@ def jobs(n: int, steps: int) -> list[hc.Scenario]:
     return [lasting(s, steps) for s in cuts]
 
 
+def both() -> np.ndarray:
+    """The time, and the processor time of this thread [s]."""
+    return np.array((time.perf_counter(), time.thread_time()))
+
+
+def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tuple[np.ndarray, np.ndarray]:
+    """A batch whose threads take turns with the floor, so that a drift of the machine moves both.
+
+    Returns:
+        (core seconds and processor seconds a run, those of a step of the bare engine on all cores at once).
+    """
+    from hapticclay import native
+
+    each = max(1, min(100, len(todo) // (8 * CORES)))
+    bare: list[Any] = []  # of a step
+    aside: list[Any] = []  # of the turns of the floor, its preparations included
+
+    class Turns(native.Pool):
+        def _go(self, *args: Any) -> Any:
+            made = self.own.__dict__.setdefault("made", 0)
+            if made % each == 0:
+                begin = both()
+                bare.append(floor(todo[0], max(500, each * steps // 5), both))
+                aside.append(both() - begin)
+            self.own.made = made + 1
+            return super()._go(*args)
+
+    usual, native.Pool = native.Pool, Turns
+    try:
+        took = timed(hc.simulate_batch, todo, keep=keep) * (CORES, 1.0)
+    finally:
+        native.Pool = usual
+    return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
+
+
 def batches(sizes: list[tuple[int, int]], rounds: int) -> list[dict[str, Any]]:
-    """Batches of n runs of so many steps over the floor on all cores, just before and after: time, processor time."""
+    """Batches of n runs of so many steps over the floor on all cores: time, processor time."""
     rows: list[dict[str, Any]] = []
     for n, steps in sizes:
-        todo, ratios = jobs(n, steps), {}
-        for _ in range(rounds if n < 10_000 else 1):
-            for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
-                bare = floor_on_all_cores(todo[0], min(n, 256) * steps)
-                took = timed(hc.simulate_batch, todo, keep=keep) / (n * steps)
-                bare = 0.5 * (bare + floor_on_all_cores(todo[0], min(n, 256) * steps))
-                ratios.setdefault(keep, []).append(took / bare)
+        todo = jobs(n, steps)
         row: dict[str, Any] = {"runs": n, "steps": steps}
-        for keep, x in ratios.items():
-            row[keep], row[f"{keep}_cpu"] = np.median(x, axis=0).tolist()
+        for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
+            made = (beside(todo, steps, keep) for _ in range(rounds if n < 10_000 else 1))
+            ratios = [run / (steps * bare) for run, bare in made]
+            row[keep], row[f"{keep}_cpu"] = np.median(ratios, axis=0).tolist()
         rows.append(row)
     return rows
 
@@ -184,44 +201,14 @@ def memory() -> float | str:
 
 
 def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
-    """Time a run, from the smallest batch to the largest, against the floor, which its threads take turns with."""
-    from hapticclay import native
-
-    class Turns(native.Pool):
-        """Each thread steps the bare engine after every so many runs."""
-
-        each = 100
-
-        def brief(self, scenario: hc.Scenario) -> tuple[Any, ...]:
-            n = getattr(self.own, "n", 0)
-            if n % self.each == 0:
-                begin = time.thread_time()
-                if n:
-                    ran.append(begin - self.own.since)
-                bare.append(floor(scenario, 2000, time.thread_time))
-                self.own.since = time.thread_time()
-                aside.append(self.own.since - begin)
-            self.own.n = n + 1
-            return super().brief(scenario)
-
+    """Time a run, from the smallest batch to the largest; a small one is made often, as it is soon over."""
     rows: list[dict[str, Any]] = []
-    usual = native.Pool
     for n in sizes:
-        ran: list[float] = []  # processor seconds, of so many runs each time
-        bare: list[float] = []  # of a step
-        aside: list[float] = []  # of the turns of the floor
-        todo, wall = jobs(n, steps), 0.0
-        batches = max(1, 10_000 // n)  # the smallest would measure one moment of the machine
-        native.Pool = Turns
-        try:
-            for _ in range(batches):
-                wall += float(timed(hc.simulate_batch, todo, keep="summaries")[0])
-        finally:
-            native.Pool = usual
-        a_run = statistics.mean(ran) / Turns.each
-        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * (wall - sum(aside) / CORES) / (n * batches),
-                     "us_a_run_cpu": 1e6 * a_run, "over_floor": a_run / steps / statistics.mean(bare),
-                     "peak_MiB": memory()})  # fmt: skip
+        todo = jobs(n, steps)
+        run, bare = np.mean([beside(todo, steps) for _ in range(max(1, 20_000 // n))], axis=0)
+        over, over_cpu = (run / (steps * bare)).tolist()
+        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * float(run[0]) / CORES, "over_floor": over,
+                     "over_floor_cpu": over_cpu, "peak_MiB": memory()})  # fmt: skip
     return rows
 
 
@@ -243,9 +230,9 @@ TITLES = {
     "first_call": "The first native call of a process, import of numba included, in processor seconds.",
     "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same "
     "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
-    "batch": "Batches over the floor on all cores: wall time, and processor time (others disturb it less).",
-    "linearity": "Time a run, from a small batch to a large one: wall time over all cores; processor time, and "
-    "that over the floor, which the threads of the batch take turns with; the most memory taken so far.",
+    "batch": "Batches over the floor on all cores, with which their threads take turns: time, and processor time.",
+    "linearity": "Time a run, from a small batch to a large one, over the floor in the same way; the most memory the "
+    "process has taken so far.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
