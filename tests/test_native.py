@@ -278,7 +278,7 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
 
 @fast
 def test_native_is_faster():
-    """A guard, not the measurement: benchmarks/throughput.py measures 2.4."""
+    """A guard, not the measurement, which is in docs/bench."""
     s = hc.constant_cut(start=(0.06, 0.0), t_max=3.0)
     hc.simulate(s, engine="native")
     ratio = []
