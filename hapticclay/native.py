@@ -186,7 +186,7 @@ class Native(Run):
         w1, w2 = self.data.qvel
         self.first = energy.stored(th, w1, w1 + w2, s.start, s.velocity)
         self.quiet = quiet
-        self.calm = s.stop and (quiet or every == 1)  # so far; later `look` may want all rows once more
+        self.calm = s.stop and every == 1  # so far; later `look` may want all rows once more
         self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
 
     def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
