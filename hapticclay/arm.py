@@ -70,6 +70,15 @@ def torques(fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
     return u1x * fx + u1y * fy + t2, t2
 
 
+def acceleration(
+    a1: float, a2: float, fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
+) -> tuple[float, float]:
+    """Acceleration of a handle that all but rests [m/s^2]: of links a1, a2 [rad/s^2], and of a force on it [N]."""
+    ax, ay = along(a1, a2, u1x, u1y, u2x, u2y)
+    wxx, wxy, wyy = mobility(u1x, u1y, u2x, u2y)
+    return ax + wxx * fx + wxy * fy, ay + wxy * fx + wyy * fy
+
+
 def rates(vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float) -> tuple[float, float]:
     """Absolute link rates that move the handle with (vx, vy), divided by n.
 

@@ -10,28 +10,58 @@ import numpy as np
 from .params import AXES, B_MAX, Clay, Profile
 
 
-def kick(b0: tuple[float, float], b1: tuple[float, float], H: float, L: float, R: float, w: float) -> tuple[float, ...]:
+def kick(b0, b1, H, L, R, w, damper):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
-    Each side of the sample keeps its own part of the kick: Crank-Nicolson, second order, and across a
-    border an impulse of exactly b times the distance travelled inside. Where the part before would
-    overshoot, L b H w > 1, the excess acts on the velocity after: the least implicit split without
-    overshoot, so that no stiffness rings. One share serves both axes, which keeps the energy that the
-    clay takes positive however the axes are coupled.
+    A step gives half of its clay to the kick before it and half to the one after: Crank-Nicolson, second order.
+    Where the half that acts on the velocity before would overshoot, b h w > 2, it is cut to what just stops the
+    handle, and the kick before the step gets the rest. Both together are b h in any case, so the impulse of a step
+    is exactly b times its distance. What the uneven split does to a slow motion, `slow_force` takes back.
 
     Args:
         b0, b1: damping before and after the sample on each axis [N.s/m].
         H: length of the kick [s]. L, R: its shares before and after the sample.
         w: largest acceleration per unit of force over all directions [1/kg].
+        damper: of the operator's arm, which resists beside the clay [N.s/m].
 
     Returns:
-        (before x, after x, before y, after y [N.s/m], felt [1]): fe = before v- + after v+, and the
-        velocity that the clay feels at the sample is v- + felt (v+ - v-).
+        (before x, after x, before y, after y [N.s/m]; stiff; share x, y; softness x, y [m/(N.s)]):
+        fe = before v- + after v+, in stiff clay less share times slow_force, which the next kick gets back.
+        stiff: 1.0 where any of this is so, else 0.0. softness: 1/b where both steps are stiff, else 0.0.
     """
-    z = L * max(b0) * H * w
-    share = 1.0 / z if z > 1.0 else 1.0
-    x, y = share * L * b0[0], share * L * b0[1]
-    return x, L * b0[0] - x + R * b1[0], y, L * b0[1] - y + R * b1[1], 1.0 - share * (1.0 - L)
+    most = 1.0 / (H * w)
+    x0, y0 = L * b0[0], L * b0[1]
+    x1, y1 = R * b1[0], R * b1[1]
+    stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
+    if x0 > most or y0 > most or x1 > most or y1 > most:
+        stiff = 1.0
+        if x1 > most:
+            sharex = (x1 - most) / (b1[0] + damper)
+            softx = 1.0 / b1[0] if x0 > most else 0.0
+            x1 += x1 - most
+        if y1 > most:
+            sharey = (y1 - most) / (b1[1] + damper)
+            softy = 1.0 / b1[1] if y0 > most else 0.0
+            y1 += y1 - most
+        x0, y0 = min(x0, most), min(y0, most)
+    return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
+
+
+def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):
+    """Force of stiff clay on a handle that moves slowly through it, held up by nothing else [N].
+
+    Args:
+        gx, gy: acceleration of the handle without clay [m/s^2]. sxx, sxy, syy: acceleration per force [1/kg].
+        sharex, sharey: from `kick`: on which axes the clay is stiff. fx, fy: force of the clay where it is not [N].
+    """
+    if sharex and sharey:
+        det = sxx * syy - sxy * sxy
+        x = (syy * gx - sxy * gy) / det
+        y = (sxx * gy - sxy * gx) / det
+    else:
+        x = (gx - sxy * fy) / sxx
+        y = (gy - sxy * fx) / syy
+    return x, y
 
 
 def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:
@@ -122,12 +152,13 @@ class Regions:
         table: the clay. index: of the region along x and y.
         low, high: borders of the present region on each coordinate [m].
         base, rate: the clay there is b = base + rate t on each axis [N.s/m, N.s/m per s].
-        grows: whether any region's clay grows.
+        grows: whether any region's clay grows. stiffest: largest damping of any region, before it grows [N.s/m].
     """
 
     def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
         self.table = table(clay, length)
         self.index = [bisect.bisect_right(row[1:].tolist(), x) for row, x in zip(self.table, p, strict=False)]
+        self.stiffest = float(self.table[VALUE : VALUE + 2].max())
         self.grows = bool(self.table[RATE : RATE + 2].any())
         self._settle(0.0)
 

@@ -39,18 +39,19 @@ def balance(work: Sequence[float], first: tuple[float, float], last: tuple[float
     }
 
 
-def spent(H, k, bx, by, ax, ay, t1, t2, w1, w2, damper):
+def spent(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):
     """Work done in a kick [J]: of muscle, motors, clay, hand's damper, and throughput. Floats, or arrays over kicks.
 
     Args:
-        H: length of the kick [s]. k: from loop.inputs. bx, by, ax, ay: handle velocity before and after it [m/s].
+        H: length of the kick [s]. k: from loop.inputs. restx, resty: of the clay, beside its dampers [N].
+        bx, by, ax, ay: handle velocity before and after it [m/s].
         t1, t2: motor torques [N.m]. w1, w2: mean joint rates [rad/s]. damper: of the hand [N.s/m].
     """
     vx = 0.5 * (bx + ax)
     vy = 0.5 * (by + ay)
     muscle = H * (k[5] * vx + k[6] * vy)
     motors = H * (t1 * w1 + t2 * w2)
-    clay = H * ((k[0] * bx + k[1] * ax) * vx + (k[2] * by + k[3] * ay) * vy)
+    clay = H * ((k[0] * bx + k[1] * ax + restx) * vx + (k[2] * by + k[3] * ay + resty) * vy)
     hand = H * damper * (vx * vx + vy * vy)
     return muscle, motors, clay, hand, abs(muscle) + abs(motors)
 
@@ -70,12 +71,12 @@ class Ledger:
         self.first: tuple[float, float] | None = None  # energy of arm and hand at the start
         self.last = (0.0, 0.0)
 
-    def add(self, raw: np.ndarray, k: np.ndarray, H: np.ndarray) -> None:
+    def add(self, raw: np.ndarray, k: np.ndarray, rest: np.ndarray, H: np.ndarray) -> None:
         """Enters kicks.
 
         Args:
-            raw: shape (14, n), as loop.advance keeps them. k: loop.inputs of each, (7, n) or (7, 1).
-            H: length of each kick [s], (n,) or (1,).
+            raw: shape (14, n), as loop.advance keeps them. k: loop.inputs of each, (12, n) or (12, 1).
+            rest: of the clay, beside its dampers [N], (2, n) or (2, 1). H: length of each kick [s], (n,) or (1,).
         """
         if not raw.shape[1]:
             return
@@ -86,7 +87,7 @@ class Ledger:
         columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
         r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
         around = before[0], before[1], after[0], after[1]
-        self.work += [x.sum() for x in spent(H, k, *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
+        self.work += [x.sum() for x in spent(H, k, rest[0], rest[1], *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
         if self.extra is not None:
             self._memo(H, v, r1, r2)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import itertools
 import math
 import struct
@@ -12,13 +11,16 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from . import energy, loop
+from . import arm, energy, loop
 from .clay import at
 from .inline import inline
-from .params import Scenario
-from .run import CHUNK, TOUCH, Run, root
+from .params import NO_HAND, Scenario
+from .run import CHUNK, TOUCH, Run, outlet, root, window
 
 LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
+FIRST, WIDER = 0.1, 1.03  # first step of such a hit, in decay times of the speed; each step over the one before
+INPUTS = 12  # numbers in loop.inputs
+NONE = (0.0, 0.0)
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
 
 _row = struct.Struct("14d")
@@ -34,41 +36,15 @@ def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
     return _fused[law]
 
 
-def _outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
-    """A view of the engine's memory from ctrl on, and what writes a whole command into it.
-
-    ctrl holds the motors and, where there is clay, two dampers; its first 32 bytes are its own either
-    way if the next array begins only 64 bytes on (the engine aligns arrays so). One call then does
-    for both arrays; where they lie otherwise, two calls do.
-    """
-    first, second = ctrl.ctypes.data, push.ctypes.data
-    if second - first == 64:
-        view = memoryview((ctypes.c_char * 80).from_address(first))
-        return view, struct.Struct("4d32x2d").pack_into
-
-    def write(view, offset, t1, t2, bx, by, p1, p2):
-        ctrl[:] = (t1, t2, bx, by)[: len(ctrl)]
-        push[:] = p1, p2
-
-    return memoryview(ctrl), write  # type: ignore[arg-type]
-
-
 class _Stretch(NamedTuple):
     """Rows in a row that have this in common."""
 
     n: int
     is_sample: bool  # False at a border between two samples
     b: Any  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all; of one row a tuple
-    k: Any  # loop.inputs, (7, n), (7, 1) or a tuple
+    k: Any  # loop.inputs, (INPUTS, n), (INPUTS, 1) or a tuple
     H: float  # length of the kick [s]
-
-
-def _window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
-    """A view of the engine's memory from a to b, two floats each, and what reads all four at once."""
-    first, second = a.ctypes.data, b.ctypes.data
-    gap = second - first - a.nbytes
-    view = memoryview((ctypes.c_char * (a.nbytes + gap + b.nbytes)).from_address(first))
-    return view, struct.Struct(f"2d{gap}x2d").unpack_from
+    rest: Any = NONE  # clay's force beside its dampers [N], (2, n) or a tuple
 
 
 def _spread(columns: list[Any], counts: list[int]) -> np.ndarray:
@@ -83,17 +59,21 @@ def _spread(columns: list[Any], counts: list[int]) -> np.ndarray:
     return np.concatenate(out, axis=1) if out else np.empty((2, 0))
 
 
-def _sampled(raw: np.ndarray, k: np.ndarray, scenario: Scenario) -> np.ndarray:
+def _sampled(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario) -> np.ndarray:
     """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
 
-    k is loop.inputs of each kick, shape (7, n), or (7, 1) where they are the same for all.
+    k is loop.inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) where they are the same for all; rest the clay's
+    force beside its dampers [N], (2, n) or (2, 1).
     """
     out = np.empty((12, raw.shape[1]))
     before, after = raw[4:6], raw[6:8]
     out[0:4] = raw[0:4]
     out[4:6] = before + k[4] * (after - before)
+    if k[10:12].any():  # see loop.at_sample
+        soft = k[10:12] * (k[0:4:2] * before + k[1:4:2] * after + rest)
+        out[4:6] = np.where(k[10:12] > 0.0, soft, out[4:6])
     if scenario.operator:
-        out[6:8] = raw[8:10] + k[0:4:2] * before + k[1:4:2] * after
+        out[6:8] = raw[8:10] + k[0:4:2] * before + k[1:4:2] * after + rest
     else:
         out[6:8] = k[5:7]
     out[8:12] = raw[10:14]
@@ -105,12 +85,19 @@ class Leapfrog(Run):
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
-        self.motion, self.read = _window(self.data.qpos, self.data.qvel)
-        self.drive, self.write = _outlet(self.data.ctrl, self.data.qfrc_applied)
+        self.motion, self.read = window(self.data.qpos, self.data.qvel)
+        self.drive, self.write = outlet(self.data.ctrl, self.data.qfrc_applied)
         self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
-        self.many = _written_out(loop.vary if self.varies else loop.advance, self.last)
+        self.hand = scenario.operator or NO_HAND
+        # what the steps here will need is written out before the run is timed
+        _written_out(loop.vary if self.varies else loop.advance, self.last)
+        if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
+            _written_out(loop.vary, self.last)
         self.landings = 0  # on borders since the last sample
+        self.struck = True  # the clay has just become stiffer, or the run begins in it
+        self.fine = math.inf  # longest step on the way from a hit [s]
+        self.final: Any = None  # velocity of the handle at the end [m/s]
         self.before = 0.0  # length of the step that led here [s]
         self.clay = self.regions.base, self.regions.rate  # before the sample
         self.rows = bytearray(CHUNK * loop.ROW)
@@ -137,18 +124,24 @@ class Leapfrog(Run):
                 n = min(n, max(16, int(min(0.95 * way, n))))
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
         rows = range(self.filled * loop.ROW, (self.filled + n) * loop.ROW, loop.ROW)
+        rest: list[tuple[float, float]] = []
         if self.varies:
             b, inputs, shift = self._ahead(n)
-            given: Any = (list(zip(rows, inputs, *shift, strict=True)), self.whole)
             b, k = np.array(b).T, np.array(inputs).T
         else:
             b = self.regions.b(self.t)
-            inputs = loop.inputs(b, b, self.scenario.force, dt, dt)
-            given = (rows, self.whole, inputs)
-            b, k = np.reshape(b, (2, 1)), np.reshape(inputs, (7, 1))
+            inputs = loop.inputs(b, b, self.scenario.force, dt, dt, self.hand)
+            b, k, shift = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1)), ([0.0] * n, [0.0] * n)
+        simple = not self.varies and not k[7, 0]
+        many = _written_out(loop.advance if simple else loop.vary, self.last)
+        if simple:
+            steps, given = rows, (self.whole, inputs)
+        else:
+            each = inputs if self.varies else itertools.repeat(inputs, n)
+            steps, given = list(zip(rows, each, *shift, strict=True)), (rest, self.whole)
         while True:
-            self.state = self.many(
-                given[0][:n], *given[1:], state,
+            self.state = many(
+                steps[:n], *given, state,
                 self.read, self.write, _row.pack_into, self.motion, self.drive, self.rows,
                 mujoco.mj_step, self.model, self.data,
             )  # fmt: skip
@@ -158,10 +151,11 @@ class Leapfrog(Run):
             self.angles[0], self.angles[1] = q
             self.rates[0], self.rates[1] = w
             n = good
+            rest.clear()
             if n < 1:
                 self.state = state
                 return False
-        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt))
+        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [NONE]).T))
         self.filled += n
         self.steps += n
         self.i += n
@@ -177,10 +171,10 @@ class Leapfrog(Run):
         uh = self.uh(t[:n] - 0.5 * dt, t[:n] + 0.5 * dt).tolist()
         if self.regions.grows:
             halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in now]
-            k = [loop.inputs(b0, b1, u, dt, dt) for (b0, b1), u in zip(halves, uh, strict=True)]
+            k = [loop.inputs(b0, b1, u, dt, dt, self.hand) for (b0, b1), u in zip(halves, uh, strict=True)]
         else:
-            same = loop.inputs(b[0], b[0], (0.0, 0.0), dt, dt)[:5]
-            k = [(*same, *u) for u in uh]
+            same = loop.inputs(b[0], b[0], NONE, dt, dt, self.hand)
+            k = [(*same[:5], *u, *same[7:]) for u in uh]
         return b, k, self.shift(t[:n], t[1:]).T.tolist()
 
     def _good(self, first: int, n: int) -> int:
@@ -204,8 +198,15 @@ class Leapfrog(Run):
             self.landings = 0
         q, w = tuple(self.angles), tuple(self.rates)
         crossed: dict[int, bool] = {}  # borders stepped over without a step: axis, upwards
+        after = min(after, self.fine)
         while True:
             new, command, sample, out = self._tick(q, w, after)
+            if self.struck:
+                self.struck = False
+                self.fine = self._first_of_a_hit(command)
+                if self.fine < after:
+                    after, w = self.fine, self._halve(q, w)
+                    continue
             here, there = self.position(q, out[2:], 0.0), self.position(q, out[2:], after)
             ups = {i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])}
             hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]  # no way back: a border must not hold the run
@@ -231,15 +232,49 @@ class Leapfrog(Run):
         self._engine(w, command, out, after)
         self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
-        if landing is None:
+        self.fine = self.fine * WIDER if self._limited(command) else math.inf
+        self.t += after
+        if target - self.t <= 1e-9 * self.scenario.dt:
             self._arrive(target)
-        else:
+        if landing is not None:
             self.landings += 1
-            self.t += after
-            if target - self.t <= 1e-9 * self.scenario.dt:  # the border lies at the sample itself
-                self._arrive(target)
             self._cross(*landing)
         return None
+
+    def _velocity(self, q, w, out) -> tuple[float, float]:
+        """Velocity of the handle at this time [m/s], to which half a kick has brought it, on the near side of a border.
+
+        In stiff clay that half holds too little; there it is what the clay would feel in a whole one.
+        """
+        k = self._inputs(self.before, self.before)
+        if not (k[10] or k[11]):
+            return out[:2]
+        at, end = self._whole_kick(q, w)
+        x, y = (loop.at_sample(k, i, at[2 + i], end[i], at[8 + i]) if k[10 + i] else out[i] for i in (0, 1))
+        return x, y
+
+    def _whole_kick(self, q, w) -> tuple[Any, Any]:
+        """Sample and end of a kick here, if the step before it were made once more, as loop.tick returns them."""
+        return self._tick(q, w, self.before)[2:]
+
+    def _halve(self, q: tuple[float, ...], w: tuple[float, ...]) -> tuple[float, ...]:
+        """Ends the step that led here by the kick's own half; returns the rates at this time, from which to go on."""
+        if self.before:
+            self.state, command, sample, out = self._tick(q, w, 0.0)
+            self._keep(False, q, sample, command, out, 0.0)
+            self.before, w = 0.0, out[2:]
+            self.rates[0], self.rates[1] = w
+        return w
+
+    def _first_of_a_hit(self, command: tuple[float, ...]) -> float:
+        """Length of the first step of a hit that drives motors into their limits [s], which must be resolved."""
+        b = max(self.regions.b(self.t))
+        return FIRST / (b * arm.TRACE_W) if b and self._limited(command) else math.inf
+
+    def _limited(self, command: tuple[float, ...]) -> bool:
+        """Whether a motor gives all it can in this kick."""
+        limit = self.scenario.torque_limit
+        return abs(command[0]) >= limit[0] or abs(command[1]) >= limit[1]
 
     def _arrive(self, target: float) -> None:
         """The time that `target` gave has come [s]."""
@@ -259,7 +294,7 @@ class Leapfrog(Run):
         """loop.inputs of the kick at this time, between steps of these lengths."""
         t = self.t
         b0, b1 = at(*self.clay, t - 0.25 * before), self.regions.b(t + 0.25 * after)
-        return loop.inputs(b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after)
+        return loop.inputs(b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after, self.hand)
 
     def _landing(self, q, w, i: int, up: bool, after: float, there: float) -> float:
         """Length of the step that ends on the border of coordinate i."""
@@ -271,9 +306,12 @@ class Leapfrog(Run):
         return root(miss, after, there - border)
 
     def _cross(self, i: int, up: bool) -> bool:
-        # half a kick, on the near side of the border, brings the velocity to it
-        speed = self._tick(tuple(self.angles), tuple(self.rates), 0.0)[3][i] if self.before else 0.0
+        q, w = tuple(self.angles), tuple(self.rates)
+        speed = self._velocity(q, w, self._tick(q, w, 0.0)[3])[i] if self.before else 0.0
+        soft = self.regions.b(self.t)
         end = self.cross(i, up, speed)
+        hard = self.regions.b(self.t)
+        self.struck = hard[0] > soft[0] or hard[1] > soft[1]
         if end:
             self._close("finished")
         return end
@@ -282,8 +320,10 @@ class Leapfrog(Run):
         """The last sample: half a kick brings the rates to it, nothing is stepped."""
         q = tuple(self.angles)
         if self.before > 0.0:
-            _, command, sample, out = self._tick(q, tuple(self.rates), 0.0)
+            w = tuple(self.rates)
+            _, command, sample, out = self._tick(q, w, 0.0)
             self._keep(True, q, sample, command, out, 0.0)
+            self.final = self._velocity(q, w, out)
         self.finish(code)
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
@@ -293,9 +333,9 @@ class Leapfrog(Run):
 
     def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool) -> None:
         """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
-        _row.pack_into(self.rows, self.filled * loop.ROW, *row)
+        _row.pack_into(self.rows, self.filled * loop.ROW, *row[:14])
         b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
-        self.stretches.append(_Stretch(1, is_sample, b, k, H))
+        self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
@@ -319,22 +359,27 @@ class Leapfrog(Run):
         n, self.filled = self.filled, 0
         raw = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).T.copy()
         pieces, self.stretches = self.stretches, []
-        k, H, which = np.empty((7, 0)), np.array([x.H for x in pieces]), slice(n)
+        k, H, which = np.empty((INPUTS, 0)), np.array([x.H for x in pieces]), slice(n)
+        rest = np.empty((2, 0))
         if len(pieces) == 1:
-            k = np.reshape(pieces[0].k, (7, -1))
+            k, rest = np.reshape(pieces[0].k, (INPUTS, -1)), np.reshape(pieces[0].rest, (2, -1))
         elif pieces:
             counts = [x.n for x in pieces]
             k, H = _spread([x.k for x in pieces], counts), np.repeat(H, counts)
+            rest = _spread([x.rest for x in pieces], counts)
             if not all(x.is_sample for x in pieces):
                 which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
         samples = [x for x in pieces if x.is_sample]
+        rows = _sampled(raw, k, rest, self.scenario)
+        if self.final and n:
+            rows[4:6, -1] = self.final
         good = self.judge(
-            _sampled(raw, k, self.scenario)[:, which],
+            rows[:, which],
             lambda: _spread([x.b for x in samples], [x.n for x in samples]),
         )
         if self.outcome is not None and self.end_time is None:
             n = good if isinstance(which, slice) or not good else int(which[good - 1]) + 1
-        self.ledger.add(raw[:, :n], k[:, :n], H[:n])
+        self.ledger.add(raw[:, :n], k[:, :n], rest[:, :n], H[:n])
 
     def balance(self) -> dict[str, float]:
         return self.ledger.close()

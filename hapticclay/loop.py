@@ -7,6 +7,8 @@ of the step after it, and either step may be short, to end on a border of the cl
 Derivation and error terms: docs/equations.md, section 4.
 """
 
+# pyright: reportPossiblyUnboundVariable=false
+# What only stiff clay needs is bound and read under the same `if stiff`: the loop has no time to bind it otherwise.
 from __future__ import annotations
 
 from math import cos, sin
@@ -21,17 +23,16 @@ SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float, ...]:
     """State of a loop whose handle is at p [m] and moves with v [m/s], as if it had done so for long; see `tick`.
 
-    The compensator is ahead by the lag of G at constant speed, damping/stiffness of G times v.
+    The compensator leads by the lag of G at constant speed.
     """
     ahead = (p[i] + G[i].damping / G[i].stiffness * v[i] for i in (0, 1))
-    return (*ahead, *v, *p, *v, 0.0, 0.0)
+    return (*ahead, *v, *p, *v, 0.0, 0.0, 0.0, 0.0)
 
 
 def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
     """What a tick needs of the scenario and of the two steps around its sample.
 
-    Args:
-        before, after: lengths of the steps [s]; before = 0 at the start, after = 0 at the end.
+    before, after: lengths of the steps [s]; before = 0 at the start, after = 0 at the end.
     """
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
@@ -51,26 +52,39 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     )  # fmt: skip
 
 
-def inputs(
-    b0: tuple[float, float], b1: tuple[float, float], uh: tuple[float, float], before: float, after: float
-) -> tuple[float, ...]:
+def inputs(b0, b1, uh, before, after, hand):
     """What a tick needs of its surroundings.
 
     Args:
         b0, b1: clay before and after the sample [N.s/m]. uh: muscle force [N]. before, after: as above [s].
+        hand: the operator, or zeros.
     """
     span = before + after
-    cx0, cx1, cy0, cy1, felt = clay.kick(b0, b1, 0.5 * span, before / span, after / span, arm.TRACE_W)
+    L = before / span
+    w = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
+    cx0, cx1, cy0, cy1, stiff, sharex, sharey, softx, softy = clay.kick(
+        b0, b1, 0.5 * span, L, after / span, w, hand.damper
+    )
     uhx, uhy = uh
-    return cx0, cx1, cy0, cy1, felt, uhx, uhy
+    return cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
+
+
+def owe(step, H, spring, sharex, sharey, hx, hy):
+    """What stiff clay leaves to the next kick: (force x, y [N], less so much per velocity after x, y [N.s/m]).
+
+    Args:
+        step, H: lengths of the step after the sample and of the kick [s]. spring: of the hand [N/m].
+        sharex, sharey: from clay.kick. hx, hy: clay.slow_force at the sample [N].
+    """
+    return sharex * hx, sharey * hy, 0.5 * step * spring * sharex, 0.5 * step * spring * sharey
 
 
 def measure(q1, q2, w1, w2, d1, d2, ox, noy):
     """What there is to know of the handle.
 
     Args:
-        q1, q2: joint angles [rad]. w1, w2: joint rates [rad/s]. d1, d2: what the absolute link rates
-            have gained since, for the centripetal acceleration alone [rad/s].
+        q1, q2: joint angles [rad]. w1, w2: joint rates [rad/s].
+        d1, d2: what the absolute link rates have gained since, for the centripetal acceleration alone [rad/s].
         ox, noy: origin of p, x and -y [m].
 
     Returns:
@@ -94,24 +108,23 @@ def tick(c, k, q1, q2, w1, w2, state):
         c: from `coefficients`. k: from `inputs`.
         q1, q2: joint angles at the sample [rad]. w1, w2: joint rates half a step before it [rad/s].
         state: (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2
-            [rad/s^2]): compensator output and rate, reference model y = G delta and its rate, link
-            accelerations; positions at the sample, rates half a step before it.
+            [rad/s^2], owedx, owedy [N.s]): compensator output and rate, reference model y = G delta and its rate,
+            link accelerations, impulse that stiff clay owes; positions at the sample, rates half a step before it.
 
     Returns:
         (state, command, sample, after):
         state: for the next sample.
-        command: (tau1, tau2 of the motors [N.m], clay that the engine treats implicitly bx, by [N.s/m],
-            further torques 1, 2 [N.m]) for the engine.
-        sample: (position x, y [m], velocity half a step before x, y [m/s], net hand force f of the
-            kick x, y [N], delta x, y [m]).
+        command: (tau1, tau2 of the motors [N.m], implicit clay bx, by [N.s/m], further torques 1, 2 [N.m]).
+        sample: (position x, y [m], velocity half a step before [m/s], net hand force f of the kick [N], delta [m],
+            clay's force beside its dampers [N]), x and y each.
         after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) half a step after the sample.
     """
     (
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
         ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, _, uhx, uhy = k
-    deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2 = state
+    cx0, cx1, cy0, cy1, _, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
     u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
     if shaped:
@@ -134,10 +147,45 @@ def tick(c, k, q1, q2, w1, w2, state):
     vry = keepy * ydy + takey * (deltay - yy)
     ax = servo.acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
     ay = servo.acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
+    restx, resty = 0.0, 0.0
+    if stiff:
+        restx, resty = owedx / H, owedy / H
+        bx, by = (cx0 + cx1) * vx, (cy0 + cy1) * vy
+        hx, hy = uhx - spring * px, uhy - spring * py
+        gx = ax - mx * vx + sxx * hx + sxy * hy
+        gy = ay - my * vy + sxy * hx + syy * hy
+        gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+        owedx, owedy, softx, softy = owe(step, H, spring, sharex, sharey, gx, gy)
+        fx += owedx - restx
+        fy += owedy - resty
+        dx += softx
+        dy += softy
     ux, uy, g1, g2, ffx, ffy, t1, t2 = servo.resolve(
         H, vx, vy, u1x, u1y, u2x, u2y, nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy,
         limit1, limit2, square1, square2,
     )  # fmt: skip
+    if stiff:
+        if t1 * t1 >= square1 or t2 * t2 >= square2:  # what the motors hold against the clay is less
+            gx, gy = arm.acceleration((t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y)
+            sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+            fx -= owedx
+            fy -= owedy
+            owedx, owedy, _, _ = owe(step, H, spring, sharex, sharey, gx, gy)
+            fx += owedx
+            fy += owedy
+            ux, uy = servo.pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+            ffx = fx - dx * ux
+            ffy = fy - dy * uy
+            g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        owedx -= softx * ux
+        owedy -= softy * uy
+        restx -= owedx
+        resty -= owedy
+        fx -= softx * ux
+        fy -= softy * uy
+        owedx *= H
+        owedy *= H
 
     # compensator, driven by the force that acts in this kick
     ex = keep * ex + gainx * ffx
@@ -151,10 +199,10 @@ def tick(c, k, q1, q2, w1, w2, state):
     return (
         (
             deltax + step * ex, deltay + step * ey, ex, ey,
-            yx + step * vrx, yy + step * vry, vrx, vry, g1, g2,
+            yx + step * vrx, yy + step * vry, vrx, vry, g1, g2, owedx, owedy,
         ),
         (t1, t2, cx1, cy1, p1, p2),
-        (px, py, vx, vy, ffx, ffy, deltax, deltay),
+        (px, py, vx, vy, ffx, ffy, deltax, deltay, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )  # fmt: skip
 
@@ -225,35 +273,67 @@ def plant(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
     """What `push` needs of the scenario and of the two steps around its kick [s]."""
     H, span = 0.5 * (before + after), before + after
     return (
-        H, scenario.origin[0], -scenario.origin[1],
+        H, after, scenario.origin[0], -scenario.origin[1],
         *human.kick(scenario.operator, H, before / span, after / span, max(before, after)),
     )  # fmt: skip
 
 
-def push(c, k, q1, q2, w1, w2, t1, t2):
+def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
     """One kick of the arm and the hand alone, under given motor torques.
 
     Args:
         c: from `plant`. k: from `inputs`. q1, q2, w1, w2: as in `tick`. t1, t2: motor torques [N.m].
+        owedx, owedy: what stiff clay owes of its impulse in the step before [N.s].
 
     Returns:
-        (sample, after): (position x, y [m], velocity before x, y [m/s], net hand force x, y [N],
-        acceleration of the handle x, y [m/s^2]) and (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick.
+        (sample, after, owed): (position x, y [m], velocity before x, y [m/s], net hand force x, y [N],
+        clay's force beside its dampers x, y [N]); (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick; and
+        what the clay owes after it x, y [N.s].
     """
-    H, ox, noy, spring, mass, before, behind = c
-    cx0, cx1, cy0, cy1, _, uhx, uhy = k
+    H, step, ox, noy, spring, mass, before, behind = c
+    cx0, cx1, cy0, cy1, _, uhx, uhy, stiff, sharex, sharey, _, _ = k
     u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
     fx = uhx - cx0 * vx - human.impedance(spring, mass, before, px, cx, vx)
     fy = uhy - cy0 * vy - human.impedance(spring, mass, before, py, cy, vy)
     dx, dy = cx1 + behind, cy1 + behind
+    restx, resty = 0.0, 0.0
+    if stiff:
+        restx, resty = owedx / H, owedy / H
+        hx, hy = arm.acceleration(
+            (t1 - t2) / arm.I1, t2 / arm.I2, uhx - spring * px, uhy - spring * py, u1x, u1y, u2x, u2y
+        )
+        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        hx, hy = clay.slow_force(hx, hy, sxx, sxy, syy, sharex, sharey, (cx0 + cx1) * vx, (cy0 + cy1) * vy)
+        owedx, owedy, softx, softy = owe(step, H, spring, sharex, sharey, hx, hy)
+        fx += owedx - restx
+        fy += owedy - resty
+        dx += softx
+        dy += softy
     ux, uy = servo.pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
-    ax = (ux - vx) / H
-    ay = (uy - vy) / H
-    g1, g2 = arm.rates(ax, ay, u1x, u1y, u2x, u2y, 1.0)
+    if stiff:
+        owedx -= softx * ux
+        owedy -= softy * uy
+        restx -= owedx
+        resty -= owedy
+    g1, g2 = arm.rates((ux - vx) / H, (uy - vy) / H, u1x, u1y, u2x, u2y, 1.0)
     return (
-        (px, py, vx, vy, fx - dx * ux, fy - dy * uy, ax - cx, ay - cy),
+        (px, py, vx, vy, fx - dx * ux, fy - dy * uy, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
+        (H * owedx, H * owedy),
     )
+
+
+def at_sample(k, i, before, after, rest):
+    """Velocity of coordinate i at a sample [m/s].
+
+    Args:
+        k: from `inputs`. before, after: velocities around the sample [m/s]. rest: clay's force beside its dampers [N].
+    """
+    if k[10 + i]:  # what the clay feels: stiff clay leaves nothing else of the velocities around the sample
+        v = k[10 + i] * (k[2 * i] * before + k[2 * i + 1] * after + rest)
+    else:
+        v = before + k[4] * (after - before)
+    return v
 
 
 def entire(w1, w2, n1, n2, t1, t2, step):
@@ -275,46 +355,46 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, m
         state: see `tick`.
         read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
         write: packs a command into the engine's memory, drive.
-        keep: packs one row into the record, buffer.
-        step, model, data: the engine.
+        keep: packs one row into the record, buffer. step, model, data: the engine.
 
     Returns:
         The state after the last step.
     """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9 = state
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
     for row in rows:
         q1, q2, w1, w2 = read(motion)
         (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
             (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy),
+            (px, py, vx, vy, fx, fy, dx, dy, _, _),
             (ux, uy, n1, n2),
-        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
+        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
         write(drive, 0, t1, t2, bx, by, p1, p2)
         keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
         step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
 
 
-def vary(steps, c, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """As `advance`, where the clay, the muscle force or the command change from step to step.
+def vary(steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data):
+    """As `advance`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
 
     Args:
-        steps: for each step its offset into the record [bytes], its `inputs`, and the change of the command
-            x, y over it [m].
+        steps: for each step its offset into the record [bytes], `inputs`, change of the command x, y over it [m].
+        rest: list that gets the clay's force beside its dampers x, y in each kick [N].
     """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9 = state
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
     for row, k, cx, cy in steps:
         q1, q2, w1, w2 = read(motion)
         (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9),
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
             (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy),
+            (px, py, vx, vy, fx, fy, dx, dy, rx, ry),
             (ux, uy, n1, n2),
-        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9))
+        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
         s0 += cx
         s1 += cy
         write(drive, 0, t1, t2, bx, by, p1, p2)
         keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
+        rest.append((rx, ry))
         step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11

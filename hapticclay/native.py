@@ -11,6 +11,7 @@ import copy
 import ctypes
 import functools
 import hashlib
+import math
 import os
 import signal
 import sys
@@ -25,7 +26,7 @@ import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic, overload
 
-from . import arm, clay, energy, loop, march, record, run, scene, signals, stride
+from . import arm, clay, energy, loop, march, outcome, record, run, scene, signals, stride
 from .clay import slab
 from .inline import inline
 from .params import AXES, NO_HAND, Scenario
@@ -33,13 +34,13 @@ from .run import CHUNK, Run
 from .rungekutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    arm.position, clay.at, clay.settle, loop.coefficients, loop.derivative, loop.entire, loop.tick,
+    arm.position, clay.at, clay.settle, loop.at_sample, loop.coefficients, loop.derivative, loop.entire, loop.tick,
     stride.around, stride.enter, stride.place,
 )  # fmt: skip
 PLAIN = (
     march.leap, march.slope, run.aim, run.root, signals.line,
-    stride.drive, stride.heading, stride.kick, stride.land, stride.mean, stride.miss, stride.move, stride.note,
-    stride.side, stride.stride, stride.write,
+    stride.drive, stride.first_of_a_hit, stride.harder, stride.heading, stride.kick, stride.land, stride.limited,
+    stride.mean, stride.miss, stride.move, stride.note, stride.side, stride.stride, stride.velocity, stride.write,
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
@@ -114,7 +115,7 @@ def folder() -> Path:
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
 
 
-_stride, _calm, _march, _once = _compiled(_whole, stride.calm, march.march, march.once)
+_stride, _calm, _march, _once = _compiled(_whole, outcome.calm, march.march, march.once)
 
 
 def _addresses(*names: str) -> list[int]:
@@ -177,6 +178,7 @@ class Native(Run):
         )  # fmt: skip
         self.now = np.zeros(1, stride.STATE)
         self.now["loop"] = loop.initial_state(s.start, s.velocity)
+        self.now["fine"], self.now["struck"] = math.inf, 1
         self.now["clay"] = *self.regions.base, *self.regions.rate
         self.now["index"] = self.regions.index
         self.rows, self.filled = self.bench.rows, 0

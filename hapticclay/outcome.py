@@ -244,3 +244,42 @@ class Watch:
         if not s.shaping:
             return "turn shaping on: the loop is stable at the nominal pose, the arm's inertia changes along the path"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+def calm(rows, n, limit1, limit2, swings, seen):
+    """Whether Watch can have nothing to say of the next n rows of a run: an easier question than its own.
+
+    It is not calm where a row is no longer a run's, or where as many swings in a row did not shrink as a verdict takes.
+
+    Args:
+        swings: of each axis, (2, 6): last two velocities, that at the last turning point [m/s], size of the last
+            swing [m/s], number of swings that did not shrink, samples since the turn with a motor in its limit.
+        seen: as Watch has them, (4,): seen, moved, unbound, often.
+    """
+    for j in range(n):
+        row = rows[j]
+        vx, vy = abs(row[4]), abs(row[5])
+        bound = abs(row[8]) >= limit1 or abs(row[9]) >= limit2
+        if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[1])) >= FOLD):
+            return False
+        if vx > STILL or vy > STILL:
+            seen[1] = seen[0]
+        if bound:
+            seen[3] += 1
+        else:
+            seen[2] = seen[0]
+        seen[0] += 1
+        for i in range(2):
+            s, v = swings[i], row[4 + i]
+            s[5] += bound
+            if (v > s[0]) != (s[0] > s[1]):
+                size = abs(s[0] - s[2])
+                grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
+                if size < FLOOR:
+                    grown = 0.0
+                s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
+                if grown >= SWINGS:
+                    return False
+            s[1] = s[0]
+            s[0] = v
+    return True

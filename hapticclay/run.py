@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -183,6 +185,33 @@ def _signal(multisine: Multisine | None) -> Any:
     from .signals import Signal  # only a run that has one pays for it
 
     return Signal(multisine)
+
+
+def window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
+    """A view of the engine's memory from a to b, two floats each, and what reads all four at once."""
+    first, second = a.ctypes.data, b.ctypes.data
+    gap = second - first - a.nbytes
+    view = memoryview((ctypes.c_char * (a.nbytes + gap + b.nbytes)).from_address(first))
+    return view, struct.Struct(f"2d{gap}x2d").unpack_from
+
+
+def outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
+    """A view of the engine's memory from ctrl on, and what writes a whole command into it.
+
+    ctrl holds the motors and, where there is clay, two dampers; its first 32 bytes are its own either
+    way if the next array begins only 64 bytes on (the engine aligns arrays so). One call then does
+    for both arrays; where they lie otherwise, two calls do.
+    """
+    first, second = ctrl.ctypes.data, push.ctypes.data
+    if second - first == 64:
+        view = memoryview((ctypes.c_char * 80).from_address(first))
+        return view, struct.Struct("4d32x2d").pack_into
+
+    def write(view, offset, t1, t2, bx, by, p1, p2):
+        ctrl[:] = (t1, t2, bx, by)[: len(ctrl)]
+        push[:] = p1, p2
+
+    return memoryview(ctrl), write  # type: ignore[arg-type]
 
 
 def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, float, bool]:

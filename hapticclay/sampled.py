@@ -33,8 +33,8 @@ class Sampled(Leapfrog):
             for axis, K in zip(AXES, scenario.gain, strict=True)
         ]
         s = self.state
-        # (delta, delta', y, y') of each axis, and the torques held
-        self.state = (s[0:8:2], s[1:8:2], NONE)
+        # (delta, delta', y, y') of each axis, the torques held, and what stiff clay owes, see loop.push
+        self.state = (s[0:8:2], s[1:8:2], NONE, NONE)
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
@@ -48,26 +48,48 @@ class Sampled(Leapfrog):
     def _inputs(self, before: float, after: float) -> tuple[float, ...]:
         if self.physical:
             return super()._inputs(before, after)
-        return loop.inputs(NONE, NONE, self.uh(self.t - 0.5 * before, self.t + 0.5 * after), before, after)
+        uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
+        return loop.inputs(NONE, NONE, uh, before, after, self.hand)
+
+    def _limited(self, command: tuple[float, ...]) -> bool:
+        return False  # torques that are held do not follow a hit
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
-        x, y, tau = self.state
+        x, y, tau, owed = self.state
         before, s = self.before, self.scenario
-        self.row, new, shown = None, self.state, (x[0], y[0])
+        self.row, shown = None, (x[0], y[0])
         if after > 0.0 and self._is_sample():
+            seen = w
             if before:
-                at, out = loop.push(loop.plant(s, before, 0.0), self._inputs(before, 0.0), q[0], q[1], w[0], w[1], *tau)
-                self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown)
-                w = out[2:]
-                force = self._felt(q, w, tau)
+                c, k = loop.plant(s, before, 0.0), self._inputs(before, 0.0)
+                at, out, owed = loop.push(c, k, q[0], q[1], w[0], w[1], *tau, *owed)
+                self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown, *at[6:])
+                seen, w = self._seen(q, w, out), out[2:]
+                force = self._felt(q, seen, tau)
             else:
                 force = self._first(q, w)
-            tau, f = self._control(q, w, x, y, force)
+            tau, f = self._control(q, seen, x, y, force)
             shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else NONE
-            new = (*map(self._hold, (x, y), self.blocks, f, shift), tau)
+            x, y = map(self._hold, (x, y), self.blocks, f, shift)
             before = 0.0
-        at, out = loop.push(loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau)
-        return new, (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown), out
+        at, out, owed = loop.push(
+            loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau, *owed
+        )
+        return (x, y, tau, owed), (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
+
+    def _seen(self, q, w, out) -> Any:
+        """Joint rates at the sample [rad/s], see `_velocity`."""
+        v = self._velocity(q, w, out)
+        if v == out[:2]:
+            return out[2:]
+        r1, r2 = arm.rates(v[0], v[1], *self._measure(q, w)[0], 1.0)
+        return r1, r2 - r1
+
+    def _whole_kick(self, q, w) -> tuple[Any, Any]:
+        _, _, tau, owed = self.state
+        h = self.before
+        at, out, _ = loop.push(loop.plant(self.scenario, h, h), self._inputs(h, h), q[0], q[1], w[0], w[1], *tau, *owed)
+        return (*at[:6], *NONE, *at[6:]), out
 
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
         """arm.columns, position, velocity and centripetal acceleration of the handle."""
@@ -134,9 +156,10 @@ class Sampled(Leapfrog):
         if self.row:
             k = self._inputs(before, 0.0)
             self._put(False, self.row, k, 0.5 * before, False)
-            _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_ = self.row
+            _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_, restx, resty = self.row
+            fx, fy = fx + k[0] * v0x + k[1] * v1x + restx, fy + k[2] * v0y + k[3] * v1y + resty
             # the means of both kicks, half of the step before and half of the one after, interpolated at the sample
-            early = fx + k[0] * v0x + k[1] * v1x, fy + k[2] * v0y + k[3] * v1y, after / (before + after)
+            early = fx, fy, after / (before + after)
             before = 0.0
             self.fresh = self.i
         elif after and self._is_sample():

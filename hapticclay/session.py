@@ -69,7 +69,8 @@ class _Live(Leapfrog):
         super().__init__(scenario, every)
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
-        self.varies, self.many = True, _written_out(loop.vary, self.last)
+        self.varies = True
+        _written_out(loop.vary, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
         self.watch = outcome.Watch(replace(scenario, muscle=Multisine()))

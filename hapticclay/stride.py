@@ -7,14 +7,12 @@ same: the laws are those of `loop`, `clay`, `signals` and `energy` themselves.
 from __future__ import annotations
 
 import ctypes
-from math import sin
 from typing import NamedTuple
 
 import numpy as np
 
 from . import arm, clay, energy, loop, signals
-from .leapfrog import LANDINGS
-from .outcome import FLOOR, FOLD, SPEED, STILL, SWINGS
+from .leapfrog import FIRST, LANDINGS, WIDER
 from .params import L1, L2
 from .run import TOUCH, aim, root
 
@@ -25,7 +23,8 @@ STATE = np.dtype(
     [
         ("t", "f8"),  # now [s]
         ("before", "f8"),  # length of the step that led here [s]
-        ("loop", "f8", 10),  # state of loop.tick
+        ("fine", "f8"),  # longest step on the way from a hit [s]
+        ("loop", "f8", 12),  # state of loop.tick
         ("clay", "f8", 4),  # base and rate before the sample, see clay.at
         ("work", "f8", 5),  # see energy.spent
         ("last", "f8", 6),  # of the last kick: position, velocity and joint rates after it
@@ -34,6 +33,7 @@ STATE = np.dtype(
         ("closing", "i8"),  # why the next kick is the last, MORE where it is not
         ("landings", "i8"),  # on borders since the last sample
         ("steps", "i8"),  # engine steps made
+        ("struck", "i8"),  # whether the clay has just become stiffer, or the run begins in it
     ]
 )
 
@@ -105,7 +105,7 @@ def around(g, muscle, t, before, after, old, new):
     b0 = clay.at(old[0], old[1], t - 0.25 * before)
     b1 = clay.at(new[0], new[1], t + 0.25 * after)
     x, y = mean(muscle, t + 0.25 * (after - before), 0.25 * (before + after))
-    k = loop.inputs(b0, b1, (g.force[0] + x, g.force[1] + y), before, after)
+    k = loop.inputs(b0, b1, (g.force[0] + x, g.force[1] + y), before, after, g.operator)
     return k
 
 
@@ -162,11 +162,19 @@ def land(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state, out, sx, 
     return span, i, up
 
 
+def velocity(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state):
+    """See Leapfrog._velocity: of coordinate i."""
+    k = around(g, muscle, t, before, before, old, new)
+    after = before if k[10 + i] > 0.0 else 0.0
+    _, _, sample, out = kick(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
+    return loop.at_sample(k, i, sample[2 + i], out[i], sample[8 + i]) if after > 0.0 else out[i]
+
+
 def note(crossing, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, up, low, high, end):
     """Notes that the handle steps over this border; True if it is the end of the path."""
     speed = 0.0
-    if before > 0.0:  # half a kick, on the near side of the border, brings the velocity to it
-        speed = kick(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)[3][i]
+    if before > 0.0:
+        speed = velocity(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state)
     border = high[i] if up > 0 else low[i]
     crossing[0], crossing[1], crossing[2], crossing[3] = i, border, t, speed
     return i == 0 and up > 0 and border == end
@@ -175,11 +183,11 @@ def note(crossing, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, up,
 def write(row, g, q1, q2, sample, command, out, k, b):
     """Writes what belongs to a sample: see `leapfrog._sampled`."""
     row[0], row[1], row[2], row[3] = q1, q2, sample[0], sample[1]
-    row[4] = sample[2] + k[4] * (out[0] - sample[2])
-    row[5] = sample[3] + k[4] * (out[1] - sample[3])
+    row[4] = loop.at_sample(k, 0, sample[2], out[0], sample[8])
+    row[5] = loop.at_sample(k, 1, sample[3], out[1], sample[9])
     if g.held:
-        row[6] = sample[4] + k[0] * sample[2] + k[1] * out[0]
-        row[7] = sample[5] + k[2] * sample[3] + k[3] * out[1]
+        row[6] = sample[4] + k[0] * sample[2] + k[1] * out[0] + sample[8]
+        row[7] = sample[5] + k[2] * sample[3] + k[3] * out[1] + sample[9]
     else:
         row[6], row[7] = k[5], k[6]
     row[8], row[9], row[10], row[11] = command[0], command[1], sample[6], sample[7]
@@ -189,7 +197,7 @@ def write(row, g, q1, q2, sample, command, out, k, b):
 def enter(work, g, H, k, sample, command, out, w1, w2):
     """Enters the work of a kick of length H into the ledger."""
     done = energy.spent(
-        H, k, sample[2], sample[3], out[0], out[1], command[0], command[1],
+        H, k, sample[8], sample[9], sample[2], sample[3], out[0], out[1], command[0], command[1],
         0.5 * (w1 + out[2]), 0.5 * (w2 + out[3]), g.operator.damper,
     )  # fmt: skip
     for j in range(5):
@@ -218,6 +226,25 @@ def move(engine, dampers, whole, dt, after, command, w1, w2, out):
         store(engine.timestep, dt)
 
 
+def limited(g, command):
+    """Whether a motor gives all it can in a kick."""
+    return abs(command[0]) >= g.torque_limit[0] or abs(command[1]) >= g.torque_limit[1]
+
+
+def harder(old, new, t):
+    """Whether the clay new, (base, rate), is stiffer than the old at time t [s]."""
+    x0, y0 = clay.at(old[0], old[1], t)
+    x1, y1 = clay.at(new[0], new[1], t)
+    return x1 > x0 or y1 > y0
+
+
+def first_of_a_hit(g, command, base, rate, t):
+    """See Leapfrog._first_of_a_hit."""
+    x, y = clay.at(base, rate, t)
+    b = max(x, y)
+    return FIRST / (b * arm.TRACE_W) if b > 0.0 and limited(g, command) else np.inf
+
+
 def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
     """Steps on, until most kicks are made, room rows written, crossings full, or the run is over.
 
@@ -232,9 +259,10 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
     """
     now, dt = run[0], g.dt
     t, before, i, closing = now["t"], now["before"], now["i"], now["closing"]
-    landings, steps = now["landings"], now["steps"]
+    landings, steps, fine, struck = now["landings"], now["steps"], now["fine"], now["struck"]
     s, c = now["loop"], now["clay"]
-    state, old = (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9]), ((c[0], c[1]), (c[2], c[3]))
+    state = (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11])
+    old = ((c[0], c[1]), (c[2], c[3]))
     index = (now["index"][0], now["index"][1])
     low, high, base, rate = clay.settle(table, index[0], index[1], t)
     work, last = now["work"], now["last"]
@@ -249,6 +277,7 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
         if on_grid:
             landings = 0
         q1, q2, w1, w2 = load(engine.q), load(engine.q + 8), load(engine.w), load(engine.w + 8)
+        after = min(after, fine)
         axis, up, overx, overy = -1, 0, 0, 0  # border that the step ends on; borders stepped over without a step
         while True:
             if closing != MORE:
@@ -265,6 +294,20 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
                 to, command, sample, out = loop.tick(loop.coefficients(g, before, after), k, q1, q2, w1, w2, state)
             if after == 0.0 or axis >= 0:
                 break
+            if struck:
+                struck, fine = 0, first_of_a_hit(g, command, base, rate, t)
+                if fine < after:
+                    after = fine
+                    if before > 0.0:  # see Leapfrog._halve
+                        to, command, sample, out = kick(
+                            g, muscle, t, before, 0.0, old, (base, rate), q1, q2, w1, w2, state
+                        )
+                        k = around(g, muscle, t, before, 0.0, old, (base, rate))
+                        enter(work, g, 0.5 * before, k, sample, command, out, w1, w2)
+                        state, before, w1, w2 = to, 0.0, out[2], out[3]
+                        store(engine.w, w1)
+                        store(engine.w + 8, w2)
+                    continue
             sx, sy = heading(g, q1, q2, sample, out, after, low, high)
             # no way back over a border: it must not hold the run
             sx, sy = sx if overx in (0, sx) else 0, sy if overy in (0, sy) else 0
@@ -293,16 +336,21 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
                 if before == 0.0:
                     break
             else:
-                fresh = False
+                fresh, soft = False, (base, rate)
                 index = (index[0] + up, index[1]) if here == 0 else (index[0], index[1] + up)
                 low, high, base, rate = clay.settle(table, index[0], index[1], t)
+                struck = 1 if harder(soft, (base, rate), t) else 0
         if before > 0.0 or closing == MORE:
             enter(work, g, 0.5 * (before + after), k, sample, command, out, w1, w2)
             last[0], last[1], last[2], last[3], last[4], last[5] = sample[0], sample[1], *out
             done += 1
             if on_grid or closing != MORE:
                 b = clay.at(base, rate, t) if after > 0.0 else clay.at(old[0], old[1], t)
-                write(rows[filled], g, q1, q2, sample, command, out, k, b)
+                row = rows[filled]
+                write(row, g, q1, q2, sample, command, out, k, b)
+                if after == 0.0 and k[7] > 0.0:
+                    row[4] = velocity(0, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state)
+                    row[5] = velocity(1, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state)
                 filled += 1
         if closing != MORE:
             code = closing
@@ -316,17 +364,18 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
         if len(commanded):
             x1, y1 = mean(commanded, t + after, 0.0)
             x0, y0 = mean(commanded, t, 0.0)
-            state = (to[0] + (x1 - x0), to[1] + (y1 - y0), to[2], to[3], to[4], to[5], to[6], to[7], to[8], to[9])
+            state = (
+                to[0] + (x1 - x0), to[1] + (y1 - y0),
+                to[2], to[3], to[4], to[5], to[6], to[7], to[8], to[9], to[10], to[11],
+            )  # fmt: skip
         old, before = (base, rate), after
-        if axis < 0:
+        fine = fine * WIDER if fine < np.inf and limited(g, command) else np.inf
+        t += after
+        if target - t <= 1e-9 * dt:
             i += 1
             t = target
-        else:
+        if axis >= 0:
             landings += 1
-            t += after
-            if target - t <= 1e-9 * dt:  # the border lies at the sample itself
-                i += 1
-                t = target
             fresh = False
             ended = note(
                 crossings[crossed], g, muscle, t, before, old, (base, rate),
@@ -339,49 +388,11 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
             else:
                 index = (index[0] + up, index[1]) if axis == 0 else (index[0], index[1] + up)
                 low, high, base, rate = clay.settle(table, index[0], index[1], t)
+                struck = 1 if harder(old, (base, rate), t) else 0
     now["t"], now["before"], now["i"], now["closing"] = t, before, i, closing
-    now["landings"], now["steps"] = landings, steps
+    now["landings"], now["steps"], now["fine"], now["struck"] = landings, steps, fine, struck
     now["index"][0], now["index"][1] = index
-    for j in range(10):
+    for j in range(12):
         now["loop"][j] = state[j]
     c[0], c[1], c[2], c[3] = old[0][0], old[0][1], old[1][0], old[1][1]
     return code, filled, crossed
-
-
-def calm(rows, n, limit1, limit2, swings, seen):
-    """Whether outcome.Watch can have nothing to say of the next n rows of a run: an easier question than its own.
-
-    It is not calm where a row is no longer a run's, or where as many swings in a row did not shrink as a verdict takes.
-
-    Args:
-        swings: of each axis, (2, 6): last two velocities, that at the last turning point [m/s], size of the last
-            swing [m/s], number of swings that did not shrink, samples since the turn with a motor in its limit.
-        seen: as Watch has them, (4,): seen, moved, unbound, often.
-    """
-    for j in range(n):
-        row = rows[j]
-        vx, vy = abs(row[4]), abs(row[5])
-        bound = abs(row[8]) >= limit1 or abs(row[9]) >= limit2
-        if not (vx <= SPEED and vy <= SPEED and abs(sin(row[1])) >= FOLD):
-            return False
-        if vx > STILL or vy > STILL:
-            seen[1] = seen[0]
-        if bound:
-            seen[3] += 1
-        else:
-            seen[2] = seen[0]
-        seen[0] += 1
-        for i in range(2):
-            s, v = swings[i], row[4 + i]
-            s[5] += bound
-            if (v > s[0]) != (s[0] > s[1]):
-                size = abs(s[0] - s[2])
-                grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
-                if size < FLOOR:
-                    grown = 0.0
-                s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
-                if grown >= SWINGS:
-                    return False
-            s[1] = s[0]
-            s[0] = v
-    return True

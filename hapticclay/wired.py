@@ -71,7 +71,7 @@ class Wired(Sampled):
         start: Pair = scenario.start
         rest = (0.0,) * order
         hw = Electronics(0, (), past, w, (rest, rest), NONE, NONE, start, (NONE,) * (self.whole_delay + 2), start)
-        self.state = (*self.state[:2], Held(), hw)
+        self.state = (*self.state[:2], Held(), hw, NONE)
         self.extra: list[tuple[float, ...]] = []
         self.extras: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())  # of the row at an event, and after it
         self.acting = Held()
@@ -101,39 +101,48 @@ class Wired(Sampled):
         return False  # an event has its own row already
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
-        x, y, held, hw = self.state
+        x, y, held, hw, owed = self.state
         before, now = self.before, self.t + NEAR * self.scenario.dt
         self.row, shown = None, (x[0], y[0])
         sample = after > 0.0 and self._when(hw.k) <= now
         if sample or after > 0.0 and hw.queue and hw.queue[0][0] <= now:
+            seen = w
             if before:
-                at, out, slip = self._push(before, 0.0, q, w, held)
-                self.row = (*q, *at[:4], *out[:2], *at[4:6], *held.torque, *shown)
+                at, out, owed, slip = self._push(before, 0.0, q, w, held, owed)
+                self.row = (*q, *at[:4], *out[:2], *at[4:6], *held.torque, *shown, *at[6:])
                 self.extras = (_memo(slip, held), ())
-                w = out[2:]
-                force = self._felt(q, w, (held.torque[0] + slip[0], held.torque[1] + slip[1]))
+                tau = held.torque[0] + slip[0], held.torque[1] + slip[1]
+                seen, w = self._seen(q, w, out), out[2:]
+                force = self._felt(q, seen, tau)
             else:
                 force = self._first(q, w)
             if sample:
-                x, y, hw = self._sample(q, w, x, y, force, hw)
+                x, y, hw = self._sample(q, seen, x, y, force, hw)
             while hw.queue and hw.queue[0][0] <= now:
                 held, hw = hw.queue[0][1], hw._replace(queue=hw.queue[1:])
             before = 0.0
-        at, out, slip = self._push(before, after, q, w, held)
+        at, out, owed, slip = self._push(before, after, q, w, held, owed)
         self.extras, self.acting = (self.extras[0], _memo(slip, held)), held
-        return (x, y, held, hw), (*held.torque, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown), out
+        return (x, y, held, hw, owed), (*held.torque, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
 
-    def _push(self, before: float, after: float, q, w, held: Held) -> tuple[Any, Any, Pair]:
+    def _whole_kick(self, q, w) -> tuple[Any, Any]:
+        _, _, held, _, owed = self.state
+        at, out, _, _ = self._push(self.before, self.before, q, w, held, owed)
+        return (*at[:6], *NONE, *at[6:]), out
+
+    def _push(self, before: float, after: float, q, w, held: Held, owed: Pair) -> tuple[Any, Any, Any, Pair]:
         """loop.push under the held torques and the friction, and the torques of the latter [N.m]."""
         c, k, (t1, t2) = loop.plant(self.scenario, before, after), self._inputs(before, after), held.torque
-        at, out = loop.push(c, k, q[0], q[1], w[0], w[1], t1, t2)
+        at, out, left = loop.push(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
         limit: Any = self.parts.friction
         if limit == NONE:
-            return at, out, NONE
-        one, two = (loop.push(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2)[1] for d1, d2 in ((1.0, 0.0), (0.0, 1.0)))
+            return at, out, left, NONE
+        one, two = (
+            loop.push(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1] for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
+        )
         a12 = 0.5 * (one[3] - out[3] + two[2] - out[2])  # equal but for rounding
         f1, f2 = interface.stuck(out[2:], one[2] - out[2], a12, two[3] - out[3], limit)
-        return *loop.push(c, k, q[0], q[1], w[0], w[1], t1 + f1, t2 + f2), (f1, f2)
+        return *loop.push(c, k, q[0], q[1], w[0], w[1], t1 + f1, t2 + f2, *owed), (f1, f2)
 
     def _encoded(self, q) -> Pair:
         return interface.encoded(q[0], self.parts.encoder), interface.encoded(q[1], self.parts.encoder)

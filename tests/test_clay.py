@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +11,7 @@ from hapticclay.params import Clay, Profile
 @given(st.floats(0, 1e9), st.floats(1e-6, 1e-1))
 def test_interior_kick_conserves_the_damping_and_never_overshoots(b, H):
     w = 0.92
-    before, after, *_ = clay.kick((b, b), (b, b), H, 0.5, 0.5, w)
+    before, after, *_ = clay.kick((b, b), (b, b), H, 0.5, 0.5, w, 0.0)
     assert before + after == pytest.approx(b, rel=1e-15)
     z = b * H * w
     amplification = (1 - H * w * before) / (1 + H * w * after)
@@ -20,11 +21,32 @@ def test_interior_kick_conserves_the_damping_and_never_overshoots(b, H):
 
 
 @given(st.floats(0, 1e3), st.floats(0, 1e3), st.floats(0.01, 0.99))
-def test_border_kick_gives_each_side_its_share(b0, b1, L):
-    before, after, _, _, felt = clay.kick((b0, b0), (b1, b1), 1e-4, L, 1 - L, 0.92)
-    if b0 != b1:
-        assert (before, after) == (L * b0, (1 - L) * b1)
-        assert felt == pytest.approx(L)  # linear in time between the midpoints of the steps
+def test_soft_border_kick_gives_each_side_its_share(b0, b1, L):
+    before, after, *_, stiff, sharex, sharey, softx, softy = clay.kick((b0, b0), (b1, b1), 1e-4, L, 1 - L, 0.92, 0.0)
+    assert (before, after) == (L * b0, (1 - L) * b1)
+    assert stiff == sharex == sharey == softx == softy == 0.0
+
+
+@given(*[st.floats(0, 9).map(lambda e: 10.0**e)] * 2, *[st.floats(1e-6, 1e-2)] * 3)
+def test_impulse_of_a_step_is_b_times_its_distance_in_any_clay(bx, by, h0, h, h1):
+    """The shares that two kicks give to the velocity of the step between them add up to b h, whatever their lengths."""
+    b, free = (bx, by), (0.0, 0.0)
+    H0, H1 = 0.5 * (h0 + h), 0.5 * (h + h1)
+    first = clay.kick(free, b, H0, h0 / (2 * H0), h / (2 * H0), 0.92, 0.0)
+    then = clay.kick(b, free, H1, h / (2 * H1), h1 / (2 * H1), 0.92, 0.0)
+    for i in (0, 1):
+        assert H0 * first[2 * i + 1] + H1 * then[2 * i] == pytest.approx(b[i] * h, rel=1e-12)
+        assert H1 * then[2 * i] * 0.92 <= 1.0 + 1e-12  # the part before never overshoots
+
+
+def test_slow_force_balances_whatever_pushes():
+    """Whichever axes are stiff: under it, and the clay that is not, the handle does not accelerate along them."""
+    W, g, soft = np.array([[0.8, 0.2], [0.2, 0.15]]), np.array([1.0, -2.0]), np.array([0.3, -0.4])
+    for stiff in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
+        slow = clay.slow_force(*g, W[0, 0], W[0, 1], W[1, 1], *stiff, *soft)
+        f = np.where(np.array(stiff) > 0.0, slow, soft)
+        rest = (g - W @ f)[np.array(stiff) > 0.0]
+        assert np.abs(rest).max() < 1e-15 * 10  # a few roundings
 
 
 def test_regions_of_the_slab():
