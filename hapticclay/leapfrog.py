@@ -18,7 +18,7 @@ from .params import NO_HAND, Scenario
 from .run import CHUNK, TOUCH, Run, outlet, root, window
 
 LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
-FIRST, WIDER = 0.1, 1.03  # first step of such a hit, in decay times of the speed; each step over the one before
+FIRST, WIDER = 0.02, 1.01  # first step of such a hit, in decay times of the speed; each step over the one before
 INPUTS = 12  # numbers in loop.inputs
 NONE = (0.0, 0.0)
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
@@ -95,7 +95,7 @@ class Leapfrog(Run):
         if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
             _written_out(loop.vary, self.last)
         self.landings = 0  # on borders since the last sample
-        self.struck = True  # the clay has just become stiffer, or the run begins in it
+        self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
         self.final: Any = None  # velocity of the handle at the end [m/s]
         self.before = 0.0  # length of the step that led here [s]
@@ -200,13 +200,11 @@ class Leapfrog(Run):
         crossed: dict[int, bool] = {}  # borders stepped over without a step: axis, upwards
         after = min(after, self.fine)
         while True:
-            new, command, sample, out = self._tick(q, w, after)
             if self.struck:
-                self.struck = False
-                self.fine = self._first_of_a_hit(command)
+                self.struck, self.fine = False, self._first_of_a_hit(q, w, after)
                 if self.fine < after:
                     after, w = self.fine, self._halve(q, w)
-                    continue
+            new, command, sample, out = self._tick(q, w, after)
             here, there = self.position(q, out[2:], 0.0), self.position(q, out[2:], after)
             ups = {i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])}
             hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]  # no way back: a border must not hold the run
@@ -266,10 +264,19 @@ class Leapfrog(Run):
             self.rates[0], self.rates[1] = w
         return w
 
-    def _first_of_a_hit(self, command: tuple[float, ...]) -> float:
-        """Length of the first step of a hit that drives motors into their limits [s], which must be resolved."""
+    def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
+        """Length of the first of the steps that resolve a hit which drives motors into their limits [s]; else inf."""
         b = max(self.regions.b(self.t))
-        return FIRST / (b * arm.TRACE_W) if b and self._limited(command) else math.inf
+        first = FIRST / (b * arm.TRACE_W) if b else math.inf
+        if first >= after:
+            return math.inf
+        state, before = self.state, self.before
+        if before:
+            self.state, _, _, out = self._tick(q, w, 0.0)
+            self.before, w = 0.0, out[2:]
+        command = self._tick(q, w, first)[1]
+        self.state, self.before = state, before
+        return first if self._limited(command) else math.inf
 
     def _limited(self, command: tuple[float, ...]) -> bool:
         """Whether a motor gives all it can in this kick."""
@@ -308,10 +315,8 @@ class Leapfrog(Run):
     def _cross(self, i: int, up: bool) -> bool:
         q, w = tuple(self.angles), tuple(self.rates)
         speed = self._velocity(q, w, self._tick(q, w, 0.0)[3])[i] if self.before else 0.0
-        soft = self.regions.b(self.t)
         end = self.cross(i, up, speed)
-        hard = self.regions.b(self.t)
-        self.struck = hard[0] > soft[0] or hard[1] > soft[1]
+        self.struck = True
         if end:
             self._close("finished")
         return end

@@ -39,7 +39,7 @@ FLAT = (  # laws that are compiled with their own laws written into them
 )  # fmt: skip
 PLAIN = (
     march.leap, march.slope, run.aim, run.root, signals.line,
-    stride.drive, stride.first_of_a_hit, stride.harder, stride.heading, stride.kick, stride.land, stride.limited,
+    stride.drive, stride.first_of_a_hit, stride.heading, stride.kick, stride.land, stride.limited,
     stride.mean, stride.miss, stride.move, stride.note, stride.side, stride.stride, stride.velocity, stride.write,
 )  # fmt: skip
 LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone

@@ -225,19 +225,32 @@ def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, fl
 
 
 def root(f: Callable[..., float], b: float, fb: float, *args: Any) -> float:
-    """Where f(x, *args), of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding."""
-    a = 1e-9 * b
-    fa, end = f(a, *args), b
-    if fa == 0.0 or (fa > 0.0) == (fb > 0.0):
-        return a
+    """Where f(x, *args), of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding.
+
+    f may be 0 at 0 itself, as of a handle that enters stiff clay, stops and comes back: then f/x is what must vanish.
+    Where f never is of the other sign, next to 0.
+    """
+    first, end = 1e-9 * b, b
+    a, fa = first, f(first, *args)
+    leaves = fa == 0.0 or (fa > 0.0) == (fb > 0.0)
+    if leaves:
+        while fa == 0.0 or (fa > 0.0) == (fb > 0.0):
+            a *= 8.0
+            if a > 0.5 * b:
+                return first
+            fa = f(a, *args)
+        fa, fb = fa / a, fb / b
     for _ in range(60):
         h = b - fb * (b - a) / (fb - fa)
         fh = f(h, *args)
+        small = abs(fh) < 4e-16  # rounding of a position
+        if leaves:
+            fh /= h
         if (fh > 0.0) != (fb > 0.0):
             a, fa = b, fb
         else:
             fa *= 0.5
         b, fb = h, fh
-        if abs(b - a) <= 1e-12 * end or abs(fh) < 4e-16:  # rounding of a position
+        if abs(b - a) <= 1e-12 * end or small:
             break
     return b

@@ -51,8 +51,8 @@ class Sampled(Leapfrog):
         uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
         return loop.inputs(NONE, NONE, uh, before, after, self.hand)
 
-    def _limited(self, command: tuple[float, ...]) -> bool:
-        return False  # torques that are held do not follow a hit
+    def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
+        return inf  # torques that are held do not follow a hit
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         x, y, tau, owed = self.state

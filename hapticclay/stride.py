@@ -33,7 +33,7 @@ STATE = np.dtype(
         ("closing", "i8"),  # why the next kick is the last, MORE where it is not
         ("landings", "i8"),  # on borders since the last sample
         ("steps", "i8"),  # engine steps made
-        ("struck", "i8"),  # whether the clay has just become stiffer, or the run begins in it
+        ("struck", "i8"),  # whether the handle has just come into this clay
     ]
 )
 
@@ -231,18 +231,18 @@ def limited(g, command):
     return abs(command[0]) >= g.torque_limit[0] or abs(command[1]) >= g.torque_limit[1]
 
 
-def harder(old, new, t):
-    """Whether the clay new, (base, rate), is stiffer than the old at time t [s]."""
-    x0, y0 = clay.at(old[0], old[1], t)
-    x1, y1 = clay.at(new[0], new[1], t)
-    return x1 > x0 or y1 > y0
-
-
-def first_of_a_hit(g, command, base, rate, t):
+def first_of_a_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
     """See Leapfrog._first_of_a_hit."""
-    x, y = clay.at(base, rate, t)
+    x, y = clay.at(new[0], new[1], t)
     b = max(x, y)
-    return FIRST / (b * arm.TRACE_W) if b > 0.0 and limited(g, command) else np.inf
+    first = FIRST / (b * arm.TRACE_W) if b > 0.0 else np.inf
+    if first >= after:
+        return np.inf
+    if before > 0.0:
+        state, _, _, out = kick(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)
+        w1, w2 = out[2], out[3]
+    command = kick(g, muscle, t, 0.0, first, old, new, q1, q2, w1, w2, state)[1]
+    return first if limited(g, command) else np.inf
 
 
 def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
@@ -282,6 +282,18 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
         while True:
             if closing != MORE:
                 after = 0.0
+            if struck and after > 0.0:
+                new = (base, rate)
+                struck, fine = 0, first_of_a_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
+                if fine < after:
+                    after = fine
+                    if before > 0.0:  # see Leapfrog._halve
+                        k = around(g, muscle, t, before, 0.0, old, new)
+                        to, command, sample, out = kick(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)
+                        enter(work, g, 0.5 * before, k, sample, command, out, w1, w2)
+                        state, before, w1, w2 = to, 0.0, out[2], out[3]
+                        store(engine.w, w1)
+                        store(engine.w + 8, w2)
             whole = before == dt and after == dt
             if whole:
                 if not fresh:
@@ -294,20 +306,6 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
                 to, command, sample, out = loop.tick(loop.coefficients(g, before, after), k, q1, q2, w1, w2, state)
             if after == 0.0 or axis >= 0:
                 break
-            if struck:
-                struck, fine = 0, first_of_a_hit(g, command, base, rate, t)
-                if fine < after:
-                    after = fine
-                    if before > 0.0:  # see Leapfrog._halve
-                        to, command, sample, out = kick(
-                            g, muscle, t, before, 0.0, old, (base, rate), q1, q2, w1, w2, state
-                        )
-                        k = around(g, muscle, t, before, 0.0, old, (base, rate))
-                        enter(work, g, 0.5 * before, k, sample, command, out, w1, w2)
-                        state, before, w1, w2 = to, 0.0, out[2], out[3]
-                        store(engine.w, w1)
-                        store(engine.w + 8, w2)
-                    continue
             sx, sy = heading(g, q1, q2, sample, out, after, low, high)
             # no way back over a border: it must not hold the run
             sx, sy = sx if overx in (0, sx) else 0, sy if overy in (0, sy) else 0
@@ -336,10 +334,9 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
                 if before == 0.0:
                     break
             else:
-                fresh, soft = False, (base, rate)
+                fresh, struck = False, 1
                 index = (index[0] + up, index[1]) if here == 0 else (index[0], index[1] + up)
                 low, high, base, rate = clay.settle(table, index[0], index[1], t)
-                struck = 1 if harder(soft, (base, rate), t) else 0
         if before > 0.0 or closing == MORE:
             enter(work, g, 0.5 * (before + after), k, sample, command, out, w1, w2)
             last[0], last[1], last[2], last[3], last[4], last[5] = sample[0], sample[1], *out
@@ -388,7 +385,7 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
             else:
                 index = (index[0] + up, index[1]) if axis == 0 else (index[0], index[1] + up)
                 low, high, base, rate = clay.settle(table, index[0], index[1], t)
-                struck = 1 if harder(old, (base, rate), t) else 0
+                struck = 1
     now["t"], now["before"], now["i"], now["closing"] = t, before, i, closing
     now["landings"], now["steps"], now["fine"], now["struck"] = landings, steps, fine, struck
     now["index"][0], now["index"][1] = index

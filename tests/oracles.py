@@ -276,3 +276,37 @@ def hybrid(
             t, x = s.t[-1], s.y[:, -1]
         q, w = x[:2], x[2:]
     return np.array(P), np.array(V), np.array(T)
+
+
+def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_max=1.0, times=(), scan=2e-4):
+    """Exact motion along one axis at one constant inertia, through the borders `edges` in both directions.
+
+    b is values[i] between edges i - 1 and i. At the start the loop has moved with v0 for long. A return to a border
+    within `scan` seconds of leaving it is missed.
+
+    Returns (crossings as (time, border, velocity), states (p, v, ...) at the ascending times, (n, 7)).
+    """
+    z = np.array([p0, v0, p0 + G1[axis] / G0[axis] * v0, v0, p0, v0, 1.0])
+    region, t, crossings, states, times = int(np.searchsorted(edges, p0, side="right")), 0.0, [], [], list(times)
+    while True:
+        A = Linear(axis, values[region], K, uh, th).A
+        low = edges[region - 1] if region else -np.inf
+        high = edges[region] if region < len(edges) else np.inf
+        E, a, ta = expm(A * scan), z, t
+        while ta < t_max and low <= (ahead := E @ a)[0] <= high:
+            a, ta = ahead, ta + scan
+        end = t_max
+        if ta < t_max:
+            border = high if ahead[0] > high else low
+            # next to a border that it has just left, the handle is on the near side of it already
+            begin = 1e-3 * scan if a is z and border == z[0] else 0.0
+            h = brentq(lambda h, A=A, a=a, c=border: (expm(A * h) @ a)[0] - c, begin, scan, xtol=1e-17, rtol=1e-15)
+            end = ta + h
+        while times and times[0] <= min(end, t_max):
+            states.append(expm(A * (times.pop(0) - t)) @ z)
+        if end >= t_max:
+            return crossings, np.array(states).reshape(-1, 7)
+        z, t = expm(A * h) @ a, end
+        z[0] = border
+        crossings.append((t, border, float(z[1])))
+        region += 1 if border == high else -1
