@@ -114,7 +114,7 @@ class SweepCommand:
         if len(plot_sweep.columns(table)) < 2:
             return
         for value in ("status", "fe_over_v_x", "speed_x", "end_time"):
-            if value != "status" and not any(x == x for x in table[value].to_pylist()):
+            if all(plot_sweep.absent(table, value)):
                 continue
             with atomic(self.out / f"{value}.png") as f:
                 plot_sweep.heat(table, value).savefig(f, format="png")

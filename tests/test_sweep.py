@@ -1,5 +1,6 @@
 """Sweeps: the space is what was asked for, and the data set survives interruption, murder and a change of mind."""
 
+import inspect
 import json
 import os
 import re
@@ -387,3 +388,62 @@ def test_samples_need_no_count(text):
     listed = Sweep("constant", {**vary, "gain.y": Range.parse("gain.y", "0.3,0.5")}, {}, "sobol", 8)
     assert set(listed.points(0, 8)[:, 2]) == {0.3, 0.5}
     assert Range.parse("b", "1:1000:50 log") == Range(1.0, 1000.0, 50, True)
+
+
+def hatched(figure):
+    """Number of cells and label of each kind without figure."""
+    shown = [p for p in figure.axes[0].patches if p.get_hatch()]
+    names = [t.get_text() for t in figure.legends[0].get_texts()]
+    return {n: len(p.get_path().to_polygons()) for n, p in zip(names, shown, strict=True)}
+
+
+def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
+    """The slab begins at 5 cm: with 0 or 0.01 N on the handle no run of 3 s gets there, with 1 N all do."""
+    sweep.run(
+        Sweep("constant", parse_grid("b=20:50:3 force=0,0.01,1"), {"t_max": 3.0, "dt": 2e-3}), tmp_path, workers=1
+    )
+    table = sweep.read(tmp_path)
+    for value in ("fe_over_v_x", "speed_x"):
+        assert plot_sweep.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        figure = plot_sweep.heat(table, value)
+        shown = figure.axes[0].collections[0].get_array()
+        np.testing.assert_array_equal(np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3])
+        np.testing.assert_allclose(shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0])
+        assert hatched(figure) == {"no clay reached": 6}
+    assert hatched(plot_sweep.heat(table, "crossing1")) == {"border not reached": 6}
+    assert figure.axes[1].get_ylabel() == "speed x [m/s]"
+    free = table.set_column(table.column_names.index("b_x"), "b_x", [[0.0] * 9])  # an experiment without clay
+    assert "no clay reached" not in plot_sweep.absent(free, "speed_x")
+    assert set(plot_sweep.absent(free, "fe_over_v_x")) == {"no clay reached"}
+
+
+def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
+    s = Sweep("constant", parse_grid("b=20:60 force=0.01:1 dt=0.5,0.002"), {"t_max": 0.5}, "lhs", 40, seed=4)
+    sweep.run(s, tmp_path, workers=1)
+    table = sweep.read(tmp_path)
+    why = plot_sweep.absent(table, "fe_over_v_x")
+    marks = {c.get_label(): len(c.get_offsets()) for c in plot_sweep.heat(table, "fe_over_v_x").axes[0].collections}
+    for name in ("refused", "no clay reached"):
+        assert marks[name] == why.count(name) > 0
+    assert sum(marks.values()) == 40 and why.count("refused") == table["status"].to_pylist().count("refused")
+
+
+def test_every_column_and_parameter_has_its_unit(tmp_path):
+    """As the docstrings of row and of the experiments state it; a number that has none says what it is a ratio of."""
+    sweep.run(small(), tmp_path, workers=1)
+    table = sweep.read(tmp_path)
+    units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
+             "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
+    for name, unit in units.items():
+        assert name in table.column_names and plot_sweep._label(name).endswith(f" [{unit}]")
+    for name, unit in {"operator.damper": "N.s/m", "operator.mass": "kg", "gain.x": "1/kg", "force.y": "N"}.items():
+        assert plot_sweep._label(name).endswith(f" [{unit}]")
+    for make in hc.SCENARIOS.values():
+        for name, parameter in inspect.signature(make).parameters.items():
+            if isinstance(parameter.default, float) or (
+                isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
+            ):
+                assert "[" in plot_sweep._label(name), name
+    for text in ("axis", "cause"):
+        with pytest.raises(ParameterError, match="column"):
+            plot_sweep.heat(table, text)
