@@ -63,8 +63,7 @@ def simulate_batch(
     for i, s in enumerate(jobs):
         if not isinstance(s, Scenario):
             raise ParameterError(f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    threads = integer("threads", cores if threads is None else threads, 1, 1024)
+    threads = integer("threads", cores() if threads is None else threads, 1, 1024)
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
     out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
@@ -85,6 +84,11 @@ def simulate_batch(
         r = simulate(jobs[i], every=every, engine=engine)
         out[i] = entry(*record.brief(r)) if summaries else r
     return out
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:

@@ -21,6 +21,9 @@ class ParameterError(ValueError):
         self.field, self.value, self.bound = field, value, bound
         super().__init__(f"{field} = {_short(value)}: {bound}")
 
+    def __reduce__(self):
+        return type(self), (self.field, self.value, self.bound), self.__dict__
+
 
 def _short(value: object) -> str:
     text = " ".join(repr(value).split())

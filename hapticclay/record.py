@@ -41,6 +41,7 @@ EXTRA = {  # arrays that some records have
     "target": "m",
     "gain": "1/kg",
 }
+SCALAR = ("t", "removed", "removal_rate")  # arrays of one figure a sample; the others have one an axis
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -247,6 +248,7 @@ class Record:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
+            _check(arrays | extra)
             schema = head["schema"]
             if schema == SCHEMA:
                 return cls(
@@ -265,6 +267,19 @@ class Record:
             what = " ".join(str(error).split()) or type(error).__name__
             raise ParameterError("record", str(path), f"must be a saved record ({what})") from None
         raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {schema}")
+
+
+def _check(arrays: dict[str, np.ndarray]) -> None:
+    """Raises ValueError, which names the array, unless all are finite, of their shapes, and time does not go back."""
+    t = arrays["t"]
+    for name, x in arrays.items():
+        shape = (t.size,) if name in SCALAR else (t.size, 2)
+        if x.shape != shape or x.dtype != np.float64:
+            raise ValueError(f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}")
+        if not np.isfinite(x).all():
+            raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
+    if (np.diff(t) < 0.0).any():
+        raise ValueError("array t must not go back")
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import inspect
 import json
@@ -19,40 +20,41 @@ from .experiments import SCENARIOS
 from .params import AXES, Operator, Scenario
 from .record import versions
 
-SCHEMA = "hapticclay-sweep-1"
+SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
-LETTERS = r"(?P<low>[^:]+):(?P<high>[^:]+):(?P<n>\d+)(?P<log>log)?"
+LETTERS = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST = 10_000_000  # runs in one sweep
 
 
 @dataclass(frozen=True)
 class Range:
-    """Values of one parameter: n from low to high, evenly spaced or, if log, by constant factors; or a list."""
+    """Values of one parameter: n from low to high, evenly spaced or, if log, by constant factors; or a list.
+
+    Without n it is for designs that sample: anything from low to high.
+    """
 
     low: float
     high: float
-    n: int
+    n: int | None = None
     log: bool = False
     values: tuple[float, ...] = ()
 
     @classmethod
     def parse(cls, field: str, text: object) -> Range:
-        """Reads "1:1000:50log", "0.2:2:20" or "1,2,5"; a number or a list of numbers is welcome too.
+        """Reads "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5"; a number or a list of them is welcome too.
 
         Raises:
             ParameterError: it is none of these.
         """
-        bound = 'must be like "1:1000:50log", "0.2:2:20" or "1,2,5"'
+        bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5"'
         items = text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
         try:
             if items is None:
                 found = re.fullmatch(LETTERS, str(text).strip())
                 if found:
-                    low, high, n = float(found["low"]), float(found["high"]), int(found["n"])
-                    good = (
-                        n >= 1 and math.isfinite(low) and math.isfinite(high) and (low > 0.0 < high or not found["log"])
-                    )
-                    if not good or (n > 1 and low >= high):
+                    low, high, n = float(found["low"]), float(found["high"]), int(found["n"]) if found["n"] else None
+                    finite = math.isfinite(low) and math.isfinite(high)
+                    if not finite or n == 0 or (found["log"] and low <= 0.0) or (n != 1 and low >= high):
                         raise ValueError
                     return cls(low, high, n, bool(found["log"]))
                 items = str(text).split(",")
@@ -67,12 +69,13 @@ class Range:
         """The values, shape (n,)."""
         if self.values:
             return np.array(self.values)
+        assert self.n
         return np.geomspace(self.low, self.high, self.n) if self.log else np.linspace(self.low, self.high, self.n)
 
     def spread(self, u: np.ndarray) -> np.ndarray:
         """u in [0, 1) over the range; a list is drawn from."""
         if self.values:
-            return np.array(self.values)[(u * self.n).astype(int)]
+            return np.array(self.values)[(u * len(self.values)).astype(int)]
         if self.log:
             return self.low * (self.high / self.low) ** u
         return self.low + (self.high - self.low) * u
@@ -109,6 +112,10 @@ class Sweep:
             raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
         if (self.runs is None) != (self.design == "grid"):
             raise ParameterError("runs", self.runs, "must be given for 'lhs' and 'sobol', and for them alone")
+        for name, r in self.vary.items():
+            if not r.values and (r.n is None) == (self.design == "grid"):
+                told = "must have a count, as in 1:1000:50log" if self.runs is None else "takes no count: runs has it"
+                raise ParameterError(name, f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}", f"{told} ({self.design})")
         integer("runs", len(self), 1, MOST)
         known = tuple(inspect.signature(SCENARIOS[self.experiment]).parameters)
         for name in (*self.vary, *self.fixed):
@@ -124,30 +131,25 @@ class Sweep:
     def __len__(self) -> int:
         if self.runs is not None:
             return integer("runs", self.runs, 1, MOST)
-        return math.prod(r.n for r in self.vary.values())
+        return math.prod(r.n or 1 for r in self.vary.values())
 
     @property
     def chunks(self) -> int:
         """Number of files."""
         return -(-len(self) // self.chunk)
 
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one file."""
+        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
+
     def points(self, first: int, last: int) -> np.ndarray:
         """Parameters of the runs first to last - 1, shape (last - first, parameters)."""
         axes = list(self.vary.values())
         if self.design == "grid":
-            index = np.unravel_index(np.arange(first, last), [r.n for r in axes])
+            index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
             return np.column_stack([r.grid()[i] for r, i in zip(axes, index, strict=True)])
-        return np.column_stack([r.spread(u) for r, u in zip(axes, self._unit()[first:last].T, strict=True)])
-
-    def _unit(self) -> np.ndarray:
-        from scipy.stats import qmc
-
-        kind = qmc.LatinHypercube if self.design == "lhs" else qmc.Sobol
-        with np.errstate(all="ignore"):
-            engine = kind(len(self.vary), rng=np.random.default_rng(self.seed))
-        if self.design == "sobol":  # balance needs a power of two; the first runs of that are taken
-            return engine.random_base2(max(0, math.ceil(math.log2(len(self)))))[: len(self)]  # type: ignore[attr-defined]
-        return engine.random(len(self))
+        unit = _unit(self.design, len(axes), len(self), self.seed)[first:last]
+        return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
 
     def scenario(self, point: np.ndarray) -> Scenario:
         """The scenario of one run.
@@ -191,14 +193,28 @@ class Sweep:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
+@functools.lru_cache(1)  # a worker is asked for it with each chunk
+def _unit(design: str, dimensions: int, runs: int, seed: int) -> np.ndarray:
+    """A sample of the unit cube, shape (runs, dimensions)."""
+    from scipy.stats import qmc
+
+    kind = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
+    with np.errstate(all="ignore"):
+        engine = kind(dimensions, rng=np.random.default_rng(seed))
+    if design == "sobol":  # balance needs a power of two; the first runs of that are taken
+        return engine.random_base2(max(0, math.ceil(math.log2(runs))))[:runs]  # type: ignore[attr-defined]
+    return engine.random(runs)
+
+
 def parse_grid(text: str) -> dict[str, Range]:
-    """Reads "b=1:1000:50log gain=0.2:2:20".
+    """Reads "b=1:1000:50log gain=0.2:2:20 force=1:2 log".
 
     Raises:
         ParameterError: a word is not name=range, or a name stands twice.
     """
-    how = "must be name=low:high:n, name=low:high:nlog or name=a,b,c, each name once"
-    return {name: Range.parse(name, values) for name, values in _words("grid", text, how).items()}
+    how = "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, each name once"
+    together = re.sub(r"\s+log(?!\S)", "log", text)
+    return {name: Range.parse(name, values) for name, values in _words("grid", together, how).items()}
 
 
 def parse_fixed(text: str) -> dict[str, Any]:

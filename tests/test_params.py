@@ -1,5 +1,7 @@
+import copy
 import dataclasses
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -76,3 +78,14 @@ def test_scenarios_are_frozen_and_listed():
     assert set(hc.SCENARIOS) == {"constant", "variable", "stability", "free"}
     with pytest.raises(dataclasses.FrozenInstanceError):
         hc.free().dt = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
+@pytest.mark.parametrize("value", [-1.0, "x" * 100, (1.0, [2.0]), None])
+def test_a_parameter_error_survives_copies_and_the_way_between_processes(again, value):
+    error = ParameterError("b", value, "must be >= 0")
+    error.add_note("while sweeping")
+    other = again(error)
+    assert type(other) is ParameterError and other is not error
+    assert (other.field, other.value, other.bound) == ("b", value, "must be >= 0")
+    assert (str(other), other.args, other.__notes__) == (str(error), error.args, ["while sweeping"])

@@ -92,6 +92,26 @@ def test_load_refuses_a_damaged_record(run, tmp_path):
         hc.Record.load(tmp_path / "a.npy")
 
 
+@pytest.mark.parametrize("name,change", [
+    ("fe", lambda x: x[:-1]), ("p", lambda x: x[:, 0]), ("b", lambda x: x[:, :1]), ("t", lambda x: x[:, None]),
+    ("t", lambda x: x[0]), ("tau", lambda x: np.stack((x, x))), ("t", lambda x: x[::-1]),
+    ("v", lambda x: x.astype(np.float32)), ("q", lambda x: x.astype(int)), ("qd", lambda x: x.astype(complex)),
+    ("delta", lambda x: x.astype("U8")), ("fh", lambda x: np.where(x == x[7], np.nan, x)),
+    ("v", lambda x: x + np.inf), ("removed", lambda x: x[:, None]), ("removal_rate", lambda x: x[1:]),
+    ("target", lambda x: x[:, 0]), ("gain", lambda x: x.astype(int)), ("target", lambda x: np.nan * x),
+])  # fmt: skip
+def test_load_refuses_an_array_that_is_not_what_it_must_be_and_names_it(run, tmp_path, name, change):
+    n = len(run.t)
+    extra = {"removed": np.zeros(n), "removal_rate": np.zeros(n), "target": np.zeros((n, 2)), "gain": np.ones((n, 2))}
+    file = dataclasses.replace(run, extra=extra).save(tmp_path) / "record.npz"
+    hc.Record.load(file)
+    with np.load(file) as z:
+        arrays = dict(z)
+    np.savez(file, **{**arrays, name: change(arrays[name])})
+    with pytest.raises(ParameterError, match=f"record = .*array {name} must"):
+        hc.Record.load(file)
+
+
 def test_load_refuses_another_schema(run, tmp_path, monkeypatch):
     monkeypatch.setattr(record, "SCHEMA", "hapticclay-record-0")
     run.save(tmp_path)

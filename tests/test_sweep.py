@@ -1,7 +1,9 @@
 """Sweeps: the space is what was asked for, and the data set survives interruption, murder and a change of mind."""
 
+import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import cli, plot_sweep, space, sweep
+from hapticclay import cli, plot_sweep, space, sweep, sweep_command
 from hapticclay.errors import ParameterError
 from hapticclay.space import Range, Sweep, parse_fixed, parse_grid
 
@@ -39,7 +41,23 @@ def test_ranges(text, values):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "a", "1:2", "1:2:0", "2:1:5", "0:1:5log", "-1:1:5log", "nan", "1:inf:3", None, "1:2:3:4"]
+    "text",
+    [
+        "",
+        "a",
+        "1:",
+        "1:2:0",
+        "2:1",
+        "2:1:5",
+        "0:1log",
+        "0:1:5log",
+        "-1:1:5log",
+        "nan",
+        "1:inf:3",
+        "1:log",
+        None,
+        "1:2:3:4",
+    ],
 )
 def test_bad_ranges_are_refused(text):
     with pytest.raises(ParameterError, match="b = "):
@@ -63,7 +81,7 @@ def test_grid_is_every_combination_once_whatever_the_chunks(n, m, chunk):
 
 @pytest.mark.parametrize("design", ["lhs", "sobol"])
 def test_samples_fill_the_space(design):
-    s = Sweep("constant", parse_grid("b=1:1000:2log gain.x=0:2:2"), {}, design, 60, seed=3)
+    s = Sweep("constant", parse_grid("b=1:1000log gain.x=0:2"), {}, design, 60, seed=3)
     points = s.points(0, 60)
     np.testing.assert_array_equal(points, Sweep("constant", s.vary, {}, design, 60, seed=3).points(0, 60))
     u = np.column_stack((np.log10(points[:, 0]) / 3.0, points[:, 1] / 2.0))
@@ -294,3 +312,138 @@ def test_a_damaged_folder_is_refused(tmp_path):
     Path(tmp_path / "data").mkdir()
     with pytest.raises(ParameterError):
         sweep.read(tmp_path)
+
+
+def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
+    import pyarrow.parquet as pq
+
+    sweep.run(small(), tmp_path, workers=1)
+    marked = columns(sweep.read(tmp_path))
+    for n in range(3):
+        file = sweep.part(tmp_path, n)
+        pq.write_table(sweep._read(file).replace_schema_metadata(None), file)
+    assert columns(sweep.read(tmp_path)) == marked
+
+
+def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
+    """By a clock of our own: the first run compiles for a minute, each further one takes what is asked."""
+    s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
+    real = sweep.measure
+    for each, runs in ((0.25, sweep.PROBES + 1), (0.5, 12), (30.0, 2)):  # 11 of 0.5 s are more than 5 s, and one of 30
+        clock, made = [0.0], []
+
+        def timed(*args, each=each, clock=clock, made=made):
+            clock[0] += each if made else 60.0
+            made.append(args[1])
+            return real(*args)
+
+        monkeypatch.setattr(sweep, "measure", timed)
+        monkeypatch.setattr(sweep.time, "perf_counter", lambda clock=clock: clock[0])
+        assert sweep.estimate(s)[0] == pytest.approx(each, rel=1e-12)
+        assert len(made) == runs and made[0] == made[1]
+
+
+def test_an_estimated_size_is_that_of_the_files(tmp_path):
+    s = Sweep("constant", parse_grid("b=10:1000:16log gain.x=0.5:2:16"), {"t_max": 0.4}, chunk=64)
+    guess = sweep.estimate(s)[1] * len(s)
+    sweep.run(s, tmp_path, workers=1)
+    size = sum(f.stat().st_size for f in (tmp_path / "data").iterdir())
+    assert guess == pytest.approx(size, rel=0.3)  # 20 of 256 runs, some with a longer cause than others
+
+
+def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypatch):
+    args = ["sweep", "--grid", "b=10:1000:30log gain.x=1:2:2", "--fixed", "t_max=0.01", "--chunk", "1",
+            "--workers", "1", "--no-maps", "--out", str(tmp_path)]  # fmt: skip
+    monkeypatch.setattr(sweep_command, "LARGE", 60)
+    assert cli.main(args) == 0
+    first, *lines = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(
+        r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data .* free.", first
+    )
+    told = [re.match(r"hapticclay: (\d+) of 60 runs, (\d+) %, \d\d:\d\d gone, \d\d:\d\d to go", x) for x in lines]
+    assert [(int(m[1]), int(m[2])) for m in told if m] == [(6 * k, 10 * k) for k in range(1, 11)]
+    for n in range(30):
+        sweep.part(tmp_path, n).unlink()
+    ticks = iter(range(0, 10**6, 100))  # seconds, 100 from one look at the clock to the next
+    monkeypatch.setattr(sweep_command.time, "monotonic", lambda: next(ticks))
+    assert cli.main(args) == 0
+    lines = capsys.readouterr().err.splitlines()  # half of them is there: no estimate, and a line after each
+    assert [int(x.split()[1]) for x in lines] == list(range(31, 61))
+    assert lines[0].endswith("31 of 60 runs, 52 %, 01:40 gone, 48:20 to go")
+
+
+@pytest.mark.parametrize("design,text,word", [
+    ("lhs", "b=1:1000:50log", "takes no count"), ("sobol", "b=1:2:2", "takes no count"),
+    ("grid", "b=1:2", "have a count"), ("grid", "b=1:10log", "have a count"),
+])  # fmt: skip
+def test_only_a_grid_counts(design, text, word):
+    with pytest.raises(ParameterError, match=f"b = .*{word}.*{design}"):
+        Sweep("constant", parse_grid(text), {}, design, None if design == "grid" else 8)
+
+
+@pytest.mark.parametrize("text", ["b=1:1000log gain.x=0:2", "b=1:1000 log  gain.x=0:2", "gain.x=0:2 b=1:1000 log"])
+def test_samples_need_no_count(text):
+    vary = parse_grid(text)
+    assert vary == {"b": Range(1.0, 1000.0, log=True), "gain.x": Range(0.0, 2.0)}
+    listed = Sweep("constant", {**vary, "gain.y": Range.parse("gain.y", "0.3,0.5")}, {}, "sobol", 8)
+    assert set(listed.points(0, 8)[:, 2]) == {0.3, 0.5}
+    assert Range.parse("b", "1:1000:50 log") == Range(1.0, 1000.0, 50, True)
+
+
+def hatched(figure):
+    """Number of cells and label of each kind without figure."""
+    shown = [p for p in figure.axes[0].patches if p.get_hatch()]
+    names = [t.get_text() for t in figure.legends[0].get_texts()]
+    return {n: len(p.get_path().to_polygons()) for n, p in zip(names, shown, strict=True)}
+
+
+def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
+    """The slab begins at 5 cm: with 0 or 0.01 N on the handle no run of 3 s gets there, with 1 N all do."""
+    sweep.run(
+        Sweep("constant", parse_grid("b=20:50:3 force=0,0.01,1"), {"t_max": 3.0, "dt": 2e-3}), tmp_path, workers=1
+    )
+    table = sweep.read(tmp_path)
+    for value in ("fe_over_v_x", "speed_x"):
+        assert plot_sweep.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        figure = plot_sweep.heat(table, value)
+        shown = figure.axes[0].collections[0].get_array()
+        np.testing.assert_array_equal(np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3])
+        np.testing.assert_allclose(shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0])
+        assert hatched(figure) == {"no clay reached": 6}
+    assert hatched(plot_sweep.heat(table, "crossing1")) == {"border not reached": 6}
+    assert figure.axes[1].get_ylabel() == "speed x [m/s]"
+    free = table.set_column(table.column_names.index("b_x"), "b_x", [[0.0] * 9])  # an experiment without clay
+    assert "no clay reached" not in plot_sweep.absent(free, "speed_x")
+    assert set(plot_sweep.absent(free, "fe_over_v_x")) == {"no clay reached"}
+
+
+def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
+    s = Sweep("constant", parse_grid("b=20:60 force=0.01:1 dt=0.5,0.002"), {"t_max": 0.5}, "lhs", 40, seed=4)
+    sweep.run(s, tmp_path, workers=1)
+    table = sweep.read(tmp_path)
+    why = plot_sweep.absent(table, "fe_over_v_x")
+    marks = {c.get_label(): len(c.get_offsets()) for c in plot_sweep.heat(table, "fe_over_v_x").axes[0].collections}
+    for name in ("refused", "no clay reached"):
+        assert marks[name] == why.count(name) > 0
+    assert sum(marks.values()) == 40 and why.count("refused") == table["status"].to_pylist().count("refused")
+
+
+def test_every_column_and_parameter_has_its_unit(tmp_path):
+    """As the docstrings of row and of the experiments state it; a number that has none says what it is a ratio of."""
+    sweep.run(small(), tmp_path, workers=1)
+    table = sweep.read(tmp_path)
+    units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
+             "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
+    for name, unit in units.items():
+        assert name in table.column_names and plot_sweep._label(name).endswith(f" [{unit}]")
+    for name, unit in {"operator.damper": "N.s/m", "operator.mass": "kg", "gain.x": "1/kg", "force.y": "N"}.items():
+        assert plot_sweep._label(name).endswith(f" [{unit}]")
+    for make in hc.SCENARIOS.values():
+        for name, parameter in inspect.signature(make).parameters.items():
+            if isinstance(parameter.default, float) or (
+                isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
+            ):
+                assert "[" in plot_sweep._label(name), name
+    for text in ("axis", "cause"):
+        with pytest.raises(ParameterError, match="column"):
+            plot_sweep.heat(table, text)
