@@ -64,6 +64,13 @@ def centripetal(r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: f
     return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
 
 
+def turning(vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
+    """`centripetal` at handle velocity (vx, vy) [m/s]; columns as above."""
+    r1, r2 = rates(vx, vy, u1x, u1y, u2x, u2y, 1.0)
+    x, y = centripetal(r1, r2, u1x, u1y, u2x, u2y)
+    return x, y
+
+
 def torques(fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
     """Joint torques J' f [N.m] of a force at the handle [N]."""
     t2 = u2x * fx + u2y * fy

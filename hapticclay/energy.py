@@ -75,7 +75,7 @@ class Ledger:
         """Enters kicks.
 
         Args:
-            raw: shape (14, n), as loop.advance keeps them. k: loop.inputs of each, (12, n) or (12, 1).
+            raw: shape (14, n), as glide.advance keeps them. k: loop.inputs of each, (12, n) or (12, 1).
             rest: of the clay, beside its dampers [N], (2, n) or (2, 1). H: length of each kick [s], (n,) or (1,).
         """
         if not raw.shape[1]:

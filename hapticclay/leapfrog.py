@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from . import arm, energy, loop
+from . import arm, energy, glide, loop
 from .clay import at
 from .inline import inline
 from .params import NO_HAND, Scenario
@@ -91,16 +91,16 @@ class Leapfrog(Run):
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
         self.hand = scenario.operator or NO_HAND
         # what the steps here will need is written out before the run is timed
-        _written_out(loop.vary if self.varies else loop.advance, self.last)
+        _written_out(glide.vary if self.varies else glide.advance, self.last)
         if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-            _written_out(loop.vary, self.last)
+            _written_out(glide.vary, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
         self.final: Any = None  # velocity of the handle at the end [m/s]
         self.before = 0.0  # length of the step that led here [s]
         self.clay = self.regions.base, self.regions.rate  # before the sample
-        self.rows = bytearray(CHUNK * loop.ROW)
+        self.rows = bytearray(CHUNK * glide.ROW)
         self.filled = 0
         self.stretches: list[_Stretch] = []
         self.ledger = energy.Ledger(scenario)
@@ -123,7 +123,7 @@ class Leapfrog(Run):
                 way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
                 n = min(n, max(16, int(min(0.95 * way, n))))
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
-        rows = range(self.filled * loop.ROW, (self.filled + n) * loop.ROW, loop.ROW)
+        rows = range(self.filled * glide.ROW, (self.filled + n) * glide.ROW, glide.ROW)
         rest: list[tuple[float, float]] = []
         if self.varies:
             b, inputs, shift = self._ahead(n)
@@ -133,7 +133,7 @@ class Leapfrog(Run):
             inputs = loop.inputs(b, b, self.scenario.force, dt, dt, self.hand)
             b, k, shift = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1)), ([0.0] * n, [0.0] * n)
         simple = not self.varies and not k[7, 0]
-        many = _written_out(loop.advance if simple else loop.vary, self.last)
+        many = _written_out(glide.advance if simple else glide.vary, self.last)
         if simple:
             steps, given = rows, (self.whole, inputs)
         else:
@@ -338,7 +338,7 @@ class Leapfrog(Run):
 
     def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool) -> None:
         """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
-        _row.pack_into(self.rows, self.filled * loop.ROW, *row[:14])
+        _row.pack_into(self.rows, self.filled * glide.ROW, *row[:14])
         b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
         self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
         self.filled += 1

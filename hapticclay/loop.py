@@ -16,7 +16,6 @@ from math import cos, sin
 from . import arm, clay, human, lti, servo
 from .params import C_POLE, NO_HAND, G, S, Scenario
 
-ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
 
@@ -123,7 +122,7 @@ def tick(c, k, q1, q2, w1, w2, state):
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
         ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, _, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
     u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
@@ -151,6 +150,13 @@ def tick(c, k, q1, q2, w1, w2, state):
     if stiff:
         restx, resty = owedx / H, owedy / H
         bx, by = (cx0 + cx1) * vx, (cy0 + cy1) * vy
+        # behind the sample the handle goes round the joints with the velocity that such clay leaves it
+        gx, gy = arm.turning(0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
+        gx, gy = (1.0 - L) * (gx - cx), (1.0 - L) * (gy - cy)
+        ax += gx
+        ay += gy
+        fx += mass * gx
+        fy += mass * gy
         hx, hy = uhx - spring * px, uhy - spring * py
         gx = ax - mx * vx + sxx * hx + sxy * hy
         gy = ay - my * vy + sxy * hx + syy * hy
@@ -344,57 +350,3 @@ def entire(w1, w2, n1, n2, t1, t2, step):
     """
     a1, a2 = (n1 - w1) / step, (n1 + n2 - w1 - w2) / step
     return t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2
-
-
-def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """Whole steps within one region of the clay.
-
-    Args:
-        rows: range of offsets into the record, one for each step [bytes].
-        c, k: from `coefficients` and `inputs`, for whole steps before and after.
-        state: see `tick`.
-        read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
-        write: packs a command into the engine's memory, drive.
-        keep: packs one row into the record, buffer. step, model, data: the engine.
-
-    Returns:
-        The state after the last step.
-    """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
-    for row in rows:
-        q1, q2, w1, w2 = read(motion)
-        (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
-            (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy, _, _),
-            (ux, uy, n1, n2),
-        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
-        write(drive, 0, t1, t2, bx, by, p1, p2)
-        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
-        step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
-
-
-def vary(steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """As `advance`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
-
-    Args:
-        steps: for each step its offset into the record [bytes], `inputs`, change of the command x, y over it [m].
-        rest: list that gets the clay's force beside its dampers x, y in each kick [N].
-    """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
-    for row, k, cx, cy in steps:
-        q1, q2, w1, w2 = read(motion)
-        (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
-            (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy, rx, ry),
-            (ux, uy, n1, n2),
-        ) = tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
-        s0 += cx
-        s1 += cy
-        write(drive, 0, t1, t2, bx, by, p1, p2)
-        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
-        rest.append((rx, ry))
-        step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from . import loop, outcome, record
+from . import glide, loop, outcome, record
 from .errors import ParameterError, integer, number
 from .leapfrog import Leapfrog, _written_out
 from .params import B_MAX, L1, L2, Clay, Multisine, Operator, Profile, Scenario
@@ -70,7 +70,7 @@ class _Live(Leapfrog):
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        _written_out(loop.vary, self.last)  # now, not while the hand waits
+        _written_out(glide.vary, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
         self.watch = outcome.Watch(replace(scenario, muscle=Multisine()))

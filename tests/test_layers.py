@@ -17,7 +17,7 @@ LEVELS = [
     {"arm", "lti", "clay", "human", "signals", "estimate"},
     {"servo", "record", "energy", "limits"},
     {"loop", "scene", "outcome", "stability", "removal"},
-    {"run", "robust", "design", "passive", "stage"},
+    {"run", "robust", "design", "passive", "stage", "glide"},
     {"leapfrog", "rungekutta"},
     {"sampled", "stride", "session"},
     {"march", "wired"},

@@ -8,7 +8,7 @@ import pytest
 from oracles import Arm
 
 import hapticclay as hc
-from hapticclay import inline, leapfrog, loop
+from hapticclay import glide, inline, leapfrog
 from hapticclay.params import Operator
 
 CASES = {
@@ -29,7 +29,7 @@ def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
     monkeypatch.setattr(leapfrog, "_fused", {})
     monkeypatch.setattr(leapfrog, "FUSE_FROM", 10**9)
     plain = hc.simulate(CASES[name])
-    assert not leapfrog._fused and inline.inline(loop.advance) is not loop.advance
+    assert not leapfrog._fused and inline.inline(glide.advance) is not glide.advance
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(fused, field), getattr(plain, field), err_msg=field)
 
