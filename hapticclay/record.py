@@ -52,7 +52,7 @@ class Outcome:
     Attributes:
         code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
             their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
-            "out of reach" (the arm is stretched), "singular" (it is folded).
+            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
         time: simulated time of the end, or of the verdict where an unstable run went on [s].
         step: index of the last good sample.
         axis: the axis that is to blame, "" if none.

@@ -11,7 +11,7 @@ import hapticclay
 
 PACKAGE = Path(hapticclay.__file__).parent
 LEVELS = [
-    {"engine", "errors", "inline"},
+    {"engine", "errors", "inline", "memory"},
     {"hardware"},
     {"params", "interface"},
     {"arm", "lti", "clay", "human", "signals", "estimate"},
