@@ -85,7 +85,7 @@ def filmed(folder, blocked, out="x.mp4", **env):
     """What `hapticclay video` says where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
-        "from hapticclay import cli; cli.simulate_with_progress = None\n"
+        "from hapticclay import cli, cli_view; cli_view.simulate_with_progress = None\n"
         f"sys.exit(cli.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
@@ -149,7 +149,6 @@ def test_smooth_pictures_have_soft_edges():
     (["video", "no/such"], "must be a saved record"),
     (["view", "constant", "--tool-width", "0"], "tool.width"),
     (["view", "constant", "--every", "0"], "every = 0: must be a whole number"),
-    (["view", "--web", "variable"], "the experiment comes first: hapticclay view variable"),
     (["view", "constant", "--web", "--port", "99999"], "port = 99999: must be a whole number"),
 ])  # fmt: skip
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
