@@ -93,7 +93,7 @@ class Video:
     size: tuple[int, int] = (960, 480)
     """Width and height [pixels]."""
     plots: bool = True
-    """Run the plots on the right."""
+    """Run the plots on the right, if there is room: from 320 x 100."""
     smooth: bool = False
     """Soften edges and shadows; takes twice as long without a graphics card."""
     tool_width: float = TOOL.width
