@@ -145,7 +145,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         command = _parsed(list(sys.argv[1:] if argv is None else argv))
         code = command() if command else 0
-        sys.stdout.flush()
+        if sys.stdout:  # None where it was closed before we came
+            sys.stdout.flush()
         return code
     except ParameterError as error:
         text = error.bound if error.field == "arguments" else str(error)

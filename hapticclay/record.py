@@ -243,6 +243,8 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
+            if file.is_file() and not zipfile.is_zipfile(file):
+                raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}

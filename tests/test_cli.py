@@ -188,6 +188,19 @@ def test_a_full_device_for_output_is_one_line(tmp_path):
     assert out.returncode == 1 and out.stderr.count("\n") == 1 and "No space left" in out.stderr
 
 
+def test_a_closed_output_is_no_traceback(tmp_path):
+    words = f"{sys.executable} -m hapticclay run constant --t-max 0.5 --no-plots --out o >&-"
+    out = subprocess.run(["bash", "-c", words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, timeout=120)
+    assert (out.returncode, out.stderr) == (0, "")
+    assert sorted(os.listdir(tmp_path / "o")) == ["record.npz", "summary.json"]
+
+
+def test_a_file_that_is_no_record_is_called_so(capsys, tmp_path):
+    (tmp_path / "notes.txt").write_text("x")
+    code, _, err = run(capsys, "video", str(tmp_path / "notes.txt"))
+    assert code == 2 and err.endswith("must be a saved record (it is no .npz file)\n")
+
+
 def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeypatch):
     def full(self, path):
         raise cli.ParameterError("out", str(path), "must be writable (No space left on device)")
