@@ -16,9 +16,9 @@ BIN := .venv/bin
 	@touch $@
 
 demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say where plots and report are
-	$(BIN)/hapticclay run constant --out out/demo
-	$(BIN)/hapticclay reproduce --quick --out out/demo/paper
-	@echo "plots: $(CURDIR)/out/demo/velocity.png $(CURDIR)/out/demo/force.png"
+	$(BIN)/hapticclay run constant
+	$(BIN)/hapticclay reproduce --quick
+	@echo "plots: $(CURDIR)/out/run/constant/velocity.png $(CURDIR)/out/run/constant/force.png"
 
 test: .venv/dev.done  ## set up and run all tests
 	$(BIN)/python -m pytest

@@ -16,6 +16,8 @@ from .maps import Map
 from .params import AXES, B_CONSTANT, GAIN, TS, Operator
 from .record import atomic, versions, writable
 
+SCHEMA = "hapticclay-stability-1"
+UNITS = {"b": "N.s/m", "operator": "kg, N.s/m, N/m", "Ts": "s", "delay": "s", "omega": "rad/s"}
 ONE_HZ = 2.0 * math.pi  # [rad/s]
 
 
@@ -51,7 +53,12 @@ class Stability:
                              self.delay if self.Ts else 0.0, self.shaping)  # fmt: skip
         rows = verdicts(loop, self.delay)
         print(table(rows))
-        found: dict[str, Any] = {"verdicts": rows, "map": None, "versions": versions()}
+        asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": loop.operator and asdict(loop.operator),
+                 "Ts": self.Ts, "delay": self.delay, "shaping": self.shaping, "map": self.map,
+                 "quick": self.quick}  # fmt: skip
+        found: dict[str, Any] = {
+            "schema": SCHEMA, "asked": asked, "units": UNITS, "verdicts": rows, "map": None, "versions": versions(),
+        }  # fmt: skip
         if self.map != "none":
             chart = maps.chart(self.map, replace(loop, delay=0.0 if self.map == "delay-damping" else loop.delay),
                                self.quick, _progress)  # fmt: skip
@@ -79,25 +86,29 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     def add(question: str, answer: bool | None, value: float, what: str, omega: float) -> None:
         rows.append({"question": question, "answer": answer, "value": value, "what": what, "omega": omega})
 
-    def judge(question: str, v: stability.Verdict) -> None:
-        add(question, v.verdict, v.margin, v.measures, v.omega)
+    def judge(question: str, v: stability.Verdict, what: str) -> None:
+        add(question, v.verdict, v.margin, what, v.omega)
 
-    judge("stable with this hand, continuous time", stability.coupled_stability(axis, K, b, **kw))
-    judge(f"... sampled every {1e3 * Ts:g} ms", stability.coupled_stability(axis, K, b, Ts=Ts, **kw))
+    def stable(question: str, **late: Any) -> None:
+        v = stability.coupled_stability(axis, K, b, **late, **kw)
+        add(question, v.verdict, v.margin * K, "largest stable K", v.omega)
+
+    stable("stable with this hand")
+    stable(f"... sampled every {1e3 * Ts:g} ms", Ts=Ts)
     if delay:
-        late = f"{1e3 * delay:g} ms late"
-        judge(f"... {late}, continuous time", stability.coupled_stability(axis, K, b, delay=delay, **kw))
-        judge(f"... {late}, sampled", stability.coupled_stability(axis, K, b, Ts=Ts, delay=delay, **kw))
+        stable(f"... {1e3 * delay:g} ms late", delay=delay)
+        stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
     m = stability.margins(axis, K, b, **kw)
     add("gain margin", None, m.gain[1], "factor on K", m.gain_omega[1])
     add("phase margin", None, math.degrees(m.phase), "degrees", m.phase_omega)
-    add("delay margin", None, 1e3 * m.delay, "ms, of the compensator", m.delay_omega)
+    add("delay margin of the compensator", None, 1e3 * m.delay, "ms", m.delay_omega)
     add("disk margin", None, m.disk, "alpha", m.disk_omega)
     for equation in (11, 13):
-        judge(f"small gain, Eq. {equation}", stability.small_gain(axis, K, b, equation=equation, **kw))
-    judge("passive: stable with every hand", passive.passivity(axis, K, b))
+        small = stability.small_gain(axis, K, b, equation=equation, **kw)
+        judge(f"small gain, Eq. {equation}", small, "right over left side")
+    judge("passive: stable with every hand", passive.passivity(axis, K, b), "least Re Z [N.s/m]")
     damper = loop.operator.damper if loop.operator else 0.0
-    judge("held clay passive behind the hand's damper", passive.clay_passivity(b, Ts, damper))
+    judge("held clay passive with this hand", passive.clay_passivity(b, Ts, damper), "N.s/m to spare")
     felt = stability.transparency(axis, K, b, np.array([ONE_HZ]))[0]
     add("transparency |fe/fh| at 1 Hz", None, float(abs(felt)), "1 at best", ONE_HZ)
     return rows
@@ -109,7 +120,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
     said = {True: "yes", False: "no", None: ""}
     cells = [[r["question"], said[r["answer"]], _number(r["value"]), r["what"], _number(r["omega"])] for r in rows]
-    return tabulate(cells, ["", "", "value", "what it is", "at [rad/s]"], disable_numparse=True)
+    return tabulate(cells, ["", "", "value", "what it is", "at rad/s"], disable_numparse=True)
 
 
 def disagreements(chart: Map) -> str:

@@ -1,4 +1,4 @@
-"""What the commands `view` and `video` do: windows, pages and films around sessions, scenarios and records."""
+"""`hapticclay view` and `video`: windows, pages and films around sessions, scenarios and records."""
 
 from __future__ import annotations
 
@@ -7,42 +7,110 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+import tyro
 
-from .errors import ParameterError, choice
+from .cli_run import Experiment, deliver, simulate_with_progress
+from .errors import ParameterError
 from .experiments import SCENARIOS
 from .params import Scenario
-from .record import Record
-from .removal import Tool
+from .record import Record, writable
+from .removal import TOOL, Tool
 from .session import Session
 
-COMMANDS = ("view", "video")
 
+def recorded(path: tyro.conf.Positional[Path]) -> Record:
+    """A saved record.
 
-def complete(words: list[str]) -> list[str]:
-    """Command line words with what may be left out: the experiment ("constant"), the word "record" before a path.
-
-    Raises:
-        ParameterError: a word is neither an experiment nor a file.
+    Args:
+        path: its folder, or its record.npz.
     """
-    if words[:1] not in [[c] for c in COMMANDS] or "--help" in words[:2] or "-h" in words[:2]:
-        return words
-    command, *rest = words
-    if not rest or rest[0].startswith("-"):
-        late = [w for before, w in zip(rest, rest[1:], strict=False) if w in SCENARIOS and before != "--out"]
-        if late:
-            raise ParameterError("arguments", "", f"the experiment comes first: hapticclay {command} {late[0]} ...")
-        return [command, "constant", *rest]
-    if rest[0] in SCENARIOS or rest[0] == "record":
-        return words
-    if not Path(rest[0]).exists() and os.sep not in rest[0]:
-        try:
-            choice("experiment", rest[0], tuple(SCENARIOS))
-        except ParameterError as error:
-            raise ParameterError(error.field, error.value, f"{error.bound}; or the folder of a record") from None
-    return [command, "record", *rest]
+    return Record.load(path)
+
+
+Recorded = Annotated[Record, tyro.conf.subcommand("record", constructor=recorded)]
+
+
+@dataclass(frozen=True)
+class View:
+    """Take part: pull the handle with the mouse, in a window or a browser; or replay a record (its folder).
+
+    The person is the muscle: force, length and t_max of the experiment do not count. On exit the record, its
+    summary and its plots are written.
+    """
+
+    scenario: Experiment | Recorded
+    stiffness: float = 10.0
+    """Of the hand, as a multiple of the spring of Th (Eq. 19): 1 is the paper's arm at rest."""
+    tool_width: float = TOOL.width
+    """Width of the tool [m]."""
+    tool_depth: float = TOOL.depth
+    """Depth of the cut [m]."""
+    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")] = None
+    """Folder for record.npz, summary.json and the plots."""
+    every: int = 10
+    """Keep every n-th sample in the record."""
+    plots: bool = True
+    """Draw the plots."""
+    web: bool = False
+    """Show it in a browser, without a display of our own."""
+    host: str = "127.0.0.1"
+    """Address to serve the browser on; other than this machine's, a token guards it."""
+    port: int = 8080
+    """Port to serve the browser on."""
+
+    def __call__(self) -> int:
+        tool = Tool(self.tool_width, self.tool_depth)
+        if isinstance(self.scenario, Record):
+            if self.web:
+                raise ParameterError("web", True, "shows sessions only: make a film of a record with hapticclay video")
+            replay(self.scenario, tool)
+            return 0
+        writable(self.out or Path("out/view"))
+        record = look(self.scenario, self.stiffness, tool, self.every, self.web, self.host, self.port)
+        if record is None:
+            print("nothing was recorded")
+            return 0
+        deliver(record, self.out or Path("out/view", record.scenario.name), self.plots)
+        return 0
+
+
+@dataclass(frozen=True)
+class Video:
+    """Film a record (its folder) or an experiment: arm, clay and running plots side by side."""
+
+    scenario: Experiment | Recorded
+    out: Path = Path("out/film.mp4")
+    """The file: .mp4, .webp or .gif."""
+    camera: Literal["room", "top", "close"] = "room"
+    """Where to look from."""
+    speed: float = 1.0
+    """1 is real time, 2 twice as fast."""
+    size: tuple[int, int] = (960, 480)
+    """Width and height [pixels]."""
+    plots: bool = True
+    """Run the plots on the right, if there is room: from 320 x 100."""
+    smooth: bool = False
+    """Soften edges and shadows; takes twice as long without a graphics card."""
+    tool_width: float = TOOL.width
+    """Width of the tool [m]."""
+    tool_depth: float = TOOL.depth
+    """Depth of the cut [m]."""
+
+    def __call__(self) -> int:
+        tool = Tool(self.tool_width, self.tool_depth)
+        writable(self.out.parent)
+        s = self.scenario
+        made = film(
+            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1),
+            self.out, self.camera, self.speed, self.size, self.plots, tool, self.smooth,
+        )  # fmt: skip
+        print(f"written to {made}")
+        return 0
 
 
 def look(

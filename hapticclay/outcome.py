@@ -106,6 +106,9 @@ class Watch:
     def end(self, outcome: Outcome) -> Outcome:
         """What there is to say of a run that came to this end, now that all its rows have been seen."""
         s = self.scenario
+        if outcome.code == "interrupted":
+            since = self.onset
+            return replace(outcome, cause=f"{since.axis} axis: {since.cause}") if since else outcome
         recent = max(1, min(self.seen, round(WHILE / s.dt)))
         if self.onset is not None:
             cycles = self.bound.sum() > OFTEN * len(self.bound)
@@ -113,7 +116,8 @@ class Watch:
             return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
         if outcome.code == "time limit":
             if self.seen - 1 - self.unbound >= recent:
-                advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower the force"
+                least = "rms" if s.muscle else "the force"
+                advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower {least}"
                 return replace(outcome, code="saturated", cause="a motor stays in its limit", advice=advice)
             if self.seen - 1 - self.moved >= recent:
                 return replace(outcome, code="stalled", cause=f"slower than {STILL:g} m/s", advice=self._why_still())
@@ -124,6 +128,8 @@ class Watch:
 
     def _why_still(self) -> str:
         s = self.scenario
+        if s.muscle:
+            return "raise rms"
         if s.operator and s.operator.spring:
             return "the spring of the hand holds the muscle's force: raise force, or lower operator.spring"
         return "raise force, or lower b" if any(s.force) else "give a force"

@@ -248,9 +248,10 @@ class Scenario:
         put("dt", number("dt", self.dt, 1e-6, 0.02, unit="s"))
         if self.Ts is not None:
             put("Ts", number("Ts", self.Ts, self.dt, 1.0, unit="s"))
-            if self.control != "sampled" or abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
-                bound = f"must be a whole multiple of dt = {self.dt:g} s, and None unless control is 'sampled'"
-                raise ParameterError("Ts", self.Ts, bound)
+            if self.control != "sampled":
+                raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
+            if abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
+                raise ParameterError("Ts", self.Ts, f"must be a whole multiple of dt = {self.dt:g} s")
         self._check_interface()
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))

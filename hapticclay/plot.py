@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 
 from . import lti
 from .params import AXES, C_POLE, Scenario
@@ -18,6 +19,8 @@ from .signals import Signal
 
 BLUE, ORANGE, GREEN, BLACK = "#0072B2", "#D55E00", "#009E73", "#222222"  # Okabe and Ito, safe for all eyes
 CLAY, GREY = "#E8C9A8", "#555555"
+TITLE = 9.0  # size of a title's type [points]
+MARGIN = 0.9  # of a figure's width that its title has not: what stands left of the axes, and a little [inch]
 STYLE: Any = {
     "font.size": 10.0,
     "axes.spines.top": False,
@@ -87,6 +90,9 @@ def path(record: Record) -> Figure:
         ax = figure.add_subplot()
         margin = 0.08 * max(float((high - low).max()), 0.1)
         low, high = low - margin, high + margin
+        room = (high - low)[1] * (figure.get_figwidth() - MARGIN) / (figure.get_figheight() - 1.3)
+        wider = max(0.0, 0.5 * (room - (high - low)[0]))  # the axes are as wide as the figure, and so is their title
+        low[0], high[0] = low[0] - wider, high[0] + wider
         _clay_map(figure, ax, record, low, high)
         ax.plot(p[:, 0], p[:, 1], color=BLUE, label="handle")
         ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
@@ -95,7 +101,7 @@ def path(record: Record) -> Figure:
         ax.set_aspect("equal")
         ax.grid(False)
         figure.legend(loc="outside upper center", ncols=4)
-        ax.set_title(_title(record.scenario), fontsize=9, loc="left", color=GREY)
+        _title(figure, ax, _parts(record.scenario))
     return figure
 
 
@@ -138,10 +144,11 @@ def force_maneuver(records: Sequence[Record], axis: str = "x", against: str = "t
             where = r.t if against == "time" else 100.0 * r.p[:, i]
             ax.plot(where, r.fh[:, i], color=BLUE, lw=0.9, label="operator, f$_h$")
             if r.scenario.muscle is not None:
-                uh = r.scenario.force[i] + Signal(r.scenario.muscle)(r.t)[:, i]
-                ax.plot(where, uh, color=ORANGE, lw=1.1, ls="--", label="muscle, u$_h$")
+                muscle = Signal(r.scenario.muscle)  # in pieces: of n samples it would hold n times its lines at once
+                uh = np.concatenate([muscle(t)[:, i] for t in np.array_split(r.t, len(r.t) // 4096 + 1)])
+                ax.plot(where, r.scenario.force[i] + uh, color=ORANGE, lw=1.1, ls="--", label="muscle, u$_h$")
             ax.set_ylabel(f"force along {axis} [N]")
-            ax.set_title(f"{_title(r.scenario)}: {r.outcome.code}", fontsize=9, loc="left", color=GREY)
+            _title(figure, ax, [*_parts(r.scenario), r.outcome.code])
             if against != "time":
                 ax.set_xlabel(f"position {axis} [cm]")
         panels[-1].set_xlabel("time [s]" if against == "time" else f"position {axis} [cm]")
@@ -220,19 +227,34 @@ def _limits(ax: Axes, v: np.ndarray) -> None:
     ax.set_ylim(low - 0.04 * span, high + 0.12 * span)
 
 
-def _title(s: Scenario) -> str:
+def _parts(s: Scenario) -> list[str]:
+    """What a title says of a scenario."""
+
     def pair(x: tuple[float, float]) -> str:
         return f"({x[0]:.3g}, {x[1]:.3g})"
 
-    name = f"{s.name}: K = {pair(s.gain)}"
+    out = [f"{s.name}: K = {pair(s.gain)}"]
     if s.muscle is None:
-        name += f", u$_h$ = {pair(s.force)} N"
+        out.append(f"u$_h$ = {pair(s.force)} N")
     if s.clay:
         values = list(dict.fromkeys(v for f in (s.clay.x, s.clay.y) for v in f.values if v))
-        name += f", b = {', '.join(f'{v:g}' for v in values) or '0'} N$\\cdot$s/m"
-        grown = [g for f in (s.clay.x, s.clay.y) for g in f.growth if g]
-        name += f", growing {grown[0]:g} a second" if grown else ""
-    return name + (", T$_h$ in the loop" if s.operator else "") + (", inertia shaped" if s.shaping else "")
+        out.append(f"b = {', '.join(f'{v:g}' for v in values) or '0'} N$\\cdot$s/m")
+        out += [f"growing {g:g} a second" for f in (s.clay.x, s.clay.y) for g in f.growth if g][:1]
+    return out + ["T$_h$ in the loop"] * bool(s.operator) + ["inertia shaped"] * s.shaping
+
+
+def _title(figure: Figure, ax: Axes, parts: list[str]) -> None:
+    """Puts a title over the axes, in as many lines as keep it within the figure."""
+    room = 72.0 * (figure.get_figwidth() - MARGIN)
+    lines = [parts[0]]
+    for part in parts[1:]:
+        more = f"{lines[-1]}, {part}"
+        if TextPath((0.0, 0.0), more, size=TITLE).get_extents().width <= room:
+            lines[-1] = more
+        else:
+            lines[-1] += ","
+            lines.append(part)
+    ax.set_title("\n".join(lines), fontsize=TITLE, loc="left", color=GREY)
 
 
 def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:
@@ -243,4 +265,4 @@ def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:
         ax.set_xlim(low - margin, high + margin)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5)
-    panels[0].set_title(_title(record.scenario), fontsize=9, loc="left", color=GREY)
+    _title(figure, panels[0], _parts(record.scenario))

@@ -53,7 +53,7 @@ class Outcome:
     Attributes:
         code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
             their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
-            "out of reach" (the arm is stretched), "singular" (it is folded).
+            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
         time: simulated time of the end, or of the verdict where an unstable run went on [s].
         step: index of the last good sample.
         axis: the axis that is to blame, "" if none.
@@ -244,6 +244,8 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
+            if file.is_file() and not zipfile.is_zipfile(file):
+                raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}

@@ -6,6 +6,7 @@ import ctypes
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -74,14 +75,15 @@ class Run:
         """The energy ledger, as record.Record.energy."""
         raise NotImplementedError
 
-    def go(self, progress: Callable[[float, float], None] | None) -> None:
-        """Runs to the end, or until sample `pause`; whoever paused it flushes."""
+    def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
+        """Runs to the end, until progress says so, or until sample `pause`; whoever paused it flushes."""
         try:
             while self.outcome is None and self.i < self.pause:
                 if self.advance() or self.outcome:
+                    enough = progress and progress(self.t, self.position(self.angles, self.rates, 0.0)[0])
+                    if enough and self.outcome is None:
+                        self.outcome = record.Outcome("interrupted", self.t, self.i)
                     self.flush()
-                    if progress:
-                        progress(self.t, self.position(self.angles, self.rates, 0.0)[0])
         except (ArithmeticError, ValueError) as error:  # beyond floating point, or the arm exactly straight
             if isinstance(error, ValueError) and all(map(math.isfinite, (*self.angles, *self.rates))):
                 raise
@@ -146,6 +148,10 @@ class Run:
             self.outcome, self.end_time = found, None
             self.crossings = [c for c in self.crossings if c.time <= found.time]
         elif self.outcome is not None:
+            if self.outcome.code == "interrupted":  # anywhere: the record ends with its last sample
+                step = self.looked + good - 1
+                self.outcome = replace(self.outcome, time=step * self.scenario.dt, step=step)
+                self.crossings = [c for c in self.crossings if c.time <= self.outcome.time]
             self.outcome = self.watch.end(self.outcome)
         if good:
             keep = np.arange(-self.looked % self.every, good, self.every)

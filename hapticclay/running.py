@@ -20,52 +20,73 @@ PEN = 1.1  # half the width of a line [pixels]
 STRIDE = 0.5  # between two dabs of the pen [pixels]
 
 
+LEAST = (120, 100)  # width and height of one panel [pixels]: less has no room for its numbers
+ROOMY = (180, 110)  # width and height of a panel from which axes are named in words [pixels]
+
+
+def fits(width: int, height: int) -> bool:
+    """Whether there is room for plots in so many pixels."""
+    return width >= LEAST[0] and height >= LEAST[1]
+
+
 class Running:
     """Velocity and fe/v against position, and the operator's force against time, one above the other.
+
+    The first of these that there is room for.
 
     Attributes:
         image: as it is now, shape (height, width, 3) of bytes.
     """
 
     def __init__(self, record: Record, width: int, height: int):
-        r, s = record, record.scenario
-        self.axis = "y" if float(np.ptp(r.p[:, 1])) > 1.2 * float(np.ptp(r.p[:, 0])) else "x"
-        i = AXES.index(self.axis)
-        x, v = 100.0 * r.p[:, i], r.v[:, i]
-        ratio, top = r.ratio(r.fe)[:, i], max(float(r.b[:, i].max(initial=0.0)), 1.0)
-        ratio = np.clip(ratio, -top, 2.0 * top)  # 0/0 as a run begins or turns
-        with matplotlib.rc_context({**STYLE, "font.size": 7.5, "lines.linewidth": 1.0}):
-            figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI)
-            panels: Any = figure.subplots(3, 1)
-            _frame(panels[0], x, v, f"position {self.axis} [cm]", f"velocity v$_{self.axis}$ [m/s]")
-            _frame(panels[1], x, np.array([0.0, 1.25 * top]), f"position {self.axis} [cm]", "f$_e$/v [N$\\cdot$s/m]")
-            force = r.fh[:, i]
-            usual = np.percentile(np.concatenate((force, r.fe[:, i])), (1.0, 99.0))  # not the spike at a border
-            _frame(panels[2], r.t, np.append(1.15 * usual, 0.0), "time [s]", "force [N]")
-            for ax in panels[:2]:
-                _clay(ax, r, i)
-            b = np.unique(r.b[:, i])
-            for value in b[b > 0.0] if len(b) <= 4 else ():
-                panels[1].axhline(value, color=ORANGE, ls="--", lw=0.9)
-                panels[1].annotate("b", (1.0, value), (-2, 2), xycoords=("axes fraction", "data"),
-                                   textcoords="offset points", color=ORANGE, ha="right")  # fmt: skip
-            title = "operator f$_h$, clay f$_e$"
-            panels[2].set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
-            panels[0].set_title(s.name, fontsize=7.5, color=GREY, pad=2, loc="left")
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            self.image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        curves: Any = (
-            (panels[0], x, v, BLUE), (panels[1], x, ratio, BLUE),
-            (panels[2], r.t, force, GREEN), (panels[2], r.t, r.fe[:, i], BLUE),
-        )  # fmt: skip
-        self._pens = [_Pen(self.image, ax, *data) for ax, *data in curves]
+        figure, curves = draw(record, width, height)
+        canvas: Any = figure.canvas
+        self.image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        self._pens = [_Pen(self.image, *curve) for curve in curves]
 
     def upto(self, n: int) -> np.ndarray:
         """The image with the first n samples on it; n must not fall from call to call."""
         for pen in self._pens:
             pen.draw(n)
         return self.image
+
+
+def draw(record: Record, width: int, height: int) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
+    """The plots before anything runs on them, and the curves that will: axes, x, y, colour."""
+    r, count = record, max(1, min(3, height // LEAST[1]))
+    roomy = width >= ROOMY[0] and height >= ROOMY[1] * count
+    axis = "y" if float(np.ptp(r.p[:, 1])) > 1.2 * float(np.ptp(r.p[:, 0])) else "x"
+    i = AXES.index(axis)
+    x, v, force = 100.0 * r.p[:, i], r.v[:, i], r.fh[:, i]
+    ratio, top = r.ratio(r.fe)[:, i], max(float(r.b[:, i].max(initial=0.0)), 1.0)
+    ratio = np.clip(ratio, -top, 2.0 * top)  # 0/0 as a run begins or turns
+    usual = np.percentile(np.concatenate((force, r.fe[:, i])), (1.0, 99.0))  # not the spike at a border
+    where, when = (f"position {axis} [cm]", "time [s]") if roomy else (f"{axis} [cm]", "t [s]")
+    speed, ratio_name = f"v$_{axis}$ [m/s]", "f$_e$/v [N$\\cdot$s/m]"
+    plans: Any = (  # x, y to be seen, names of x and y, title where there is room, title where there is not; curves
+        (x, v, where, f"velocity {speed}", record.scenario.name, speed, ((v, BLUE),)),
+        (x, np.array([0.0, 1.25 * top]), where, ratio_name, "", ratio_name, ((ratio, BLUE),)),
+        (r.t, np.append(1.15 * usual, 0.0), when, "force [N]", "operator f$_h$, clay f$_e$", "f$_h$, f$_e$ [N]",
+         ((force, GREEN), (r.fe[:, i], BLUE))),
+    )[:count]  # fmt: skip
+    with matplotlib.rc_context({**STYLE, "font.size": 7.5, "lines.linewidth": 1.0}):
+        figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI)
+        panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
+        for ax, (across, up, xlabel, ylabel, title, short, _) in zip(panels, plans, strict=True):
+            _frame(ax, across, up, xlabel, ylabel if roomy else "")
+            ax.set_title(title if roomy else short, fontsize=7.5, color=GREY, pad=2, loc="left")
+        for ax in panels[:2]:
+            _clay(ax, r, i)
+        b = np.unique(r.b[:, i])
+        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 else ():
+            panels[1].axhline(value, color=ORANGE, ls="--", lw=0.9)
+            panels[1].annotate("b", (1.0, value), (-2, 2), xycoords=("axes fraction", "data"),
+                               textcoords="offset points", color=ORANGE, ha="right")  # fmt: skip
+        canvas = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()  # which settles the ticks, and so what room they take
+        canvas.draw()
+    curves = [(ax, plan[0], y, color) for ax, plan in zip(panels, plans, strict=True) for y, color in plan[-1]]
+    return figure, curves
 
 
 class _Pen:

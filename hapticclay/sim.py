@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
-from . import record, scene
+from . import memory, record, scene
 from .errors import ParameterError, choice, integer
 from .leapfrog import Leapfrog
 from .params import Scenario
@@ -18,6 +19,8 @@ from .sampled import Sampled
 
 ENGINES = ("auto", "python", "native")
 STAGES = 15  # steps of the fast run that one of the accurate run costs
+SAMPLE, WIRE = 470, 480  # bytes that a run needs at its end, measured: a sample kept; a step, where there is hardware
+SMALL = 2.0**28  # [bytes] runs that need less need not ask what there is
 NATIVE_FROM = 300_000  # steps from which loading the compiled loop (a second, once per process) pays
 
 
@@ -25,7 +28,7 @@ def simulate(
     scenario: Scenario,
     *,
     every: int = 1,
-    progress: Callable[[float, float], None] | None = None,
+    progress: Callable[[float, float], bool | None] | None = None,
     engine: str = "auto",
 ) -> record.Record:
     """Runs a scenario to its end.
@@ -35,18 +38,19 @@ def simulate(
         every: keep each every-th sample, and the last.
         engine: "python", "native" (compiled, needs hapticclay[fast]; what it cannot do, Python does, and says so) or
             "auto": native where it is installed and the run may take 300000 steps or more (20000 of "accurate").
-        progress: called now and then with (simulated time [s], handle x [m]).
+        progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as "interrupted".
 
     Returns:
         The record. Instability and its like are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: scenario, every or engine is of the wrong kind, numba is not installed, or the scene is too
-            stiff for its integrator.
+        ParameterError: scenario, every or engine is of the wrong kind, numba is not installed, the scene is too
+            stiff for its integrator, or its record might not fit into memory.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
+    _check_memory(scenario, every)
     with scene.warnings_caught():
         kind = _kind(scenario, choice("engine", engine, ENGINES))
         run = kind(scenario, every)
@@ -54,6 +58,20 @@ def simulate(
         run.go(progress)
         wall = time.perf_counter() - begin
     return run.result(wall)
+
+
+def _check_memory(scenario: Scenario, every: int) -> None:
+    """Refuses a run whose record, should it last for t_max, does not fit into memory."""
+    steps = scenario.t_max / scenario.dt
+    fixed = WIRE * steps if scenario.interface else 0.0
+    samples = math.floor(steps / every) + 2
+    if fixed + SAMPLE * samples < SMALL or fixed + SAMPLE * samples < (room := memory.left()):
+        return
+    need = f"{(fixed + SAMPLE * samples) / 1e9:.3g} GB of memory, and {max(room, 0.0) / 1e9:.3g} GB are left"
+    if room > 2.0 * fixed and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000:
+        bound = f"up to {samples} samples take {need}: keep fewer (--every {more}), or lower t_max"
+        raise ParameterError("every", every, bound)
+    raise ParameterError("t_max", scenario.t_max, f"up to {math.floor(steps)} steps take {need}: lower it")
 
 
 def _kind(scenario: Scenario, engine: str) -> type[Run]:

@@ -24,6 +24,7 @@ from .stage import CAMERAS, Stage
 FPS = {".mp4": 30, ".webp": 20, ".gif": 20}  # frames a second, by kind of file
 ASPECT = 1.2  # width over height that the cameras are made for, at least
 PLOTS = 0.375  # share of the width that the plots take
+TITLE = 240  # width of a picture from which its title is one line [pixels]
 SAMPLES, SHADOW = 4, 2048  # a pixel, and the width of the shadow's map [pixels], where edges are softened
 ON, OFF = ("enable", "enabled", "on", "true", "1"), ("disable", "disabled", "off", "false", "0")  # MUJOCO_GL
 GL = "apt-get install libegl1 libgl1 (or libosmesa6 and MUJOCO_GL=osmesa)"
@@ -162,19 +163,21 @@ def frames(
 
     Args:
         record: of the run. camera: "room", "top" or "close". speed: of the film, 1 for real time.
-        size: width and height [pixels]. plots: whether plots run on the right.
+        size: width and height [pixels]. plots: whether plots run on the right, if there is room: from 320 x 100.
         tool: at the handle. fps: frames a second. smooth: whether edges are softened, at twice the time.
 
     Raises:
         ParameterError: there is no such camera, or no OpenGL.
     """
     width, height = size
-    beside = 2 * round(0.5 * PLOTS * width) if plots else 0
-    stage, running = Stage(record.scenario, tool), None
+    beside, running = 0, None
+    stage = Stage(record.scenario, tool)
     if plots:
-        from .running import Running
+        from .running import Running, fits
 
-        running = Running(record, beside, height)
+        share = 2 * round(0.5 * PLOTS * width)
+        if fits(share, height):
+            beside, running = share, Running(record, share, height)
     lens = Lens(stage, width - beside, height, choice("camera", camera, CAMERAS), smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
     try:
@@ -184,7 +187,8 @@ def frames(
             stage.pose(record.q[n - 1])
             title = f"t = {record.t[n - 1]:.2f} s"
             if stage.field >= 0:
-                title += f"   removed {1e6 * stage.removal.volume:.1f} cm3"
+                title += "   " if width - beside >= TITLE else "\n"
+                title += f"removed {1e6 * stage.removal.volume:.1f} cm3"
             image[:, : width - beside] = lens.photograph(title)
             if running:
                 image[:, width - beside :] = running.upto(n)

@@ -216,10 +216,18 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
     assert cli.main(args) == 0
     out = capsys.readouterr().out
-    assert "sampled every 0.36 ms" in out and f"{hc.gain_limit('x', 90.0) / 0.5:.4g}" in out
+    assert "sampled every 0.36 ms" in out and f" {hc.gain_limit('x', 90.0):.4g}    largest stable K" in out
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
+    assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80
     data = json.loads((tmp_path / "o" / "stability.json").read_text())
     assert data["map"]["kind"] == "gain-pose" and len(data["verdicts"]) > 10
+    assert data["asked"] == {
+        "axis": "x", "b": 90.0, "K": 0.5, "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0}, "Ts": 0.36e-3,
+        "delay": 1e-3, "shaping": False, "map": "gain-pose", "quick": False,
+    }  # fmt: skip
+    limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
+    kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
+    assert limits == pytest.approx([hc.gain_limit("x", 90.0, **kw) for kw in kinds], rel=1e-12)  # whatever K
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
 

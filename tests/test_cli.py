@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -11,7 +12,8 @@ import termios
 
 import pytest
 
-from hapticclay import cli
+import hapticclay as hc
+from hapticclay import cli, cli_run, cli_words, plot
 
 
 def run(capsys, *args):
@@ -45,16 +47,34 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
 @pytest.mark.parametrize("args,words", [
     (["run", "constant", "--b", "-1"], ["b = -1.0", ">= 0"]),
     (["run", "constant", "--b", "nan"], ["b = nan", "finite"]),
-    (["run", "constant", "--b", "x"], ["--b", "'x'"]),
+    (["run", "constant", "--b", "x"], ["--b = 'x': must be a number"]),
+    (["run", "constant", "--b"], ["--b = '': must be a number"]),
+    (["run", "constant", "--every", "1.5"], ["--every = '1.5': must be a whole number"]),
+    (["run", "constant", "--control", "smapled"], ["--control = 'smapled'", "did you mean 'sampled'"]),
+    (["run", "constant", "--Ts", "foo"], ["--Ts = 'foo': must be a number or None"]),
+    (["run", "constant", "--Ts", "0.00072"], ["Ts = 0.00072: must be None unless control is 'sampled'\n"]),
+    (["run", "constant", "--control", "sampled", "--Ts", "1e-3"], ["must be a whole multiple of dt = 0.00036 s\n"]),
+    (["run", "variable", "--growth", "foo"],
+     ["--growth = 'foo': must be a number or one of 30/s, 0.15/s, 0.15/sample, none\n"]),
     (["run", "constant", "--force", "inf", "0"], ["force[x] = inf"]),
-    (["run", "constant", "--gain", "1"], ["--gain"]),
+    (["run", "constant", "--gain", "1"], ["--gain = '1': must be 2 numbers"]),
+    (["run", "constant", "--gain", "1", "a"], ["--gain = '1 a': must be 2 numbers"]),
+    (["run", "constant", "--gain", "1", "1", "7"], ["'7': one word too many for run constant"]),
     (["run", "constant", "--gain", "0", "1"], ["gain[x] = 0.0"]),
     (["run", "constant", "--dt", "0"], ["dt = 0.0"]),
     (["run", "constant", "--dt", "-1e-3"], ["dt = -0.001"]),
     (["run", "constant", "--length", "0.5"], ["length = 0.5", "unreachable"]),
     (["run", "constant", "--origin", "2", "2"], ["unreachable"]),
     (["run", "constant", "--clay", "0.15", "0.05"], ["clay"]),
-    (["run", "constant", "--nonsense", "1"], ["--nonsense"]),
+    (["run", "constant", "--nonsense", "1"], ["--nonsense: no option of run constant; see hapticclay run constant"]),
+    (["run", "constant", "--gan", "1", "1"], ["--gan: no option of run constant; did you mean --gain?"]),
+    (["run", "constant", "--no-plot"], ["did you mean --no-plots?"]),
+    (["run", "constant", "--torque_limits=1", "1"], ["--torque_limits: no", "did you mean --torque-limit?"]),
+    (["stability", "--axs", "y"], ["--axs: no option of stability; did you mean --axis?"]),
+    (["sweep", "--grd", "b=1:2:3"], ["did you mean --grid?"]),
+    (["identify", "extra"], ["'extra': one word too many for identify"]),
+    (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
+    (["video", "--speed", "2", "constnat"], ["did you mean 'constant'?; or the folder of a record"]),
     (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
     (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
     (["stabilty"], ["stabilty", "did you mean 'stability'"]),
@@ -73,7 +93,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, w
 
 
 def test_unwritable_out_is_refused_before_the_run(capsys, monkeypatch):
-    monkeypatch.setattr(cli, "simulate", lambda *a, **k: pytest.fail("ran"))
+    monkeypatch.setattr(cli_run, "simulate", lambda *a, **k: pytest.fail("ran"))
     code, _, err = run(capsys, "run", "constant", "--out", "/proc/nowhere")
     assert code == 2 and "out = '/proc/nowhere'" in err and err.count("\n") == 1
 
@@ -84,7 +104,9 @@ def test_out_that_is_a_file_is_refused(capsys, tmp_path):
     assert code == 2 and err.count("\n") == 1
 
 
-@pytest.mark.parametrize("args", [["--help"], ["run", "--help"], ["run", "constant", "--help"], ["version"]])
+@pytest.mark.parametrize(
+    "args", [["--help"], ["run", "--help"], ["run", "constant", "--help"], ["version"], ["--version"]]
+)
 def test_help_and_version(capsys, args):
     code, out, err = run(capsys, *args)
     assert (code, err) == (0, "") and len(out) > 30
@@ -100,23 +122,52 @@ def test_module_entry_point_runs_without_a_display(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["o"]  # no MUJOCO_LOG.TXT
 
 
-def test_ctrl_c_leaves_nothing_behind(tmp_path):
+def rest_of(screen):
+    """What a terminal says until everybody has left it."""
+    said = b""
+    with contextlib.suppress(OSError):
+        while True:
+            said += screen.read(1000)
+    return said
+
+
+def stopped_at_a_terminal(folder, *args, program=("-m", "hapticclay")):
+    """Starts a run of minutes and presses Ctrl-C when the bar is there: so it runs. Its status, output and screen."""
     terminal, end = pty.openpty()
     termios.tcsetwinsize(end, (24, 80))
-    with open(terminal, "rb", buffering=0) as screen, subprocess.Popen(
-        [sys.executable, "-m", "hapticclay", "run", "constant", "--dt", "1e-6", "--out", "o"],
-        cwd=tmp_path, stderr=end, stdout=subprocess.DEVNULL,
+    with open(terminal, "rb", buffering=0) as screen, open(folder / "said", "w+") as out, subprocess.Popen(
+        [sys.executable, *program, *args], cwd=folder, stderr=end, stdout=out,
     ) as p:  # fmt: skip
         os.close(end)
-        assert b"constant" in screen.read(1000)  # the bar is there, so it runs
-        p.send_signal(signal.SIGINT)
         said = b""
-        with contextlib.suppress(OSError):  # the end of a terminal
-            while True:
-                said += screen.read(1000)
-    assert p.returncode == 130
-    assert said.decode().split("\r")[-2:] == ["hapticclay: interrupted", "\n"]
-    assert os.listdir(tmp_path) == []
+        while said.count(b"constant") < 2:  # after its first showing tqdm has yet to note that it was shown
+            said += screen.read(1000)
+        p.send_signal(signal.SIGINT)
+        said += rest_of(screen)
+        p.wait()
+        out.seek(0)
+        text = out.read()
+    (folder / "said").unlink()
+    return p.returncode, text, said.decode()
+
+
+def test_ctrl_c_keeps_what_was_run(tmp_path):
+    args = ("run", "constant", "--dt", "1e-6", "--every", "100", "--out", "o")
+    code, out, said = stopped_at_a_terminal(tmp_path, *args)
+    assert code == 130 and "Traceback" not in said and "status: interrupted at" in out
+    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+    r = hc.Record.load(tmp_path / "o")
+    assert r.outcome.code == "interrupted" and 0.0 < r.t[-1] == r.outcome.time < 11.0
+
+
+def test_ctrl_c_while_a_film_is_simulated_leaves_nothing_behind(tmp_path):
+    (tmp_path / "film.py").write_text(
+        "import sys; from hapticclay import cli, video; video.ready = lambda *a: None; sys.exit(cli.main())"
+    )  # without asking for OpenGL
+    args = ("video", "constant", "--dt", "2e-6", "--out", "x.webp")
+    code, out, said = stopped_at_a_terminal(tmp_path, *args, program=["film.py"])
+    assert (code, out) == (130, "") and said.split("\r")[-2:] == ["hapticclay: interrupted", "\n"]
+    assert os.listdir(tmp_path) == ["film.py"]
 
 
 def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
@@ -137,11 +188,24 @@ def test_a_full_device_for_output_is_one_line(tmp_path):
     assert out.returncode == 1 and out.stderr.count("\n") == 1 and "No space left" in out.stderr
 
 
+def test_a_closed_output_is_no_traceback(tmp_path):
+    words = f"{sys.executable} -m hapticclay run constant --t-max 0.5 --no-plots --out o >&-"
+    out = subprocess.run(["bash", "-c", words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, timeout=120)
+    assert (out.returncode, out.stderr) == (0, "")
+    assert sorted(os.listdir(tmp_path / "o")) == ["record.npz", "summary.json"]
+
+
+def test_a_file_that_is_no_record_is_called_so(capsys, tmp_path):
+    (tmp_path / "notes.txt").write_text("x")
+    code, _, err = run(capsys, "video", str(tmp_path / "notes.txt"))
+    assert code == 2 and err.endswith("must be a saved record (it is no .npz file)\n")
+
+
 def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeypatch):
     def full(self, path):
         raise cli.ParameterError("out", str(path), "must be writable (No space left on device)")
 
-    monkeypatch.setattr(cli.Record, "save", full)
+    monkeypatch.setattr(cli_run.Record, "save", full)
     code, out, err = run(capsys, "run", "constant", "--t-max", "0.5", "--out", str(tmp_path))
     assert code == 2 and "status: time limit" in out and err.count("\n") == 1
 
@@ -156,3 +220,128 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
     args = ("--b", "1e4", "--start", "0.06", "0", "--force", "1e6", "0", "--dt", "0.02")
     code, out, _ = run(capsys, "run", "constant", *args, "--out", str(tmp_path))
     assert code == 0 and "diverged" in out and (tmp_path / "force.png").is_file()
+
+
+@pytest.mark.parametrize("scenario", [hc.constant_cut(t_max=0.1), hc.variable_cut(t_max=0.1), hc.free(t_max=0.1),
+                                      hc.stability_test(t_max=0.1)], ids=lambda s: s.name)  # fmt: skip
+def test_names_of_figures_are_known(scenario):
+    assert set(plot.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
+
+
+def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("constant", "variable"):
+        code, out, _ = run(capsys, "run", name, "--t-max", "0.1")
+        assert code == 0 and f"written to out/run/{name}\n" in out
+    assert sorted(os.listdir("out/run")) == ["constant", "variable"]
+    (tmp_path / "o").mkdir()
+    (tmp_path / "o" / "path.png").write_text("mine")
+    run(capsys, "run", "constant", "--t-max", "0.1", "--out", "o")
+    assert (tmp_path / "o" / "path.png").read_text() == "mine"  # no record lay beside it
+    (tmp_path / "o" / "notes.png").write_text("mine")
+    run(capsys, "run", "variable", "--t-max", "0.1", "--out", "o")
+    assert sorted(os.listdir("o")) == ["notes.png", "path.png", "record.npz", "summary.json", "velocity.png"]
+    run(capsys, "run", "stability", "--t-max", "0.1", "--no-plots", "--out", "o")
+    assert sorted(os.listdir("o")) == ["notes.png", "record.npz", "summary.json"]
+
+
+@pytest.mark.parametrize("words,ordered", [
+    ("run --out o constant --b 50", "run constant --out o --b 50"),
+    ("run --gain 1 0.5 --impedance constant", "run constant --gain 1 0.5 --impedance"),
+    ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
+    ("run --out constant variable", "run variable --out constant"),
+    ("run --help", "run --help"),
+    ("view --stiffness 2 o", "view record o --stiffness 2"),
+    ("view --web variable --port=1", "view variable --web --port=1"),
+    ("view --every 3", "view constant --every 3"),
+    ("view", "view constant"),
+    ("view --help", "view --help"),
+    ("video --speed 2 o/record.npz", "video record o/record.npz --speed 2"),
+    ("video --out x.gif --size 320 240 o", "video record o --out x.gif --size 320 240"),
+    ("video --tool_width 0.01 --smooth record o", "video record --tool_width 0.01 --smooth o"),
+    ("video --growth none variable", "video variable --growth none"),
+    ("stability --axis y", "stability --axis y"),
+    ("--version", "version"),
+    ("help", "--help"),
+    ("help run", "run --help"),
+    ("--help", "--help"),
+])  # fmt: skip
+def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "o").mkdir()
+    assert cli_words.ordered(words.split(), cli.COMMANDS) == ordered.split()
+
+
+def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(capsys, "run", "free", "--t-max", "0.1", "--no-plots", "--out", "o")
+    for words in (["view", "--tool-width", "0.01", "o"], ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"]):
+        command = cli._parsed(words)
+        assert isinstance(command.scenario, hc.Record) and command.scenario.scenario.name == "free"
+
+
+def widths(text):
+    return [len(line) for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("args", [("variable",), ("constant", "--gain", "1", "1"), ("stability", "--t-max", "1")])
+def test_the_table_fits_a_terminal_and_knows_no_negative_zero(capsys, tmp_path, args):
+    code, out, _ = run(capsys, "run", *args, "--no-plots", "--out", str(tmp_path))
+    assert code == 0 and max(widths(out.split("\n\n")[0])) <= 80
+    assert not re.search(r"-0\.?0*(?![\d.])", out)
+
+
+@pytest.mark.parametrize(
+    "x,said", [(-1e-9, "0.00"), (-0.004, "0.00"), (-0.006, "-0.01"), (0.0, "0.00"), (-2.0, "-2.00")]
+)
+def test_fixed_point_has_no_negative_zero(x, said):
+    assert cli_run.fixed(x, 2) == said
+
+
+@pytest.mark.parametrize("args", [("--every", "5000"), ("--t-max", "0.005")])
+def test_a_maneuver_with_few_samples_has_a_table(capsys, tmp_path, args):
+    code, out, err = run(capsys, "run", "stability", *args, "--no-plots", "--out", str(tmp_path))
+    assert (code, err) == (0, "") and "status: time limit" in out
+
+
+def test_advice_names_what_the_experiment_has(capsys, tmp_path):
+    _, out, _ = run(capsys, "run", "stability", "--rms", "0", "--no-plots", "--out", str(tmp_path))
+    assert "advice: raise rms\n" in out
+    _, out, _ = run(capsys, "run", "free", "--force", "0", "0", "--no-plots", "--out", str(tmp_path))
+    assert "advice: give a force\n" in out
+
+
+@pytest.mark.parametrize("env,coloured", [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True)])
+def test_no_color_is_heeded(tmp_path, env, coloured):
+    env = {**os.environ, "TERM": "xterm", "FORCE_COLOR": ""} | env
+    env = {k: v for k, v in env.items() if k != "FORCE_COLOR" and (v or k != "NO_COLOR")}
+    terminal, end = pty.openpty()
+    with (
+        open(terminal, "rb", buffering=0) as screen,
+        subprocess.Popen(
+            [sys.executable, "-m", "hapticclay", "version", "--help"], cwd=tmp_path, env=env, stdout=end
+        ) as p,
+    ):
+        os.close(end)
+        said = rest_of(screen)
+    assert p.returncode == 0 and (b"\x1b[" in said) == coloured
+
+
+def test_a_home_that_cannot_be_written_is_no_matter(tmp_path):
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("XDG_", "MPLCONFIG"))} | {"HOME": "/dev/null"}
+    out = subprocess.run(
+        [sys.executable, "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--out", "o"],
+        cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert (out.returncode, out.stderr) == (0, "")
+    assert (tmp_path / "o" / "force.png").is_file()
+
+
+def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
+    def full(*args, **kw):
+        raise MemoryError("Unable to allocate 8 GiB")
+
+    monkeypatch.setattr(cli_run, "simulate", full)
+    code, out, err = run(capsys, "run", "constant", "--out", str(tmp_path / "o"))
+    assert (code, out, err) == (1, "", "hapticclay: out of memory: Unable to allocate 8 GiB\n")
+    assert os.listdir(tmp_path) == []

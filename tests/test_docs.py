@@ -17,14 +17,8 @@ README = (ROOT / "README.md").read_text()
 @pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.S))
 def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
     out = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True)
-    printed = out.stdout.splitlines()
     said = re.findall(r"print\(.*\)  # ([^:\n]*)", block)
-    assert len(printed) == len(said)
-    for a, b in zip(printed, said, strict=True):
-        try:
-            assert float(a) == pytest.approx(float(b), rel=1e-3)
-        except ValueError:
-            assert a == b
+    assert out.stdout.splitlines() == said and len(said) >= 3
     assert (tmp_path / "out" / "record.npz").is_file()
 
 

@@ -11,7 +11,7 @@ import hapticclay
 
 PACKAGE = Path(hapticclay.__file__).parent
 LEVELS = [
-    {"engine", "errors", "inline"},
+    {"engine", "errors", "inline", "memory"},
     {"hardware"},
     {"params", "interface"},
     {"arm", "lti", "clay", "human", "signals", "estimate"},
@@ -28,7 +28,7 @@ LEVELS = [
     {"plot", "entries", "space", "drift", "maps"},
     {"plot_stability", "plot_identify", "paper_model", "paper_cuts", "sweep"},
     {"ledger", "plot_sweep", "plot_boundary", "identify_command", "gate", "player", "running"},
-    {"report", "sweep_command", "cli_stability", "video", "view", "web"},
+    {"report", "sweep_command", "cli_stability", "cli_run", "cli_words", "video", "view", "web"},
     {"cli_view"},
     {"cli"},
 ]
@@ -51,9 +51,9 @@ HEAVY = {  # outside package -> the only modules that may import it
         "view",
     },
     "matplotlib": {"plot", "plot_stability", "plot_identify", "plot_sweep", "plot_boundary", "running"},
-    "tyro": {"cli", "sweep_command"},
-    "tqdm": {"cli", "sweep_command", "identify_command", "cli_stability", "cli_view"},
-    "tabulate": {"cli", "identify_command", "cli_stability"},
+    "tyro": {"cli", "cli_run", "cli_view", "sweep_command"},
+    "tqdm": {"cli", "cli_run", "sweep_command", "identify_command", "cli_stability", "cli_view"},
+    "tabulate": {"cli_run", "identify_command", "cli_stability"},
     "scipy": {"lti", "limits", "design", "space", "estimate", "identify", "interface"},
     "imageio": {"video"},
     "imageio_ffmpeg": {"video"},

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import hapticclay as hc
 from hapticclay import plot
@@ -45,3 +46,25 @@ def test_any_record_can_be_drawn(scenario, axis, tmp_path):
     for draw in (plot.velocity_position, plot.force_velocity):
         draw(record, axis).savefig(tmp_path / "p.png")
         assert (tmp_path / "p.png").stat().st_size > 5000
+
+
+LONG = dict(impedance=True, shaping=True, gain=(1.234, 0.5678), t_max=3.0)
+
+
+@pytest.mark.parametrize("scenario", [
+    hc.variable_cut(), hc.variable_cut(**LONG), hc.constant_cut(**LONG, force=(1.234, -0.5678)), hc.free(**LONG),
+    hc.stability_test(25.0, shaping=True, t_max=3.0), hc.constant_cut(t_max=0.1), hc.constant_cut(gain=(1.0, 1.0)),
+], ids=["variable", "long", "long constant", "long free", "driven", "short", "unstable"])  # fmt: skip
+def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
+    record = hc.simulate(scenario)
+    for name, figure in {**plot.figures(record), "map": plot.path(record)}.items():
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        key, whole = legend.get_window_extent(), figure.bbox
+        for ax in figure.axes:
+            said = ax.get_title(loc="left")
+            for text in ax.findobj(lambda x, said=said: isinstance(x, Text) and said and x.get_text() == said):
+                box = text.get_window_extent()
+                assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1, (name, said)
+                assert not box.overlaps(key), (name, said)
+        assert figure.axes[0].get_title(loc="left").startswith(scenario.name)

@@ -7,10 +7,11 @@ import time
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import hapticclay as hc
 from hapticclay import cli, video
-from hapticclay.running import Running
+from hapticclay.running import Running, draw, fits
 from hapticclay.stage import Stage
 
 
@@ -85,7 +86,7 @@ def filmed(folder, blocked, out="x.mp4", **env):
     """What `hapticclay video` says where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
-        "from hapticclay import cli; cli.simulate_with_progress = None\n"
+        "from hapticclay import cli, cli_view; cli_view.simulate_with_progress = None\n"
         f"sys.exit(cli.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
@@ -149,7 +150,6 @@ def test_smooth_pictures_have_soft_edges():
     (["video", "no/such"], "must be a saved record"),
     (["view", "constant", "--tool-width", "0"], "tool.width"),
     (["view", "constant", "--every", "0"], "every = 0: must be a whole number"),
-    (["view", "--web", "variable"], "the experiment comes first: hapticclay view variable"),
     (["view", "constant", "--web", "--port", "99999"], "port = 99999: must be a whole number"),
 ])  # fmt: skip
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
@@ -171,3 +171,46 @@ def test_running_plots_end_as_the_whole_curve(record):
     assert differ.sum() < 0.005 * differ.size  # dabs fall elsewhere by half a pixel
     inked = (whole.image != blank).any(axis=-1)
     assert inked.sum() > 1000 and not inked[:, :30].any()
+
+
+SIZES = [(120, 100), (120, 240), (130, 333), (180, 320), (180, 480), (240, 160), (240, 360), (360, 480), (480, 720)]
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("scenario", [
+    hc.constant_cut(), hc.variable_cut(), hc.free(t_max=0.1), hc.stability_test(25.0, t_max=3.0),
+    hc.constant_cut(b=1e6, t_max=2.0),
+], ids=["constant", "variable", "free", "unstable", "stiff"])  # fmt: skip
+def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario, size):
+    assert fits(*size)
+    figure, _ = draw(hc.simulate(scenario, every=20), *size)
+    boxes = []
+    for ax in figure.axes:
+        hidden = set()  # ticks out of view, and those of an earlier layout
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            drawn = axis.majorTicks[: len(axis.get_majorticklocs())]
+            hidden |= {t.label1 for t in axis.majorTicks if t not in drawn or not low <= t.get_loc() <= high}
+        for text in ax.findobj(Text):
+            if text.get_visible() and text.get_text() not in ("", "b") and text not in hidden:  # b names a line
+                boxes.append((text.get_text(), text.get_window_extent()))
+    assert len(boxes) > 3 * len(figure.axes)
+    for i, (name, box) in enumerate(boxes):
+        assert box.x0 > -0.5 and box.y0 > -0.5 and box.x1 < size[0] + 0.5 and box.y1 < size[1] + 0.5, (name, box)
+        for other, more in boxes[:i]:
+            apart = max(box.x0, more.x0) >= min(box.x1, more.x1) or max(box.y0, more.y0) >= min(box.y1, more.y1)
+            assert apart, (name, other)
+
+
+@needs_gl
+@pytest.mark.parametrize("size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str)
+def test_small_films_have_what_fits_and_whole_titles(record, size):
+    """The title's box is darker than the sky behind it; a clipped one would reach the right edge of the picture."""
+    images = video.frames(record, speed=50.0, size=size)
+    image = next(images).astype(int)
+    images.close()
+    picture = image[:, : size[0] - 120] if size[0] >= 320 and size[1] >= 100 else image
+    plain = picture is image
+    assert plain == bool((image[:, -1] != 255).any())  # plots are on white
+    dark = (picture[:12].mean(axis=-1) < 140).any(axis=0)
+    assert dark[5:60].all() and not dark[-1]

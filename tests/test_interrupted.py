@@ -1,0 +1,59 @@
+"""A run that is told to end keeps what was run: the first part of what the whole run gives."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay import record
+
+HARDWARE = dataclasses.replace(
+    hc.constant_cut(control="sampled", t_max=3.5),
+    interface=hc.Interface(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
+)
+SCENES = {  # name: scenario, engine, every
+    "fast": (hc.constant_cut(), "python", 1),
+    "fast, some samples": (hc.constant_cut(), "python", 7),
+    "driven": (hc.stability_test(3.0), "python", 1),
+    "growing": (hc.variable_cut(), "python", 1),
+    "native": (hc.constant_cut(), "native", 1),
+    "native, some samples": (hc.constant_cut(), "native", 7),
+    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3), "python", 1),
+    "accurate, native": (hc.constant_cut(integrator="accurate"), "native", 3),
+    "sampled": (hc.constant_cut(control="sampled"), "python", 1),
+    "hardware": (HARDWARE, "python", 1),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
+    scenario, engine, every = SCENES[name]
+    if engine == "native":
+        pytest.importorskip("numba")
+    looks = []
+
+    def enough(t, x):
+        looks.append(t)
+        return len(looks) == 2
+
+    r = hc.simulate(scenario, engine=engine, every=every, progress=enough)
+    whole = hc.simulate(scenario, engine=engine)
+    assert len(looks) == 2 and r.outcome.code == "interrupted" and not r.outcome.advice
+    step = r.outcome.step
+    assert 1000 < step < len(whole.t) - 1 and r.outcome.time == r.t[-1] == whole.t[step]
+    index = sorted({*range(0, step, every), step})  # each every-th, and the last
+    for array in record.ARRAYS:
+        np.testing.assert_array_equal(getattr(r, array), getattr(whole, array)[index], err_msg=array)
+    assert r.crossings == tuple(c for c in whole.crossings if c.time <= r.t[-1])
+    assert abs(r.energy["residual"]) < 1e-5 * r.energy["throughput"]  # whole runs with a hand have 3e-6
+
+
+def test_an_instability_met_before_is_not_forgotten():
+    r = hc.simulate(hc.stability_test(25.0), progress=lambda t, x: t > 5.0)
+    assert r.status == f"interrupted at {r.t[-1]:.4f} s (x axis: growing oscillation)"
+
+
+def test_a_run_that_ends_by_itself_at_the_last_look_says_how():
+    r = hc.simulate(hc.constant_cut(t_max=0.5), progress=lambda t, x: True)
+    assert r.outcome.code == "time limit"
