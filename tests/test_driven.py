@@ -135,7 +135,8 @@ def test_clay_hit_at_speed(b, speed, control):
 
 @pytest.mark.parametrize("engine,kw", [
     ("python", dict()), ("native", dict()), ("python", dict(integrator="accurate", dt=1.8e-3)),
-    ("python", dict(control="sampled")), ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
+    ("python", dict(control="sampled")),
+    ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
 ])  # fmt: skip
 def test_command_is_counted_from_the_start(engine, kw):
     """K = 0 opens the loop: delta is the command less its value at t = 0, however the run is stepped; p = G delta."""
