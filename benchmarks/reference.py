@@ -72,7 +72,7 @@ class Loop:
         th = s.operator
         self.m, self.d, self.k = (th.mass, th.damper, th.spring) if th else (0.0, 0.0, 0.0)
         self.muscle, self.command = _signal(s.muscle), _signal(s.command)
-        self.shown = self.command(0.0) if self.command else (0.0, 0.0)
+        self.first = self.command(0.0) if self.command else (0.0, 0.0)  # a command is counted from t = 0
 
     def uh(self, t: float) -> tuple[float, float]:
         if not self.muscle:
@@ -118,8 +118,8 @@ class Loop:
         z = [float(x) for x in z]
         if self.command:
             now = self.command(t)
-            z[4] += now[0] - self.shown[0]
-            z[5] += now[1] - self.shown[1]
+            z[4] += now[0] - self.first[0]
+            z[5] += now[1] - self.first[1]
         J, p, v, c, W = self.kinematics(*z[:4])
         want, y2 = self.want(z, p, v)
         ux, uy = uh or self.uh(t)
@@ -167,8 +167,6 @@ class Loop:
         out = np.zeros(12)
         out[:2] = z[:2]
         out[4:6] = out[8:10] = p
-        if self.command:
-            out[4:6] -= np.subtract(self.command(0.0), self.shown)
         return out, (self.k * p[0], self.k * p[1])
 
     def growth(self, z, b) -> float:

@@ -33,7 +33,7 @@ import hapticclay as hc  # noqa: E402
 from hapticclay import record  # noqa: E402
 
 PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
-DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "control", "pybullet", "drake", "pin")
+DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "numba", "control", "pybullet", "drake", "pin")
 ERRORS = {
     "crossing": "largest error of the three crossing times [s]",
     "position": "largest error of the handle position [m]",
@@ -135,6 +135,42 @@ def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[s
     return out
 
 
+def leaders(rows: list[dict]) -> list[dict[str, Any]]:
+    """For each asked error: the package that keeps it in the least time, the next one, and how much longer it takes."""
+    packages = dict.fromkeys(r["package"] for r in rows)
+    best = [x for package in packages for x in recommend(rows, {package})]
+    out = []
+    for asked in ASKED:
+        order = sorted((x for x in best if x["asked"] == asked), key=lambda x: x["wall"])
+        if order:
+            named = [f"{x['package']}, {x['method']}" for x in order[:2]]
+            out.append({"asked": asked, "first": named[0], "package": order[0]["package"],
+                        "next": named[1] if len(order) > 1 else "none",
+                        "factor": order[1]["wall"] / order[0]["wall"] if len(order) > 1 else None})  # fmt: skip
+    return out
+
+
+def who_leads(found: list[dict[str, Any]]) -> str:
+    """One line on which package leads in which span of errors."""
+    spans: list[list[dict[str, Any]]] = []
+    for x in found:
+        if spans and spans[-1][0]["package"] == x["package"]:
+            spans[-1].append(x)
+        else:
+            spans.append([x])
+    told = [
+        f"{s[0]['package']} at {s[0]['asked']:.0e}" + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s") for s in spans
+    ]
+    return "Fastest, by asked error: " + "; ".join(told) + "."
+
+
+def table_of_leaders(found: list[dict[str, Any]]) -> str:
+    cells = [[format(x["asked"], ".0e"), x["first"], x["next"], "-" if x["factor"] is None else f"{x['factor']:.1f}"]
+             for x in found]  # fmt: skip
+    head = ["asked error [s]", "fastest", "fastest of another package", "takes so many times as long"]
+    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
+
+
 def dominance(rows: list[dict]) -> list[dict[str, Any]]:
     """For each other package: how many of its points hapticclay beats in both error and time, with one setting."""
     ours = [
@@ -230,6 +266,8 @@ def sections(data: dict[str, Any]) -> list[str]:
         "With a MuJoCo model in the loop:",
         table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
         "### Who is ahead",
+        who_leads(leaders(rows)),
+        table_of_leaders(leaders(rows)),
         "Points of each package that hapticclay, in continuous time, beats or equals in error and run time together, "
         "with one setting.",
         tabulate(dominance(rows), headers="keys", tablefmt="github"),

@@ -78,7 +78,10 @@ class Stability:
 
 
 def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
-    """What the analysis says of a loop: question, answer, figure, where [rad/s]; `delay` [s] of the motors."""
+    """What the analysis says of a loop: question, answer, figure, where [rad/s]; `delay` [s] of the motors.
+
+    Margins and transparency are those of continuous time; NaN where the loop is unstable there.
+    """
     axis, K, b, Ts = loop.axis, loop.K, loop.b, loop.Ts or TS
     kw: dict[str, Any] = dict(impedance=loop.operator is not None, operator=loop.operator)
     rows: list[dict[str, Any]] = []
@@ -99,10 +102,14 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
         stable(f"... {1e3 * delay:g} ms late", delay=delay)
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
     m = stability.margins(axis, K, b, **kw)
-    add("gain margin", None, m.gain[1], "factor on K", m.gain_omega[1])
-    add("phase margin", None, math.degrees(m.phase), "degrees", m.phase_omega)
-    add("delay margin of the compensator", None, 1e3 * m.delay, "ms", m.delay_omega)
-    add("disk margin", None, m.disk, "alpha", m.disk_omega)
+
+    def response(question: str, value: float, what: str, omega: float) -> None:  # none without a steady state
+        add(question, None, value if m.stable else math.nan, what, omega if m.stable else math.nan)
+
+    response("gain margin", m.gain[1], "factor on K", m.gain_omega[1])
+    response("phase margin", math.degrees(m.phase), "degrees", m.phase_omega)
+    response("delay margin of the compensator", 1e3 * m.delay, "ms", m.delay_omega)
+    response("disk margin", m.disk, "alpha", m.disk_omega)
     for equation in (11, 13):
         small = stability.small_gain(axis, K, b, equation=equation, **kw)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
@@ -110,7 +117,7 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     damper = loop.operator.damper if loop.operator else 0.0
     judge("held clay passive with this hand", passive.clay_passivity(b, Ts, damper), "N.s/m to spare")
     felt = stability.transparency(axis, K, b, np.array([ONE_HZ]))[0]
-    add("transparency |fe/fh| at 1 Hz", None, float(abs(felt)), "1 at best", ONE_HZ)
+    response("transparency |fe/fh| at 1 Hz", float(abs(felt)), "1 at best", ONE_HZ)
     return rows
 
 

@@ -21,7 +21,7 @@ NAMES = {
     "Th": ("mass", "damper", "spring"),
 }
 UNITS = {"G": ("1/s^2", "1/s", "1/s^2"), "S": ("1/kg", "1/s", "1/s^2"), "Th": ("kg", "N.s/m", "N/m")}
-TRUST = 1e-4  # no line counts as known to better than this share of itself: (omega dt)^2/12 is 2e-4 at 20 Hz
+TRUST = 1e-6  # no line counts as known to better than this share of itself
 NEIGHBOURS = 5  # lines over which the scatter of the response is averaged
 COVER = 0.95  # of the confidence intervals
 
@@ -57,15 +57,31 @@ def printed(what: str, axis: str) -> tuple[float, ...]:
     return tuple(getattr(block, name) for name in NAMES[what])
 
 
-def response(what: str, coefficients: tuple[float, ...] | np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Complex response of what with these coefficients at frequency [Hz], both (n,)."""
-    s = 2j * np.pi * frequency
+def response(what: str, coefficients: tuple[float, ...] | np.ndarray, frequency: np.ndarray, dt: float | None = None):
+    """Complex response of what with these coefficients at frequency [Hz], both (n,).
+
+    Args:
+        dt: step of the loop [s], which differentiates by central differences and lets a spring act on (1, 2, 1)/4 of
+            three positions; None for the printed form in continuous time.
+    """
+    s2, s, one = _operators(frequency, dt)
     a, b, c = coefficients
-    return a * s**2 + b * s + c if what == "Th" else a / (s**2 + b * s + c)
+    return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
 
 
-def estimate(signals: np.ndarray, n: int, bins: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Response, its standard deviation and the coherence at the lines of a multisine, each (lines,).
+def _operators(frequency: np.ndarray, dt: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What stands for s^2, s and 1 at frequency [Hz]."""
+    omega = 2.0 * np.pi * frequency
+    if dt is None:
+        return -(omega**2), 1j * omega, np.ones_like(omega)
+    half = 0.5 * omega * dt
+    return -((2.0 * np.sin(half) / dt) ** 2), 1j * np.sin(2.0 * half) / dt, np.cos(half) ** 2
+
+
+def estimate(
+    signals: np.ndarray, n: int, bins: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
+    """Response, its standard deviation and the coherence at the lines of a multisine, each (lines,), and the runs' own.
 
     The reference is free of noise, so S_ry/S_ru is free of bias, with noise on the input and in a closed loop too
     (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
@@ -73,11 +89,16 @@ def estimate(signals: np.ndarray, n: int, bins: np.ndarray) -> tuple[np.ndarray,
     Args:
         signals: reference, input and output, (runs, 3, periods n); more than one run, or period.
         n: samples in a period. bins: multiples of 1/period that the lines are, (lines,).
+
+    Returns:
+        (response, deviation, coherence, errors): errors, what each run adds to the response, (runs, lines); None for
+        a single run.
     """
     from scipy.signal import csd
 
     r, u, y = np.moveaxis(signals, 1, 0)
-    if len(r) == 1:  # scatter over its periods then
+    single = len(r) == 1
+    if single:  # scatter over its periods then
         r, u, y = (x.reshape(-1, n) for x in (r, u, y))
 
     keep: Any = False
@@ -87,10 +108,12 @@ def estimate(signals: np.ndarray, n: int, bins: np.ndarray) -> tuple[np.ndarray,
 
     ru, ry = spectrum(r, u), spectrum(r, y)
     H = ry.mean(axis=0) / ru.mean(axis=0)
-    scatter = np.sum(np.abs(ry / ru - H) ** 2, axis=0) / (len(r) - 1) / len(r)
+    errors = (ry - H * ru) / ru.mean(axis=0)
+    scatter = np.sum(np.abs(errors) ** 2, axis=0) / (len(r) - 1) / len(r)
     share = _smooth(scatter / np.abs(H) ** 2)
     uu, yy, uy = (spectrum(a, b).mean(axis=0) for a, b in ((u, u), (y, y), (u, y)))
-    return H, np.sqrt(share) * np.abs(H), np.minimum(np.abs(uy) ** 2 / (uu.real * yy.real), 1.0)
+    coherence = np.minimum(np.abs(uy) ** 2 / (uu.real * yy.real), 1.0)
+    return H, np.sqrt(share) * np.abs(H), coherence, None if single else errors
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
@@ -101,45 +124,69 @@ def _smooth(x: np.ndarray) -> np.ndarray:
     return (total[high] - total[low]) / (high - low)
 
 
-def fit(what: str, frequency: np.ndarray, H: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def fit(
+    what: str,
+    frequency: np.ndarray,
+    H: np.ndarray,
+    deviation: np.ndarray,
+    errors: np.ndarray | None = None,
+    dt: float | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients that fit a response best, and half of their 95 % confidence intervals, each (3,), order of NAMES.
 
-    Least squares of the complex misfit, each line weighted by its deviation. The intervals come from the Jacobian and
-    the variance of the misfit that is left, which also holds what a deviation does not show: rounding to the counts of
-    an encoder, which is the same in every period.
+    Least squares of the complex misfit, each line weighted by its deviation. The intervals come from how far each run
+    alone would move the coefficients (Student's t, of as many degrees of freedom as runs but one): the count of an
+    encoder makes errors that lines share, and an error that all share leaves no misfit. A single run has but that
+    misfit.
 
     Args:
         what: which form. frequency: [Hz], (n,), n >= 3. H: response, complex, (n,). deviation: of H, (n,).
+        errors: of each run, (runs, n), as `estimate` gives them; None for a single run. dt: as `response`.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
 
     sigma = np.hypot(deviation, TRUST * np.abs(H))
-    start = _linear(what, 2j * np.pi * frequency, H)
+    start = _linear(what, frequency, H, dt)
+
+    def parts(e: np.ndarray) -> np.ndarray:
+        return np.concatenate((e.real, e.imag), axis=-1)
 
     def misfit(x: np.ndarray) -> np.ndarray:
-        e = (H - response(what, x * start, frequency)) / sigma
-        return np.concatenate((e.real, e.imag))
+        return parts((H - response(what, x * start, frequency, dt)) / sigma)
 
-    found = least_squares(misfit, np.ones(3), method="lm", xtol=1e-12, ftol=1e-12)
-    freedom = 2 * len(H) - 3
-    covariance = np.linalg.inv(found.jac.T @ found.jac) * 2.0 * found.cost / freedom
-    half = stdtrit(freedom, 0.5 + 0.5 * COVER) * np.sqrt(np.diag(covariance))
+    found = least_squares(misfit, np.ones(3), method="lm", xtol=1e-14, ftol=1e-14)
+    if errors is None:
+        freedom = 2 * len(H) - 3
+        variance = np.diag(np.linalg.inv(found.jac.T @ found.jac)) * 2.0 * found.cost / freedom
+    else:
+        runs = len(errors)
+        freedom = runs - 1
+        variance = np.sum((np.linalg.pinv(found.jac) @ parts(errors / sigma).T) ** 2, axis=1) / (runs * freedom)
+    half = stdtrit(freedom, 0.5 + 0.5 * COVER) * np.sqrt(variance)
     return found.x * start, half * np.abs(start)
 
 
-def _linear(what: str, s: np.ndarray, H: np.ndarray) -> np.ndarray:
+def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -> np.ndarray:
     """Where the fit starts: the form made linear in its coefficients (Levy 1959), of relative misfit."""
+    s2, s, one = _operators(frequency, dt)
     if what == "Th":
-        A, b = np.stack((s**2, s, np.ones_like(s)), axis=1) / H[:, None], np.ones_like(H)
+        A, b = np.stack((s2, s, one), axis=1) / H[:, None], np.ones_like(H)
     else:
-        A, b = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / np.abs(s[:, None]) ** 2, -np.ones_like(H)
+        A, b = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / np.abs(s2[:, None]), s2 / np.abs(s2) + 0j
     both = np.concatenate((A.real, A.imag)), np.concatenate((b.real, b.imag))
     return np.linalg.lstsq(*both, rcond=None)[0]
 
 
-def coefficients(what: str, axis: str, frequency: np.ndarray, H: np.ndarray, deviation: np.ndarray):
-    """`fit` beside the printed coefficients of what on axis: three of Coefficient."""
-    value, half = (x.tolist() for x in fit(what, frequency, H, deviation))
-    rows = zip(NAMES[what], UNITS[what], printed(what, axis), value, half, strict=True)
+def coefficients(what: str, axis: str, frequency: np.ndarray, found: tuple, dt: float | None, least: float):
+    """`fit` beside the printed coefficients of what on axis: three of Coefficient.
+
+    Args:
+        found: H, deviation, coherence, errors, as `estimate` returns them. dt: as `response`.
+        least: share of a coefficient that the fitted form is wrong by, part of the interval.
+    """
+    H, deviation, _, errors = found
+    value, half = fit(what, frequency, H, deviation, errors, dt)
+    half = np.hypot(half, least * np.abs(value))
+    rows = zip(NAMES[what], UNITS[what], printed(what, axis), value.tolist(), half.tolist(), strict=True)
     return tuple(Coefficient(name, unit, known, x, x - h, x + h) for name, unit, known, x, h in rows)

@@ -27,6 +27,8 @@ BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz], either
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
 AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small, so that the pose stays; Th is the same at every pose
 LINES = 40
+LEFT = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}  # between loop and fitted form at AMPLITUDE, by runs without noise ...
+SHAPED = 5e-9  # ... of Sh where it holds at every pose
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Identified:
         frequency: lines of the multisine [Hz], (n,). response: complex, (n,), in the unit of what.
         deviation: standard deviation of response, by its scatter over the runs, (n,).
         coherence: of measured input and output over all periods, (n,).
-        coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring.
+        coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring, with 95 % intervals
+            from the scatter of the runs.
         scenario: of the first run. noise: what was added to the records. seed: of phases and noise.
         periods: kept of each run. realisations: number of runs.
     """
@@ -198,11 +201,11 @@ def identify(
             progress(made, realisations)
     bins = np.round(Signal(wave).omega / (2.0 * np.pi) * wave.period).astype(int)
     frequency = bins / wave.period
-    H, deviation, coherence = estimate.estimate(np.array(signals), n, bins)
-    return Identified(
-        what, axis, frequency, H, deviation, coherence, estimate.coefficients(what, axis, frequency, H, deviation),
-        scenarios[0], noise, seed, periods, realisations,
-    )  # fmt: skip
+    found = estimate.estimate(np.array(signals), n, bins)
+    step = base.dt if control == "continuous" else None  # no difference equation of second order holds the hold
+    least = (SHAPED if what == "S" and shaping else LEFT[what]) * (size / AMPLITUDE[what]) ** 2
+    fitted = estimate.coefficients(what, axis, frequency, found, step, least)
+    return Identified(what, axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods, realisations)
 
 
 def _multisine(rms, band: object, period: float, lines: int, limit: float) -> Multisine:

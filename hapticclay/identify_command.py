@@ -13,7 +13,7 @@ from .estimate import KINDS
 from .identify import SCHEMA, Identified, Noise, identify
 from .record import atomic
 
-QUICK: dict[str, Any] = {"realisations": 2, "periods": 1, "lines": 20}
+QUICK: dict[str, Any] = {"periods": 1, "lines": 20}
 QUICK_PERIOD = {"G": 2.5, "S": 2.5, "Th": 5.0}  # [s]
 QUICK_BAND = {"G": (0.3, 20.0), "S": (0.3, 20.0), "Th": (0.15, 3.0)}  # [Hz]
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]

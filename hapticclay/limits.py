@@ -22,6 +22,8 @@ from .errors import ParameterError, choice, flag, number
 from .params import AXES, B_MAX, C_POLE, NO_HAND, RENDERS, G, Operator, S
 
 STEP = 1.01  # the frequency grid grows by this factor ...
+LEAST = 1e-60  # nothing crosses at a lower gain, and products of such numbers vanish
+SMALL = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
 NEAR = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
 
 
@@ -253,16 +255,21 @@ def lifted(
     """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma') x(k), exact at the samples.
 
     See `matrices`. A loop is stable if every eigenvalue lies within the unit circle, but for the one at z = 1 that
-    moves the handle where Th has no spring; that one is taken out beforehand, exactly.
+    moves the handle where Th has no spring. Clay of 1e9 N.s/m, or K = 1e-12, put others within rounding of z = 1, so
+    the map is of differences, M - 1, and counted from where handle and motors would rest under this delta: the column
+    of delta is then exactly zero, and gamma's share of it that of the hand's spring.
     """
-    M, beta, gamma = matrices(axis, b, operator, Ts, delay, render)
-    if not (operator or NO_HAND).spring:  # a shift of p, delta and y together changes nothing: count from p
-        Q = np.delete(np.eye(len(M)), 0, axis=1)
-        R = Q.T.copy()
-        R[[1, 3], 0] = -1.0
-        M, beta, gamma = R @ M @ Q, R @ beta, gamma @ Q
-    n = len(M)
-    less = M - np.eye(n)
+    less, beta, gamma = differences(axis, b, operator, Ts, delay, render)
+    i, spring = AXES.index(axis), (operator or NO_HAND).spring
+    rest = np.zeros(len(less))
+    rest[0] = S[i].stiffness / (S[i].stiffness + S[i].gain * spring)
+    rest[4], rest[6:] = 1.0, spring * rest[0]
+    less, beta = less - np.outer(rest, less[2]), beta - rest * beta[2]
+    less[:, 2], gamma[2] = 0.0, -spring * rest[0]
+    free = np.delete(np.delete(less, 2, 0), 2, 1)  # without the integrator
+    if not spring:
+        less, beta, gamma = free, np.delete(beta, 2), np.delete(gamma, 2)
+    n = len(less)
 
     def h(omega: np.ndarray) -> np.ndarray:
         out = np.empty(len(omega), dtype=complex)
@@ -272,17 +279,28 @@ def lifted(
         return out
 
     def stable(K: float) -> bool:
-        return bool(np.max(np.abs(np.linalg.eigvals(M + K * np.outer(beta, gamma)))) < 1.0)
+        z1 = eigenvalues(less + max(K, LEAST) * np.outer(beta, gamma))
+        return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
 
-    z = np.linalg.eigvals(M)
-    poles = np.array([cmath.log(w) / Ts for w in z if abs(w) > 1e-6])
+    z1 = eigenvalues(free)
+    poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
     zeros = np.roots(np.trim_zeros(lti.impedance(b, operator)))
     resonances = np.concatenate((poles, zeros))
-    resonances = resonances[np.abs(resonances) > 1e-9 / Ts]
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     turns = np.linspace(low, top, 20 * n)[:-1]
     return Family(h, np.union1d(turns, grid(low, top * (1.0 - 1e-9), resonances.imag)), stable, top)
+
+
+def eigenvalues(a: np.ndarray) -> np.ndarray:
+    """Eigenvalues of a, shape (n, n), the small ones as exact as the large: from its inverse, where they are large."""
+    z = np.linalg.eigvals(a)
+    z = z[np.argsort(np.abs(z))]
+    small = int(np.sum(np.abs(z) < SMALL * np.abs(z[-1])))
+    if small:
+        large = np.linalg.eigvals(np.linalg.inv(a))
+        z[:small] = 1.0 / large[np.argsort(-np.abs(large))][:small]
+    return z
 
 
 def matrices(
@@ -303,8 +321,14 @@ def matrices(
     Returns:
         M, shape (m, m), beta and gamma, shape (m,); m = 7 + n.
     """
-    from scipy.linalg import expm
+    less, beta, gamma = differences(axis, b, operator, Ts, delay, render)
+    return less + np.eye(len(less)), beta, gamma
 
+
+def differences(
+    axis: str, b: float, operator: Operator | None, Ts: float, delay: float = 0.0, render: str = "held"
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M - 1, beta, gamma of `matrices`, M - 1 without the loss of digits of the difference."""
     i = AXES.index(choice("axis", axis, AXES))
     physical = choice("render", render, RENDERS) == "implicit"
     th, g, s = operator or NO_HAND, G[i], S[i]
@@ -312,8 +336,8 @@ def matrices(
     part = max(delay / Ts - n, 0.0) if delay / Ts - n > 1e-9 else 0.0
     m = 7 + n
     w = 1.0 / (1.0 / s.gain + th.mass)
-    a = np.array([[0.0, 1.0, 0.0], [-w * th.spring, -w * (th.damper + physical * b), w], [0.0, 0.0, 0.0]])
-    rest, head = expm((1.0 - part) * Ts * a), expm(part * Ts * a)  # under u(k-n), after u(k-n-1)
+    own = np.array([-w * th.spring, -w * (th.damper + physical * b)])  # of the handle's acceleration
+    (rest, new), (head, old) = (_moved(own, w, x * Ts) for x in (1.0 - part, part))  # under u(k-n), after u(k-n-1)
 
     u = np.zeros(m)  # u(k) from x(k)
     u[:6] = [-s.stiffness, -s.damping, g.stiffness, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
@@ -321,20 +345,43 @@ def matrices(
     u[1] -= (not physical) * b
     gamma = np.zeros(m)
     gamma[0], gamma[1] = -th.spring, -th.damper - b
-    gamma[:2] -= th.mass * a[1, :2]
+    gamma[:2] -= th.mass * own
     gamma[-1] -= th.mass * w
 
     A, B = lti.held(axis, 1.0, Ts)
-    M = np.zeros((m, m))
-    M[:2, :2] = rest[:2, :2] @ head[:2, :2]
-    M[:2, -1] = rest[:2, :2] @ head[:2, 2]
+    less = np.zeros((m, m))
+    less[:2, :2] = rest + head + rest @ head
+    less[:2, -1] = old + rest @ old
     if n:
-        M[:2, 5 + n] += rest[:2, 2]
+        less[:2, 5 + n] += new
     else:
-        M[:2] += np.outer(rest[:2, 2], u)
-    M[2:6, 2:6] = A
-    M[6] = u
-    M[np.arange(7, m), np.arange(6, m - 1)] = 1.0
+        less[:2] += np.outer(new, u)
+    less[2:6, 2:6] = A - np.eye(4)
+    less[6] = u
+    less[np.arange(7, m), np.arange(6, m - 1)] = 1.0
+    less[np.arange(6, m), np.arange(6, m)] -= 1.0
     beta = np.zeros(m)
     beta[2:6] = B
-    return M, beta, gamma
+    return less, beta, gamma
+
+
+def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Change of (p, v) over t [s] under p'' = own (p, v) + w u: for p and v before, (2, 2), and for a held u, (2,).
+
+    The response to a pulse, and its integral, are divided differences of exp(s t) at the roots 0, slow and fast,
+    written so that nothing cancels however stiff the clay.
+    """
+    fast = 0.5 * (own[1] - cmath.sqrt(own[1] * own[1] + 4.0 * own[0]))
+    slow = -own[0] / fast if fast else 0.0
+
+    def mean(x: complex) -> complex:  # of exp(x u) over u from 0 to 1
+        return np.expm1(x) / x if x else 1.0
+
+    pulse = cmath.exp(slow * t) * mean((fast - slow) * t) * t
+    if abs(fast) * t > 1.0:
+        sums = (pulse - mean(slow * t) * t) / fast
+    else:
+        sums = lti.exponential(t * np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]]))[0, 2]
+    pulse, sums = pulse.real, sums.real
+    change = [[own[0] * sums, pulse], [own[0] * pulse, own[1] * pulse + own[0] * sums]]
+    return np.array(change), w * np.array([sums, pulse])

@@ -180,7 +180,8 @@ class Scenario:
         gain: compensator gain K on each axis, C = K/(s^2 + 10 s); 0 turns the compensator off.
         force: the operator's muscle force uh on each axis [N], its constant part.
         muscle: the part of uh that varies [N]; None for none.
-        command: displacement added to the compensator's output [m]; None for none.
+        command: displacement added to the compensator's output [m], counted from t = 0: the multisine less its value
+            there, so that the run starts without a jump; None for none.
         operator: impedance Th of the operator's arm; None for a pure force (Th = 0).
         shaping: True lets the servo shape the handle's inertia, so that Sh holds at every pose.
         dt: physics and control step [s].

@@ -18,6 +18,7 @@ import scaling
 import stiffness
 import throughput
 import work_precision as wp
+from peers import common, scipy_ivp
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +61,30 @@ def test_the_default_path_is_a_thousand_times_closer_than_first_order_stepping(r
 def test_peers_converge_to_the_reference(rows):
     best = min(r["crossing"] for r in of(rows, "SciPy"))
     assert best < 1e-8
+
+
+@pytest.mark.parametrize("problem", problems.PROBLEMS)
+def test_compiled_right_hand_side_is_the_plain_one(problem):
+    """The same law compiled: rounding of sums in another order; and so the same crossings, at an rtol of 1e-10."""
+    job = common.Job.of(problem)
+    plain, fast = common.ode(job), common.compiled_ode(job)
+    rng = np.random.default_rng(0)
+    for b in job.b:
+        z = common.initial(job) + 0.1 * rng.normal(size=12)
+        np.testing.assert_allclose(fast(0.0, z, b), plain(0.0, z, b), rtol=1e-12, atol=1e-12)
+    one, other = (scipy_ivp.solve(problem, m, 1e-10).crossings for m in ("DOP853", "DOP853, compiled"))
+    np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def test_leaders_are_said_by_the_figures():
+    times = {"a": {1e-5: 1.0, 1e-9: 4.0}, "b": {1e-7: 6.0, 1e-9: 3.0}}
+    rows = [dict(problem="p", package=k, method="m", setting=e, crossing=e, wall=w)
+            for k, x in times.items() for e, w in x.items()]  # fmt: skip
+    found = wp.leaders(rows)
+    assert [x["package"] for x in found] == ["a"] * 4 + ["b"] * 3  # from 1e-2 to 1e-5, from 1e-6 on
+    assert found[0]["factor"] == 3.0 and found[-1]["next"] == "a, m" and found[-1]["factor"] == pytest.approx(4 / 3)
+    assert wp.who_leads(found) == "Fastest, by asked error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
+    assert wp.who_leads(wp.leaders(rows[:2])).endswith("a at 1e-02 to 1e-08 s.")
 
 
 def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):

@@ -231,6 +231,23 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
 
+@pytest.mark.parametrize("gain,stable", [("0.8604", True), ("0.8606", False)])  # its limit is 0.8605
+def test_command_gives_margins_and_transparency_of_stable_loops_only(gain, stable, tmp_path, capsys):
+    import json
+
+    args = ["stability", "--axis", "y", "--gain", gain, "--out", str(tmp_path)]
+    assert cli.main(args) == 0
+    lines = capsys.readouterr().out.splitlines()
+    rows = json.loads((tmp_path / "stability.json").read_text())["verdicts"]
+    assert rows[0]["answer"] is stable
+    mine = [r for r in rows if "margin" in r["question"] or "transparency" in r["question"]]
+    assert len(mine) == 5
+    for r in mine:
+        assert (r["value"] is None and r["omega"] is None) != stable, r
+        shown = next(x for x in lines if x.startswith(r["question"])).removeprefix(r["question"]).split()
+        assert (shown[0] == shown[-1] == "-") != stable, shown
+
+
 @pytest.mark.parametrize(
     "args,word",
     [(["--map", "gain"], "--map"), (["--b", "-1"], "b = -1"), (["--gain", "0"], "K = 0"), (["--axis", "z"], "--axis")],

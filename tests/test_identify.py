@@ -5,6 +5,8 @@ Signals are short: 1.5 s (Th 2.5 s) instead of 5 s (10 s), one period of each ru
 
 import dataclasses
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,10 @@ from hapticclay import cli, estimate
 from hapticclay.drift import Drift, poses
 from hapticclay.estimate import fit, response
 from hapticclay.identify import measured
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import intervals
 
 DT = 0.36e-3
 PRINTED = {  # Eqs. 15 to 19, lengths in m
@@ -43,42 +49,60 @@ def kick_response(what, axis, f, dt=DT):
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
 def test_printed_coefficients_and_response_without_noise(what, axis):
-    """The loop's error is (omega dt)^2/12 of s^2, (omega dt)^2/6 of s: 2e-4 of either at 15 Hz, times up to 2."""
+    """The fitted form is the loop's own difference equation; what is left is 1e-6, and for Sh the pose: (p/l1)^2."""
     r = quick(what, axis)
+    left = 1e-4 if what == "S" else 1e-6
     assert [c.name for c in r.coefficients] == list(estimate.NAMES[what])
-    np.testing.assert_allclose(r.values, PRINTED[what + axis], rtol=2e-4)
-    assert all(
-        abs(c.error) < 2e-4 and c.printed == x for c, x in zip(r.coefficients, PRINTED[what + axis], strict=True)
-    )
+    np.testing.assert_allclose(r.values, PRINTED[what + axis], rtol=left)
+    assert [c.printed for c in r.coefficients] == list(PRINTED[what + axis])
     assert np.all(r.coherence > 1.0 - 1e-6)
     exact = response(what, PRINTED[what + axis], r.frequency)
-    share = np.abs(r.response / exact - 1.0)
+    share = np.abs(r.response / exact - 1.0)  # of continuous time: (omega dt)^2/12 of s^2, /6 of s, times up to 2
     assert np.all(share < (2.0 * np.pi * r.frequency * DT) ** 2 / 3.0 + 3e-5)
     # beside the loop's own difference equation there remain the transient, and for Sh the pose: (p/l1)^2 = 4e-4 peak
     own = kick_response(what, axis, r.frequency)
-    np.testing.assert_allclose(r.response, own, rtol=1e-4 if what == "S" else 1e-6)
+    np.testing.assert_allclose(r.response, own, rtol=left)
+    np.testing.assert_allclose(response(what, PRINTED[what + axis], r.frequency, DT), own, rtol=1e-9)
 
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
 def test_printed_coefficients_from_noisy_data(what, axis):
     """Encoders of 65536 counts, 0.02 N rms: within 0.5 %, Sh 2 %, and within 4 sigma (2 half-intervals), seeded."""
-    short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else dict(realisations=4)
-    r = quick(what, axis, noise=hc.Noise(), seed=1, **short)
+    short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else {}
+    r = quick(what, axis, noise=hc.Noise(), seed=1, realisations=4, **short)
     for c in r.coefficients:
         assert abs(c.error) < (0.02 if what == "S" else 0.005), c
         assert abs(c.value - c.printed) < (c.high - c.low), c
     assert 0.9 < r.coherence.min() < 1.0 - 1e-6
 
 
-def test_intervals_cover_the_truth_in_simulated_runs():
-    """12 seeds, 36 intervals of 95 %: fewer than 29 hits has a chance of 1e-4, even in threes that agree 1e-2."""
-    hits = [
-        c.low <= c.printed <= c.high
-        for seed in range(4)
-        for what, axis in (("G", "y"), ("S", "x"), ("Th", "y"))
-        for c in quick(what, axis, noise=hc.Noise(), seed=seed).coefficients
-    ]
-    assert len(hits) == 36 and sum(hits) >= 29
+def test_intervals_cover_the_truth_with_any_encoder():
+    """G, y, whose gain suffers most from rounding, 20 seeds, three encoders; benchmarks/intervals.py is the study.
+
+    Of 60 gains, 95 % are 57; fewer than 51 have a chance of 2e-3 among independent ones. Intervals that know nothing
+    of errors common to all lines hold 60 to 80 % of them, and that of continuous time none of the last 20.
+    """
+    hits = np.array([row["half"] >= abs(row["error"]) for seed in range(20) for row in intervals.one(
+        seed, (("G", False),), "y", period=1.5, band=(0.6, 15.0), periods=1, lines=20)])  # fmt: skip
+    held = hits.reshape(20, len(intervals.SENSORS), 3).sum(axis=0)  # of 20: sensors, coefficients
+    assert held[:, 0].sum() >= 51, held
+    assert held.min() >= 15  # of one, fewer has a chance of 3e-3 for each of 9
+    assert held.sum() >= 155  # of 180, 171 expected
+
+
+def test_intervals_from_the_scatter_of_runs_cover_at_the_stated_rate():
+    """Four runs, errors that half of them is common to all lines; 400 draws: 95 % +- 4.4 % is 4 sigma of the count."""
+    rng = np.random.default_rng(8)
+    f = np.geomspace(0.2, 15.0, 20)
+    exact = response("G", PRINTED["Gx"], f, DT)
+    hits = np.zeros(3)
+    for _ in range(400):
+        own, common = (rng.normal(size=(2, 4, n)) for n in (len(f), 1))
+        errors = 1e-3 * exact * ((own + common)[0] + 1j * (own + common)[1])
+        H = exact + errors.mean(axis=0)
+        value, half = fit("G", f, H, 1e-3 * np.abs(exact), errors - errors.mean(axis=0), DT)
+        hits += np.abs(value - PRINTED["Gx"]) <= half
+    assert np.all(np.abs(hits / 400 - 0.95) < 0.044), hits
 
 
 @pytest.mark.parametrize("what", ["G", "S", "Th"])
@@ -106,7 +130,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
         r = np.cos(2 * np.pi * np.outer(t, bins) + rng.uniform(0, 2 * np.pi, len(bins))).sum(axis=1)
         # as much noise in each bin as signal: variance n/4 per line, over n/2 bins
         signals.append((r, r + rng.normal(0.0, np.sqrt(n / 4), n), 2.0 * r))
-    H, deviation, coherence = estimate.estimate(np.array(signals), n, bins)
+    H, deviation, coherence, _ = estimate.estimate(np.array(signals), n, bins)
     assert np.abs(H.mean() - 2.0) < 4.0 * np.sqrt(np.mean(deviation**2) / len(bins))
     assert 0.35 < coherence.mean() < 0.65
 

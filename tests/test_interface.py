@@ -399,11 +399,24 @@ def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     assert abs(tame.energy["residual"]) < 1e-11 * tame.energy["throughput"]
 
 
-def test_the_controller_leaves_passive_clay_alone():
+@pytest.mark.parametrize(
+    "parts", [dict(), dict(force_noise=0.1, adc_bits=12, dac_bits=12), dict(jitter=1e-5, lost=0.01)]
+)
+def test_the_controller_leaves_passive_clay_alone(parts):
     kw = dict(t_max=0.8, clay=(0.02, 0.15))
-    a, b = (hc.simulate(cut(hc.Interface(passivity=x), **kw)) for x in (False, True))
+    a, b = (hc.simulate(cut(hc.Interface(passivity=x, **parts), **kw)) for x in (False, True))
     np.testing.assert_array_equal(a.p, b.p)
     assert b.energy["passivity_controller"] == 0.0
+
+
+@pytest.mark.parametrize("parts", [dict(encoder=65536), dict(velocity="difference")])
+def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exact(parts):
+    """On the idle axis, whose velocity passes zero: some 1e-7 J and 1e-6 m, of 5 N and 20 cm."""
+    kw = dict(shaping=True, force=(5.0, 0.0))
+    a, b = (hc.simulate(cut(hc.Interface(passivity=x, **parts), **kw)) for x in (False, True))
+    n = min(len(a.p), len(b.p))
+    assert 0.0 < np.abs(a.p[:n] - b.p[:n]).max() < 1e-5
+    assert 0.0 < b.energy["passivity_controller"] < 1e-6
 
 
 @given(st.floats(0.0, 1e9), st.floats(1.0, 1e5), st.floats(0.1, 1e3), st.floats(-1.0, 1.0), st.floats(1e-5, 1e-2))

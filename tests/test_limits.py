@@ -1,6 +1,7 @@
 """Gain limits found another way: roots, Routh, Pade, a period walked step by step, python-control, the simulator."""
 
 import itertools
+from decimal import Decimal, localcontext
 
 import control
 import numpy as np
@@ -88,19 +89,19 @@ def test_continuous_limits_by_routh_hurwitz(axis, b):
     assert np.any(routh(polynomial(axis, found * (1 + 1e-9), b, HANDS["hand"])) < 0)
 
 
-def period(axis, K, b, hand, Ts, delay, render):
+def period(axis, K, b, hand, Ts, delay, render, number=float, exponential=expm):
     """One period of the sampled loop as a matrix: every unit state is walked through the events, one after another."""
-    i = "xy".index(axis)
-    m, d, k = hand
-    mass = 1 / SG[i] + m
-    physical = b if render == "implicit" else 0.0
     n = int(delay / Ts + 1e-9) + 1
-    blocks = expm(Ts * np.array([
-        [0, 1, 0, 0, 0], [0, -10, 0, 0, K], [0, 0, 0, 1, 0], [G0[i], 0, -G0[i], -G1[i], 0], [0, 0, 0, 0, 0]
+    g0, g1, s0, s1, sg = (number(float(x["xy".index(axis)])) for x in (G0, G1, S0, S1, SG))
+    K, b, Ts, delay, m, d, k = (number(x) for x in (K, b, Ts, delay, *hand))
+    mass = 1 / sg + m
+    physical = b if render == "implicit" else 0
+    blocks = exponential(Ts * np.array([
+        [0, 1, 0, 0, 0], [0, -10, 0, 0, K], [0, 0, 0, 1, 0], [g0, 0, -g0, -g1, 0], [0, 0, 0, 0, 0]
     ]))  # fmt: skip
     changes = delay - (n - 1) * Ts  # in a period the oldest gives way to the next then
     plant = np.array([[0, 1, 0], [-k / mass, -(d + physical) / mass, 1 / mass], [0, 0, 0]])
-    before, after = expm(changes * plant), expm((Ts - changes) * plant)
+    before, after = exponential(changes * plant), exponential((Ts - changes) * plant)
 
     def walk(x):
         p, v, *z = x[:6]
@@ -108,14 +109,14 @@ def period(axis, K, b, hand, Ts, delay, render):
         acting = queue[-1]
         a = (acting - k * p - (d + physical) * v) / mass
         f = -k * p - d * v - m * a - b * v
-        y2 = G0[i] * (z[0] - z[2]) - G1[i] * z[3]
-        u = (y2 + S1[i] * (z[3] - v) + S0[i] * (z[2] - p)) / SG[i] - (b * v if render == "held" else 0.0)
+        y2 = g0 * (z[0] - z[2]) - g1 * z[3]
+        u = (y2 + s1 * (z[3] - v) + s0 * (z[2] - p)) / sg - (b * v if render == "held" else 0)
         state = before @ [p, v, acting]
         queue = [u, *queue]
         state = after @ [state[0], state[1], queue[-2]]
         return [*state[:2], *(blocks @ [*z, f])[:4], *queue[:-1]]
 
-    return np.array([walk(e) for e in np.eye(6 + n)]).T
+    return np.array([walk([number(x) for x in e]) for e in np.eye(6 + n).tolist()]).T
 
 
 def radius(matrix, spring):
@@ -164,6 +165,72 @@ def test_sampled_limits_of_random_loops():
             assert all(beyond(K) < 1e-10 for K in found * np.array([1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1 - 1e-5]))
             assert beyond(found * (1 + 1e-5)) > -1e-11
     assert 0 < zero < 20
+
+
+def exponential(a):
+    """Of a matrix of Decimals: Taylor's series of a/2^n, squared n times."""
+    n = max(0, int(max(abs(x) for x in a.ravel()) * len(a)).bit_length() + 8)
+    a, out = a / Decimal(2) ** n, np.eye(len(a), dtype=int) * Decimal(1)
+    term = out
+    for i in range(1, 60):  # 2^-8 each: beyond 120 digits
+        term = term @ a / i
+        out = out + term
+    for _ in range(n):
+        out = out @ out
+    return out
+
+
+def inside(matrix, spring):
+    """Whether all eigenvalues of a matrix of Decimals lie within the unit circle (Schur, Cohn), but the handle's place.
+
+    The characteristic polynomial is Faddeev's and LeVerrier's.
+    """
+    n, p, M = len(matrix), [Decimal(1)], matrix * Decimal(0)
+    for i in range(1, n + 1):
+        M = matrix @ (M + p[-1] * np.eye(n, dtype=int))
+        p.append(-np.trace(M) / i)
+    if not spring:
+        assert abs(sum(p)) < Decimal(10) ** -80  # z = 1 is a root
+        p = list(itertools.accumulate(p))[:-1]
+    while len(p) > 1:
+        if abs(p[-1]) >= abs(p[0]):
+            return False
+        p = [p[0] * x - p[-1] * y for x, y in zip(p[:-1], p[:0:-1], strict=True)]
+        p = [x / p[0] for x in p]
+    return True
+
+
+@pytest.fixture
+def digits():
+    with localcontext() as context:
+        context.prec = 150
+        yield
+
+
+def is_inside(axis, K, b, hand, Ts, delay, render):
+    return inside(period(axis, K, b, hand, Ts, delay, render, Decimal, exponential), hand[2])
+
+
+@pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
+@pytest.mark.parametrize("b,Ts,delay", [(1e9, 3.6e-4, 0.0), (1e9, 1e-6, 0.0), (1e8, 1e-3, 1.4e-3), (90.0, 3.6e-4, 0.0)])
+def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, delay):
+    """Implicit clay to 1e9 N.s/m moves poles to within 1e-15 of z = 1; judged with 150 digits, by another criterion."""
+    found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="implicit")
+    assert 0.0 < found < np.inf
+    for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
+        stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "implicit")
+        assert stable == (share < 1.0)
+        assert limits.is_stable(axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit") == stable
+
+
+@pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
+@pytest.mark.parametrize("Ts,delay", [(1e-6, 0.0), (3.6e-4, 0.0), (3.6e-4, 6e-4)])
+@pytest.mark.parametrize("render", ["held", "implicit"])
+def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, delay, render):
+    """The pole that K moves is at -K k/10: z = 1 - 2e-16 at K = 1e-12, and far below rounding at 1e-30 and 5e-324."""
+    for K in (1e-6, 1e-12, 1e-30, 5e-324):
+        assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
+        assert limits.is_stable(axis, K, 90.0, operator(HANDS[hand]), Ts, delay, render)
 
 
 @pytest.mark.parametrize("axis,n", list(itertools.product("xy", [0, 1, 3])))

@@ -117,6 +117,26 @@ def ode(job: Job):
     return rhs
 
 
+def compiled_ode(job: Job):
+    """`ode` as machine code: numba compiles the same `law`; with its array, and without a limit of wall time."""
+    from numba import njit
+
+    from_arm, (Kx, Ky) = njit(law(job)), job.K
+
+    @njit
+    def rhs(t, z, b):
+        a1, a2, w1, w2, dx, dy, ex, ey, yx, yy, rx, ry = z
+        o = from_arm(a1, a2 - a1, w1, w2 - w1, dx, dy, ex, ey, yx, yy, rx, ry, b)
+        _, _, _, _, fx, fy, ax, ay, t1, t2, h1, h2, _ = o
+        n2 = t2 + h2
+        n1 = t1 + h1 - n2
+        return np.array(
+            [w1, w2, n1 / I1, n2 / I2, ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay]
+        )
+
+    return rhs
+
+
 def initial(job: Job) -> np.ndarray:
     """The state of `ode` at the start."""
     z = np.zeros(12)
