@@ -121,12 +121,13 @@ def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[s
     for r in rows:
         if (packages is None or r["package"] in packages) and not r["method"].startswith(SAMPLED):
             groups.setdefault((r["package"], r["method"], r["setting"]), []).append(r)
+    most = {package: max(len(g) for key, g in groups.items() if key[0] == package) for package, *_ in groups}
     out = []
     for asked in ASKED:
         fit = {
             key: (max(r["crossing"] for r in g), statistics.mean(r["wall"] for r in g))
             for key, g in groups.items()
-            if all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
+            if len(g) == most[key[0]] and all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
         }
         if fit:
             key = min(fit, key=lambda k: fit[k][1])
