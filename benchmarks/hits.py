@@ -32,10 +32,11 @@ import hapticclay as hc  # noqa: E402
 from hapticclay import sim  # noqa: E402
 from hapticclay.clay import slab  # noqa: E402
 from hapticclay.errors import ParameterError  # noqa: E402
-from hapticclay.params import AXES, ORIGIN, TS, Clay, Operator, Profile, Scenario  # noqa: E402
+from hapticclay.params import AXES, L1, L2, ORIGIN, TS, Clay, Operator, Profile, Scenario  # noqa: E402
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
-STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits
+STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...
+NOMINAL_BORDER = (L2 - EDGES[0], L1)  # ... where shaping has least to do: the border lies at the nominal pose
 FELT = 0.05  # [s] after the hit, at which the force on the hand is compared
 SLOW = 1e-3  # [m/s] the time at which a border is passed more slowly than this says little
 LIMIT_TIME, LIMIT_PLACE = 1e-4, 1e-5  # [s], [m] what random hits at 0.36 ms keep
@@ -43,7 +44,7 @@ LIMIT_TIME, LIMIT_PLACE = 1e-4, 1e-5  # [s], [m] what random hits at 0.36 ms kee
 
 def jobs(b: float) -> dict[str, Scenario]:
     """One of each kind in clay b [N.s/m]."""
-    s = Scenario(clay=slab(b, *EDGES[:2]), length=None, shaping=True, torque_limit=STRONG)
+    s = Scenario(clay=slab(b, *EDGES[:2]), length=None, shaping=True, torque_limit=STRONG, origin=NOMINAL_BORDER)
     hand = Operator(0.25, 2.0, 60.0)
     thin = Profile((0.05, 0.051, 0.052, 0.053), (0.0, b, 0.1 * b, b, 0.0))
     return {
@@ -70,7 +71,7 @@ def exact(kind: str, b: float) -> tuple[list[tuple[float, float, float]], float,
     where = sum(c[0] < felt for c in crossings)
     region = 0
     for _, border, v in crossings[:where]:
-        region = edges.index(border) + (1 if v > 0.0 else 0)
+        region = int(np.argmin(np.abs(np.array(edges) - border))) + (1 if v > 0.0 else 0)
     return crossings, float(states[1, 0]), values[region] * float(states[0, 1])
 
 
@@ -83,7 +84,7 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
         runs = [hc.simulate(s, engine="native" if how else "python")]
         runs += [hc.simulate(s, engine="native") for _ in range(2) if how and runs[0].wall_time < 0.3]
     except ParameterError as error:  # an explicit method in clay too stiff for it
-        return {**out, "crossing": None, "position": None, "force": None, "wall": None, "note": error.bound}
+        return {**out, **dict.fromkeys(("crossing", "leaves", "position", "force", "wall")), "note": error.bound}
     r, (crossings, place, felt) = runs[0], exact(kind, b)
     mine, clear = [c.time for c in r.crossings if abs(c.speed) > SLOW], [e[0] for e in crossings if abs(e[2]) > SLOW]
     same = len(mine) == len(clear)
@@ -92,6 +93,7 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
     return {
         **out,
         "crossing": max(abs(a - b) for a, b in zip(mine, clear, strict=True)) if same else None,
+        "leaves": min((abs(c.time - crossings[-1][0]) for c in r.crossings), default=None),
         "position": abs(float(r.p[-1, 0]) - place),
         "force": abs(force - felt) / max(abs(felt), 0.1),
         "wall": statistics.median(x.wall_time for x in runs) / s.t_max,

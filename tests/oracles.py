@@ -282,16 +282,20 @@ def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_
     """Exact motion along one axis at one constant inertia, through the borders `edges` in both directions.
 
     b is values[i] between edges i - 1 and i. At the start the loop has moved with v0 for long. A return to a border
-    within `scan` seconds of leaving it is missed.
+    within `scan` seconds of leaving it is missed. In each region the state is that from its border on, with b v for v:
+    so it keeps its digits in any clay.
 
     Returns (crossings as (time, border, velocity), states (p, v, ...) at the ascending times, (n, 7)).
     """
-    z = np.array([p0, v0, p0 + G1[axis] / G0[axis] * v0, v0, p0, v0, 1.0])
-    region, t, crossings, states, times = int(np.searchsorted(edges, p0, side="right")), 0.0, [], [], list(times)
+    place = np.array([1.0, 0, 1, 0, 1, 0, 0])  # what a shift of the origin shifts
+    z = np.array([0.0, v0, G1[axis] / G0[axis] * v0, v0, 0.0, v0, 1.0])
+    region, t, c, crossings, states, times = int(np.searchsorted(edges, p0, side="right")), 0.0, p0, [], [], list(times)
     while True:
-        A = Linear(axis, values[region], K, uh, th).A
-        low = edges[region - 1] if region else -np.inf
-        high = edges[region] if region < len(edges) else np.inf
+        scale = np.array([1.0, max(values[region], 1.0), 1.0, 1.0, 1.0, 1.0, 1.0])
+        A = Linear(axis, values[region], K, uh - th[2] * c, th).A * scale[:, None] / scale
+        z = z * scale
+        low = edges[region - 1] - c if region else -np.inf
+        high = edges[region] - c if region < len(edges) else np.inf
         E, a, ta = expm(A * scan), z, t
         while ta < t_max and low <= (ahead := E @ a)[0] <= high:
             a, ta = ahead, ta + scan
@@ -299,14 +303,14 @@ def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_
         if ta < t_max:
             border = high if ahead[0] > high else low
             # next to a border that it has just left, the handle is on the near side of it already
-            begin = 1e-3 * scan if a is z and border == z[0] else 0.0
-            h = brentq(lambda h, A=A, a=a, c=border: (expm(A * h) @ a)[0] - c, begin, scan, xtol=1e-17, rtol=1e-15)
+            begin = 1e-3 * scan if a is z and border == 0.0 else 0.0
+            h = brentq(lambda h, A=A, a=a, d=border: (expm(A * h) @ a)[0] - d, begin, scan, xtol=1e-17, rtol=1e-15)
             end = ta + h
         while times and times[0] <= min(end, t_max):
-            states.append(expm(A * (times.pop(0) - t)) @ z)
+            states.append((expm(A * (times.pop(0) - t)) @ z) / scale + c * place)
         if end >= t_max:
             return crossings, np.array(states).reshape(-1, 7)
-        z, t = expm(A * h) @ a, end
-        z[0] = border
-        crossings.append((t, border, float(z[1])))
+        z, t = (expm(A * h) @ a) / scale, end
+        crossings.append((t, c + border, float(z[1])))
+        z, c = z - z[0] * np.eye(7)[0] - border * (place - np.eye(7)[0]), c + border
         region += 1 if border == high else -1

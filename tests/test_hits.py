@@ -53,7 +53,7 @@ def test_random_hits_keep_what_the_documents_promise(seed):
 
 
 @pytest.mark.parametrize("kind", ["cut", "hit", "hit, hand", "layers", "grazing"])
-@pytest.mark.parametrize("b", [1e2, 1e4, 1e6, 1e8])
+@pytest.mark.parametrize("b", [1e2, 1e4, 1e6, 1e9])
 def test_order_is_two_at_any_stiffness(kind, b):
     """Fitted to the largest error of the border times over five steps; the motors never reach their limits."""
     steps = np.array([4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4])
@@ -64,7 +64,7 @@ def test_order_is_two_at_any_stiffness(kind, b):
 
 
 @settings(max_examples=25)
-@given(st.floats(0.0, 8.0), st.floats(0.05, 0.5), st.booleans(), st.booleans(), st.sampled_from([TS, 1e-3]))
+@given(st.floats(0.0, 9.0), st.floats(0.05, 0.5), st.booleans(), st.booleans(), st.sampled_from([TS, 1e-3]))
 def test_any_hit_is_within_second_order_of_the_exact_solution(power, v, hand, y, dt):
     """Errors of the times of borders passed faster than 1 mm/s: below 150 dt^2, 2e-5 s at 0.36 ms, whatever b.
 
@@ -78,7 +78,7 @@ def test_any_hit_is_within_second_order_of_the_exact_solution(power, v, hand, y,
     s = Scenario(
         clay=Clay(profile, profile), operator=Operator(*th) if hand else None, force=put(-v), velocity=put(v),
         start=put(0.05 - 0.05 * v), gain=(1.0, 0.3), shaping=True, torque_limit=hits.STRONG, length=None, t_max=0.4,
-        dt=dt, stop=False, origin=(0.33, 0.16) if y else (0.25, 0.24),
+        dt=dt, stop=False, origin=(0.35, 0.19) if y else hits.NOMINAL_BORDER,
     )  # fmt: skip
     exact, _ = bounces((0.05, 0.15), (0.0, b, 0.0), s.gain[axis], -v, th, axis, 0.05 - 0.05 * v, v, s.t_max)
     r = hc.simulate(s)
