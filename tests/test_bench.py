@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import bench
 import extremes
+import hits
 import parts
 import problems
 import scaling
@@ -135,6 +136,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     monkeypatch.setattr(wp.measure, "__defaults__", (("ours",),))
     monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
+    monkeypatch.setattr(hits, "CLAYS", (1e1, 1e3))
     monkeypatch.setattr(throughput, "SCENES", {"free space": throughput.SCENES["free space"]})
     for table in ("ENGINE", "LOOP"):
         monkeypatch.setattr(parts, table, dict(list(getattr(parts, table).items())[:2]))
@@ -145,7 +147,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
     assert files == [
-        "bench.md", "default_cut.png", "extremes.json", "parts.json", "scaling.json", "scaling.png", "stiffness.json",
+        "bench.md", "default_cut.png", "extremes.json", "hits.json", "parts.json", "scaling.json", "scaling.png", "stiffness.json",
         "throughput.json", "work_precision.json",
     ]  # fmt: skip
     data = bench.load(tmp_path / "o")
