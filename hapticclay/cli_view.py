@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import os
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +13,8 @@ import tyro
 
 from .cli_run import Experiment, deliver, simulate_with_progress
 from .errors import ParameterError
-from .experiments import SCENARIOS
 from .params import Scenario
+from .player import Replay, stoppable
 from .record import Record, writable
 from .removal import TOOL, Tool
 from .session import Session
@@ -122,21 +119,13 @@ def look(
         ParameterError: there is no display, no OpenGL, or no viser.
     """
     session = Session(scenario, stiffness, tool, every)
-    if web:
-        _serve(session, host, port)
-    else:
-        _window_possible()
-        from .view import Window
+    with stoppable() as stop:
+        if web:
+            _serve(session, host, port, stop.is_set)
+        else:
+            from .view import Window
 
-        while True:
-            window = Window(session)
-            try:
-                window.show()
-            except KeyboardInterrupt:
-                break
-            if not window.wanted:
-                break
-            session.start(SCENARIOS[window.wanted]())
+            Window(session).show(stop.is_set)
     return session.record() if session.recorded else None
 
 
@@ -148,14 +137,10 @@ def replay(record: Record, tool: Tool) -> None:
     """
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
-    _window_possible()
-    from .player import Replay
     from .view import Window
 
-    try:
-        Window(Replay(record, tool)).show()
-    except KeyboardInterrupt:
-        pass
+    with stoppable() as stop:
+        Window(Replay(record, tool)).show(stop.is_set)
 
 
 def film(
@@ -178,8 +163,9 @@ def film(
     return video.film(record(), out, camera, speed, size, plots, tool, progress, smooth)
 
 
-def _serve(session: Session, host: str, port: int) -> None:
-    from .web import LOCAL, Page
+def _serve(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
+    from .gate import LOCAL
+    from .web import Page
 
     page = Page(session, host, port)
     if host not in LOCAL:
@@ -188,24 +174,4 @@ def _serve(session: Session, host: str, port: int) -> None:
             file=sys.stderr,
         )
     print(f"open {page.url} in a browser; Ctrl-C ends the session", flush=True)
-    try:
-        page.serve()
-    except KeyboardInterrupt:
-        pass
-
-
-def _window_possible() -> None:
-    """Raises ParameterError where no window can be opened, and says what to do instead."""
-    if not sys.platform.startswith("linux"):
-        return
-    instead = "use --web for a browser, or hapticclay video for a film"
-    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ParameterError("display", "", f"there is none: {instead}")
-    if not ctypes.util.find_library("GL"):
-        raise ParameterError("OpenGL", "", f"libGL is missing: apt-get install libgl1, or {instead}")
-    with warnings.catch_warnings():  # the viewer itself would end the process here
-        warnings.simplefilter("ignore")
-        import glfw
-
-        if not glfw.init():
-            raise ParameterError("display", os.environ.get("DISPLAY", ""), f"does not answer: {instead}")
+    page.serve(until)

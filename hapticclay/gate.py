@@ -1,38 +1,59 @@
-"""A gate before a server that listens on this machine alone: who comes from elsewhere must show a token."""
+"""A gate before a server that listens on this machine alone: who comes must mean this page, and may need a token."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import hmac
+import http.client
+import io
+import secrets
 import threading
+from collections.abc import Callable
+from ipaddress import ip_address
+from socket import gethostname
 from urllib.parse import parse_qs, urlsplit
 
 from .errors import ParameterError
 
+LOCAL = ("127.0.0.1", "localhost", "::1")
 COOKIE = "hapticclay"
+PASS = "X-Hapticclay-Pass"  # header by which the server behind knows whom the gate has let in
 HEAD = 65536  # longest head of a request [bytes]
-PATIENCE = 10.0  # for it [s]
+PATIENCE = 10.0  # for it, and for a page from behind [s]
 
 
 class Gate:
-    """Passes connections on whose first request has the token, in its address (?token=) or in a cookie.
+    """Lets in who asks for this machine by a name of its own, and from no page but its own.
 
-    The page is asked for with the address; it gets the cookie, which the browser then shows by itself.
+    A stranger's page can make the browser of whoever looks at it come here, under our name or (DNS rebinding) under
+    the page's; it cannot make it lie about either in Host and Origin. Where other machines can come there is a token
+    as well: in the first address (?token=), afterwards in a cookie, which the browser shows by itself.
+
+    Attributes:
+        port: where it listens. secret: what PASS says.
 
     Raises:
         ParameterError: the address cannot be listened on.
     """
 
-    def __init__(self, host: str, port: int, inner: int, token: str):
-        self.host, self.port, self.inner, self.token = host, port, inner, token
+    def __init__(self, host: str, port: int, inner: int, token: str = "", edit: Callable[[bytes], bytes] = bytes):
+        """Listens.
+
+        Args:
+            host, port: address to listen on; port 0 for any. inner: port of the server on this machine.
+            token: "" for none. edit: changes the page on its way.
+        """
+        self.host, self.inner, self.token, self.edit = host, inner, token, edit
+        self.secret = secrets.token_urlsafe(16)
         self._loop = asyncio.new_event_loop()
         self._tasks: set[asyncio.Task] = set()
         try:
             self._server = self._loop.run_until_complete(asyncio.start_server(self._meet, host, port, limit=HEAD))
         except OSError as error:
             self._loop.close()
-            raise ParameterError("host", f"{host}:{port}", f"cannot be listened on ({error.strerror})") from None
+            why = error.strerror.lower() if error.strerror else str(error)
+            raise ParameterError("port", port, f"{host} cannot be listened on ({why}): try --port 0, for any") from None
         self.port = self._server.sockets[0].getsockname()[1]
         self._thread = threading.Thread(target=self._loop.run_forever, name="gate", daemon=True)
         self._thread.start()
@@ -56,39 +77,70 @@ class Gate:
         self._tasks.add(task)
         try:
             head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), PATIENCE)
-            answer = self._judge(head.decode("latin-1"))
-            if answer:
-                writer.write(answer.encode("latin-1"))
-                await writer.drain()
+            target, fields, refusal = self._judge(head)
+            if refusal:
+                writer.write(refusal)
+            elif fields.get("Upgrade", "").lower() == "websocket":
+                await self._pass(head[:-2] + f"{PASS}: {self.secret}\r\n\r\n".encode(), reader, writer)
             else:
-                await self._pass(head, reader, writer)
+                writer.write(await asyncio.wait_for(self._fetch(target), PATIENCE))
+            await writer.drain()
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError, TimeoutError):
             pass  # whoever it was has gone, or never was a browser
         finally:
             self._tasks.discard(task)
             writer.close()
 
-    def _judge(self, head: str) -> str:
-        """What to answer to a request; "" to let it in."""
-        request, *lines = head.split("\r\n")
-        target = (request.split(" ") + ["", ""])[1]
-        fields = {k.strip().lower(): v.strip() for k, _, v in (line.partition(":") for line in lines)}
-        cookies = [c.strip() for c in fields.get("cookie", "").split(";")]
-        if any(self._right(c[len(COOKIE) + 1 :]) for c in cookies if c.startswith(f"{COOKIE}=")):
-            return ""
-        if self._right(parse_qs(urlsplit(target).query).get("token", [""])[0]):
-            cookie = f"Set-Cookie: {COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-            return (
-                f"HTTP/1.1 303 See Other\r\nLocation: /\r\n{cookie}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-            )
-        text = "hapticclay: the address lacks the token that was printed at start\n"
-        return (
-            "HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\n"
-            f"Content-Length: {len(text)}\r\nConnection: close\r\n\r\n{text}"
-        )
+    def _judge(self, head: bytes) -> tuple[str, http.client.HTTPMessage, bytes]:
+        """Target and header fields of a request, and what to answer instead of letting it in; b"" to let it in."""
+        line, _, rest = head.partition(b"\r\n")
+        method, target, *_ = (*line.decode("latin-1").split(" "), "", "")
+        fields = http.client.HTTPMessage()
+        try:
+            fields = http.client.parse_headers(io.BytesIO(rest))
+            hosts, origins = fields.get_all("Host", []), fields.get_all("Origin", [])
+            own = len(hosts) == 1 and self._ours(urlsplit(f"//{hosts[0]}").hostname or "")
+            own = own and all(urlsplit(o).netloc.lower() == hosts[0].lower() for o in origins)
+            query = parse_qs(urlsplit(target).query)
+            understood = method == "GET" and target.startswith("/")
+        except (ValueError, http.client.HTTPException):
+            understood, own, query = False, False, {}
+        if not understood:
+            return target, fields, _answer("400 Bad Request", b"hapticclay: not a request for a page\n")
+        if not own:
+            text = b"hapticclay: asked for under another name, or by another page: open the address printed at start\n"
+            return target, fields, _answer("403 Forbidden", text)
+        cookies = [c.strip().partition("=") for c in fields.get("Cookie", "").split(";")]
+        if not self.token or any(name == COOKIE and self._right(value) for name, _, value in cookies):
+            return target, fields, b""
+        if self._right(query.get("token", [""])[0]):
+            cookie = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+            return target, fields, _answer("303 See Other", b"", f"Location: /\r\nSet-Cookie: {cookie}\r\n")
+        text = b"hapticclay: the address lacks the token that was printed at start\n"
+        return target, fields, _answer("403 Forbidden", text)
+
+    def _ours(self, name: str) -> bool:
+        """Whether this is a name of the machine: on other addresses than its own, also any number, which is no name."""
+        if name in LOCAL or not self.token:
+            return name in LOCAL
+        with contextlib.suppress(ValueError):
+            return bool(ip_address(name))
+        return name in (self.host.lower(), gethostname().lower())
 
     def _right(self, token: str) -> bool:
         return hmac.compare_digest(token.encode(), self.token.encode())
+
+    async def _fetch(self, target: str) -> bytes:
+        """The page behind, as an answer of our own."""
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.inner)
+        try:
+            writer.write(f"GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{self.inner}\r\n\r\n".encode("latin-1"))
+            head, _, body = (await reader.read(-1)).partition(b"\r\n\r\n")
+        finally:
+            writer.close()
+        line, _, rest = head.partition(b"\r\n")
+        kind = http.client.parse_headers(io.BytesIO(rest)).get("Content-Type", "text/plain")
+        return _answer(line.decode("latin-1").partition(" ")[2] or "502 Bad Gateway", self.edit(body), kind=kind)
 
     async def _pass(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self.inner)
@@ -103,6 +155,11 @@ class Gate:
                 await asyncio.gather(*ways, return_exceptions=True)
         finally:
             inner_writer.close()
+
+
+def _answer(status: str, body: bytes, more: str = "", kind: str = "text/plain") -> bytes:
+    head = f"HTTP/1.1 {status}\r\n{more}Content-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
+    return f"{head}X-Frame-Options: DENY\r\nConnection: close\r\n\r\n".encode("latin-1") + body
 
 
 async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import threading
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
 from .record import Record
 from .removal import TOOL, Tool
 from .session import FRAME, Clock, Session
+from .verdict import Verdict, limits, verdict
 
 
 class Replay:
@@ -40,9 +44,44 @@ class Replay:
         self.frames.append(self._frame(self.n))
         return self.source.p[before : self.n + 1]
 
+    @property
+    def gain(self) -> tuple[float, float]:
+        """K now."""
+        x, y = self.source.extra["gain"][self.n].tolist() if "gain" in self.source.extra else self.scenario.gain
+        return x, y
+
+    @property
+    def b(self) -> tuple[float, float]:
+        """Damping of the clay where the handle is [N.s/m]."""
+        x, y = self.source.b[self.n].tolist()
+        return x, y
+
+    def verdict(self) -> Verdict:
+        """As of a session; what the monitor found is the outcome of the record."""
+        r, n, s = self.source, self.n, self.scenario
+        found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
+        limit = limits(self.b, s.operator) if s.control == "continuous" else None
+        return verdict(self.gain, limit, r.outcome if found else None, True)
+
     def _frame(self, n: int) -> tuple:
         r = self.source
         return (float(r.t[n]), *(tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh)))
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[threading.Event]:
+    """An event that Ctrl-C sets, in place of an exception in the midst of anything; a second Ctrl-C is one."""
+    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def heard(*_) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, heard)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Player(threading.Thread):

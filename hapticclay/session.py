@@ -19,6 +19,7 @@ from .errors import ParameterError, integer, number
 from .leapfrog import Leapfrog, _written_out
 from .params import B_MAX, L1, L2, Clay, Multisine, Operator, Profile, Scenario
 from .removal import TOOL, Tool, removed
+from .verdict import Verdict, limits, verdict
 
 FRAME = 1.0 / 60.0  # [s] between two looks at the person
 MOST = 0.05  # longest slice of simulated time; a machine that needs longer for it slows the clock [s]
@@ -26,6 +27,7 @@ HOUR = 3600.0  # longest session [s]
 REACH = (abs(L2 - L1) + 0.05, L1 + L2 - 0.02)  # from the shoulder, of the point that the hand pulls to [m]
 JITTER = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # edges of the histogram of lateness [ms]
 RECENT = 60  # frames over which the real-time factor is shown
+CALM = 1.0  # without growing swings until an unstable arm is called calm again [s]
 
 
 class Pull:
@@ -187,6 +189,7 @@ class Session:
         self._damping = 1.0
         self.frames: list[tuple] = []
         self._carry = 0.0
+        self._swung = -math.inf  # when it last swung so that growth would be called unstable [s]
         self._look()
 
     def restart(self) -> None:
@@ -215,6 +218,16 @@ class Session:
     def b(self) -> tuple[float, float]:
         """Damping of the clay where the handle is [N.s/m]."""
         return self.run.regions.b(self.run.t)
+
+    @property
+    def gain(self) -> tuple[float, float]:
+        """K now."""
+        return self.scenario.gain
+
+    def verdict(self) -> Verdict:
+        """What the monitor of the run, and its gain limit, say now."""
+        s, onset = self.scenario, self.run.watch.onset
+        return verdict(self.gain, limits(self.b, s.operator), onset, self.t - self._swung < CALM)
 
     def pull(self, point: tuple[float, float] | None) -> None:
         """The hand pulls to this point [m] from now on, as far as the arm reaches; None lets go."""
@@ -307,6 +320,9 @@ class Session:
         return p, (vx, vy)
 
     def _look(self) -> None:
+        watch = self.run.watch
+        if watch.onset and max(map(len, watch.swings)) >= outcome.SWINGS:
+            self._swung = self.t
         p, v = self._state()
         b = self.b
         spring = self.run.muscle

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from . import scene
-from .params import Scenario
+from .params import AXES, Scenario
 from .removal import TOOL, Removal, Tool
 
 CAMERAS = ("room", "top", "close")
@@ -14,10 +14,10 @@ PALE, DEEP = np.array([222, 168, 132]), np.array([186, 100, 62])  # clay of the 
 HIDDEN = (0.0, 0.0, -5.0)  # where the target is when nobody pulls [m]
 
 
-def along(scenario: Scenario) -> int:
-    """The axis that plots beside a picture show: 1 where all clay is laid out along y, else 0."""
+def cut_axes(scenario: Scenario) -> tuple[int, ...]:
+    """The axes that plots beside a picture show: those along which the clay is laid out, x where there is none."""
     clay = scenario.clay
-    return int(clay is not None and clay.x.along == clay.y.along == "y")
+    return tuple(sorted({AXES.index(f.along) for f in (clay.x, clay.y)})) if clay is not None else (0,)
 
 
 def hardest(scenario: Scenario) -> float:

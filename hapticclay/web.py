@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 import secrets
 import socket
@@ -13,17 +14,19 @@ import numpy as np
 
 from . import scene
 from .errors import ParameterError, integer
-from .gate import Gate
+from .gate import LOCAL, PASS, Gate
 from .params import AXES, L1, L2
 from .player import Player
 from .session import Session
-from .stage import Stage, along, hardest
+from .stage import Stage, cut_axes, hardest
 
 FRAME = 1.0 / 30.0  # [s] between two looks of the browser
 CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
 POINTS = 400  # of a plot
-LOCAL = ("127.0.0.1", "localhost", "::1")
+TITLE = "hapticclay"
 SKY, GROUND = (236, 240, 245), (214, 220, 228)  # behind the scene, above and below
+RED, GREEN, AMBER = "#c92a2a", "#0d6b52", "#b86b00"  # behind the verdict
+INK = {("hand", 0): "#009E73", ("clay", 0): "#0072B2", ("hand", 1): "#E69F00", ("clay", 1): "#D55E00"}
 DARK, STEEL, BLUE, ORANGE = (56, 64, 74), (178, 186, 196), (15, 110, 173), (230, 107, 13)
 
 
@@ -49,24 +52,21 @@ class Page:
             import viser
         except ImportError:
             raise ParameterError("web", "viser", "is not installed: pip install 'hapticclay[web]'") from None
-        self.session, self.gate = session, None
+        self.session = session
         port, local = integer("port", port, 0, 65535), host in LOCAL
         self.console = rich.get_console()
         self.quiet, self.console.quiet = self.console.quiet, True  # viser's boxes name the port behind the gate
-        self.server = viser.ViserServer(
-            host=host if local else "127.0.0.1", port=_free(host, port) if local else _free(LOCAL[0], 0),
-            verbose=False, label="hapticclay",
-        )  # fmt: skip
-        inner = self.server.get_port()
-        self.url = f"http://{_name(host)}:{inner}"
-        if not local:
-            token = secrets.token_urlsafe(16)
-            try:
-                self.gate = Gate(host, port, inner, token)
-            except ParameterError:
-                self._stop()
-                raise
-            self.url = f"http://{_name(host)}:{self.gate.port}/?token={token}"
+        with socket.create_server((LOCAL[0], 0)) as free:
+            behind = free.getsockname()[1]
+        self.server = viser.ViserServer(host=LOCAL[0], port=behind, verbose=False, label=TITLE)
+        token = "" if local else secrets.token_urlsafe(16)
+        try:
+            self.gate = Gate(host, port, self.server.get_port(), token, _titled)
+        except ParameterError:
+            self._stop()
+            raise
+        self.server._websock_server.on_client_connect(self._admit)
+        self.url = f"http://{_name(host)}:{self.gate.port}" + (f"/?token={token}" if token else "")
         self.player = Player(session)
         self.stage = Stage(session.scenario, session.tool)
         self.shown = 1  # frames that the clay is cut by
@@ -91,18 +91,24 @@ class Page:
             if self.player.ident:
                 self.player.stop()
         finally:
-            if self.gate:
-                self.gate.close()
+            self.gate.close()
             self._stop()
 
     def _stop(self) -> None:
         self.server.stop()
         self.console.quiet = self.quiet
 
+    async def _admit(self, client: Any) -> None:
+        """Sends whoever has come past the gate away, before they are told or have said anything."""
+        connection = self.server._websock_server._live_connections[client.client_id]
+        request = connection.request
+        if request is None or request.headers.get_all(PASS) != [self.gate.secret]:
+            await connection.close(1008, "not through the gate")
+
     def _scene(self) -> None:
         add, ground = self.server.scene, scene.GROUND
         camera = self.server.initial_camera
-        camera.position, camera.look_at, camera.fov = (0.29, -0.60, 0.60), (0.25, 0.15, -0.04), 0.52
+        camera.position, camera.look_at, camera.fov = (0.21, -0.66, 0.64), (0.18, 0.15, -0.04), 0.60
         add.set_background_image(np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)
@@ -148,7 +154,7 @@ class Page:
     def _controls(self, uplot: Any) -> None:
         gui, s = self.server.gui, self.session.scenario
         gui.configure_theme(control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False)
-        self.status = gui.add_markdown("")
+        self.verdict, self.status = gui.add_html(""), gui.add_markdown("")
         self.run = gui.add_button("Pause")
         reset = gui.add_button("Reset")
         self.keep = gui.add_checkbox("Record", True)
@@ -159,32 +165,44 @@ class Page:
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
         nothing = (np.array([0.0, 1.0]), np.zeros(2))
         form: Any = {"mode": 1, "scales": {"x": uplot.Scale(time=False)}, "aspect": 2.0, "padding": (12, 4, 0, 0)}
-        a = self.axis = along(s)
-        self.velocity = gui.add_uplot(
-            nothing,
-            (uplot.Series(label=f"position {AXES[a]} [cm]"), uplot.Series(label="v [cm/s]", stroke="#0072B2", width=2)),
-            title="velocity against position", **form,
-        )  # fmt: skip
+        self.velocities = {
+            i: gui.add_uplot(
+                nothing,
+                (uplot.Series(label=f"position {AXES[i]} [cm]"),
+                 uplot.Series(label=f"v{AXES[i]} [cm/s]", stroke=INK["clay", i], width=2)),
+                title=f"velocity along {AXES[i]}", **form,
+            )
+            for i in cut_axes(s)
+        }  # fmt: skip
+        lines = [(who, i) for i in self.velocities for who in ("hand", "clay")]
         self.forces = gui.add_uplot(
-            (*nothing, np.zeros(2)),
-            (uplot.Series(label="t [s]"), uplot.Series(label="hand fh [N]", stroke="#009E73", width=2),
-             uplot.Series(label="clay fe [N]", stroke="#0072B2", width=2)),
+            (nothing[0], *(np.zeros(2) for _ in lines)),
+            (uplot.Series(label="t [s]"),
+             *(uplot.Series(label=f"{who} {AXES[i]} [N]", stroke=INK[who, i], width=2) for who, i in lines)),
             title="force against time", **form,
         )  # fmt: skip
         self.run.on_click(self._toggle)
         reset.on_click(self._reset)
-        for handle, act in (
-            (self.b, lambda: self.session.change(b=self.b.value / (top or 1.0))),
-            (self.gain, self._gain),
+        for slider, act in (
+            (self.b, lambda: self.session.change(b=self.b.value / (top or 1.0))), (self.gain, self._gain),
             (self.force, self._press),
-            (self.keep, lambda: setattr(self.session, "recording", self.keep.value)),
-            (self.hold, self._hold),
-        ):
-            handle.on_update(lambda _, act=act: self._locked(act))
+        ):  # fmt: skip
+            slider.on_update(lambda _, slider=slider, act=act: self._slid(slider, act))
+        for box, act in (
+            (self.keep, lambda: setattr(self.session, "recording", self.keep.value)), (self.hold, self._hold)
+        ):  # fmt: skip
+            box.on_update(lambda _, act=act: self._locked(act))
 
     def _locked(self, act: Callable[[], None]) -> None:
         with self.player.lock:
             act()
+
+    def _slid(self, slider: Any, act: Callable[[], None]) -> None:
+        """Acts on a slider; a number typed beside it that is out of its range becomes the end of the range."""
+        if slider.min <= slider.value <= slider.max:
+            self._locked(act)
+        else:
+            slider.value = slider.max if slider.value > slider.max else slider.min  # a change that comes here again
 
     def _gain(self) -> None:
         first = self.session.given.gain
@@ -228,7 +246,7 @@ class Page:
             new = [f[1] for f in frames[first:]]
             self.shown = len(frames)
             frame, point, q = frames[-1], session.point, list(session.run.angles)
-            clock, ended, paused = session.clock, session.ended, session.paused
+            clock, ended, paused, verdict = session.clock, session.ended, session.paused, session.verdict()
             every = max(1, len(frames) // POINTS)
             some = frames[::every] if now - self.plotted > PLOT_EVERY else []
             self.stage.carve(new)
@@ -247,16 +265,22 @@ class Page:
         if some:
             self.plotted = now
             t, p, v, fe, fh = (np.array(x) for x in zip(*some, strict=True))
-            i = self.axis
-            self.velocity.data = _by_position(100.0 * p[:, i], 100.0 * v[:, i])
-            self.forces.data = (t, fh[:, i], fe[:, i])
-            state = f"{ended}: reset to go on" if ended else ("paused" if paused else "playing")
+            for i, plot in self.velocities.items():
+                plot.data = _by_position(100.0 * p[:, i], 100.0 * v[:, i])
+            self.forces.data = (t, *(f[:, i] for i in self.velocities for f in (fh, fe)))
+            state = "ended" if ended else "paused" if paused else "playing"
             slow = ", this machine is too slow" if clock.slow else ""
             b = session.b
             self.status.content = (
                 f"**{state}** {frame[0]:.1f} s, {clock.factor:.2f} x real{slow}  \n"
-                f"b = {b[0]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N  \n"
+                f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N  \n"
                 f"removed {1e6 * self.stage.removal.volume:.2f} cm³"
+            )
+            text = f"{ended}: reset to go on" if ended else verdict.text
+            color = RED if verdict.unstable else GREEN if text.startswith("stable") else AMBER
+            self.verdict.content = (
+                f'<div style="background:{color};color:white;padding:0.4em 0.6em;margin:0 0.7em 0.5em;'
+                f'border-radius:4px;font-size:0.85em">{html.escape(text)}</div>'
             )
 
 
@@ -286,18 +310,9 @@ def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, out
 
 
-def _free(host: str, port: int) -> int:
-    """The port, which nobody listens on; of port 0, one that nobody does.
-
-    Raises:
-        ParameterError: somebody does; viser would go on to another, or wait for ever.
-    """
-    try:
-        with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET) as s:
-            return s.getsockname()[1]
-    except OSError as error:
-        why = error.strerror.lower() if error.strerror else str(error)
-        raise ParameterError("port", port, f"{host} cannot be listened on ({why}): try --port 0, for any") from None
+def _titled(page: bytes) -> bytes:
+    """viser's page under our own title, which it has no setting for."""
+    return page.replace(b"<title>Viser</title>", f"<title>{TITLE}</title>".encode(), 1)
 
 
 def _name(host: str) -> str:

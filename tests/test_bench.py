@@ -147,8 +147,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
     assert files == [
-        "bench.md", "default_cut.png", "extremes.json", "hits.json", "parts.json", "scaling.json", "scaling.png", "stiffness.json",
-        "throughput.json", "work_precision.json",
+        "bench.md", "default_cut.png", "extremes.json", "hits.json", "parts.json", "scaling.json", "scaling.png",
+        "stiffness.json", "throughput.json", "work_precision.json",
     ]  # fmt: skip
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}

@@ -231,3 +231,40 @@ def test_replay_follows_the_record():
         went.append(replay.advance(FRAME))
     assert replay.ended == record.status
     np.testing.assert_array_equal(np.concatenate(went)[-1], record.p[-1])
+
+
+def test_verdict_follows_the_monitor_and_the_gain():
+    """K_y above, below and again above nothing: the limit is where the poles of Eq. 8 cross, by numpy's roots."""
+    session = Session(hc.constant_cut(), stiffness=10.0)
+    assert session.verdict().text == "stable; limit of K here: none"
+    session.push((0.0, 0.2))
+    drag(session, 3.0, lambda t: (0.1, 0.0))
+    assert session.b == (90.0, 90.0)
+    limit = hc.gain_limit("y", 90.0, operator=session.scenario.operator)
+    assert session.verdict().text.startswith("stable; limit of K here: ")
+    assert session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
+    session.change(gain=(1.0, 3.0 * limit))
+    assert session.verdict().text == f"beyond the limit of K; here Ky {3.0 * limit:.3g} > {limit:.3g}"
+    drag(session, 6.0, lambda t: (0.1, 0.0))
+    onset = session.run.watch.onset
+    said = session.verdict()
+    assert said.unstable and onset.axis == "y"
+    assert said.text.startswith(f"UNSTABLE since {onset.time:.1f} s: growing oscillation of y; here Ky")
+    swing = np.ptp([f[2][1] for f in session.frames[-30:]])
+    session.change(gain=(1.0, 0.5 * limit))
+    drag(session, 6.0, lambda t: (0.1, 0.0))
+    assert np.ptp([f[2][1] for f in session.frames[-30:]]) < 0.02 * swing  # it did calm down
+    assert not session.verdict().unstable and session.verdict().text.startswith("calm again, was unstable")
+
+
+@pytest.mark.parametrize("gain,axis", [(1.0, ""), (6.0, "x")])
+def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
+    record = hc.simulate(hc.stability_test(gain=gain), every=10)
+    assert record.outcome.axis == axis
+    replay, said = Replay(record), []
+    while not replay.ended:
+        said.append((replay.t, replay.verdict()))
+        replay.advance(FRAME)
+    said.append((replay.t, replay.verdict()))
+    assert all(v.unstable == (bool(axis) and t >= record.outcome.time) for t, v in said)
+    assert said[-1][1].unstable == bool(axis)

@@ -1,8 +1,11 @@
 """The window under a real X server without a screen: a mouse drags, keys are pressed, the record tells."""
 
+import ctypes
+import math
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -12,6 +15,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.player import Replay
+from hapticclay.session import FRAME, Session
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (apt-get install xvfb xdotool)")
@@ -39,12 +44,12 @@ class Mouse:
     def __init__(self, screen, folder, *args):
         self.screen = screen
         self.program = subprocess.Popen(
-            [sys.executable, "-W", "error", "-m", "hapticclay", *args],
+            [sys.executable, "-W", "error", "-X", "faulthandler", "-m", "hapticclay", *args],
             cwd=folder, env=screen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         for _ in range(240):
             found = subprocess.run(
-                ["xdotool", "search", "--name", "MuJoCo"], env=screen, capture_output=True, text=True
+                ["xdotool", "search", "--name", "hapticclay"], env=screen, capture_output=True, text=True
             )
             if found.stdout or self.program.poll() is not None:
                 break
@@ -64,13 +69,69 @@ class Mouse:
             self.do("mousemove_relative", "--", pixels // 40, 0)
             time.sleep(0.1)
 
+    def end(self, how):
+        """Closes the window in this way; exit status, output. Fails if that takes longer than a minute."""
+        if how == "Ctrl-Q":
+            self.do("keydown", "ctrl", "key", "q", "keyup", "ctrl")
+        elif how == "Ctrl-C":
+            self.program.send_signal(signal.SIGINT)
+        elif how == "message":
+            ask_to_close(int(self.window), self.screen["DISPLAY"])
+        else:
+            self.do({"destroyed": "windowclose", "disconnected": "windowkill"}[how], self.window)
+        try:
+            out, err = self.program.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            self.program.send_signal(signal.SIGABRT)  # so that it says where it stands
+            pytest.fail(f"{how}: still running after a minute: {self.program.communicate()}")
+        return self.program.returncode, out, err
+
     def close(self):
         """Lets go and quits; exit status, output."""
         self.do("mouseup", 3, "keyup", "ctrl")
         time.sleep(1.0)
-        self.do("key", "ctrl+q")
-        out, err = self.program.communicate(timeout=120)
-        return self.program.returncode, out, err
+        return self.end("Ctrl-Q")
+
+
+def ask_to_close(window, display):
+    """Sends what a window manager sends when somebody clicks on the cross: WM_DELETE_WINDOW (ICCCM 4.2.8.1)."""
+
+    class Message(ctypes.Structure):
+        _fields_ = [
+            ("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int), ("display", ctypes.c_void_p),
+            ("window", ctypes.c_ulong), ("message", ctypes.c_ulong), ("format", ctypes.c_int),
+            ("data", ctypes.c_long * 5), ("rest", ctypes.c_long * 12),
+        ]  # fmt: skip
+
+    x = ctypes.CDLL("libX11.so.6")
+    x.XOpenDisplay.restype, x.XInternAtom.restype = ctypes.c_void_p, ctypes.c_ulong
+    display = ctypes.c_void_p(x.XOpenDisplay(display.encode()))
+    kind, data = (x.XInternAtom(display, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW"))
+    message = Message(33, 0, 1, display, window, kind, 32, (ctypes.c_long * 5)(data))
+    x.XSendEvent(display, ctypes.c_ulong(window), 0, 0, ctypes.byref(message))
+    x.XCloseDisplay(display)
+
+
+@pytest.mark.parametrize("how", ["message", "destroyed", "disconnected", "Ctrl-C"])
+def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_path, how):
+    """A hand of 60 N/m lags behind the mouse in clay of 200 N.s/m by 3 s; the window goes while the button is down."""
+    mouse = Mouse(screen, tmp_path, "view", "--b", "200", "--out", "o", "--no-plots")
+    try:
+        mouse.drag(200)
+        code, out, err = mouse.end(how)
+    finally:
+        mouse.do("mouseup", 3, "keyup", "ctrl")
+    assert (code, err) == (0, ""), out
+    record = hc.Record.load(tmp_path / "o")
+    assert record.b[-1, 0] == 200.0 and record.v[-1, 0] > 1e-3 and record.extra["removed"][-1] > 1e-6
+    assert record.outcome.code == "finished"
+
+
+@pytest.mark.parametrize("how", ["message", "destroyed", "Ctrl-C"])
+def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
+    """It begins in the clay, so that clay is cut from the first picture on."""
+    hc.simulate(hc.constant_cut(clay=(-0.05, 0.15)), every=10).save(tmp_path / "r")
+    assert Mouse(screen, tmp_path, "view", "r").end(how) == (0, "", "")
 
 
 def test_mouse_cuts_through_the_clay(screen, tmp_path):
@@ -94,7 +155,6 @@ def test_keys_change_what_runs_and_switch_the_scenario(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "free", "--out", "o", "--no-plots")
     mouse.do("key", "1")
     time.sleep(6.0)
-    mouse.window = None
     for key in ("Up", "Right", "Right", "h"):
         mouse.do("key", key)
         time.sleep(1.0)
@@ -114,7 +174,6 @@ def test_a_record_is_replayed(screen, tmp_path):
 
 
 def test_every_key_of_the_page_does_what_it_says():
-    from hapticclay.session import FRAME, Session
     from hapticclay.view import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
 
     page = (Path(__file__).parents[1] / "docs" / "view.md").read_text()
@@ -145,18 +204,76 @@ def test_every_key_of_the_page_does_what_it_says():
     assert session.recording and not window.help
     for key, name in zip("123", ("constant", "variable", "free"), strict=True):
         press(ord(key))
-        assert window.wanted == name
+        assert (session.scenario.name, window.stage.scenario, session.t) == (name, session.scenario, 0.0)
 
 
-@pytest.mark.parametrize("low,high", [(0.0, 1.06), (-0.001, 2.06), (0.0, 0.3), (-0.4, 0.2), (0.0, 90.0), (3.0, 31.0)])
-def test_axes_have_round_ticks(low, high):
-    """The engine widens limits to whole numbers and divides evenly: others than whole give ticks such as 0.667."""
-    from hapticclay.view import _round
+def engine_snaps(low, high):
+    """What mjr_figure makes of the limits of y: the next multiples of the range's power of ten, in floats."""
+    low, high = np.float32(low), np.float32(high)
+    power = np.float32(10.0) ** np.floor(np.log10(high - low))
+    return float(np.floor(low / power) * power), float(np.ceil(high / power) * power)
 
-    first, last, lines = _round(low, high, 1.0)
-    assert first == round(first) and last == round(last) and 3 <= lines <= 9
-    assert first <= low + 0.06 * (high - low) and last >= high - 0.06 * (high - low)
-    assert (last - first) / (lines - 1) in (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("scale", [1e-3, 0.01, 1.0, 30.0, 1e4])
+def test_axes_hold_the_data_and_have_round_ticks(axis, scale):
+    """Ticks at 1, 2 or 5 times a power of ten; no data farther outside than a line is thick."""
+    from hapticclay.view import _snapped, _wide
+
+    rng = np.random.default_rng(1)
+    for a, b in rng.normal(size=(300, 2)) * scale:
+        for low, high in ((min(a, b), max(a, b)), (0.0, abs(a)), (-1e-6 * abs(a), abs(b))):
+            first, last, lines = (_wide if axis == "x" else _snapped)(low, high, 1e-3 * scale)
+            if axis == "y":
+                first, last = engine_snaps(first, last)
+            step = (last - first) / (lines - 1)
+            assert 3 <= lines <= 8
+            mantissa = step / 10.0 ** math.floor(math.log10(step * (1.0 + 1e-5)))
+            assert min(abs(mantissa - m) for m in (1.0, 2.0, 5.0, 10.0)) < 1e-4, (low, high, step)
+            assert abs(first / step - round(first / step)) < 1e-3
+            assert low > first - 0.02 * (last - first) and high < last + 0.02 * (last - first)
+            assert last - first < 10.0 * max(high - low, 1e-3 * scale)
+
+
+def figures(play):
+    from hapticclay.view import Window
+
+    window = Window(play)
+    window._read()
+    return window
+
+
+def test_both_axes_are_drawn_where_both_are_cut():
+    """The variable cut; against the record, to the thickness of a line (1/160 of the range, and a float's rounding)."""
+    record = hc.simulate(hc.variable_cut(), every=10)
+    replay = Replay(record)
+    while not replay.ended:
+        replay.advance(FRAME)
+    velocity = figures(replay).plots[0]
+    assert [line.name for line in velocity.lines] == ["x", "y"]
+    for i in (0, 1):
+        n = velocity.figure.linepnt[i]
+        x, v = velocity.figure.linedata[i, : 2 * n].reshape(-1, 2).T
+        assert n > 50 and x.max() == pytest.approx(100 * record.p[:, i].max(), abs=0.1)
+        np.testing.assert_allclose(v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4)
+    one = figures(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
+    assert [len(plot.lines) for plot in one.plots] == [1, 1, 2]
+
+
+def test_a_replay_offers_the_keys_that_act_on_it():
+    from hapticclay.view import LIVE, REPLAY
+
+    record = hc.simulate(hc.constant_cut(t_max=0.5), every=10)
+    replay = Replay(record)
+    window = figures(replay)
+    assert {row[0] for row in LIVE} - {row[0] for row in REPLAY} == {
+        "Ctrl + drag", "up, down", "left, right", "1, 2, 3", "R"
+    }  # fmt: skip
+    before = dict(vars(replay)), window.stage
+    for key in (262, 263, 264, 265, *map(ord, "123R")):
+        window._key(key)
+    assert (dict(vars(replay)), window.stage) == before
+    assert dict(window.rows)["state"] == "replaying"
 
 
 def test_without_a_display_it_says_what_to_do(tmp_path):

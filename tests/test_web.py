@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 
 import hapticclay as hc
@@ -52,7 +53,7 @@ def press(slider, key, times):
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="needs chromium (apt-get install chromium)")
-def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
+def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd):
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
     troubles = []
     with playwright.sync_playwright() as p:
@@ -62,6 +63,7 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
         tab.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
         tab.on("pageerror", lambda e: troubles.append(str(e)))
         tab.goto(page.url)
+        playwright.expect(tab).to_have_title("hapticclay")
         sliders = tab.locator("[role=slider]")
         sliders.nth(2).wait_for()
         press(sliders.nth(2), "ArrowRight", 15)
@@ -71,10 +73,19 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
         while time.monotonic() < deadline and page.session.frames[-1][1][0] < 0.06:
             tab.wait_for_timeout(500)
         picture = tab.screenshot(path=tmp_path / "page.png")
+        before = page.session.scenario.clay.x.values[1]
+        number = tab.locator("input[type=text], input[type=number]").nth(0)
+        number.fill("-5")
+        number.press("Enter")
+        deadline = time.monotonic() + 60.0
+        while time.monotonic() < deadline and page.session.scenario.clay.x.values[1]:
+            tab.wait_for_timeout(500)
         browser.close()
     assert troubles == []
+    assert page.session.scenario.clay.x.values[1] == page.b.value == 0.0  # as far down as it goes
+    assert capfd.readouterr().err == ""
     assert page.session.run.muscle.force == pytest.approx((1.5, 0.0))
-    assert page.session.scenario.clay.x.values[1] == pytest.approx(80.0)
+    assert before == pytest.approx(80.0)
     assert page.session.frames[-1][1][0] > 0.06  # the force moved the handle into the clay
 
     import imageio.v3 as iio
@@ -87,12 +98,136 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path):
     assert record.ratio(record.fe)[inside, 0] == pytest.approx(record.b[inside, 0], rel=0.01)
 
 
+@pytest.mark.parametrize("typed,taken", [(-5.0, 0.0), (1e9, 270.0), (float("nan"), 0.0), (45.0, 45.0)])
+def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
+    page.b.value = typed
+    assert page.b.value == taken and page.session.scenario.clay.x.values[1] == pytest.approx(taken)
+
+
+@pytest.mark.parametrize("scenario", [hc.constant_cut, hc.variable_cut, hc.free, hc.stability_test])
+@pytest.mark.parametrize("width,height", [(580, 600), (960, 800), (1600, 1000)])
+def test_first_view_holds_arm_and_clay(scenario, width, height):
+    """A pinhole camera, worked out here; 580 x 600 is what the controls leave of a page of 900 x 600."""
+    from hapticclay import scene
+    from hapticclay.web import Page
+
+    page = Page(Session(scenario()), port=0)
+    try:
+        camera, s, grid = page.server.initial_camera, page.session.scenario, page.stage.removal
+        place, at = np.array(camera.position), np.array(camera.look_at)
+        turn = np.linspace(0.0, 2.0 * np.pi, 60)
+        ring = np.column_stack((np.cos(turn), np.sin(turn), np.zeros(60)))
+        shoulder = [0.06 * ring + (0.0, 0.0, scene.GROUND), 0.042 * ring + (0.0, 0.0, 0.022)]
+        x, y = np.add(s.start, s.origin)
+        hand = np.array([(x, y, 0.07), (x + 0.12, y, 0.052), (x, y + 0.12, 0.052)])
+        q = page.session.run.angles[0]
+        elbow = 0.026 * ring + (hc.params.L1 * np.cos(q), hc.params.L1 * np.sin(q), 0.024)
+        corners = [
+            (cx + s.origin[0], cy + s.origin[1], scene.GROUND + cz)
+            for cx in grid.x[[0, -1]] for cy in grid.y[[0, -1]] for cz in (0.0, scene.THICKNESS)
+        ]  # fmt: skip
+        ahead = (at - place) / np.linalg.norm(at - place)
+        right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(ahead, (0.0, 0.0, 1.0)))
+        away = np.vstack([*shoulder, elbow, hand, *([corners] if s.clay else [])]) - place
+        half = np.tan(0.5 * camera.fov) * (away @ ahead)
+        assert np.abs(away @ right / half).max() < 0.97 * width / height
+        assert np.abs(away @ np.cross(right, ahead) / half).max() < 0.97
+    finally:
+        page.close()
+
+
+def test_page_says_what_the_monitor_says(page):
+    deadline = time.monotonic() + 30.0
+    page.gain.value = 3.0
+    while time.monotonic() < deadline and "limit of K here: none" not in page.verdict.content:
+        time.sleep(0.05)
+    assert "stable" in page.verdict.content  # in free space, where no gain is too much for this hand
+    onset = hc.Outcome("diverged", 1.0, 1, "y", "growing <oscillation>")
+    with page.player.lock:
+        page.session.run.watch.onset, page.session._swung = onset, page.session.t + 1e3
+    while time.monotonic() < deadline and "UNSTABLE" not in page.verdict.content:
+        time.sleep(0.05)
+    assert "UNSTABLE since 1.0 s: growing &lt;oscillation&gt; of y" in page.verdict.content
+
+
 def test_page_listens_on_this_machine_alone(page):
-    port = page.server.get_port()
-    assert page.url == f"http://127.0.0.1:{port}" and page.gate is None
+    assert page.url == f"http://127.0.0.1:{page.gate.port}"
     elsewhere = "127.0.0.2"  # another address of this machine: open only to who listens on all of them
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection((elsewhere, port), timeout=5.0)
+    for port in (page.gate.port, page.server.get_port()):
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection((elsewhere, port), timeout=5.0)
+
+
+def asked(port, *lines):
+    """First line of the answer to a request of these lines."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as s:
+        s.sendall("\r\n".join((*lines, "", "")).encode("latin-1"))
+        return s.makefile("rb").readline().decode().strip()
+
+
+UPGRADE = (
+    "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_no_other_name_and_no_other_page_gets_in(host):
+    """A browser sends in Host the name that it was told, and in Origin whose page it shows; with a cookie or not."""
+    from hapticclay.web import Page
+
+    page = Page(Session(hc.constant_cut()), host=host, port=0)
+    port = page.gate.port
+    own, cookie = f"127.0.0.1:{port}", [f"Cookie: hapticclay={page.gate.token}"]
+
+    def ask(*fields, target="/"):
+        return asked(port, f"GET {target} HTTP/1.1", *fields, *cookie)
+
+    try:
+        for good in (own, f"localhost:{port}", "localhost:9000", f"[::1]:{port}"):  # 9000: ssh -L 9000:...
+            assert ask(f"Host: {good}") == "HTTP/1.1 200 OK"
+            assert ask(f"Host: {good}", f"Origin: http://{good}", *UPGRADE).startswith("HTTP/1.1 101 ")
+        for bad in (
+            "evil.example",
+            f"evil.example:{port}",
+            "127.0.0.1.evil.example",
+            "localhost.evil.example",
+            "",
+            "[",
+        ):
+            for more in ((), (f"Origin: http://{bad}", *UPGRADE), (f"Origin: http://{own}", *UPGRADE)):
+                assert ask(f"Host: {bad}", *more) in ("HTTP/1.1 403 Forbidden", "HTTP/1.1 400 Bad Request"), bad
+        assert ask() == ask(f"Host: {own}", "Host: evil.example") == "HTTP/1.1 403 Forbidden"
+        for origin in ("http://evil.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{port + 1}",
+                       f"http://localhost:{port}", f"http://{own}.evil.example", "file://"):  # fmt: skip
+            for more in ((), UPGRADE):
+                assert ask(f"Host: {own}", f"Origin: {origin}", *more) == "HTTP/1.1 403 Forbidden", origin
+        if host == "0.0.0.0":
+            assert ask(f"Host: {socket.gethostname()}:{port}") == ask(f"Host: 192.0.2.7:{port}") == "HTTP/1.1 200 OK"
+        else:
+            assert ask(f"Host: 192.0.2.7:{port}") == "HTTP/1.1 403 Forbidden"
+    finally:
+        page.close()
+
+
+def test_server_behind_the_gate_speaks_only_to_the_gate(page):
+    """Its port is open on this machine as well: whoever finds it learns nothing and changes nothing."""
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+    from websockets.typing import Subprotocol
+
+    speak = [Subprotocol(f"viser-v{viser.__version__}")]
+    for fields in ({}, {"X-Hapticclay-Pass": "guess"}):
+        with connect(f"ws://127.0.0.1:{page.server.get_port()}", subprotocols=speak, additional_headers=fields) as s:
+            with pytest.raises(ConnectionClosed) as closed:
+                s.recv(timeout=10.0)
+            assert closed.value.rcvd.code == 1008
+    origin = {"X-Hapticclay-Pass": "guess"}  # nor does saying it at the gate help, or spoil what the gate says
+    with connect(f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak) as s:
+        assert s.recv(timeout=10.0)
+    with connect(f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak, additional_headers=origin) as s:
+        with pytest.raises(ConnectionClosed):
+            s.recv(timeout=10.0)
 
 
 def answer(port, path="/", **headers):
@@ -197,15 +332,22 @@ def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_gate_survives_noise():
+def test_gate_survives_noise(caplog):
     gate = Gate("127.0.0.1", 0, 9, "secret")
     try:
         for noise in (b"\r\n\r\n", b"\xff" * 100 + b"\r\n\r\n", b"GET\r\n\r\n", b"x" * 100_000):
             with socket.create_connection(("127.0.0.1", gate.port), timeout=5.0) as s:
                 s.sendall(noise)
+        for line in ("GET http://[ HTTP/1.1", "GET //[ HTTP/1.1", "GET http://127.0.0.1/ HTTP/1.1", "POST / HTTP/1.1",
+                     "GET", "", "GET * HTTP/1.1", "GET /?token=%ff%00\xe9 HTTP/1.1"):  # fmt: skip
+            said = asked(gate.port, line, f"Host: 127.0.0.1:{gate.port}")
+            assert said == "HTTP/1.1 " + ("403 Forbidden" if "token" in line else "400 Bad Request"), line
+        many = [f"X-{k}: 1" for k in range(200)]
+        assert asked(gate.port, "GET / HTTP/1.1", *many) == "HTTP/1.1 400 Bad Request"
         assert answer(gate.port)[0] == 403
     finally:
         gate.close()
+    assert caplog.records == []
 
 
 def test_taken_address_is_refused():
