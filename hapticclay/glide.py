@@ -8,7 +8,7 @@ ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, del
 
 
 def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """Whole steps within one region of the clay.
+    """Whole steps within one region of the clay, which is not stiff.
 
     Args:
         rows: range of offsets into the record, one for each step [bytes].

@@ -20,13 +20,17 @@ from typing import Any
 PACKAGE = __name__.partition(".")[0]
 
 
-def inline(function: FunctionType) -> Callable[..., Any]:
-    """Returns function with every law inlined; function itself where its source is not at hand."""
+def inline(function: FunctionType, never: frozenset[str] = frozenset()) -> Callable[..., Any]:
+    """Returns function with every law inlined; function itself where its source is not at hand.
+
+    Args:
+        never: names that are false whenever function is called; what stands under `if` one of them is left out.
+    """
     try:
         tree = _parse(function)
     except (OSError, TypeError, SyntaxError):
         return function
-    work = _Inliner()
+    work = _Inliner(never)
     scope: dict[str, ast.expr] = {n: _name(n) for n in _assigned(tree) | {a.arg for a in tree.args.args}}
     tree.body = work.block(tree.body, function, scope)
     tree.decorator_list, tree.returns = [], None
@@ -59,7 +63,8 @@ def _read(node: ast.AST) -> set[str]:
 
 
 class _Inliner:
-    def __init__(self):
+    def __init__(self, never: frozenset[str]):
+        self.never = never
         self.bound: dict[str, Any] = {}
         self.count = itertools.count()
 
@@ -69,7 +74,13 @@ class _Inliner:
         for statement in body:
             call = getattr(statement, "value", None)
             law = self._law(call.func, function) if isinstance(call, ast.Call) else None
-            if isinstance(statement, ast.If | ast.For):
+            if (
+                isinstance(statement, ast.If)
+                and isinstance(statement.test, ast.Name)
+                and statement.test.id in self.never
+            ):
+                out += self.block(statement.orelse, function, scope)
+            elif isinstance(statement, ast.If | ast.For):
                 head: list[ast.stmt] = []
                 inner = self.block(statement.body, function, scope)
                 if isinstance(statement, ast.For):

@@ -32,7 +32,7 @@ def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
     if law not in _fused:
         if steps < FUSE_FROM:
             return law
-        _fused[law] = inline(law)
+        _fused[law] = inline(law, frozenset({"stiff"} if law is glide.advance else ()))
     return _fused[law]
 
 

@@ -83,3 +83,27 @@ def test_inlining_the_loop_is_quick():
         inline.inline(glide.advance)
         ratios.append((time.perf_counter() - middle) / (middle - begin))
     assert min(ratios) < 200
+
+
+def sometimes(a, stiff):
+    b = a * 2.0
+    if stiff:
+        b, _ = swap(b, a)
+    else:
+        b = b + 1.0
+    return b
+
+
+def often(items, stiff):
+    out = 0.0
+    for a in items:
+        out = sometimes(a, stiff)
+    return out
+
+
+def test_what_never_happens_is_left_out(monkeypatch):
+    monkeypatch.setattr(inline, "PACKAGE", __name__)
+    lean, whole = inline.inline(often, frozenset({"stiff"})), inline.inline(often)
+    read = [{i.argval for i in dis.get_instructions(f) if i.opname == "LOAD_FAST"} for f in (lean, whole)]
+    assert "stiff" not in read[0] and "stiff" in read[1]
+    assert lean([1.0, 2.0], 0.0) == whole([1.0, 2.0], 0.0) == often([1.0, 2.0], 0.0) == 5.0
