@@ -97,7 +97,7 @@ def sometimes(a, stiff):
 def often(items, stiff):
     out = 0.0
     for a in items:
-        out = sometimes(a, stiff)
+        out = sometimes(a + out, stiff)
     return out
 
 
@@ -106,4 +106,4 @@ def test_what_never_happens_is_left_out(monkeypatch):
     lean, whole = inline.inline(often, frozenset({"stiff"})), inline.inline(often)
     read = [{i.argval for i in dis.get_instructions(f) if i.opname == "LOAD_FAST"} for f in (lean, whole)]
     assert "stiff" not in read[0] and "stiff" in read[1]
-    assert lean([1.0, 2.0], 0.0) == whole([1.0, 2.0], 0.0) == often([1.0, 2.0], 0.0) == 5.0
+    assert lean([1.0, 2.0], 0.0) == whole([1.0, 2.0], 0.0) == often([1.0, 2.0], 0.0) == 11.0
