@@ -1,8 +1,10 @@
 """The window under a real X server without a screen: a mouse drags, keys are pressed, the record tells."""
 
+import contextlib
 import ctypes
 import math
 import os
+import queue
 import re
 import shutil
 import signal
@@ -15,6 +17,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay import view
+from hapticclay.pane import Pane
 from hapticclay.player import Replay
 from hapticclay.session import FRAME, Session
 
@@ -22,20 +26,27 @@ missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (apt-get install xvfb xdotool)")
 
 
-@pytest.fixture(scope="module")
-def screen():
-    """The environment of a screen of its own."""
+@contextlib.contextmanager
+def x_server(*args):
+    """A screen of its own; its name."""
     reading, writing = os.pipe()
     x = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-noreset"],
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-noreset", *args],
         pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     os.close(writing)
     with os.fdopen(reading) as f:
         number = f.readline().strip()
-    yield {**os.environ, "DISPLAY": f":{number}"}
+    yield f":{number}"
     x.terminate()
     x.wait()
+
+
+@pytest.fixture(scope="module")
+def screen():
+    """The environment of a screen of its own."""
+    with x_server() as name:
+        yield {**os.environ, "DISPLAY": name}
 
 
 class Mouse:
@@ -49,7 +60,7 @@ class Mouse:
         )  # fmt: skip
         for _ in range(240):
             found = subprocess.run(
-                ["xdotool", "search", "--name", "hapticclay"], env=screen, capture_output=True, text=True
+                ["xdotool", "search", "--name", "MuJoCo"], env=screen, capture_output=True, text=True
             )
             if found.stdout or self.program.poll() is not None:
                 break
@@ -188,8 +199,9 @@ def test_every_key_of_the_page_does_what_it_says():
     session.pull((0.1, 0.0))
     while session.t < 3.0:
         session.advance(FRAME)
-    window.stage.carve([f[1] for f in session.frames])
-    assert window.stage.removal.volume > 1e-6
+    pane = Pane(session.scenario, session.tool)
+    pane.take(window.look([], None))
+    assert pane.stage.removal.volume > 1e-6
     for key, gain, b in ((UP, 1.25, 90.0), (RIGHT, 1.25, 112.5), (RIGHT, 1.25, 140.625), (DOWN, 1.0, 140.625),
                          (LEFT, 1.0, 112.5)):  # fmt: skip
         press(key)
@@ -197,14 +209,16 @@ def test_every_key_of_the_page_does_what_it_says():
     press(ord("R"))
     assert not session.recording
     press(BACKSPACE)
-    assert (session.t, session.recorded, session.recording, window.stage.removal.volume) == (0.0, False, False, 0.0)
+    pane.take(window.look([], None))
+    assert (session.t, session.recorded, session.recording, pane.stage.removal.volume) == (0.0, False, False, 0.0)
     assert session.scenario.clay.x.values[1] == pytest.approx(112.5)  # as it was set
     press(ord("R"))
     press(ord("H"))
     assert session.recording and not window.help
     for key, name in zip("123", ("constant", "variable", "free"), strict=True):
+        window.other = False
         press(ord(key))
-        assert (session.scenario.name, window.stage.scenario, session.t) == (name, session.scenario, 0.0)
+        assert (session.scenario.name, window.other, session.t) == (name, True, 0.0)
 
 
 def engine_snaps(low, high):
@@ -218,7 +232,7 @@ def engine_snaps(low, high):
 @pytest.mark.parametrize("scale", [1e-3, 0.01, 1.0, 30.0, 1e4])
 def test_axes_hold_the_data_and_have_round_ticks(axis, scale):
     """Ticks at 1, 2 or 5 times a power of ten; no data farther outside than a line is thick."""
-    from hapticclay.view import _snapped, _wide
+    from hapticclay.pane import _snapped, _wide
 
     rng = np.random.default_rng(1)
     for a, b in rng.normal(size=(300, 2)) * scale:
@@ -235,12 +249,13 @@ def test_axes_hold_the_data_and_have_round_ticks(axis, scale):
             assert last - first < 10.0 * max(high - low, 1e-3 * scale)
 
 
-def figures(play):
+def picture(play):
+    """What the viewer's process makes of it."""
     from hapticclay.view import Window
 
-    window = Window(play)
-    window._read()
-    return window
+    pane = Pane(play.scenario, play.tool)
+    pane.take(Window(play).look([], None))
+    return pane
 
 
 def test_both_axes_are_drawn_where_both_are_cut():
@@ -249,31 +264,31 @@ def test_both_axes_are_drawn_where_both_are_cut():
     replay = Replay(record)
     while not replay.ended:
         replay.advance(FRAME)
-    velocity = figures(replay).plots[0]
-    assert [line.name for line in velocity.lines] == ["x", "y"]
+    velocity = picture(replay).plots[0]
+    assert velocity.figure.title == "velocity [cm/s]: x blue, y red"
     for i in (0, 1):
         n = velocity.figure.linepnt[i]
         x, v = velocity.figure.linedata[i, : 2 * n].reshape(-1, 2).T
         assert n > 50 and x.max() == pytest.approx(100 * record.p[:, i].max(), abs=0.1)
         np.testing.assert_allclose(v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4)
-    one = figures(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
+    one = picture(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
     assert [len(plot.lines) for plot in one.plots] == [1, 1, 2]
 
 
 def test_a_replay_offers_the_keys_that_act_on_it():
-    from hapticclay.view import LIVE, REPLAY
+    from hapticclay.view import LIVE, REPLAY, Window
 
     record = hc.simulate(hc.constant_cut(t_max=0.5), every=10)
     replay = Replay(record)
-    window = figures(replay)
+    window = Window(replay)
+    window.look([], None)
     assert {row[0] for row in LIVE} - {row[0] for row in REPLAY} == {
-        "Ctrl + drag", "up, down", "left, right", "1, 2, 3", "R"
+        "Ctrl + right drag", "up, down", "left, right", "1, 2, 3", "R"
     }  # fmt: skip
-    before = dict(vars(replay)), window.stage
-    for key in (262, 263, 264, 265, *map(ord, "123R")):
-        window._key(key)
-    assert (dict(vars(replay)), window.stage) == before
-    assert dict(window.rows)["state"] == "replaying"
+    before = dict(vars(replay))
+    window.look([262, 263, 264, 265, *map(ord, "123R")], (0.1, 0.1))
+    assert dict(vars(replay)) == before and not window.other
+    assert dict(window._writing().rows)["state"] == "replaying"
 
 
 def test_without_a_display_it_says_what_to_do(tmp_path):
@@ -284,3 +299,43 @@ def test_without_a_display_it_says_what_to_do(tmp_path):
     assert out.returncode == 2 and out.stderr.count("\n") == 1
     assert "--web" in out.stderr and "hapticclay video" in out.stderr
     assert os.listdir(tmp_path) == []
+
+
+def test_a_window_that_fails_leaves_the_record(monkeypatch):
+    """The viewer's process asks for 30 pictures and then says that it died."""
+    answers = []
+
+    @contextlib.contextmanager
+    def viewer(first):
+        heard = queue.SimpleQueue()
+        heard.put(([], (0.1, 0.0)))
+
+        def say(sight):
+            answers.append(sight)
+            time.sleep(FRAME)
+            heard.put(([], (0.1, 0.0)) if len(answers) < 30 else "Traceback\nValueError: no ink")
+
+        yield heard, say
+
+    monkeypatch.setattr(view, "_viewer", viewer)
+    monkeypatch.setenv("DISPLAY", ":0")
+    session = Session(hc.constant_cut())
+    with pytest.warns(RuntimeWarning, match="no ink"):
+        view.Window(session).show()
+    assert len(answers) == 30 and answers[0].anew and not answers[1].anew
+    shown = [f for sight in answers for f in sight.frames[0 if sight.anew else 1 :]]
+    assert shown == session.frames[: len(shown)] and len(shown) > 10  # each once, and in order
+    assert session.record().p[-1, 0] > 0.0
+
+
+@pytest.mark.parametrize("lack,said", [("display", "does not answer"), ("OpenGL", "libgl1")])
+def test_a_display_that_does_not_answer_or_draw_is_named(lack, said, tmp_path):
+    with contextlib.ExitStack() as stack:
+        name = ":4711" if lack == "display" else stack.enter_context(x_server("-extension", "GLX"))
+        out = subprocess.run(
+            [sys.executable, "-m", "hapticclay", "view"],
+            cwd=tmp_path, env={**os.environ, "DISPLAY": name}, capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+    assert out.returncode == 2 and out.stderr.count("\n") == 1
+    assert all(part in out.stderr for part in (name, said, "--web"))
+    assert os.listdir(tmp_path) == []  # no MUJOCO_LOG.TXT
