@@ -46,6 +46,13 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
 def page(data: dict[str, dict[str, Any]]) -> str:
     """The Markdown page."""
     text = ["# Benchmarks", "Every figure here comes from the runs of `hapticclay bench`; do not edit."]
+    if {"work_precision", "hits"} <= set(data):
+        text += [
+            "## Which step to take",
+            "hapticclay's fastest setting that keeps an asked error in the times of the border crossings, in every cut "
+            "of the next section and in every clay and job of the section on hits.",
+            recommended(data),
+        ]
     for name, found in data.items():
         text += PARTS[name].sections(found)
     omissions = [x for found in data.values() for x in found.get("omissions", ())]

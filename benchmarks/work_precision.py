@@ -262,7 +262,7 @@ def sections(data: dict[str, Any]) -> list[str]:
         "end of the path. Errors are against the arm in joint space under DOP853 at 1e-12, borders as events. "
         "The setting is a step [s], or a relative tolerance for adaptive methods.",
         "### Recommended settings",
-        "The fastest setting that keeps the asked error in the crossing times on every job.",
+        "The fastest setting that keeps the asked error in the crossing times on each of the three cuts.",
         table_of_settings(recommend(rows)),
         "With a MuJoCo model in the loop:",
         table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
