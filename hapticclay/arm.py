@@ -77,7 +77,7 @@ def torques(fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
     return u1x * fx + u1y * fy + t2, t2
 
 
-def acceleration(
+def handle_acceleration(
     a1: float, a2: float, fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
 ) -> tuple[float, float]:
     """Acceleration of a handle that all but rests [m/s^2]: of links a1, a2 [rad/s^2], and of a force on it [N]."""

@@ -172,7 +172,7 @@ def tick(c, k, q1, q2, w1, w2, state):
     )  # fmt: skip
     if stiff:
         if t1 * t1 >= square1 or t2 * t2 >= square2:  # what the motors hold against the clay is less
-            gx, gy = arm.acceleration((t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y)
+            gx, gy = arm.handle_acceleration((t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y)
             sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
             gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
             fx -= owedx
@@ -305,7 +305,7 @@ def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        hx, hy = arm.acceleration(
+        hx, hy = arm.handle_acceleration(
             (t1 - t2) / arm.I1, t2 / arm.I2, uhx - spring * px, uhy - spring * py, u1x, u1y, u2x, u2y
         )
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
