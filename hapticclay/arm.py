@@ -64,11 +64,18 @@ def centripetal(r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: f
     return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
 
 
-def turning(vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:
-    """`centripetal` at handle velocity (vx, vy) [m/s]; columns as above."""
+def turning(
+    L: float, cx: float, cy: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float
+) -> tuple[float, float]:
+    """Mean of `centripetal` over a kick at whose sample the handle velocity leaps [m/s^2].
+
+    Args:
+        L: share of the kick before the sample. cx, cy: centripetal acceleration there [m/s^2].
+        vx, vy: handle velocity after it [m/s]. u1x, u1y, u2x, u2y: result of `columns` [m].
+    """
     r1, r2 = rates(vx, vy, u1x, u1y, u2x, u2y, 1.0)
     x, y = centripetal(r1, r2, u1x, u1y, u2x, u2y)
-    return x, y
+    return L * cx + (1.0 - L) * x, L * cy + (1.0 - L) * y
 
 
 def torques(fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float]:

@@ -90,10 +90,10 @@ class Leapfrog(Run):
         self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
         self.hand = scenario.operator or NO_HAND
-        # what the steps here will need is written out before the run is timed
-        _written_out(glide.vary if self.varies else glide.advance, self.last)
-        if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-            _written_out(glide.vary, self.last)
+        if scenario.control == "continuous":  # what `_glide` will need is written out before the run is timed
+            _written_out(glide.vary if self.varies else glide.advance, self.last)
+            if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
+                _written_out(glide.vary, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
@@ -230,7 +230,7 @@ class Leapfrog(Run):
         self._engine(w, command, out, after)
         self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
-        self.fine = self.fine * WIDER if self._limited(command) else math.inf
+        self.fine = self.fine * WIDER if self.fine < math.inf and self._limited(command) else math.inf
         self.t += after
         if target - self.t <= 1e-9 * self.scenario.dt:
             self._arrive(target)

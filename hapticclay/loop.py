@@ -126,6 +126,8 @@ def tick(c, k, q1, q2, w1, w2, state):
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
     u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
+    if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
+        cx, cy = arm.turning(L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -150,13 +152,6 @@ def tick(c, k, q1, q2, w1, w2, state):
     if stiff:
         restx, resty = owedx / H, owedy / H
         bx, by = (cx0 + cx1) * vx, (cy0 + cy1) * vy
-        # behind the sample the handle goes round the joints with the velocity that such clay leaves it
-        gx, gy = arm.turning(0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
-        gx, gy = (1.0 - L) * (gx - cx), (1.0 - L) * (gy - cy)
-        ax += gx
-        ay += gy
-        fx += mass * gx
-        fy += mass * gy
         hx, hy = uhx - spring * px, uhy - spring * py
         gx = ax - mx * vx + sxx * hx + sxy * hy
         gy = ay - my * vy + sxy * hx + syy * hy
@@ -297,8 +292,10 @@ def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
         what the clay owes after it x, y [N.s].
     """
     H, step, ox, noy, spring, mass, before, behind = c
-    cx0, cx1, cy0, cy1, _, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
+    if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
+        cx, cy = arm.turning(L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
     fx = uhx - cx0 * vx - human.impedance(spring, mass, before, px, cx, vx)
     fy = uhy - cy0 * vy - human.impedance(spring, mass, before, py, cy, vy)
     dx, dy = cx1 + behind, cy1 + behind
