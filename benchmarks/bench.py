@@ -23,7 +23,7 @@ import stiffness  # noqa: E402
 import throughput  # noqa: E402
 import work_precision  # noqa: E402
 
-from hapticclay import record  # noqa: E402
+from hapticclay.simulation import record  # noqa: E402
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,

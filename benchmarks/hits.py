@@ -29,10 +29,10 @@ from work_precision import number, write  # noqa: E402
 
 import oracles  # noqa: E402  isort: skip
 import hapticclay as hc  # noqa: E402
-from hapticclay import sim  # noqa: E402
-from hapticclay.clay import slab  # noqa: E402
 from hapticclay.errors import ParameterError  # noqa: E402
-from hapticclay.params import AXES, L1, L2, ORIGIN, TS, Clay, Operator, Profile, Scenario  # noqa: E402
+from hapticclay.model.clay import slab  # noqa: E402
+from hapticclay.model.scenario import AXES, L1, L2, ORIGIN, TS, Clay, Operator, Profile, Scenario  # noqa: E402
+from hapticclay.simulation import simulate  # noqa: E402
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
 STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...
@@ -104,9 +104,9 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
 def methods() -> dict[str, tuple[float, ...]]:
     """Way to step -> dt [s], coarse to fine."""
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
-    if not sim.has_numba():
+    if not simulate.has_numba():
         return {"fast": fast, "accurate": accurate}
-    sim.compiled(), sim.compiled(accurate=True)
+    simulate.compiled(), simulate.compiled(accurate=True)
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}
 
 

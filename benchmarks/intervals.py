@@ -27,7 +27,8 @@ from tqdm import tqdm  # noqa: E402
 from work_precision import machine  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import estimate, record  # noqa: E402
+from hapticclay.simulation import record  # noqa: E402
+from hapticclay.studies import estimation
 
 SENSORS = {
     "20000 counts, no force noise": hc.Noise(20_000, 0.0),
@@ -39,7 +40,7 @@ BLOCKS: tuple[tuple[str, bool], ...] = (("G", False), ("S", False), ("S", True),
 
 def one(seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any) -> list[dict[str, Any]]:
     """A row for each coefficient of each block and sensor: its share of error, and of half its interval."""
-    module = importlib.import_module("hapticclay.identify")
+    module = importlib.import_module("hapticclay.studies.identification")
     simulate = module.simulate
     runs = kw.get("realisations", 4)
     module.simulate = functools.lru_cache(runs)(functools.partial(simulate, engine="native"))  # for every sensor
@@ -79,7 +80,7 @@ def page(found: list[dict[str, Any]]) -> str:
     return "\n\n".join(
         [
             "# Coverage of the intervals of `identify`",
-            f"Share of {n} seeds whose {100 * estimate.COVER:g} % interval holds the printed value, and half the "
+            f"Share of {n} seeds whose {100 * estimation.COVER:g} % interval holds the printed value, and half the "
             f"median interval as a share of it. By chance alone, two thirds of the shares are within "
             f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do not edit.",
             tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],

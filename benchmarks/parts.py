@@ -27,9 +27,9 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import energy, scene  # noqa: E402
-from hapticclay.hardware import Coupling, Interface  # noqa: E402
-from hapticclay.params import Multisine  # noqa: E402
+from hapticclay.model.hardware import Coupling, Interface  # noqa: E402
+from hapticclay.model.scenario import Multisine  # noqa: E402
+from hapticclay.stepping import energy, scene  # noqa: E402
 
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:

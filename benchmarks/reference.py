@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG  # noqa: E402
 
-from hapticclay.params import Profile, Scenario  # noqa: E402
+from hapticclay.model.scenario import Profile, Scenario  # noqa: E402
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
 STILL, WHILE = 1e-5, 1.0  # [m/s], [s] stalled is slower than this for so long; saturated, in the limit for so long
@@ -198,7 +198,7 @@ def _solve(m: float, S, x: float, y: float) -> tuple[float, float]:
 def _signal(multisine) -> Callable[[float], Any] | None:
     if multisine is None:
         return None
-    from hapticclay.signals import Signal  # its phases are the scenario's, by definition
+    from hapticclay.model.signals import Signal  # its phases are the scenario's, by definition
 
     s = Signal(multisine)
     return lambda t: [float(np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))) for i in (0, 1)]

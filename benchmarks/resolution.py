@@ -24,8 +24,9 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import machine, number  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import lti, record  # noqa: E402
-from hapticclay.params import B_CONSTANT, L2, TS  # noqa: E402
+from hapticclay.model.scenario import B_CONSTANT, L2, TS  # noqa: E402
+from hapticclay.simulation import record  # noqa: E402
+from hapticclay.theory import linear_loop
 
 FORCE = 5.0  # [N] of the hand: 5 cm/s in the clay
 END = 0.20  # [m] of the cut
@@ -53,7 +54,7 @@ def run(counts: int | None, window: int, bits: int | None = BITS, delay: float =
         out["mean"] = float(fe.mean() / v.mean() / b - 1.0)
         out["rms"] = float(np.sqrt(np.mean((fe / v / b - 1.0) ** 2)))
     if counts:  # one in the window, at the handle, over the cut's own speed
-        speed = lti.steady_speed(s.gain[0], FORCE, B_CONSTANT)
+        speed = linear_loop.steady_speed(s.gain[0], FORCE, B_CONSTANT)
         out["least"] = L2 * math.tau / counts / (window * TS) / speed
     return out
 

@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from tabulate import tabulate  # noqa: E402
 from work_precision import write  # noqa: E402
 
-from hapticclay import sweep  # noqa: E402
-from hapticclay.record import atomic  # noqa: E402
-from hapticclay.space import Sweep, parse_grid  # noqa: E402
+from hapticclay.simulation.record import atomic  # noqa: E402
+from hapticclay.studies import sweep  # noqa: E402
+from hapticclay.studies.sampling import Sweep, parse_grid  # noqa: E402
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 NEEDS = ("distributed", "pyarrow")

@@ -29,7 +29,8 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import leapfrog, sim  # noqa: E402
+from hapticclay.simulation import simulate  # noqa: E402
+from hapticclay.stepping import leapfrog
 
 LONG = 5555  # steps of 2 s, as the runs of the map
 OFTEN = 5  # compiled runs to one in Python, which takes as long
@@ -88,7 +89,7 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
 
     In processor time, which others on the machine disturb less.
     """
-    from hapticclay.native import Pool
+    from hapticclay.stepping.compiled import Pool
 
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
@@ -106,7 +107,7 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
         times = []
         for _ in range(rounds):
             times.append((floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)))
-        compiled = [native(scenario, steps) for _ in range(OFTEN * rounds)] if sim.has_numba() else []
+        compiled = [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
         rows.append(
             {
                 "scene": name,
@@ -140,13 +141,13 @@ def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tupl
     Returns:
         (core seconds and processor seconds a run, those of a step of the bare engine on all cores at once).
     """
-    from hapticclay import native
+    from hapticclay.stepping import compiled
 
     each = max(1, min(100, len(todo) // (8 * CORES)))
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
-    class Turns(native.Pool):
+    class Turns(compiled.Pool):
         def _go(self, *args: Any) -> Any:
             made = self.own.__dict__.setdefault("made", 0)
             if made % each == 0:
@@ -156,11 +157,11 @@ def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tupl
             self.own.made = made + 1
             return super()._go(*args)
 
-    usual, native.Pool = native.Pool, Turns
+    usual, compiled.Pool = compiled.Pool, Turns
     try:
         took = timed(hc.simulate_batch, todo, keep=keep) * (CORES, 1.0)
     finally:
-        native.Pool = usual
+        compiled.Pool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
 
 
@@ -257,7 +258,7 @@ def main(
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
     data: dict[str, Any] = {"rounds": rounds, "steps": steps}
-    native = sim.has_numba()
+    native = simulate.has_numba()
     if native and not quick:
         data["first_call"] = [first_calls()]
     if native:

@@ -30,7 +30,7 @@ from tabulate import tabulate  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay import record  # noqa: E402
+from hapticclay.simulation import record  # noqa: E402
 
 PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
 DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "numba", "control", "pybullet", "drake", "pin")
@@ -199,7 +199,7 @@ def draw(rows: list[dict], problem: str):
     import matplotlib
     from matplotlib.figure import Figure
 
-    from hapticclay.plot import STYLE
+    from hapticclay.views.run_plots import STYLE
 
     mine = [r for r in rows if r["problem"] == problem]
     kinds = [k for k in ERRORS if any(r[k] is not None for r in mine)]

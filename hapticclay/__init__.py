@@ -11,33 +11,23 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
-from . import engine  # noqa: F401, before whatever else imports mujoco
-from .batch import simulate_batch
-from .design import Design, compare, design_gain, transparency_error
-from .drift import Drift, drift_map
 from .errors import ParameterError
-from .experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
-from .hardware import Coupling, Interface
-from .identify import Identified, Noise, identify
-from .limits import gain_limit
-from .lti import Compensator, closed_loop_poles
-from .params import Clay, Multisine, Operator, Profile, Scenario
-from .passive import clay_passivity, observed_passivity, passivity, port_energy
-from .record import Crossing, Outcome, Record
-from .removal import removed
-from .robust import Box, WorstCase, worst_case
-from .scene import build
-from .sim import simulate
-from .stability import (
-    Margins,
-    Nyquist,
-    Verdict,
-    coupled_stability,
-    margins,
-    nyquist,
-    small_gain,
-    transparency,
-)
+from .model.experiments import SCENARIOS, constant_cut, free, irregularity, stability_test, variable_cut
+from .model.hardware import Coupling, Interface
+from .model.scenario import Clay, Multisine, Operator, Profile, Scenario
+from .simulation.batch import simulate_batch
+from .simulation.record import Crossing, Outcome, Record
+from .simulation.simulate import simulate
+from .stepping.scene import build
+from .studies.identification import Identified, Noise, identify
+from .studies.removal import removed
+from .studies.workspace import Drift, drift_map
+from .theory.design import Design, compare, design_gain, transparency_error
+from .theory.gain_limit import gain_limit
+from .theory.linear_loop import Compensator, closed_loop_poles
+from .theory.margins import Margins, Nyquist, Verdict, coupled_stability, margins, nyquist, small_gain, transparency
+from .theory.passivity import clay_passivity, observed_passivity, passivity, port_energy
+from .theory.robustness import Box, WorstCase, worst_case
 
 try:
     __version__ = version("hapticclay")

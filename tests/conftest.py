@@ -19,7 +19,7 @@ settings.load_profile("default")
 @pytest.fixture(scope="session")
 def paper_runs():
     """The runs behind the ledger, made once."""
-    from hapticclay.entries import Runs
+    from hapticclay.paper.ledger import Runs
 
     return Runs()
 
@@ -27,6 +27,6 @@ def paper_runs():
 @pytest.fixture(scope="session")
 def ledger_rows(paper_runs):
     """The rows of the ledger."""
-    from hapticclay import ledger
+    from hapticclay.paper import claims
 
-    return ledger.rows(paper_runs)
+    return claims.rows(paper_runs)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import Arm
 
-from hapticclay import arm
+from hapticclay.model import arm
 
 EPS = np.finfo(float).eps
 angle = st.floats(-3.1, 3.1)

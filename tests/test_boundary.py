@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 from oracles import Linear
 
 import hapticclay as hc
-from hapticclay import boundary, cli, limits, lti, maps, plot_boundary
-from hapticclay.boundary import Loop
+from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.params import Operator
+from hapticclay.model.scenario import Operator
+from hapticclay.studies import boundary, stability_map
+from hapticclay.studies.boundary import Loop
+from hapticclay.theory import gain_limit, linear_loop
+from hapticclay.views import plot_boundary
 
 
 @settings(max_examples=10)
@@ -45,7 +48,7 @@ def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
     found = boundary.simulated_gain(Loop(axis=axis), guess=3.0 if axis == "x" else 1.0)  # not told where
-    assert found == pytest.approx(lti.gain_limit(axis, 90.0, Operator()), rel=3e-3)  # CLOSE, and the step
+    assert found == pytest.approx(linear_loop.gain_limit(axis, 90.0, Operator()), rel=3e-3)  # CLOSE, and the step
 
 
 def test_boundary_of_the_sampled_arm():
@@ -64,7 +67,7 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
     loop = Loop(shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
-    nominal = lti.gain_limit("x", 90.0, Operator())
+    nominal = linear_loop.gain_limit("x", 90.0, Operator())
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
     assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
@@ -74,14 +77,14 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
 def test_sampled_loop_at_a_pose(delay):
     loop = Loop(Ts=2e-3, delay=delay, pose=(0.10, 0.0))
     for operator in (Operator(), None):
-        exact = limits.gain_limit("x", 90.0, impedance=bool(operator), Ts=2e-3, delay=delay)
+        exact = gain_limit.gain_limit("x", 90.0, impedance=bool(operator), Ts=2e-3, delay=delay)
         for shaping in (True, False):
             nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
             assert boundary.pose_limit(nominal) == pytest.approx(exact, rel=1e-9)  # both are found to 1e-10
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
     loop = replace(loop, shaping=False)
     exact = boundary.pose_limit(loop)
-    assert exact < 0.8 * limits.gain_limit("x", 90.0, Ts=2e-3, delay=delay)
+    assert exact < 0.8 * gain_limit.gain_limit("x", 90.0, Ts=2e-3, delay=delay)
     assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
 
 
@@ -160,7 +163,7 @@ def test_bad_loops_are_refused(kw, field):
 
 @pytest.fixture(scope="module")
 def poses():
-    return maps._gain_pose(Loop(shaping=False), 2, 3, iter)
+    return stability_map._gain_pose(Loop(shaping=False), 2, 3, iter)
 
 
 def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(poses):
@@ -187,15 +190,15 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
 
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
-    b = maps._damping(Loop(K=1.0, Ts=Ts), delay)
-    assert limits.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
-    assert not limits.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
-    assert maps._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0  # the servo itself does not bear it
+    b = stability_map._damping(Loop(K=1.0, Ts=Ts), delay)
+    assert gain_limit.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
+    assert not gain_limit.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
+    assert stability_map._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0  # the servo itself does not bear it
 
 
 def test_colgate_schenkel_with_a_whole_delay_is_its_formula():
     Ts, d = 1e-3, 2.0
-    b = maps._passive_damping(Ts, 3 * Ts, d)
+    b = stability_map._passive_damping(Ts, 3 * Ts, d)
     theta = np.linspace(0.0, math.pi, 2001)[1:]
     z = np.exp(1j * theta)
     need = 0.5 * Ts / (1 - np.cos(theta)) * ((1 - 1 / z) * b * (1 - 1 / z) / Ts * z**-3.0).real
@@ -206,15 +209,15 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     import json
 
     def small(kind, loop, quick, progress):
-        return maps._gain_pose(replace(loop, Ts=None, delay=0.0), 2, 3, progress)
+        return stability_map._gain_pose(replace(loop, Ts=None, delay=0.0), 2, 3, progress)
 
-    monkeypatch.setattr(maps, "chart", small)
+    monkeypatch.setattr(stability_map, "chart", small)
     monkeypatch.setattr(boundary, "simulated_gain", lambda loop, guess=None: boundary.pose_limit(loop))
     monkeypatch.setattr(
         boundary, "behaviour", lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges"
     )
     args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
-    assert cli.main(args) == 0
+    assert app.main(args) == 0
     out = capsys.readouterr().out
     assert "sampled every 0.36 ms" in out and f" {hc.gain_limit('x', 90.0):.4g}    largest stable K" in out
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
@@ -236,7 +239,7 @@ def test_command_gives_margins_and_transparency_of_stable_loops_only(gain, stabl
     import json
 
     args = ["stability", "--axis", "y", "--gain", gain, "--out", str(tmp_path)]
-    assert cli.main(args) == 0
+    assert app.main(args) == 0
     lines = capsys.readouterr().out.splitlines()
     rows = json.loads((tmp_path / "stability.json").read_text())["verdicts"]
     assert rows[0]["answer"] is stable
@@ -253,6 +256,6 @@ def test_command_gives_margins_and_transparency_of_stable_loops_only(gain, stabl
     [(["--map", "gain"], "--map"), (["--b", "-1"], "b = -1"), (["--gain", "0"], "K = 0"), (["--axis", "z"], "--axis")],
 )
 def test_command_refuses_bad_input_in_one_line(args, word, tmp_path, capsys):
-    assert cli.main(["stability", *args, "--out", str(tmp_path / "o")]) == 2
+    assert app.main(["stability", *args, "--out", str(tmp_path / "o")]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and word in err and not (tmp_path / "o").exists()

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticclay import clay
 from hapticclay.errors import ParameterError
-from hapticclay.params import Clay, Profile
+from hapticclay.model import clay
+from hapticclay.model.scenario import Clay, Profile
 
 
 @given(st.floats(0, 1e9), st.floats(1e-6, 1e-1))

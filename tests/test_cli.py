@@ -13,11 +13,14 @@ import termios
 import pytest
 
 import hapticclay as hc
-from hapticclay import cli, cli_run, cli_words, plot
+from hapticclay.cli import app
+from hapticclay.cli import run as cli_run
+from hapticclay.cli import words as cli_words
+from hapticclay.views import run_plots
 
 
 def run(capsys, *args):
-    code = cli.main(args)
+    code = app.main(args)
     out = capsys.readouterr()
     return code, out.out, out.err
 
@@ -162,7 +165,7 @@ def test_ctrl_c_keeps_what_was_run(tmp_path):
 
 def test_ctrl_c_while_a_film_is_simulated_leaves_nothing_behind(tmp_path):
     (tmp_path / "film.py").write_text(
-        "import sys; from hapticclay import cli, video; video.ready = lambda *a: None; sys.exit(cli.main())"
+        "import sys; from hapticclay.cli import app; from hapticclay.views import film; film.ready = lambda *a: None; sys.exit(app.main())"
     )  # without asking for OpenGL
     args = ("video", "constant", "--dt", "2e-6", "--out", "x.webp")
     code, out, said = stopped_at_a_terminal(tmp_path, *args, program=["film.py"])
@@ -203,7 +206,7 @@ def test_a_file_that_is_no_record_is_called_so(capsys, tmp_path):
 
 def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeypatch):
     def full(self, path):
-        raise cli.ParameterError("out", str(path), "must be writable (No space left on device)")
+        raise app.ParameterError("out", str(path), "must be writable (No space left on device)")
 
     monkeypatch.setattr(cli_run.Record, "save", full)
     code, out, err = run(capsys, "run", "constant", "--t-max", "0.5", "--out", str(tmp_path))
@@ -225,7 +228,7 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
 @pytest.mark.parametrize("scenario", [hc.constant_cut(t_max=0.1), hc.variable_cut(t_max=0.1), hc.free(t_max=0.1),
                                       hc.stability_test(t_max=0.1)], ids=lambda s: s.name)  # fmt: skip
 def test_names_of_figures_are_known(scenario):
-    assert set(plot.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
+    assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
 
 
 def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(capsys, tmp_path, monkeypatch):
@@ -269,14 +272,14 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(capsys, t
 def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "o").mkdir()
-    assert cli_words.ordered(words.split(), cli.COMMANDS) == ordered.split()
+    assert cli_words.ordered(words.split(), app.COMMANDS) == ordered.split()
 
 
 def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(capsys, "run", "free", "--t-max", "0.1", "--no-plots", "--out", "o")
     for words in (["view", "--tool-width", "0.01", "o"], ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"]):
-        command = cli._parsed(words)
+        command = app._parsed(words)
         assert isinstance(command.scenario, hc.Record) and command.scenario.scenario.name == "free"
 
 

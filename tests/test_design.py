@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import hapticclay as hc
-from hapticclay import lti
-from hapticclay.design import BAND
 from hapticclay.errors import ParameterError
+from hapticclay.theory import linear_loop
+from hapticclay.theory.design import BAND
 
 MARGINS = [
     (dict(gain_margin=2.0), lambda m: m.gain[1] - 2.0),
@@ -63,7 +63,7 @@ def test_shapes_are_compared_at_equal_margin_the_best_first():
         assert found[0].compensator == hc.Compensator(40.0, 20.0)  # a lead pays
         for d in found:
             assert min(d.margins.disk - 0.5, d.margins.delay - 0.005) == pytest.approx(0.0, abs=1e-9)
-            assert lti.stable(axis, d.K, 90.0, None, d.compensator) and d.margins.stable
+            assert linear_loop.stable(axis, d.K, 90.0, None, d.compensator) and d.margins.stable
 
 
 def test_a_shape_without_a_largest_gain_is_refused():

@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 import hapticclay as hc
-from hapticclay import cli, params, record, scene
+from hapticclay.cli import app
+from hapticclay.model import scenario
+from hapticclay.simulation import record
+from hapticclay.stepping import scene
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -34,7 +37,7 @@ def test_stability_page_says_what_its_snippets_print():
 def test_every_limit_in_the_stability_page_is_recomputed():
     text = (ROOT / "docs" / "stability.md").read_text()
     rows = re.findall(r"^\| ([xy]) \| (nominal|none) \| (\d+) \|(.*)\|$", text, re.M)
-    Ts = params.TS
+    Ts = scenario.TS
     columns = ({}, dict(Ts=Ts), dict(Ts=Ts, delay=Ts), dict(delay=1e-3), dict(Ts=Ts, render="implicit"))
     assert len(rows) == 12
     for axis, hand, b, cells in rows:
@@ -49,7 +52,7 @@ def test_readme_commands_run(line, tmp_path, capsys, monkeypatch):
     words = line.split()
     if words[0] == "reproduce":  # test_report.py runs it
         words = [words[0], "--help"]
-    assert cli.main([*words, "--no-plots"] if words[0] == "run" else words) == 0
+    assert app.main([*words, "--no-plots"] if words[0] == "run" else words) == 0
     if "--gain 1 1" in line:
         shown = re.search(rf"\$ hapticclay {re.escape(line)}\n(.*?)\n\n", README, re.S)
         assert shown
@@ -87,7 +90,7 @@ def test_inertias_in_the_documents_are_those_of_the_model():
     model = hc.build(hc.free())
     link1 = model.body("link1").inertia[2]
     assert repr(float(link1)) in text
-    assert repr(params.L1**2 / params.S[0].gain) in text and repr(params.L2**2 / params.S[1].gain) in text
+    assert repr(scenario.L1**2 / scenario.S[0].gain) in text and repr(scenario.L2**2 / scenario.S[1].gain) in text
     mujoco.MjModel.from_xml_path(str(scene.folder() / "arm.xml"))
 
 

@@ -12,8 +12,8 @@ from oracles import G0, G1, Linear, piecewise_linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.params import Clay, Multisine, Operator, Profile
-from hapticclay.signals import Signal
+from hapticclay.model.scenario import Clay, Multisine, Operator, Profile
+from hapticclay.model.signals import Signal
 
 TH = (0.25, 2.0, 6.0)
 

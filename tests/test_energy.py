@@ -6,7 +6,7 @@ from oracles import Linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay import run
+from hapticclay.stepping import run
 
 
 def exact_clay_and_hand(b, K, uh, th):

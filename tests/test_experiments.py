@@ -7,8 +7,8 @@ import pytest
 from oracles import Linear, piecewise_linear
 
 import hapticclay as hc
-from hapticclay import experiments
 from hapticclay.errors import ParameterError
+from hapticclay.model import experiments
 
 F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis
 

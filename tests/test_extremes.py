@@ -16,7 +16,7 @@ import extremes
 import reference
 
 import hapticclay as hc
-from hapticclay.params import Clay, Multisine, Profile
+from hapticclay.model.scenario import Clay, Multisine, Profile
 
 CASES = extremes.cases()
 LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",

@@ -14,10 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import cli, estimate
-from hapticclay.drift import Drift, poses
-from hapticclay.estimate import fit, response
-from hapticclay.identify import measured
+from hapticclay.cli import app
+from hapticclay.studies import estimation
+from hapticclay.studies.estimation import fit, response
+from hapticclay.studies.identification import measured
+from hapticclay.studies.workspace import Drift, poses
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -52,7 +53,7 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
     """The fitted form is the loop's own difference equation; what is left is 1e-6, and for Sh the pose: (p/l1)^2."""
     r = quick(what, axis)
     left = 1e-4 if what == "S" else 1e-6
-    assert [c.name for c in r.coefficients] == list(estimate.NAMES[what])
+    assert [c.name for c in r.coefficients] == list(estimation.NAMES[what])
     np.testing.assert_allclose(r.values, PRINTED[what + axis], rtol=left)
     assert [c.printed for c in r.coefficients] == list(PRINTED[what + axis])
     assert np.all(r.coherence > 1.0 - 1e-6)
@@ -130,7 +131,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
         r = np.cos(2 * np.pi * np.outer(t, bins) + rng.uniform(0, 2 * np.pi, len(bins))).sum(axis=1)
         # as much noise in each bin as signal: variance n/4 per line, over n/2 bins
         signals.append((r, r + rng.normal(0.0, np.sqrt(n / 4), n), 2.0 * r))
-    H, deviation, coherence, _ = estimate.estimate(np.array(signals), n, bins)
+    H, deviation, coherence, _ = estimation.estimate(np.array(signals), n, bins)
     assert np.abs(H.mean() - 2.0) < 4.0 * np.sqrt(np.mean(deviation**2) / len(bins))
     assert 0.35 < coherence.mean() < 0.65
 
@@ -193,7 +194,7 @@ def test_drift_over_the_workspace(drift):
 
 
 def test_map_is_drawn(drift):
-    from hapticclay import plot_identify
+    from hapticclay.views import plot_identify
 
     figure = plot_identify.workspace(drift)
     assert [ax.get_xlabel() for ax in figure.axes[2:4]] == ["world x [m]", "world x [m]"]
@@ -245,7 +246,7 @@ def test_bad_input_is_refused(kw, field):
 
 def test_command_line(capsys, tmp_path):
     args = ["identify", "--axis", "x", "--quick", "--noise", "--out", str(tmp_path)]
-    assert cli.main(args) == 0
+    assert app.main(args) == 0
     out, err = capsys.readouterr()
     assert err == "" and "damping [1/s]" in out and "95 % interval" in out
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fig4.png", "fig5.png", "fig6.png", "identify.json"]
@@ -262,7 +263,7 @@ def test_command_line(capsys, tmp_path):
 ])  # fmt: skip
 def test_command_line_refuses(capsys, tmp_path, monkeypatch, args, words):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(args) == 2
+    assert app.main(args) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and all(w in err for w in words), err
     assert list(tmp_path.iterdir()) == []

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticclay import inline
+from hapticclay.stepping import inline
 
 SCALE = 3.0
 
@@ -72,7 +72,7 @@ def test_inlining_the_loop_is_quick():
     import time
     from pathlib import Path
 
-    from hapticclay import glide, loop
+    from hapticclay.stepping import glide, loop
 
     source = Path(loop.__file__).read_text()
     ratios = []

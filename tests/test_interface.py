@@ -13,9 +13,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import arm, interface, limits
 from hapticclay.errors import ParameterError
-from hapticclay.params import TS, Clay, Operator, Profile
+from hapticclay.model import arm, interface
+from hapticclay.model.scenario import TS, Clay, Operator, Profile
+from hapticclay.theory import gain_limit
 
 EVERYWHERE = Profile((), (90.0,))
 EPS = np.finfo(float).eps
@@ -188,7 +189,7 @@ def test_difference_lags_half_its_window_in_a_run():
     s = hc.free(control="sampled", t_max=0.02)
     shown = []
 
-    class Spy(__import__("hapticclay.wired", fromlist=["Wired"]).Wired):
+    class Spy(__import__("hapticclay.stepping.wired", fromlist=["Wired"]).Wired):
         def _turned(self, k, q, w, hw):
             found = super()._turned(k, q, w, hw)
             shown.append((w, found[1]))
@@ -274,7 +275,7 @@ def test_torques_come_late_by_the_delay_to_the_step(delay):
 def test_delayed_run_follows_the_lifted_map(axis, b, Ts, delay):
     """At the nominal pose the small motion of the arm is x(k+1) = M x(k), exact between samples."""
     K, i = 0.5, "xy".index(axis)
-    M, beta, gamma = limits.matrices(axis, b, Operator(), Ts, delay)
+    M, beta, gamma = gain_limit.matrices(axis, b, Operator(), Ts, delay)
     A = M + K * np.outer(beta, gamma)
     r = hc.simulate(ring(axis, K, b, hc.Interface(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
     x = np.zeros(len(A))

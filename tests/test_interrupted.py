@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay import record
+from hapticclay.simulation import record
 
 HARDWARE = dataclasses.replace(
     hc.constant_cut(control="sampled", t_max=3.5),

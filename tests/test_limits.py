@@ -11,9 +11,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import hapticclay as hc
-from hapticclay import limits, lti
 from hapticclay.errors import ParameterError
-from hapticclay.params import Operator
+from hapticclay.model.scenario import Operator
+from hapticclay.theory import gain_limit, linear_loop
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}
 PRINTED = {
@@ -60,7 +60,7 @@ def test_continuous_limits(axis, on, j):
     hand = HANDS["hand" if on else "none"]
     root = brentq(lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13)
     assert found == pytest.approx(root, rel=1e-9)  # eps times the condition of the roots, 1e4
-    K, omega = limits.critical(axis, b, operator(hand))
+    K, omega = gain_limit.critical(axis, b, operator(hand))
     assert abs(np.polyval(polynomial(axis, K, b, hand), 1j * omega)) < 1e-8 * np.polyval(
         np.abs(polynomial(axis, K, b, hand)), omega
     )
@@ -220,7 +220,7 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
     for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
         stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "implicit")
         assert stable == (share < 1.0)
-        assert limits.is_stable(axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit") == stable
+        assert gain_limit.is_stable(axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit") == stable
 
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
@@ -230,14 +230,14 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
     """The pole that K moves is at -K k/10: z = 1 - 2e-16 at K = 1e-12, and far below rounding at 1e-30 and 5e-324."""
     for K in (1e-6, 1e-12, 1e-30, 5e-324):
         assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
-        assert limits.is_stable(axis, K, 90.0, operator(HANDS[hand]), Ts, delay, render)
+        assert gain_limit.is_stable(axis, K, 90.0, operator(HANDS[hand]), Ts, delay, render)
 
 
 @pytest.mark.parametrize("axis,n", list(itertools.product("xy", [0, 1, 3])))
 def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n):
     """No hand: the loop broken at the sampled net force, from python-control's own discretisations."""
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
-    K, omega = limits.critical(axis, b, None, Ts, n * Ts)
+    K, omega = gain_limit.critical(axis, b, None, Ts, n * Ts)
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
     G = G0[i] / (s**2 + G1[i] * s + G0[i])
     C = K / (s**2 + 10 * s)
@@ -309,11 +309,11 @@ def test_a_narrow_unstable_window_is_not_missed():
         return (1.0 - 0.1 * x) * (1.0 + 1j * (x**2 - 1e-8))
 
     edges = 1.0 / (1.0 + 1e-5), 1.0 / (1.0 - 1e-5)
-    loop = limits.Family(h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1])
-    found = sorted(limits.crossings(loop))
+    loop = gain_limit.Family(h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1])
+    found = sorted(gain_limit.crossings(loop))
     np.testing.assert_allclose([K for K, _ in found], edges, rtol=1e-9)  # a root beside its extreme: sqrt(eps) of 1e-4
     np.testing.assert_allclose(np.log([w for _, w in found]), [1.2344, 1.2346], atol=1e-9)
-    assert limits.first(loop)[0] == pytest.approx(edges[0], rel=1e-9)
+    assert gain_limit.first(loop)[0] == pytest.approx(edges[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("axis,hand", [("x", "none"), ("y", "hand")])
@@ -331,7 +331,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
         b, tuple(gain), tuple(force), th is not None, shaping=True, dt=Ts / 8, Ts=Ts, control="sampled",
         clay=(-0.05, 0.05), origin=(0.35, 0.24), length=0.04, t_max=4.0,
     ))  # fmt: skip
-    M, beta, gamma = limits.matrices(axis, b, th, Ts)
+    M, beta, gamma = gain_limit.matrices(axis, b, th, Ts)
     z = np.linalg.eigvals(M + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
@@ -346,7 +346,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
 
 def test_hand_is_nominal_none_or_given():
     assert hc.gain_limit("x", 90.0) == hc.gain_limit("x", 90.0, operator=Operator())
-    assert hc.gain_limit("x", 90.0, impedance=False) == lti.gain_limit("x", 90.0)
+    assert hc.gain_limit("x", 90.0, impedance=False) == linear_loop.gain_limit("x", 90.0)
 
 
 @pytest.mark.parametrize("call,field", [

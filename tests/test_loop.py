@@ -8,8 +8,8 @@ import pytest
 from oracles import Arm
 
 import hapticclay as hc
-from hapticclay import glide, inline, leapfrog
-from hapticclay.params import Operator
+from hapticclay.model.scenario import Operator
+from hapticclay.stepping import glide, inline, leapfrog
 
 CASES = {
     "plain": hc.constant_cut(t_max=1.0),

@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 
 import hapticclay as hc
-from hapticclay import memory, sim
+from hapticclay.simulation import memory, simulate
 
 GB = 10**9
 WIRED = dataclasses.replace(hc.constant_cut(control="sampled", dt=1e-4, t_max=1.5), interface=hc.Interface())
@@ -56,19 +56,19 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
     peak = tracemalloc.get_traced_memory()[1] - 3e6  # buffers of a chunk, however long the run
     tracemalloc.stop()
     assert record.outcome.code == "time limit"  # so it took what the longest run would
-    monkeypatch.setattr(sim, "SMALL", 0.0)
+    monkeypatch.setattr(simulate, "SMALL", 0.0)
     for left, fits in ((0.9 * peak, False), (1.5 * peak, True)):
         monkeypatch.setattr(memory, "left", lambda left=left: left)
         if fits:
-            sim._check_memory(scenario, every)
+            simulate._check_memory(scenario, every)
         else:
             with pytest.raises(hc.ParameterError):
-                sim._check_memory(scenario, every)
+                simulate._check_memory(scenario, every)
 
 
 def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
     monkeypatch.setattr(memory, "left", lambda: 4.0 * GB)
-    monkeypatch.setattr(sim, "_kind", lambda *a: pytest.fail("ran"))
+    monkeypatch.setattr(simulate, "_kind", lambda *a: pytest.fail("ran"))
     scenario = hc.constant_cut(dt=1e-6)
     with pytest.raises(hc.ParameterError) as error:
         hc.simulate(scenario)
@@ -76,9 +76,9 @@ def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
         "every = 1: up to 60000002 samples take 28.2 GB of memory, and 4 GB are left: "
         "keep fewer (--every 8), or lower t_max"
     )
-    sim._check_memory(scenario, 8)
+    simulate._check_memory(scenario, 8)
     with pytest.raises(hc.ParameterError, match="every = 6"):
-        sim._check_memory(scenario, 6)
+        simulate._check_memory(scenario, 6)
 
 
 def test_no_every_helps_where_each_step_is_remembered(monkeypatch):
@@ -91,11 +91,12 @@ def test_a_process_may_have_less_than_the_machine():
     pytest.importorskip("resource")
     code = (
         "import resource, hapticclay as hc\n"
-        "from hapticclay import cli, memory\n"
+        "from hapticclay.cli import app\n"
+        "from hapticclay.simulation import memory\n"
         "taken = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (taken + 10**9,) * 2)\n"
         "assert 0.5e9 < memory.left() <= 1e9\n"
-        "raise SystemExit(cli.main(['run', 'free', '--force', '0', '0', '--dt', '1e-5', '--t-max', '100']))"
+        "raise SystemExit(app.main(['run', 'free', '--force', '0', '0', '--dt', '1e-5', '--t-max', '100']))"
     )
     p = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert p.returncode == 2 and p.stdout == "" and p.stderr.count("\n") == 1, p.stderr

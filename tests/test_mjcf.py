@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay import scene
-from hapticclay.params import Multisine
+from hapticclay.model.scenario import Multisine
+from hapticclay.stepping import scene
 
 
 def test_operational_inertia_at_home_is_read_from_the_engine():

@@ -13,8 +13,10 @@ import pytest
 from test_loop import CASES
 
 import hapticclay as hc
-from hapticclay import batch, leapfrog, record, sim
-from hapticclay.params import Clay, Multisine, Profile
+from hapticclay import stepping
+from hapticclay.model.scenario import Clay, Multisine, Profile
+from hapticclay.simulation import batch, record, simulate
+from hapticclay.stepping import leapfrog
 
 fast = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]")
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
@@ -102,17 +104,17 @@ def test_accurate_native_leaves_the_engine_without_callback_and_needs_none():
 
 @fast
 def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
-    from hapticclay import native
+    from hapticclay.stepping import compiled
 
     s = hc.constant_cut(gain=(4.2, 0.2), shaping=True, impedance=True, start=(0.05, 0.0), force=(0.5, 0.0))
-    late, watched = native.Native(s, 1), native.Native(s, 1)
+    late, watched = compiled.Native(s, 1), compiled.Native(s, 1)
     watched.calm = False
     for run in (late, watched):
         run.go(None)
     assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
     same(late.result(0.0), watched.result(0.0))
     assert late.watch.seen == watched.watch.seen >= late.looked
-    calm = native.Native(hc.constant_cut(), 1)
+    calm = compiled.Native(hc.constant_cut(), 1)
     calm.watch.look = None  # is not called
     calm.go(None)
     same(calm.result(0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
@@ -174,11 +176,11 @@ def test_what_native_cannot_run_python_does(capsys):
 
 
 def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
-    monkeypatch.setattr(sim.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(simulate.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(hc.ParameterError, match=r"hapticclay\[fast\]"):
         hc.simulate(hc.free(t_max=0.1), engine="native")
     long = hc.free(force=(0.0, 0.0), dt=1e-6, t_max=1.0)
-    assert sim._kind(long, "auto") is leapfrog.Leapfrog
+    assert simulate._kind(long, "auto") is leapfrog.Leapfrog
     scenes = [hc.free(t_max=0.1), hc.constant_cut(t_max=0.1)]
     records = hc.simulate_batch(scenes)
     said = capsys.readouterr().err
@@ -189,8 +191,8 @@ def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
 
 @fast
 def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "hapticclay.native", None)
-    monkeypatch.delattr(hc, "native", raising=False)
+    monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", None)
+    monkeypatch.delattr(stepping, "compiled", raising=False)
     r = hc.simulate(CASES["plain"], engine="native")
     assert capsys.readouterr().err.count("\n") == 1
     (b,) = hc.simulate_batch([CASES["plain"]])
@@ -200,10 +202,10 @@ def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
 
 
 def test_auto_takes_native_for_long_runs_only():
-    assert sim._kind(hc.constant_cut(), "auto") is leapfrog.Leapfrog
+    assert simulate._kind(hc.constant_cut(), "auto") is leapfrog.Leapfrog
     long = hc.constant_cut(dt=1e-4)
-    assert (sim._kind(long, "auto") is leapfrog.Leapfrog) == (not sim.has_numba())
-    assert sim._kind(long, "python") is leapfrog.Leapfrog
+    assert (simulate._kind(long, "auto") is leapfrog.Leapfrog) == (not simulate.has_numba())
+    assert simulate._kind(long, "python") is leapfrog.Leapfrog
 
 
 @pytest.mark.parametrize("kw", [dict(threads=0), dict(every=0), dict(keep="all")])
@@ -226,12 +228,12 @@ def test_empty_batch():
 
 @fast
 def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):
-    from hapticclay import native
+    from hapticclay.stepping import compiled
 
     def broken(self):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(native.Native, "advance", broken)
+    monkeypatch.setattr(compiled.Native, "advance", broken)
     with pytest.raises(RuntimeError, match="broken"):
         hc.simulate_batch([hc.free(t_max=0.1)] * 5, threads=2)
 
@@ -241,13 +243,13 @@ def test_engine_hears_nothing_and_keeps_nothing():
     """No callback is installed, no warning written, and the engine's time step is found where it is."""
     import mujoco
 
-    from hapticclay import native
+    from hapticclay.stepping import compiled
 
     before = mujoco.get_mju_user_warning()
     hc.simulate_batch([MORE["thrown out of reach"]] * 3)
     assert mujoco.get_mjcb_control() is None and mujoco.get_mju_user_warning() is before
     model = hc.build(hc.free())
-    native._timestep(model)[0] = 0.5
+    compiled._timestep(model)[0] = 0.5
     assert model.opt.timestep == 0.5
 
 
@@ -257,7 +259,7 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
     code = (
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
-        "from hapticclay import native; print(sum(native._stride.stats.cache_hits.values()))"
+        "from hapticclay.stepping import compiled; print(sum(compiled._stride.stats.cache_hits.values()))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     took, said = [], []

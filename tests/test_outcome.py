@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import arm, leapfrog, outcome
-from hapticclay.params import Operator
+from hapticclay.model import arm
+from hapticclay.model.scenario import Operator
+from hapticclay.stepping import leapfrog, monitor
 
 CODES = {"finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"}
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
@@ -67,7 +68,7 @@ def test_out_of_reach(force, word):
     assert r.outcome.code == ("out of reach" if word == "stretched" else "singular"), r.status
     assert word in r.status
     check_finite(r)
-    assert np.min(np.abs(np.sin(r.q[:, 1]))) >= outcome.FOLD
+    assert np.min(np.abs(np.sin(r.q[:, 1]))) >= monitor.FOLD
 
 
 def test_clay_that_was_never_touched_makes_no_loop_unstable():
@@ -121,7 +122,7 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
     v = np.clip(v, -5, 5)
     rows = np.zeros((12, n))
     rows[1], rows[5] = -1.5, v
-    watch, found = outcome.Watch(s), None
+    watch, found = monitor.Watch(s), None
     for i in range(0, n, chunk):
         good, found = watch.look(rows[:, i : i + chunk], i)
         if found:

@@ -5,15 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from hapticclay import entries, params, report
+from hapticclay.model import scenario
+from hapticclay.paper import ledger, report
 
-SOURCE = Path(params.__file__)
+SOURCE = Path(scenario.__file__)
 
 PRINTED = {  # as printed, Eqs. 14-28 and Secs. 4, 4.1
-    "Gx": (params.G[0], (910.19, 41.8, 910.19)),
-    "Gy": (params.G[1], (765.5, 30.3, 765.5)),
-    "Sx": (params.S[0], (0.7919, 41.1, 432.0)),  # 79.19 cm/N
-    "Sy": (params.S[1], (0.131, 32.4, 492.46)),  # 13.1 cm/N
+    "Gx": (scenario.G[0], (910.19, 41.8, 910.19)),
+    "Gy": (scenario.G[1], (765.5, 30.3, 765.5)),
+    "Sx": (scenario.S[0], (0.7919, 41.1, 432.0)),  # 79.19 cm/N
+    "Sy": (scenario.S[1], (0.131, 32.4, 492.46)),  # 13.1 cm/N
 }
 
 
@@ -24,21 +25,26 @@ def test_transfer_functions(name):
 
 
 def test_operator_clay_arm_and_sampling():
-    th = params.Operator()
+    th = scenario.Operator()
     assert (th.mass, th.damper, th.spring) == (0.25, 2.0, 6.0)
-    assert (params.L1, params.L2, params.TS) == (0.24, 0.35, 0.36e-3)
-    assert (params.B_VARIABLE, params.BORDER, params.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
-    assert (params.GROWTH, params.GROWTH_EQ25, params.B_STABILITY) == (30.0, 0.15, 100.0)
-    assert (params.GAINS_FIG11, params.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
-    assert (params.C_POLE, params.B_CONSTANT, params.CLAY_X, params.PATH_LENGTH) == (10.0, 90.0, (0.05, 0.15), 0.20)
+    assert (scenario.L1, scenario.L2, scenario.TS) == (0.24, 0.35, 0.36e-3)
+    assert (scenario.B_VARIABLE, scenario.BORDER, scenario.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
+    assert (scenario.GROWTH, scenario.GROWTH_EQ25, scenario.B_STABILITY) == (30.0, 0.15, 100.0)
+    assert (scenario.GAINS_FIG11, scenario.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
+    assert (scenario.C_POLE, scenario.B_CONSTANT, scenario.CLAY_X, scenario.PATH_LENGTH) == (
+        10.0,
+        90.0,
+        (0.05, 0.15),
+        0.20,
+    )
 
 
 def test_path_is_centred_on_the_nominal_pose():
-    assert params.ORIGIN == pytest.approx((params.L2 - params.PATH_LENGTH / 2, params.L1), abs=1e-16)
+    assert scenario.ORIGIN == pytest.approx((scenario.L2 - scenario.PATH_LENGTH / 2, scenario.L1), abs=1e-16)
 
 
 def test_docs_paper_is_what_the_ledger_gives(ledger_rows):
-    page = Path(params.__file__).parents[1] / "docs" / "paper.md"
+    page = Path(scenario.__file__).parents[2] / "docs" / "paper.md"
     assert page.read_text() == report.paper_page(ledger_rows), (
         "make docs/paper.md anew: hapticclay reproduce --page docs/paper.md"
     )
@@ -48,7 +54,7 @@ def test_every_row_that_should_agree_does(ledger_rows):
     wrong = [(r.what, r.error) for r in ledger_rows if r.agrees is False]
     assert not wrong
     assert sum(r.agrees is True for r in ledger_rows) > 40
-    assert {r.status for r in ledger_rows} == set(entries.STATUSES)
+    assert {r.status for r in ledger_rows} == set(ledger.STATUSES)
 
 
 @pytest.mark.parametrize("words", [  # each disagreement of the paper with itself has a row with evidence
@@ -63,7 +69,7 @@ def test_each_contradiction_has_its_row(words, ledger_rows):
 @pytest.mark.parametrize("number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"])
 def test_a_printed_number_is_typed_once(number):
     typed = 0
-    for file in SOURCE.parent.glob("*.py"):
+    for file in SOURCE.parents[1].rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.Constant) and isinstance(node.value, float):
                 typed += node.value == float(number)

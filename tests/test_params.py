@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import errors, params
+from hapticclay import errors
 from hapticclay.errors import ParameterError
+from hapticclay.model import scenario
 
 
 @pytest.mark.parametrize("kw,field", [
@@ -55,7 +56,7 @@ def test_replace_checks_too():
 @pytest.mark.parametrize("kw", [dict(mass=-1.0), dict(damper=math.nan), dict(spring="6")])
 def test_operator_is_checked(kw):
     with pytest.raises(ParameterError, match="operator"):
-        params.Operator(**kw)
+        scenario.Operator(**kw)
 
 
 def test_numpy_numbers_and_arrays_are_welcome():

@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import lti, passive
 from hapticclay.errors import ParameterError
-from hapticclay.params import Operator
+from hapticclay.model.scenario import Operator
+from hapticclay.theory import linear_loop, passivity
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)
 
@@ -29,7 +29,7 @@ def test_passivity_against_dense_frequencies(axis, K, b):
     dense = shown(axis, K, b, OMEGA).real
     assert v.margin <= dense.min() + 1e-9 * np.abs(dense).max()
     assert v.margin == pytest.approx(dense.min(), rel=1e-3, abs=1e-2)  # the grid about a minimum
-    assert v.verdict == (v.margin >= 0.0 and lti.stable(axis, K, b))
+    assert v.verdict == (v.margin >= 0.0 and linear_loop.stable(axis, K, b))
     for low, high in v.fails:
         inside = (OMEGA > low * 1.001) & (OMEGA < high * 0.999)
         assert np.all(dense[inside] < 0.0)
@@ -86,7 +86,7 @@ def test_the_observer_sees_an_active_device():
 
 @pytest.mark.parametrize("call,field", [
     (lambda: hc.passivity("x", 1.0, -1.0), "b"), (lambda: hc.clay_passivity(90.0, 0.0), "Ts"),
-    (lambda: passive.colgate_schenkel(lambda z: z, 1e-3, -1.0), "damping"),
+    (lambda: passivity.colgate_schenkel(lambda z: z, 1e-3, -1.0), "damping"),
 ])  # fmt: skip
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay import plot_stability as plots
+from hapticclay.views import theory_plots as plots
 
 
 def texts(figure):

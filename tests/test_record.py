@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay import record
 from hapticclay.errors import ParameterError
+from hapticclay.simulation import record
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 import hapticclay as hc
-from hapticclay.params import Clay, Profile
-from hapticclay.removal import Removal, Tool, removed
-from hapticclay.stage import Stage
+from hapticclay.model.scenario import Clay, Profile
+from hapticclay.studies.removal import Removal, Tool, removed
+from hapticclay.views.stage import Stage
 
 
 @pytest.fixture(scope="module")

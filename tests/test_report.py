@@ -6,8 +6,9 @@ import re
 
 import pytest
 
-from hapticclay import cli, entries, ledger, report
-from hapticclay.entries import Row
+from hapticclay.cli import app
+from hapticclay.paper import claims, ledger, report
+from hapticclay.paper.ledger import Row
 
 ROW = Row("a", "Eq. 1", "1", "m", 1.0, 1.001, 1e-2, "given", "why")
 
@@ -32,8 +33,8 @@ def test_numbers_for_tables(x, unit, text):
 
 def test_runs_are_made_once_and_when_asked(monkeypatch):
     made = []
-    monkeypatch.setattr(entries, "simulate", lambda scenario: made.append(scenario) or scenario)
-    runs = entries.Runs()
+    monkeypatch.setattr(ledger, "simulate", lambda scenario: made.append(scenario) or scenario)
+    runs = ledger.Runs()
     assert not made
     runs.free()
     runs.free()
@@ -81,14 +82,14 @@ def test_ledger_is_data(written):
 
 def test_command_says_what_does_not_agree_and_fails(tmp_path, monkeypatch, capsys):
     wrong = dataclasses.replace(ROW, ours=2.0)
-    monkeypatch.setattr(ledger, "rows", lambda runs: [ROW, wrong])
+    monkeypatch.setattr(claims, "rows", lambda runs: [ROW, wrong])
     monkeypatch.setattr(report, "PICTURES", ())
-    assert cli.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 1
+    assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 1
     out = capsys.readouterr().out
     assert "does not agree: a (Eq. 1): 2 m, +100.000 %" in out and "1 of 2 numbers agree" in out
     assert str(tmp_path / "report.html") in out
-    monkeypatch.setattr(ledger, "rows", lambda runs: [ROW])
-    assert cli.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr(claims, "rows", lambda runs: [ROW])
+    assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 0
 
 
 def test_changed_physics_changes_the_page(written):

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import lti, robust
 from hapticclay.errors import ParameterError
-from hapticclay.params import Operator
+from hapticclay.model.scenario import Operator
+from hapticclay.theory import linear_loop, robustness
 
 
 def spans(high):
@@ -22,12 +22,14 @@ def test_the_worst_case_is_no_better_than_any_sample_and_is_reached(axis, b, m, 
     box = hc.Box(m, d, k)
     worst = hc.worst_case(axis, 1.0, b, box)
     samples = box.corners() + box.sample(60, seed=3)
-    limits = [lti.gain_limit(axis, b, th) for th in samples]
+    limits = [linear_loop.gain_limit(axis, b, th) for th in samples]
     assert worst.limit <= min(limits) * (1 + 1e-9)  # rounding of roots
     assert worst.hand is not None
     if worst.limit == float("inf"):
         return
-    assert lti.gain_limit(axis, b, worst.hand) == pytest.approx(worst.limit, rel=1e-6)  # the hand it names does it
+    assert linear_loop.gain_limit(axis, b, worst.hand) == pytest.approx(
+        worst.limit, rel=1e-6
+    )  # the hand it names does it
     for value, (low, high) in zip(
         (worst.hand.mass, worst.hand.damper, worst.hand.spring), (box.mass, box.damper, box.spring), strict=True
     ):
@@ -44,7 +46,7 @@ def test_box_against_a_dense_grid(axis):
         for d in np.linspace(0, 20, 9)
         for k in np.linspace(0, 100, 6)
     ]
-    dense = min(lti.gain_limit(axis, 60.0, th) for th in grid)
+    dense = min(linear_loop.gain_limit(axis, 60.0, th) for th in grid)
     found = hc.worst_case(axis, 1.0, 60.0, box).limit
     assert dense * 0.99 < found <= dense * (1 + 1e-9)  # steps of a fifth of the box about a smooth minimum
 
@@ -53,10 +55,10 @@ def test_a_worst_case_inside_an_edge():
     """Without mass and spring the limit in x is least near b + damper = 94 N.s/m: no corner of this box."""
     box = hc.Box((0.0, 0.0), (0.0, 40.0), (0.0, 0.0))
     worst = hc.worst_case("x", 1.0, 70.0, box)
-    dense = min((lti.gain_limit("x", 70.0 + d, None), d) for d in np.linspace(0.0, 40.0, 401))
+    dense = min((linear_loop.gain_limit("x", 70.0 + d, None), d) for d in np.linspace(0.0, 40.0, 401))
     assert worst.limit == pytest.approx(dense[0], rel=2e-6)  # 0.1 N.s/m about a minimum: second order
     assert worst.hand.damper == pytest.approx(dense[1], abs=0.5) and 5.0 < worst.hand.damper < 35.0
-    assert worst.limit < min(lti.gain_limit("x", 70.0, th) for th in box.corners())
+    assert worst.limit < min(linear_loop.gain_limit("x", 70.0, th) for th in box.corners())
 
 
 def test_a_point_is_the_gain_limit_of_that_hand():
@@ -76,14 +78,14 @@ def test_sampled_and_late_boxes_say_that_they_are_samples():
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
     """Closed-loop poles tend to the zeros of G C + Sh, left of the axis at every K: Th may be as large as it likes."""
-    limit, _ = robust.rigid_limit(axis)
+    limit, _ = robustness.rigid_limit(axis)
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
-        zeros = np.sort_complex(np.roots(lti.device(axis, K)[0]))
-        poles = lti.closed_loop_poles(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
+        zeros = np.sort_complex(np.roots(linear_loop.device(axis, K)[0]))
+        poles = linear_loop.closed_loop_poles(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
         near = [np.min(np.abs(poles - z)) / abs(z) for z in zeros]
         assert max(near) < 1e-3 and zeros.real.max() < 0.0
-        assert lti.stable(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
+        assert linear_loop.stable(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
     box = hc.Box((0.1, 0.5), rigid=True)
     assert hc.worst_case(axis, 0.5, 90.0, box).limit == hc.worst_case(axis, 0.5, 90.0, hc.Box((0.1, 0.5))).limit
 
@@ -91,12 +93,14 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
 def test_a_rigid_arm_limits_a_slower_compensator():
     """C = K/(s (s + 1)) in y: the zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it."""
     c, arm = hc.Compensator(1.0), Operator(1e3, 1e8, 1e9)
-    limit, omega = robust.rigid_limit("y", c)
+    limit, omega = robustness.rigid_limit("y", c)
     assert 50.0 < omega < 200.0
-    assert lti.gain_limit("y", 90.0, arm, c) == pytest.approx(limit, rel=1e-3)  # as near to rigid as 1e8 is to infinity
+    assert linear_loop.gain_limit("y", 90.0, arm, c) == pytest.approx(
+        limit, rel=1e-3
+    )  # as near to rigid as 1e8 is to infinity
     for b in (0.0, 90.0):
         worst = hc.worst_case("y", 0.1, b, hc.Box((0.25, 0.25), (2.0, 2.0), (0.0, 0.0), rigid=True), compensator=c)
-        alone = lti.gain_limit("y", b, Operator(0.25, 2.0, 0.0), c)
+        alone = linear_loop.gain_limit("y", b, Operator(0.25, 2.0, 0.0), c)
         assert worst.limit == pytest.approx(min(alone, limit), rel=1e-9) and (worst.hand is None) == (limit < alone)
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.player import Player, Replay
-from hapticclay.session import FRAME, MOST, Clock, Session, played
-from hapticclay.stage import Stage
+from hapticclay.views.player import Player, Replay
+from hapticclay.views.session import FRAME, MOST, Clock, Session, played
+from hapticclay.views.stage import Stage
 
 
 def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from hapticclay.errors import ParameterError
-from hapticclay.params import Multisine
-from hapticclay.signals import Signal
+from hapticclay.model.scenario import Multisine
+from hapticclay.model.signals import Signal
 
 
 def spelt_out(signal, t, axis):

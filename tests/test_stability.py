@@ -9,10 +9,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import lti, stability
 from hapticclay.errors import ParameterError
-from hapticclay.params import Operator
-from hapticclay.stability import BREAKS
+from hapticclay.model.scenario import Operator
+from hapticclay.theory import linear_loop, margins
+from hapticclay.theory.margins import BREAKS
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)
 LOOPS = dict(
@@ -37,7 +37,7 @@ def roots_right(poly):
 @settings(max_examples=300)
 @given(**LOOPS)
 def test_nyquist_count_of_the_loop_is_that_of_its_poles(axis, K, b, th, at):
-    right, nearest = roots_right(lti.characteristic(axis, K, b, th))
+    right, nearest = roots_right(linear_loop.characteristic(axis, K, b, th))
     assume(nearest > 1e-6)  # the curve then passes -1 as near: nothing to count
     found = hc.nyquist(axis, K, b, at=at, **hand(th))
     assert found.Z == right and found.P == 0
@@ -66,7 +66,7 @@ def test_nyquist_count_of_500_random_loops():
         right, nearest = roots_right(np.polyadd(n, d))
         if nearest < 1e-4 or (len(n) == len(d) and abs(1.0 + n[0] / d[0]) < 1e-3):
             continue
-        N, P = stability.encirclements(n, d)
+        N, P = margins.encirclements(n, d)
         assert N + P == right, (n, d)
         seen.add((P, N))
     assert len(seen) > 10 and any(P for P, _ in seen) and any(N < 0 for _, N in seen)
@@ -75,9 +75,9 @@ def test_nyquist_count_of_500_random_loops():
 @settings(max_examples=60)
 @given(**LOOPS)
 def test_margins_against_python_control(axis, K, b, th, at):
-    n, d = stability.loop(axis, K, b, at=at, **hand(th))
+    n, d = margins.loop(axis, K, b, at=at, **hand(th))
     m = hc.margins(axis, K, b, at=at, **hand(th))
-    assert m.stable == lti.stable(axis, K, b, th)
+    assert m.stable == linear_loop.stable(axis, K, b, th)
     if not m.stable:
         assert m.gain == (1.0, 1.0) and m.phase == m.delay == m.disk == 0.0
         return
@@ -98,7 +98,7 @@ def test_margins_against_python_control(axis, K, b, th, at):
 
 @pytest.mark.parametrize("axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")])
 def test_disk_margin_against_python_control(axis, K, at):
-    n, d = stability.loop(axis, K, 90.0, at=at)
+    n, d = margins.loop(axis, K, 90.0, at=at)
     alpha, down, turn = control.disk_margins(control.tf(n, d), OMEGA[OMEGA < 1e3])
     m = hc.margins(axis, K, 90.0, at=at)
     assert m.disk == pytest.approx(float(alpha), rel=1e-5)  # its grid: 2e-4 in omega, squared, times the curvature
@@ -111,7 +111,7 @@ def test_disk_margin_against_python_control(axis, K, at):
 def test_what_the_margins_allow_is_stable(axis, K, b, th, at, turn, size):
     m = hc.margins(axis, K, b, at=at, **hand(th))
     assume(m.stable and 0.01 < m.disk < 1.99)
-    n, d = stability.loop(axis, K, b, at=at, **hand(th))
+    n, d = margins.loop(axis, K, b, at=at, **hand(th))
     z = size * m.disk / 2 * np.exp(1j * np.pi * turn)
     factor = (1 + z) / (1 - z)
     L = factor * np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
@@ -149,7 +149,7 @@ def test_coupled_stability(axis, kw):
 def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, th, equation):
     v = hc.small_gain(axis, K, b, equation=equation, **hand(th))
     s = 1j * OMEGA
-    T = np.polyval(lti.impedance(b, th), s)
+    T = np.polyval(linear_loop.impedance(b, th), s)
     i = "xy".index(axis)
     g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
     GC, Sh = g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s), w / (s**2 + kd * s + kp)
@@ -163,7 +163,7 @@ def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, t
     assert np.all((bad == inside) | edge)
     assert v.verdict == (not v.fails)
     if v.verdict:
-        assert lti.stable(axis, K, b, th)  # sufficient
+        assert linear_loop.stable(axis, K, b, th)  # sufficient
 
 
 def test_the_papers_condition_fails_near_zero_for_every_gain():
@@ -176,7 +176,7 @@ def test_the_papers_condition_fails_near_zero_for_every_gain():
 
 
 def test_equation_9_is_the_distance_from_minus_one():
-    n, d = stability.loop("x", 2.0, 90.0)
+    n, d = margins.loop("x", 2.0, 90.0)
     z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
     assert hc.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(np.min(np.abs(1 + z)), rel=1e-5)  # grid
 
@@ -194,9 +194,9 @@ def test_transparency_is_equation_7(K, b, axis):
 
 def test_least_finds_the_ends_and_the_middle():
     # (x^2 - 2x + 3)/1 at x = omega^2 = 1; 1/(x + 1) at infinity; (x + 1)/(x + 2) at 0
-    assert stability.least(np.array([1.0, -2.0, 3.0]), np.array([1.0])) == pytest.approx((2.0, 1.0))
-    assert stability.least(np.array([1.0]), np.array([1.0, 1.0])) == (0.0, math.inf)
-    assert stability.least(np.array([1.0, 1.0]), np.array([1.0, 2.0])) == (0.5, 0.0)
+    assert margins.least(np.array([1.0, -2.0, 3.0]), np.array([1.0])) == pytest.approx((2.0, 1.0))
+    assert margins.least(np.array([1.0]), np.array([1.0, 1.0])) == (0.0, math.inf)
+    assert margins.least(np.array([1.0, 1.0]), np.array([1.0, 2.0])) == (0.5, 0.0)
 
 
 @pytest.mark.parametrize("call,field", [

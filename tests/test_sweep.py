@@ -16,9 +16,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import cli, plot_sweep, space, sweep, sweep_command
+from hapticclay.cli import app
+from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
-from hapticclay.space import Range, Sweep, parse_fixed, parse_grid
+from hapticclay.studies import sampling, sweep
+from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
+from hapticclay.views import plot_sweep
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -176,7 +179,7 @@ def test_spec_file(tmp_path):
     spec.write_text(
         'experiment = "free"\nchunk = 3\n[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
     )
-    s = Sweep(**space.load(spec))
+    s = Sweep(**sampling.load(spec))
     assert (s.experiment, len(s), s.chunk) == ("free", 4, 3)
     for text, word in (
         ("experiment = ", "TOML"),
@@ -185,9 +188,9 @@ def test_spec_file(tmp_path):
     ):
         spec.write_text(text)
         with pytest.raises(ParameterError, match=word):
-            space.load(spec)
+            sampling.load(spec)
     with pytest.raises(ParameterError, match="spec"):
-        space.load(tmp_path / "none.toml")
+        sampling.load(tmp_path / "none.toml")
 
 
 COMMAND = [sys.executable, "-m", "hapticclay", "sweep", "--grid", "b=10:1000:40log gain.x=1:2:2", "--fixed",
@@ -221,7 +224,7 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
 
 def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys):
     args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--workers", "1", "--out"]
-    assert cli.main([*args, str(tmp_path)]) == 0
+    assert app.main([*args, str(tmp_path)]) == 0
     assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
     for extra, word in (
         (["--grid", "b=1:2"], "b = "), (["--grid", "b=1", "--runs", "3"], "runs"), ([], "either"),
@@ -230,7 +233,7 @@ def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys):
             (["--grid", "b=1:2:2", "--experiment", "fre"], "did you mean"),
         (["nothing.toml"], "spec"), (["--grid", GRID, "--fixed", "t_max"], "fixed"),
     ):  # fmt: skip
-        assert cli.main(["sweep", *extra, "--out", str(tmp_path / "x")]) == 2
+        assert app.main(["sweep", *extra, "--out", str(tmp_path / "x")]) == 2
         err = capsys.readouterr().err
         assert word in err and err.count("\n") == 1 and not (tmp_path / "x").exists()
 
@@ -338,7 +341,7 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             return real(*args)
 
         monkeypatch.setattr(sweep, "measure", timed)
-        monkeypatch.setattr(sweep.time, "perf_counter", lambda clock=clock: clock[0])
+        monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
         assert sweep.estimate(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
 
@@ -355,7 +358,7 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
     args = ["sweep", "--grid", "b=10:1000:30log gain.x=1:2:2", "--fixed", "t_max=0.01", "--chunk", "1",
             "--workers", "1", "--no-maps", "--out", str(tmp_path)]  # fmt: skip
     monkeypatch.setattr(sweep_command, "LARGE", 60)
-    assert cli.main(args) == 0
+    assert app.main(args) == 0
     first, *lines = capsys.readouterr().err.splitlines()
     assert re.fullmatch(
         r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data .* free.", first
@@ -366,7 +369,7 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
         sweep.part(tmp_path, n).unlink()
     ticks = iter(range(0, 10**6, 100))  # seconds, 100 from one look at the clock to the next
     monkeypatch.setattr(sweep_command.time, "monotonic", lambda: next(ticks))
-    assert cli.main(args) == 0
+    assert app.main(args) == 0
     lines = capsys.readouterr().err.splitlines()  # half of them is there: no estimate, and a line after each
     assert [int(x.split()[1]) for x in lines] == list(range(31, 61))
     assert lines[0].endswith("31 of 60 runs, 52 %, 01:40 gone, 48:20 to go")

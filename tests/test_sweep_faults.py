@@ -12,9 +12,10 @@ import time
 import psutil
 import pytest
 
-from hapticclay import cli, sweep
+from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.space import Sweep, parse_grid
+from hapticclay.studies import sweep
+from hapticclay.studies.sampling import Sweep, parse_grid
 
 RUNS = 80
 
@@ -285,7 +286,7 @@ def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
         for again in (plan(), plan("1:2:3")):
             with pytest.raises(ParameterError, match=f"another sweep is at work .process {os.getpid()} on "):
                 sweep.run(again, tmp_path)
-        assert cli.main(command(tmp_path)[3:]) == 2
+        assert app.main(command(tmp_path)[3:]) == 2
         assert capsys.readouterr().err.count("\n") == 1
         assert not list(tmp_path.glob("data/*"))
     with pytest.raises(ParameterError, match="holds another sweep"):

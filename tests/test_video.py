@@ -10,14 +10,15 @@ import pytest
 from matplotlib.text import Text
 
 import hapticclay as hc
-from hapticclay import cli, video
-from hapticclay.running import Running, draw, fits
-from hapticclay.stage import Stage
+from hapticclay.cli import app
+from hapticclay.views import film
+from hapticclay.views.running import Running, draw, fits
+from hapticclay.views.stage import Stage
 
 
 def lens_works():
     try:
-        video.Lens(Stage(hc.free()), 64, 64, "room").close()
+        film.Lens(Stage(hc.free()), 64, 64, "room").close()
     except hc.ParameterError as error:
         return str(error)
     return ""
@@ -34,9 +35,9 @@ def record():
 
 @needs_gl
 def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
-    images = video.frames(record, speed=4.0, size=(640, 480))
+    images = film.frames(record, speed=4.0, size=(640, 480))
     shots = [x.copy() for x in images]
-    assert len(shots) == len(video.shots(record, 4.0, 30)) and shots[0].shape == (480, 640, 3)
+    assert len(shots) == len(film.shots(record, 4.0, 30)) and shots[0].shape == (480, 640, 3)
     scene, plots = np.s_[:, :400], np.s_[:, 400:]
     for part in (scene, plots):
         changed = [int((a[part] != b[part]).any(axis=-1).sum()) for a, b in zip(shots, shots[1:], strict=False)]
@@ -50,7 +51,7 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
 @needs_gl
 def test_frame_is_quick_in_software(record):
     """Below 60 ms of processor time at 640x480; wall time says more about the neighbours than about us."""
-    images = video.frames(record, size=(640, 480))
+    images = film.frames(record, size=(640, 480))
     next(images)
     spent = []
     for _ in range(40):
@@ -68,7 +69,7 @@ def test_film_can_be_read_back(record, tmp_path, kind):
 
     if kind == "mp4":
         pytest.importorskip("imageio_ffmpeg", reason="pip install 'imageio[ffmpeg]'")
-    out = video.film(record, tmp_path / f"film.{kind}", speed=20.0, size=(320, 240))
+    out = film.film(record, tmp_path / f"film.{kind}", speed=20.0, size=(320, 240))
     if kind == "mp4":
         import imageio_ffmpeg
 
@@ -78,7 +79,7 @@ def test_film_can_be_read_back(record, tmp_path, kind):
     else:
         back = iio.imread(out, index=...)
     assert back.shape[1:3] == (240, 320)
-    assert len(back) == len(video.shots(record, 20.0, video.FPS[f".{kind}"]))
+    assert len(back) == len(film.shots(record, 20.0, film.FPS[f".{kind}"]))
     assert [p.name for p in tmp_path.iterdir()] == [f"film.{kind}"]
 
 
@@ -86,8 +87,8 @@ def filmed(folder, blocked, out="x.mp4", **env):
     """What `hapticclay video` says where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
-        "from hapticclay import cli, cli_view; cli_view.simulate_with_progress = None\n"
-        f"sys.exit(cli.main(['video', 'constant', '--out', {out!r}]))"
+        "from hapticclay.cli import app, view; view.simulate_with_progress = None\n"
+        f"sys.exit(app.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
     p = subprocess.run([sys.executable, "-c", code], cwd=folder, env=env, capture_output=True, text=True, timeout=120)
@@ -135,7 +136,7 @@ def test_smooth_pictures_have_soft_edges():
     for smooth in (False, True):
         stage = Stage(hc.free())
         stage.pose((0.6, -0.9))
-        lens = video.Lens(stage, 320, 320, "room", smooth)
+        lens = film.Lens(stage, 320, 320, "room", smooth)
         kinds.append(len(np.unique(lens.photograph().reshape(-1, 3), axis=0)))
         lens.close()
     assert kinds[1] > 1.2 * kinds[0]
@@ -155,7 +156,7 @@ def test_smooth_pictures_have_soft_edges():
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DISPLAY", ":none")
-    code = cli.main([*args, *(["--t-max", "0.1"] if args[1] == "constant" else [])])
+    code = app.main([*args, *(["--t-max", "0.1"] if args[1] == "constant" else [])])
     err = capsys.readouterr().err
     assert code == 2 and err.count("\n") == 1 and word in err
 
@@ -206,7 +207,7 @@ def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario,
 @pytest.mark.parametrize("size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str)
 def test_small_films_have_what_fits_and_whole_titles(record, size):
     """The title's box is darker than the sky behind it; a clipped one would reach the right edge of the picture."""
-    images = video.frames(record, speed=50.0, size=size)
+    images = film.frames(record, speed=50.0, size=size)
     image = next(images).astype(int)
     images.close()
     picture = image[:, : size[0] - 120] if size[0] >= 320 and size[1] >= 100 else image

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay import view
-from hapticclay.pane import Pane
-from hapticclay.player import Replay
-from hapticclay.session import FRAME, Session
+from hapticclay.views import window
+from hapticclay.views.player import Replay
+from hapticclay.views.session import FRAME, Session
+from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (apt-get install xvfb xdotool)")
@@ -185,7 +185,7 @@ def test_a_record_is_replayed(screen, tmp_path):
 
 
 def test_every_key_of_the_page_does_what_it_says():
-    from hapticclay.view import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
+    from hapticclay.views.window import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
 
     page = (Path(__file__).parents[1] / "docs" / "view.md").read_text()
     named = [k for row in re.findall(r"^\| (?!key|---)(.+?) \|.*\|$", page, re.M) for k in row.split(", ")]
@@ -232,7 +232,7 @@ def engine_snaps(low, high):
 @pytest.mark.parametrize("scale", [1e-3, 0.01, 1.0, 30.0, 1e4])
 def test_axes_hold_the_data_and_have_round_ticks(axis, scale):
     """Ticks at 1, 2 or 5 times a power of ten; no data farther outside than a line is thick."""
-    from hapticclay.pane import _snapped, _wide
+    from hapticclay.views.viewer import _snapped, _wide
 
     rng = np.random.default_rng(1)
     for a, b in rng.normal(size=(300, 2)) * scale:
@@ -251,7 +251,7 @@ def test_axes_hold_the_data_and_have_round_ticks(axis, scale):
 
 def picture(play):
     """What the viewer's process makes of it."""
-    from hapticclay.view import Window
+    from hapticclay.views.window import Window
 
     pane = Pane(play.scenario, play.tool)
     pane.take(Window(play).look([], None))
@@ -276,7 +276,7 @@ def test_both_axes_are_drawn_where_both_are_cut():
 
 
 def test_a_replay_offers_the_keys_that_act_on_it():
-    from hapticclay.view import LIVE, REPLAY, Window
+    from hapticclay.views.window import LIVE, REPLAY, Window
 
     record = hc.simulate(hc.constant_cut(t_max=0.5), every=10)
     replay = Replay(record)
@@ -317,11 +317,11 @@ def test_a_window_that_fails_leaves_the_record(monkeypatch):
 
         yield heard, say
 
-    monkeypatch.setattr(view, "_viewer", viewer)
+    monkeypatch.setattr(window, "_viewer", viewer)
     monkeypatch.setenv("DISPLAY", ":0")
     session = Session(hc.constant_cut())
     with pytest.warns(RuntimeWarning, match="no ink"):
-        view.Window(session).show()
+        window.Window(session).show()
     assert len(answers) == 30 and answers[0].anew and not answers[1].anew
     shown = [f for sight in answers for f in sight.frames[0 if sight.anew else 1 :]]
     assert shown == session.frames[: len(shown)] and len(shown) > 10  # each once, and in order

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.gate import Gate
-from hapticclay.session import Session
+from hapticclay.views.gate import Gate
+from hapticclay.views.session import Session
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::R
 
 @pytest.fixture
 def page():
-    from hapticclay.web import Page
+    from hapticclay.views.page import Page
 
     made, done = Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0), threading.Event()
     thread = threading.Thread(target=made.serve, args=(done.is_set,))
@@ -108,8 +108,8 @@ def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
 @pytest.mark.parametrize("width,height", [(580, 600), (960, 800), (1600, 1000)])
 def test_first_view_holds_arm_and_clay(scenario, width, height):
     """A pinhole camera, worked out here; 580 x 600 is what the controls leave of a page of 900 x 600."""
-    from hapticclay import scene
-    from hapticclay.web import Page
+    from hapticclay.stepping import scene
+    from hapticclay.views.page import Page
 
     page = Page(Session(scenario()), port=0)
     try:
@@ -174,7 +174,7 @@ UPGRADE = (
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_no_other_name_and_no_other_page_gets_in(host):
     """A browser sends in Host the name that it was told, and in Origin whose page it shows; with a cookie or not."""
-    from hapticclay.web import Page
+    from hapticclay.views.page import Page
 
     page = Page(Session(hc.constant_cut()), host=host, port=0)
     port = page.gate.port
@@ -240,7 +240,7 @@ def answer(port, path="/", **headers):
 
 
 def test_other_machines_need_the_token():
-    from hapticclay.web import Page
+    from hapticclay.views.page import Page
 
     page = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
     try:
@@ -263,7 +263,7 @@ def test_other_machines_need_the_token():
 
 
 def test_address_is_one_that_others_can_open():
-    from hapticclay.web import _name
+    from hapticclay.views.page import _name
 
     assert (_name("127.0.0.1"), _name("::1"), _name("box.example")) == ("127.0.0.1", "[::1]", "box.example")
     assert _name("0.0.0.0") not in ("0.0.0.0", "")
@@ -271,7 +271,7 @@ def test_address_is_one_that_others_can_open():
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_taken_or_impossible_port_is_refused(host):
-    from hapticclay.web import Page
+    from hapticclay.views.page import Page
 
     with socket.create_server((host, 0)) as s, pytest.raises(hc.ParameterError, match="cannot be listened on"):
         Page(Session(hc.constant_cut()), host=host, port=s.getsockname()[1])
@@ -290,7 +290,7 @@ def test_reset_while_the_hand_holds_goes_on(page):
 
 
 def test_player_that_dies_leaves_no_server(monkeypatch):
-    from hapticclay.web import Page
+    from hapticclay.views.page import Page
 
     page = Page(Session(hc.constant_cut()), port=0)
     monkeypatch.setattr(page.session, "advance", lambda s: 1 / 0)
@@ -303,7 +303,7 @@ def test_player_that_dies_leaves_no_server(monkeypatch):
 @contextlib.contextmanager
 def started(folder, *args, before="pass"):
     """`hapticclay view --web` as a person starts it."""
-    code = f"import sys; {before}; from hapticclay import cli; sys.exit(cli.main(sys.argv[1:]))"
+    code = f"import sys; {before}; from hapticclay.cli import app; sys.exit(app.main(sys.argv[1:]))"
     words = [sys.executable, "-c", code, "view", "constant", "--web", "--no-plots", "--out", "o", *args]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as p:
         try:

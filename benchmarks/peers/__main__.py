@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 
-from .common import PROBLEMS
+from hapticclay.common import PROBLEMS
 
 FILES = ("scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
 

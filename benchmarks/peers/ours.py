@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-import hapticclay as hc
-from hapticclay import sim
+from hapticclay.common import PROBLEMS, Result
 
-from .common import PROBLEMS, Result
+import hapticclay as hc
+from hapticclay.simulation import simulate
 
 NAME = "hapticclay"
 
@@ -19,8 +19,8 @@ def methods() -> dict[str, list[float]]:
     accurate = [4e-3, 2e-3, 1e-3, 5e-4]
     sampled = [4e-3, 2e-3, 1e-3, 3.6e-4, 1e-4]
     native: dict[str, list[float]] = {}
-    if sim.has_numba():
-        sim.compiled(), sim.compiled(accurate=True)  # before the clock runs
+    if simulate.has_numba():
+        simulate.compiled(), simulate.compiled(accurate=True)  # before the clock runs
         native["fast, native"] = [*fast, 3.6e-5, 1e-5]
         native["accurate, native"] = [*accurate, 2.5e-4, 1.6e-4]
     return {

@@ -1,0 +1,37 @@
+"""The operator's arm: fh = uh - Th p, Th = m s^2 + d s + k (Eq. 19)."""
+
+from __future__ import annotations
+
+from .scenario import Operator
+
+
+def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> tuple[float, float, float, float]:
+    """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
+
+    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
+    mass and keeps any spring stable at any step h (Newmark, beta = 1/4).
+
+    Args:
+        operator: Th; None for Th = 0.
+        H: length of the kick [s]. L, R: its shares before and after the sample.
+        h: length of the steps [s]; H, unless the kick is but a part of one between them, as at start and end.
+
+    Returns:
+        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
+        -(spring p - mass c + before v- + after v+), c the centripetal acceleration.
+    """
+    mass, damper, spring = 0.0, 0.0, 0.0
+    if operator is not None:
+        mass, damper, spring = operator.mass, operator.damper, operator.spring
+    mass = mass + 0.25 * spring * h * h
+    return spring, mass, damper * L - mass / H, damper * R + mass / H
+
+
+def impedance(spring: float, mass: float, before: float, p: float, c: float, v: float) -> float:
+    """Resisting force of the operator's arm in a kick, less the part that depends on its outcome [N].
+
+    Args:
+        spring, mass, before: from `kick`.
+        p: handle position [m]. c: its centripetal acceleration, towards the centre [m/s^2]. v: velocity before [m/s].
+    """
+    return spring * p - mass * c + before * v

@@ -1,0 +1,1 @@
+"""One run or many, and their records."""

@@ -1,0 +1,142 @@
+"""Many runs at once: on all cores, each as it would be alone."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, choice, integer
+from ..model.scenario import AXES, Scenario
+from ..stepping import scene
+from . import record
+from .simulate import NUMBA, compiled, fits, has_numba, marches, simulate
+
+KEEP = ("records", "summaries")
+BORDERS = 8  # crossings that a summary has room for
+WORKS = ("muscle", "motors", "clay", "hand_damper", "kinetic", "hand_stored", "residual", "throughput")
+SUMMARY = np.dtype(
+    [
+        ("code", "U12"),  # record.Outcome.code; the rest of it: record.status of a run made again
+        ("axis", "U1"),  # that is to blame, "" if none
+        ("time", "f8"),  # of the end, or of the verdict [s]
+        ("step", "i8"),  # last good sample
+        ("steps", "i8"),  # engine steps made
+        ("crossings", "i8"),  # number of borders crossed; of the first of them:
+        ("crossing_axis", "i8", BORDERS),  # 0 for x, 1 for y, -1 for none
+        ("crossing_time", "f8", BORDERS),  # [s], NaN for none
+        ("crossing_speed", "f8", BORDERS),  # along the axis [m/s]: the steady one, if the region was long enough
+        ("p", "f8", 2),  # at the last good sample: position [m]
+        ("v", "f8", 2),  # velocity [m/s]
+        ("fh", "f8", 2),  # force of the operator [N]
+        ("fe", "f8", 2),  # of the clay [N]
+        ("b", "f8", 2),  # damping [N.s/m]
+        *((name, "f8") for name in WORKS),  # record.Record.energy [J]
+    ]
+)
+
+
+def simulate_batch(
+    scenarios: Iterable[Scenario], *, threads: int | None = None, every: int = 1, keep: str = "records"
+) -> Any:
+    """Runs scenarios, which may differ in anything, side by side; each comes out as simulate(engine="native") has it.
+
+    Bit for bit, at any number of threads and in any order. Accurate runs, scenes that native cannot run, and all where
+    numba is not installed, run one after the other. A record takes 160 bytes a sample kept, a summary 500 bytes.
+
+    Args:
+        scenarios: what to run.
+        threads: how many at a time; None for one a core.
+        every: keep each every-th sample, and the last.
+        keep: "records" or "summaries", which keeps no samples.
+
+    Returns:
+        A list of records in the order of the scenarios; or an array of SUMMARY, shape (n,).
+
+    Raises:
+        ParameterError: one of scenarios, or another argument, is of the wrong kind.
+    """
+    jobs = list(scenarios)
+    for i, s in enumerate(jobs):
+        if not isinstance(s, Scenario):
+            raise ParameterError(f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns")
+    threads = integer("threads", cores() if threads is None else threads, 1, 1024)
+    every = integer("every", every, 1, 1_000_000)
+    summaries = choice("keep", keep, KEEP) == "summaries"
+    out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
+    native = [i for i, s in enumerate(jobs) if fits(s)]
+    module = compiled() if native and has_numba() else None
+    if module:
+        pool = module.Pool(every)
+
+        def run(i: int) -> None:
+            out[i] = entry(*pool.brief(jobs[i])) if summaries else pool.run(jobs[i])
+
+        with scene.warnings_caught():
+            _spread(native, run, min(threads, len(native)))
+    elif native and not has_numba():
+        print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
+    for i in sorted(set(range(len(jobs))) - set(native if module else ())):
+        engine = "native" if marches(jobs[i]) and has_numba() else "python"
+        r = simulate(jobs[i], every=every, engine=engine)
+        out[i] = entry(*record.brief(r)) if summaries else r
+    return out
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
+    """run(job) for each, on so many threads; the first exception ends them all and is raised."""
+    todo = iter(jobs)
+    lock = threading.Lock()
+    failed: list[BaseException] = []
+
+    def labour() -> None:
+        while not failed:
+            with lock:
+                job = next(todo, None)
+            if job is None:
+                return
+            try:
+                run(job)
+            except BaseException as error:
+                failed.append(error)
+
+    crew = [threading.Thread(target=labour) for _ in range(threads)]
+    try:
+        for thread in crew:
+            thread.start()
+        for thread in crew:
+            thread.join()
+    except BaseException as error:  # Ctrl-C
+        failed.append(error)
+        for thread in crew:
+            thread.join()
+    if failed:
+        raise failed[0]
+
+
+def entry(
+    o: record.Outcome, steps: int, crossings: Sequence[record.Crossing], last: Sequence[Any], energy: dict[str, float]
+) -> tuple[Any, ...]:
+    """A run's entry among summaries; of a record, entry(*record.brief(r)).
+
+    Args:
+        o: how it ended. steps: of the engine. crossings: of borders. last: p, v, fh, fe, b at the last good sample.
+        energy: as Record.energy.
+    """
+    first = crossings[:BORDERS]
+    rest = BORDERS - len(first)
+    return (
+        o.code, o.axis, o.time, o.step, steps, len(crossings),
+        [AXES.index(c.axis) for c in first] + [-1] * rest,
+        [c.time for c in first] + [np.nan] * rest, [c.speed for c in first] + [np.nan] * rest,
+        *last, *(energy[name] for name in WORKS),
+    )  # fmt: skip

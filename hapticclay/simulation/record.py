@@ -1,0 +1,382 @@
+"""What a run leaves behind: arrays over time, how it ended, and files that outlive the session."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import json
+import os
+import platform
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model.hardware import Coupling, Interface
+from ..model.scenario import AXES, Clay, Multisine, Operator, Profile, Scenario
+from ..theory import linear_loop
+
+SCHEMA = "hapticclay-record-1"
+ARRAYS = {
+    "t": "s",
+    "p": "m",
+    "v": "m/s",
+    "fh": "N",
+    "fe": "N",
+    "b": "N.s/m",
+    "q": "rad",
+    "qd": "rad/s",
+    "tau": "N.m",
+    "delta": "m",
+}
+EXTRA = {  # arrays that some records have
+    "removed": "m^3",
+    "removal_rate": "m^3/s",
+    "target": "m",
+    "gain": "1/kg",
+}
+SCALAR = ("t", "removed", "removal_rate")  # arrays of one figure a sample; the others have one an axis
+STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
+STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
+            their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
+            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
+        time: simulated time of the end, or of the verdict where an unstable run went on [s].
+        step: index of the last good sample.
+        axis: the axis that is to blame, "" if none.
+        cause: what happened, in words. advice: what to change, in words.
+    """
+
+    code: str
+    time: float
+    step: int
+    axis: str = ""
+    cause: str = ""
+    advice: str = ""
+
+    def __str__(self) -> str:
+        where = f": {self.axis} axis" if self.axis else ""
+        return f"{self.code}{where} at {self.time:.4f} s" + (f" ({self.cause})" if self.cause else "")
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The handle crossed a border: coordinate, border [m], time [s], speed along it [m/s]."""
+
+    axis: str
+    border: float
+    time: float
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Arrays of one run, all over the same n samples; axes ordered (x, y).
+
+    Attributes:
+        t: time [s], shape (n,); steps of dt, the last one shorter if the run ended between two.
+        p, v: handle position [m] and velocity [m/s], shape (n, 2).
+        fh, fe: force of the operator on the handle, resisting force of the clay [N], (n, 2).
+        b: damping of the clay at p [N.s/m], (n, 2).
+        q, qd: joint angles [rad] and rates [rad/s], (n, 2).
+        tau: motor torques [N.m], (n, 2). delta: compensator output [m], (n, 2).
+        scenario: what was run. outcome: how it ended. crossings: borders, in order.
+        energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
+            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored); what is
+            left over (residual) and what went through (throughput) [J].
+        extra: of runs that asked for them, by name: removed clay (n,) and its rate (n,); of sessions, the point that
+            the hand pulled to (n, 2) and the gain K (n, 2). notes: of sessions, how well they kept real time.
+        steps: engine steps made. wall_time: seconds they took. versions: of the packages used.
+    """
+
+    t: np.ndarray
+    p: np.ndarray
+    v: np.ndarray
+    fh: np.ndarray
+    fe: np.ndarray
+    b: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    tau: np.ndarray
+    delta: np.ndarray
+    scenario: Scenario
+    outcome: Outcome
+    crossings: tuple[Crossing, ...] = ()
+    energy: dict[str, float] = dataclasses.field(default_factory=dict)
+    steps: int = 0
+    wall_time: float = 0.0
+    versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
+    extra: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    notes: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def status(self) -> str:
+        """How the run ended, in one line: its code, the axis and time, and the cause."""
+        return str(self.outcome)
+
+    def ratio(self, force: np.ndarray) -> np.ndarray:
+        """force / v along each axis [N.s/m], shape (n, 2); NaN where the handle stands still."""
+        out = np.full(self.v.shape, np.nan)
+        return np.divide(force, self.v, out=out, where=np.abs(self.v) > 1e-12)
+
+    def steady(self) -> np.ndarray:
+        """Which samples have a steady speed, shape (n, 2): less than 1 % of change in 1 s, for 0.1 s."""
+        n = len(self.t)
+        if n < 3:
+            return np.zeros(self.v.shape, dtype=bool)
+        a = np.gradient(self.v, self.t, axis=0)
+        moving = np.abs(a) > STEADY * np.abs(self.v)
+        count = np.concatenate((np.zeros((1, 2)), np.cumsum(moving, axis=0)))
+        span = max(1, round(STEADY_SPAN / float(self.t[1] - self.t[0])))
+        low, high = np.maximum(np.arange(n) - span, 0), np.minimum(np.arange(n) + span + 1, n)
+        return count[high] == count[low]
+
+    def stretches(self, axis: str | None = None) -> list[np.ndarray]:
+        """Indices of the samples, split wherever the handle entered another clay; of one axis, or of either."""
+        s = self.scenario
+        if s.clay and (s.clay.x.growth or s.clay.y.growth):
+            along = {getattr(s.clay, a).along for a in ([axis] if axis else AXES)}
+            cuts = np.searchsorted(self.t, [c.time for c in self.crossings if c.axis in along])
+            change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t) - 1)])
+        else:
+            b = self.b[:, AXES.index(axis)] if axis else self.b.sum(axis=1)
+            change = np.flatnonzero(np.diff(b)) + 1
+        return np.split(np.arange(len(self.t)), change)
+
+    def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
+        """One entry for each of the `stretches` in one clay, in order of time.
+
+        For each axis: fe/v against b over the stretch (mean, spread), and where the speed is steady,
+        the speed, fe/v and fh/v there, beside K f/(10 + K b) where force and clay are constant.
+
+        Args:
+            axis: "x" or "y" for that axis and its own stretches alone.
+        """
+        if not len(self.t):
+            return []
+        steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
+        out = []
+        for piece in self.stretches(axis):
+            entry: dict[str, Any] = {"from_s": float(self.t[piece[0]]), "to_s": float(self.t[piece[-1]])}
+            for name in [axis] if axis else AXES:
+                i = AXES.index(name)
+                s = piece[steady[piece, i]]
+                b, last = float(self.b[piece[0], i]), float(self.b[piece[-1], i])
+                entry[name] = {
+                    "from_m": float(self.p[piece[0], i]),
+                    "to_m": float(self.p[piece[-1], i]),
+                    "b": b,
+                    "b_end": last,
+                    "fe_over_v": _spread(fe_v[piece, i]),
+                    "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
+                    "expected_speed": self._expected(i, b) if b == last else None,
+                    "steady_fe_over_v": _spread(fe_v[s, i]),
+                    "steady_fh_over_v": _spread(fh_v[s, i]),
+                }
+            out.append(entry)
+        return out
+
+    def _expected(self, i: int, b: float) -> float | None:
+        s = self.scenario
+        return linear_loop.steady_speed(s.gain[i], s.force[i], b) if s.operator is None and s.muscle is None else None
+
+    def summary(self) -> dict[str, Any]:
+        """Everything about the run but its arrays, ready for JSON."""
+        end = float(self.t[-1]) if len(self.t) else 0.0
+        more = {"notes": self.notes} if self.notes else {}
+        extra = {name: EXTRA[name] for name in self.extra}
+        return {
+            "schema": SCHEMA,
+            "status": self.status,
+            "outcome": dataclasses.asdict(self.outcome),
+            "scenario": dataclasses.asdict(self.scenario),
+            "crossings": [dataclasses.asdict(c) for c in self.crossings],
+            "energy": self.energy,
+            "regions": self.regions(),
+            "samples": len(self.t),
+            "steps": self.steps,
+            "simulated_time_s": end,
+            "wall_time_s": self.wall_time,
+            "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
+            "units": {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS, **extra},
+            "versions": self.versions,
+            **more,
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes record.npz and summary.json into the folder path, each whole or not at all.
+
+        Returns:
+            The folder.
+
+        Raises:
+            ParameterError: the folder cannot be made or written.
+        """
+        folder = Path(path)
+        head = {k: v for k, v in self.summary().items() if k != "regions"}
+        arrays = {name: getattr(self, name) for name in ARRAYS} | self.extra
+        with atomic(folder / "record.npz") as f:
+            np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
+        with atomic(folder / "summary.json") as f:
+            f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
+        return folder
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Record:
+        """Reads what `save` wrote; path is the folder or its record.npz.
+
+        Raises:
+            ParameterError: no record there, or not one of this schema.
+        """
+        file = Path(path)
+        file = file / "record.npz" if file.is_dir() else file
+        try:
+            if file.is_file() and not zipfile.is_zipfile(file):
+                raise ValueError("it is no .npz file")
+            with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
+                head = json.loads(str(z["summary"]))
+                arrays = {name: z[name] for name in ARRAYS}
+                extra = {name: z[name] for name in EXTRA if name in z}
+            _check(arrays | extra)
+            schema = head["schema"]
+            if schema == SCHEMA:
+                return cls(
+                    **arrays,
+                    scenario=_scenario(head["scenario"]),
+                    outcome=Outcome(**head["outcome"]),
+                    crossings=tuple(Crossing(**c) for c in head["crossings"]),
+                    energy=head["energy"],
+                    steps=head["steps"],
+                    wall_time=head["wall_time_s"],
+                    versions=head["versions"],
+                    extra=extra,
+                    notes=head.get("notes", {}),
+                )
+        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+            what = " ".join(str(error).split()) or type(error).__name__
+            raise ParameterError("record", str(path), f"must be a saved record ({what})") from None
+        raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {schema}")
+
+
+def _check(arrays: dict[str, np.ndarray]) -> None:
+    """Raises ValueError, which names the array, unless all are finite, of their shapes, and time does not go back."""
+    t = arrays["t"]
+    for name, x in arrays.items():
+        shape = (t.size,) if name in SCALAR else (t.size, 2)
+        if x.shape != shape or x.dtype != np.float64:
+            raise ValueError(f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}")
+        if not np.isfinite(x).all():
+            raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
+    if (np.diff(t) < 0.0).any():
+        raise ValueError("array t must not go back")
+
+
+def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
+    """What is left of a record without its samples: outcome, steps, crossings, the last p, v, fh, fe, b, energy."""
+    last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
+    return r.outcome, r.steps, r.crossings, last, r.energy
+
+
+def _spread(x: np.ndarray) -> dict[str, float] | None:
+    x = x[np.isfinite(x)]
+    return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
+
+
+def _scenario(d: dict[str, Any]) -> Scenario:
+    if d.get("clay"):
+        d["clay"] = Clay(**{axis: Profile(**d["clay"][axis]) for axis in AXES})
+    if d.get("operator"):
+        d["operator"] = Operator(**d["operator"])
+    for field in ("muscle", "command"):
+        if d.get(field):
+            d[field] = Multisine(**d[field])
+    if d.get("interface"):
+        coupling = d["interface"].get("coupling")
+        d["interface"] = Interface(**{**d["interface"], "coupling": Coupling(**coupling) if coupling else None})
+    return Scenario(**d)
+
+
+@functools.cache  # some milliseconds
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages a run depends on."""
+    out = {"python": platform.python_version()}
+    for package in ("hapticclay", "mujoco", "numpy", "scipy"):
+        try:
+            out[package] = version(package)
+        except PackageNotFoundError:
+            out[package] = "unknown"
+    return out
+
+
+def writable(folder: Path) -> None:
+    """Refuses a folder that cannot be made or written, before any work is done.
+
+    Raises:
+        ParameterError: as said.
+    """
+    made = [p for p in (folder, *folder.parents) if not p.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
+    finally:
+        for p in made:  # left for the run itself to make
+            with contextlib.suppress(OSError):
+                p.rmdir()
+
+
+class atomic:
+    """Opens a file to be written under a temporary name and given its own only when complete.
+
+    Raises:
+        ParameterError: the file cannot be written; nothing is left behind.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __enter__(self):
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
+        except OSError as error:
+            raise self._refusal(error) from None
+        self.temporary = Path(name)
+        self.file = os.fdopen(handle, "wb")
+        return self.file
+
+    def __exit__(self, kind, error, trace):
+        try:
+            with self.file:
+                if kind is None:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+                    umask = os.umask(0)
+                    os.umask(umask)
+                    os.fchmod(self.file.fileno(), 0o666 & ~umask)
+            if kind is None:
+                return os.replace(self.temporary, self.path)
+        except OSError as late:
+            error = error or late
+        self.temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise self._refusal(error) from None
+        return None
+
+    def _refusal(self, error: OSError) -> ParameterError:
+        return ParameterError("out", str(self.path), f"must be writable ({error.strerror or error})")

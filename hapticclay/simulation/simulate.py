@@ -1,0 +1,138 @@
+"""One run: the engine steps the arm, the loop closes around it, the record keeps what happened."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import ParameterError, choice, integer
+from ..model.scenario import Scenario
+from ..stepping import scene
+from ..stepping.leapfrog import Leapfrog
+from ..stepping.run import Run
+from ..stepping.runge_kutta import RungeKutta
+from ..stepping.sampled import Sampled
+from . import memory, record
+
+ENGINES = ("auto", "python", "native")
+STAGES = 15  # steps of the fast run that one of the accurate run costs
+SAMPLE, WIRE = 470, 480  # bytes that a run needs at its end, measured: a sample kept; a step, where there is hardware
+SMALL = 2.0**28  # [bytes] runs that need less need not ask what there is
+NATIVE_FROM = 300_000  # steps from which loading the compiled loop (a second, once per process) pays
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    every: int = 1,
+    progress: Callable[[float, float], bool | None] | None = None,
+    engine: str = "auto",
+) -> record.Record:
+    """Runs a scenario to its end.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+        engine: "python", "native" (compiled, needs hapticclay[fast]; what it cannot do, Python does, and says so) or
+            "auto": native where it is installed and the run may take 300000 steps or more (20000 of "accurate").
+        progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as "interrupted".
+
+    Returns:
+        The record. Instability and its like are outcomes (record.status), not exceptions.
+
+    Raises:
+        ParameterError: scenario, every or engine is of the wrong kind, numba is not installed, the scene is too
+            stiff for its integrator, or its record might not fit into memory.
+    """
+    if not isinstance(scenario, Scenario):
+        raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
+    every = integer("every", every, 1, 1_000_000)
+    _check_memory(scenario, every)
+    with scene.warnings_caught():
+        kind = _kind(scenario, choice("engine", engine, ENGINES))
+        run = kind(scenario, every)
+        begin = time.perf_counter()
+        run.go(progress)
+        wall = time.perf_counter() - begin
+    return run.result(wall)
+
+
+def _check_memory(scenario: Scenario, every: int) -> None:
+    """Refuses a run whose record, should it last for t_max, does not fit into memory."""
+    steps = scenario.t_max / scenario.dt
+    fixed = WIRE * steps if scenario.interface else 0.0
+    samples = math.floor(steps / every) + 2
+    if fixed + SAMPLE * samples < SMALL or fixed + SAMPLE * samples < (room := memory.left()):
+        return
+    need = f"{(fixed + SAMPLE * samples) / 1e9:.3g} GB of memory, and {max(room, 0.0) / 1e9:.3g} GB are left"
+    if room > 2.0 * fixed and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000:
+        bound = f"up to {samples} samples take {need}: keep fewer (--every {more}), or lower t_max"
+        raise ParameterError("every", every, bound)
+    raise ParameterError("t_max", scenario.t_max, f"up to {math.floor(steps)} steps take {need}: lower it")
+
+
+def _kind(scenario: Scenario, engine: str) -> type[Run]:
+    """What runs this scenario."""
+    if not fits(scenario) and not marches(scenario):
+        if engine == "native":
+            print(f"hapticclay: native runs no {_beyond(scenario)}; Python does", file=sys.stderr)
+        if scenario.interface:
+            from ..stepping.wired import Wired  # only a run with hardware pays for it
+
+            return Wired
+        return Sampled if scenario.control == "sampled" else RungeKutta
+    if engine == "native" and not has_numba():
+        raise ParameterError("engine", engine, NUMBA)
+    accurate = marches(scenario)
+    work = scenario.t_max / scenario.dt * (STAGES if accurate else 1)
+    compile_it = engine == "native" or (engine == "auto" and work >= NATIVE_FROM and has_numba())
+    native = compiled(accurate) if compile_it else None
+    if accurate:
+        return native.March if native else RungeKutta
+    return native.Native if native else Leapfrog
+
+
+def _beyond(scenario: Scenario) -> str:
+    """What native cannot do of this scenario."""
+    return "sampled control" if scenario.control == "sampled" else "'accurate' run that is driven or whose clay grows"
+
+
+def compiled(accurate: bool = False) -> Any:
+    """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails.
+
+    Args:
+        accurate: whether for an accurate run.
+    """
+    try:
+        from ..stepping import compiled
+
+        compiled.warm(accurate)
+        return compiled
+    except (ImportError, OSError, StopIteration, AttributeError) as error:  # of numba, or the engine's library
+        print(f"hapticclay: Python runs what native cannot: {error or type(error).__name__}", file=sys.stderr)
+        return None
+
+
+def fits(scenario: Scenario) -> bool:
+    """Whether native's leapfrog can run this: continuous control, the fast integrator."""
+    return scenario.control == "continuous" and scenario.integrator == "fast"
+
+
+def marches(scenario: Scenario) -> bool:
+    """Whether native can run this accurately: nothing in it may change with time."""
+    clay = scenario.clay
+    grows = clay is not None and any((*(clay.x.growth or ()), *(clay.y.growth or ())))
+    driven = scenario.muscle is not None or scenario.command is not None
+    return scenario.control == "continuous" and scenario.integrator == "accurate" and not (grows or driven)
+
+
+NUMBA = "needs numba: pip install hapticclay[fast]"
+
+
+def has_numba() -> bool:
+    """Whether the compiled loop can be had."""
+    return importlib.util.find_spec("numba") is not None

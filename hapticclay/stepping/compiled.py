@@ -1,0 +1,381 @@
+"""Runs compiled: `stride` and `march` and the laws they call, by numba, into functions that step whole runs.
+
+They call the engine's own functions at their addresses and hold no lock, so runs go on side by side in threads. The
+compiled code is kept on disk, in a folder named after the sources it was made from.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import ctypes
+import functools
+import hashlib
+import math
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import cgutils, types
+from numba.extending import intrinsic, overload
+
+from ..model import arm, clay, signals
+from ..model.clay import slab
+from ..model.scenario import AXES, NO_HAND, Scenario
+from ..simulation import record
+from . import energy, loop, march, monitor, run, scene, stride
+from .engine import mujoco
+from .inline import inline
+from .run import CHUNK, Run
+from .runge_kutta import RungeKutta
+
+FLAT = (  # laws that are compiled with their own laws written into them
+    arm.position, clay.at, clay.settle, loop.at_sample, loop.coefficients, loop.derivative, loop.entire, loop.tick,
+    stride.around, stride.enter, stride.place,
+)  # fmt: skip
+PLAIN = (
+    march.leap, march.slope, run.aim, run.root, signals.line,
+    stride.drive, stride.first_of_a_hit, stride.heading, stride.kick, stride.land, stride.limited,
+    stride.mean, stride.miss, stride.move, stride.note, stride.side, stride.stride, stride.velocity, stride.write,
+)  # fmt: skip
+LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
+LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
+NOTICE = "hapticclay: compiling, this once"
+ROOM = 64  # crossings between two looks at them
+
+
+def _pointer(builder, address, kind):
+    return builder.inttoptr(address, cgutils.ir.PointerType(kind))
+
+
+@intrinsic
+def _load(typing, address):
+    def build(context, builder, signature, args):
+        return builder.load(_pointer(builder, args[0], cgutils.ir.DoubleType()))
+
+    return types.float64(address), build
+
+
+@intrinsic
+def _store(typing, address, x):
+    def build(context, builder, signature, args):
+        builder.store(args[1], _pointer(builder, args[0], cgutils.ir.DoubleType()))
+        return context.get_dummy_value()
+
+    return types.void(address, x), build
+
+
+@intrinsic
+def _call(typing, address, a, b):
+    def build(context, builder, signature, args):
+        byte = cgutils.ir.IntType(8)
+        kind = cgutils.ir.FunctionType(cgutils.ir.VoidType(), [byte.as_pointer()] * 2)
+        builder.call(_pointer(builder, args[0], kind), [_pointer(builder, x, byte) for x in args[1:]])
+        return context.get_dummy_value()
+
+    return types.void(address, a, b), build
+
+
+overload(stride.load)(lambda address: lambda address: _load(address))  # type: ignore
+overload(stride.store)(lambda address, x: lambda address, x: _store(address, x))  # type: ignore
+overload(stride.call)(lambda address, a, b: lambda address, a, b: _call(address, a, b))  # type: ignore
+
+
+def _compiled(*functions: Any) -> list[Any]:
+    """The functions, each to be compiled when first called, or taken from the disk."""
+    for law in (*PLAIN, *FLAT):
+        body = inline(law) if law in FLAT else law
+        overload(law, jit_options=LAW, strict=False)(lambda *args, body=body: body)
+    options: Any = {"nogil": True, "error_model": "numpy"}
+    before = numba.config.CACHE_DIR
+    try:
+        numba.config.CACHE_DIR = str(folder())
+        return [numba.njit(cache=True, **options)(f) for f in functions]
+    except (OSError, RuntimeError):  # nowhere to keep it
+        return [numba.njit(**options)(f) for f in functions]
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def _whole(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
+    """stride.stride, compiled as the laws are: each law once, for it and for the others."""
+    return stride.stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room)
+
+
+def folder() -> Path:
+    """Where compiled code is kept: NUMBA_CACHE_DIR or the user's cache folder, by the sources it is made from."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    package = Path(__file__).resolve().parents[1]
+    for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
+        digest.update(file.read_bytes())
+    root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+_stride, _calm, _march, _once = _compiled(_whole, monitor.calm, march.march, march.once)
+
+
+def _addresses(*names: str) -> list[int]:
+    """Addresses of functions of the engine."""
+    library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+    found = [ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in names]
+    return [x for x in found if x is not None]
+
+
+STEP, FORWARD = _addresses("mj_step", "mj_forward")
+
+
+class Bench:
+    """Engines of one thread, used again by run after run: one with clay, one without.
+
+    Args:
+        models: to copy, by whether there is clay; those that lack are built when needed.
+    """
+
+    def __init__(self, models: dict[bool, mujoco.MjModel]):
+        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.Engine]] = {}
+        for with_clay, model in models.items():
+            self._take(with_clay, copy.copy(model))
+        self.rows = np.empty((CHUNK - 1, stride.ROW))
+
+    def _take(self, with_clay: bool, model: mujoco.MjModel) -> None:
+        data = mujoco.MjData(model)
+        views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(model)
+        at = STEP, model._address, data._address, *(x.ctypes.data for x in views)
+        self.engines[with_clay] = model, data, stride.Engine(*at)
+
+    def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The engine as scene.build(s) would make it, at rest."""
+        if (s.clay is not None) not in self.engines:
+            self._take(s.clay is not None, scene.build(s))
+        model, data, _ = self.engines[s.clay is not None]
+        model.opt.timestep = s.dt
+        for i, limit in enumerate(s.torque_limit):
+            model.actuator_ctrlrange[i] = -limit, limit
+        mujoco.mj_resetData(model, data)
+        return model, data
+
+
+class Native(Run):
+    """The leapfrog, compiled: a chunk of steps at a time, borders included.
+
+    Args:
+        bench: engines to use; None for its own.
+        quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look.
+    """
+
+    def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
+        self.bench = bench or Bench({})
+        super().__init__(scenario, every)
+        s, engine = scenario, self.bench.engines[scenario.clay is not None][2]
+        th = s.operator or NO_HAND
+        given = stride.Given(
+            s.gain, s.force, s.origin, s.torque_limit, stride.Hand(th.mass, th.damper, th.spring),
+            s.shaping, s.operator is not None, s.clay is not None, s.dt, s.t_max, self.last,
+        )  # fmt: skip
+        self.now = np.zeros(1, stride.STATE)
+        self.now["loop"] = loop.initial_state(s.start, s.velocity)
+        self.now["fine"], self.now["struck"] = math.inf, 1
+        self.now["clay"] = *self.regions.base, *self.regions.rate
+        self.now["index"] = self.regions.index
+        self.rows, self.filled = self.bench.rows, 0
+        self.crossed = np.empty((ROOM, 4))
+        given = given, _lines(self.muscle), _lines(self.command), self.regions.table, engine
+        self.given = (*given, self.now, self.rows, self.crossed)
+        w1, w2 = self.data.qvel
+        self.first = energy.stored(th, w1, w1 + w2, s.start, s.velocity)
+        self.quiet = quiet
+        self.calm = s.stop and every == 1  # so far; later `look` may want all rows once more
+        self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
+
+    def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        return self.bench.engine(self.scenario)
+
+    def advance(self) -> bool:
+        if not self.quiet:
+            self.before = self.now.copy(), self.data.qpos.copy(), self.data.qvel.copy()
+        code, self.filled, n = _stride(*self.given, CHUNK - 1, CHUNK - 1)
+        now = self.now[0]
+        self.t, self.i, self.steps = float(now["t"]), int(now["i"]), int(now["steps"])
+        for axis, *crossing in self.crossed[:n].tolist():
+            self.crossings.append(record.Crossing(AXES[int(axis)], *crossing))
+        if code == stride.NOT_FINITE:
+            raise Suspicious if self.quiet else ArithmeticError
+        if code:
+            self.finish("finished" if code == stride.FINISHED else "time limit")
+        return True
+
+    def flush(self) -> None:
+        n, self.filled = self.filled, 0
+        if self.quiet:
+            if not n or not self._still_calm(n):
+                raise Suspicious
+            if self.outcome is not None:
+                self.outcome = self.watch.end(self.outcome)
+                self.end = self.rows[n - 1, 2:].tolist()
+            self.looked += n
+            return
+        rows = self.rows[:n].T.copy()
+        good = self.judge(rows[:12], lambda: rows[12:])
+        if self.outcome is not None and self.end_time is None:  # the ledger ends with the good rows
+            self.now[:], self.data.qpos[:], self.data.qvel[:] = self.before
+            _stride(*self.given, CHUNK - 1, good)
+
+    def look(self, rows: np.ndarray) -> tuple[int, record.Outcome | None]:
+        """As Run.look, which sees the rows of a calm run only once that has ceased to be calm."""
+        if self.calm:
+            if self._still_calm(rows.shape[1]):
+                return rows.shape[1], None
+            self.calm = False
+            for index, earlier, _ in self.kept:
+                self.watch.look(earlier, int(index[0]))
+        return super().look(rows)
+
+    def _still_calm(self, n: int) -> bool:
+        """Whether n more rows hold nothing that Watch could have to say anything of but its counts, which it gets."""
+        if not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
+            return False
+        if self.outcome is not None:
+            watch = self.watch
+            watch.seen, watch.moved, watch.unbound, watch.often = self.seen.tolist()
+        return True
+
+    def brief(self) -> tuple[Any, ...]:
+        """What batch.entry takes."""
+        px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.end
+        last = (px, py), (vx, vy), (fx, fy), (bx * vx, by * vy), (bx, by)
+        return self.outcome, self.steps, self.crossings, last, self.balance()
+
+    def balance(self) -> dict[str, float]:
+        px, py, vx, vy, w1, w2 = self.now["last"][0].tolist()
+        last = energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
+        made = self.looked > 0
+        return energy.balance(self.now["work"][0].tolist(), self.first if made else last, last)
+
+
+class March(RungeKutta):
+    """The accurate run, compiled: many samples at a time, and each step on the way to a border."""
+
+    def __init__(self, scenario: Scenario, every: int):
+        super().__init__(scenario, every)
+        views = (self.data.qpos, self.data.qvel, self.data.qacc, self.data.ctrl, self.data.qfrc_applied)
+        at = (x.ctypes.data for x in views)
+        self.arm = march.Engine(FORWARD, self.model._address, self.data._address, *at)
+        self.y, self.work = np.empty(march.STATES), np.empty((6, march.STATES))
+        self.room = np.empty((CHUNK, march.ROW))
+
+    def go(self, progress: Any) -> None:
+        Run.go(self, progress)
+
+    def _given(self) -> tuple[Any, ...]:
+        y = self.y
+        y[:2], y[2:4], y[4:] = self.data.qpos, self.data.qvel, self.data.act
+        return self.c, self.regions.b(self.t), self.scenario.force, self.scenario.clay is not None, self.arm
+
+    def _take(self) -> None:
+        self.data.qpos[:], self.data.qvel[:], self.data.act[:] = self.y[:2], self.y[2:4], self.y[4:]
+
+    def advance(self) -> bool:
+        i, dt = self.i, self.scenario.dt
+        n = min(self.last - i, CHUNK - len(self.rows)) if self.t == i * dt else 0
+        if n > 0:
+            low, high = tuple(self.regions.low), tuple(self.regions.high)
+            given, rows = self._given(), self.room[:n]
+            made = _march(*given, dt, self.substeps, low, high, self.scenario.origin, self.y, self.work, rows)
+            self._take()
+            if made:
+                self.rows += rows[:made].tolist()
+                self.b += [self.regions.b(self.t)] * made
+                self.i, self.t, self.steps = i + made, (i + made) * dt, self.steps + made * self.substeps
+                return len(self.rows) >= CHUNK
+        return super().advance()
+
+    def _leap(self, h: float) -> None:
+        _once(*self._given(), h, self.y, self.work)
+        self._take()
+
+
+class Suspicious(Exception):
+    """A run to be made again, and watched."""
+
+
+class Pool:
+    """What the threads of a batch share, and what each has of its own.
+
+    Args:
+        every: keep each every-th sample, and the last.
+    """
+
+    def __init__(self, every: int):
+        self.every = every
+        self.own = threading.local()
+        self.models = {x.clay is not None: scene.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
+
+    def _go(self, scenario: Scenario, every: int, quiet: bool) -> tuple[Native, float]:
+        """The run, made, and the seconds it took."""
+        if not hasattr(self.own, "bench"):
+            self.own.bench = Bench(self.models)
+        run = Native(scenario, every, self.own.bench, quiet)
+        begin = time.perf_counter()
+        run.go(None)
+        return run, time.perf_counter() - begin
+
+    def run(self, scenario: Scenario) -> record.Record:
+        """The record of a run that native can make."""
+        run, wall = self._go(scenario, self.every, False)
+        return run.result(wall)
+
+    def brief(self, scenario: Scenario) -> tuple[Any, ...]:
+        """What batch.entry takes, of a run that native can make."""
+        if scenario.stop:
+            with contextlib.suppress(Suspicious):
+                return self._go(scenario, LAST, True)[0].brief()
+        run, wall = self._go(scenario, LAST, False)
+        return record.brief(run.result(wall))
+
+
+def _timestep(model: mujoco.MjModel) -> np.ndarray:
+    """A view of model.opt.timestep, shape (1,)."""
+    head = np.ctypeslib.as_array((ctypes.c_double * 256).from_address(model._address))
+    before = model.opt.timestep
+    found = np.ones(256, dtype=bool)
+    for mark in (0.0123456789, 0.00987654321):
+        model.opt.timestep = mark
+        found &= head == mark
+    model.opt.timestep = before
+    (at,) = np.flatnonzero(found)
+    return head[at : at + 1]
+
+
+def _lines(signal: Any) -> np.ndarray:
+    """A signals.Signal, one row a line: omega [rad/s], phase x, y [rad], amplitude x, y; none for None."""
+    if signal is None:
+        return np.zeros((0, 5))
+    return np.column_stack((signal.omega, signal.phase, np.tile(signal.amplitude, (len(signal.omega), 1))))
+
+
+@functools.cache
+def warm(accurate: bool) -> None:
+    """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
+    entry = "march.march" if accurate else "native._whole"
+    told = NOTICE if sys.stderr and sys.stderr.isatty() and not any(folder().rglob(f"{entry}-*.nbi")) else ""
+    print(end=told, file=sys.stderr, flush=True)
+    caught: list[object] = []
+    mine = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
+    try:
+        for damping in (None, slab(1.0, 0.0, 1.0)):
+            s = Scenario(clay=damping, t_max=1e-2, integrator="accurate" if accurate else "fast")
+            (March if accurate else Native)(s, 1).go(None)
+    finally:
+        print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
+    if caught:
+        raise KeyboardInterrupt

@@ -1,0 +1,293 @@
+"""Judges a run while it goes on: is it still a run, or has an axis gone unstable?"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..model.scenario import AXES, Profile, Scenario
+from ..simulation.record import Outcome
+from ..theory import linear_loop
+
+LIMITS = "oscillation against the torque limits"
+FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
+SPEED = 20.0  # [m/s] beyond any hand
+FLOOR = 1e-9  # [m/s] swings below this are rounding
+GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
+STEP = 2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
+SWINGS = 6  # consecutive swings that a verdict of growth needs
+SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
+TRANSFER = (
+    3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
+)
+CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
+MEMORY = 200  # swings that are remembered
+STILL = 1e-5  # [m/s] a handle slower than this ...
+WHILE = 1.0  # ... for so long at the time limit is stalled; motors in their limits for so long are saturated [s]
+OFTEN = 0.1  # share of its last WHILE that an unstable run which goes on spends in the torque limits, if it cycles
+
+
+class Watch:
+    """Looks at the rows of a run, chunk by chunk, for the end of its good part.
+
+    An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
+    one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
+    its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
+    of its loop in some clay that it has been in. Under a muscle force or a command that varies, growth counts only
+    above that limit: the handle may swing as it is driven. Below it, the axis must outgrow what the other may have
+    lent it.
+    """
+
+    def __init__(self, scenario: Scenario):
+        self.scenario = scenario
+        self.past = np.zeros((2, 2))  # last two velocities seen [m/s]
+        self.turn = [0.0, 0.0]  # velocity at the last turning point [m/s]
+        self.hits = [0, 0]  # samples since then with a motor in its limit
+        self.since = [0, 0]  # samples since then
+        self.seen = 0  # samples
+        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]  # where the handle has been [m]
+        self.moved = self.unbound = -1  # last sample with the handle faster than STILL; with no motor in its limit
+        self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
+        self.often = 0  # samples with a motor in its limit
+        self.onset: Outcome | None = None  # of an instability through which the run went on
+        # of the present growth: size [m/s], whether a motor was in its limit, samples
+        self.swings: list[list[tuple[float, bool, int]]] = [[], []]
+        self.largest = [0.0, 0.0]  # swing so far [m/s]
+
+    def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
+        """Judges the next rows.
+
+        Args:
+            rows: (q, p, v, fh, tau, delta), shape (12, n). first: index of the first.
+
+        Returns:
+            (number of good rows, outcome that ends the run there or None).
+        """
+        dt = self.scenario.dt
+        v, q2 = rows[4:6], rows[1]
+        good = rows.shape[1]
+        # first the question that costs little: is anything amiss at all?
+        bend = np.abs(np.sin(q2))
+        if good and not (np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD):
+            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
+            good = int(bad.argmax()) if bad.any() else good
+        if good:
+            for i in (0, 1):
+                self.least[i] = min(self.least[i], float(rows[2 + i, :good].min()))
+                self.most[i] = max(self.most[i], float(rows[2 + i, :good].max()))
+        found = self._unstable(rows[:, :good])
+        if found is not None:
+            n, axis, cause = found
+            step = first + n - 1
+            code = "limit cycle" if cause == LIMITS else "diverged"
+            verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
+            if self.scenario.stop:
+                return n, verdict
+            self.onset = self.onset or verdict
+        if good == rows.shape[1]:
+            return good, None
+        step = max(first + good - 1, 0)
+        count = [len(x) for x in self.swings]
+        above = [i for i in (0, 1) if count[i] and self._above_limit(i)]
+        axis = self._blame(above) if max(count) >= 3 or any(count[i] >= 2 for i in above) else ""
+        if axis:
+            return good, Outcome("diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis))
+        if abs(math.sin(q2[good])) < FOLD:
+            stretched = math.cos(q2[good]) > 0.0
+            code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
+            advice = "choose a force, start or origin that keeps the handle within 0.11 to 0.59 m of the shoulder"
+            return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
+        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
+        return good, Outcome("diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis))
+
+    def end(self, outcome: Outcome) -> Outcome:
+        """What there is to say of a run that came to this end, now that all its rows have been seen."""
+        s = self.scenario
+        if outcome.code == "interrupted":
+            since = self.onset
+            return replace(outcome, cause=f"{since.axis} axis: {since.cause}") if since else outcome
+        recent = max(1, min(self.seen, round(WHILE / s.dt)))
+        if self.onset is not None:
+            cycles = self.bound.sum() > OFTEN * len(self.bound)
+            cause = f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
+            return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
+        if outcome.code == "time limit":
+            if self.seen - 1 - self.unbound >= recent:
+                least = "rms" if s.muscle else "the force"
+                advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower {least}"
+                return replace(outcome, code="saturated", cause="a motor stays in its limit", advice=advice)
+            if self.seen - 1 - self.moved >= recent:
+                return replace(outcome, code="stalled", cause=f"slower than {STILL:g} m/s", advice=self._why_still())
+        share = self.often / max(self.seen, 1)
+        if share >= 0.01:
+            return replace(outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time")
+        return outcome
+
+    def _why_still(self) -> str:
+        s = self.scenario
+        if s.muscle:
+            return "raise rms"
+        if s.operator and s.operator.spring:
+            return "the spring of the hand holds the muscle's force: raise force, or lower operator.spring"
+        return "raise force, or lower b" if any(s.force) else "give a force"
+
+    def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
+        """Notes when the handle last moved, and when the motors were in their limits."""
+        last = len(bound) - 1
+        fast = np.abs(v).max(axis=0) > STILL
+        if fast.any():
+            self.moved = self.seen + last - int(fast[::-1].argmax())
+        if not bound.all():
+            self.unbound = self.seen + last - int((~bound)[::-1].argmax())
+        self.often += int(bound.sum())
+        self.seen += last + 1
+        if not self.scenario.stop:
+            self.bound = np.concatenate((self.bound, bound))[-max(1, round(WHILE / self.scenario.dt)) :]
+
+    def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
+        verdicts = {}
+        v = np.concatenate((self.past, rows[4:6]), axis=1)
+        self.past = v[:, -2:]
+        tau, limit = np.abs(rows[8:10]), np.reshape(self.scenario.torque_limit, (2, 1))
+        hit = np.zeros(v.shape[1], dtype=int)
+        bound = np.zeros(rows.shape[1], dtype=bool)
+        if np.any(tau.max(axis=1, initial=0.0) >= limit[:, 0]):
+            bound = np.asarray((tau >= limit).any(axis=0))
+            hit[2:] = np.cumsum(bound)
+        if len(bound):
+            self._count(rows[4:6], bound)
+        for i in range(2):
+            rise = v[i, 1:] > v[i, :-1]
+            turns = np.flatnonzero(rise[1:] != rise[:-1]) + 1
+            if not len(turns):
+                self.hits[i] += int(hit[-1])
+                self.since[i] += rows.shape[1]
+                continue
+            spans = np.diff(turns, prepend=1 - self.since[i])
+            self.since[i] = v.shape[1] - 1 - int(turns[-1])
+            hits = np.diff(hit[turns], prepend=-self.hits[i])
+            sizes = np.abs(np.diff(v[i, turns], prepend=self.turn[i]))
+            self.turn[i] = float(v[i, turns[-1]])
+            self.hits[i] = int(hit[-1] - hit[turns[-1]])
+            big = np.flatnonzero(sizes >= FLOOR)
+            before = -1
+            for j in big:
+                if j != before + 1:
+                    self.swings[i] = []
+                before = j
+                self._swing(i, float(sizes[j]), bool(hits[j]), int(spans[j]))
+                cause = "" if self.onset or i in verdicts else self._verdict(i)
+                if cause:
+                    verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
+                    if self.scenario.stop:
+                        break
+            if before != len(turns) - 1 and i not in verdicts:
+                self.swings[i] = []
+        if not verdicts:
+            return None
+        growing = [i for i in (0, 1) if len(self.swings[i]) >= 3]
+        axis = self._blame([i for i in growing if self._above_limit(i)] or list(verdicts))
+        n, cause = min(verdicts.values())
+        return n, axis, cause
+
+    def _swing(self, i: int, size: float, saturated: bool, span: int) -> None:
+        last = self.swings[i][-1][0] if self.swings[i] else 0.0
+        if size < (0.8 if saturated else 1.0) * last:
+            self.swings[i] = []
+        self.swings[i].append((size, saturated, span))
+        self.largest[i] = max(self.largest[i], size)
+        del self.swings[i][:-MEMORY]
+
+    def _verdict(self, i: int) -> str:
+        swings = self.swings[i]
+        if len(swings) < SWINGS:
+            return ""
+        cycle = swings[-CYCLE:]
+        if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
+            if cycle[-1][0] >= self.largest[1 - i] or self._above_limit(i):
+                return LIMITS
+        sizes = [x[0] for x in swings]
+        if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
+            return ""
+        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) <= GROWTH:
+            return ""
+        driven = self.scenario.muscle or self.scenario.command
+        if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
+            return ""
+        return "growing oscillation"
+
+    def _blame(self, axes: list[int]) -> str:
+        return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
+
+    def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
+        """Of these values of clay, that with the least gain limit of the linear loop of axis i, and this limit."""
+        return min(
+            ((b, linear_loop.gain_limit(AXES[i], b, self.scenario.operator)) for b in values), key=lambda x: x[1]
+        )
+
+    def _profile(self, i: int) -> Profile:
+        clay = self.scenario.clay
+        return getattr(clay, AXES[i]) if clay else Profile((), (0.0,))
+
+    def _above_limit(self, i: int) -> bool:
+        profile = self._profile(i)
+        k = AXES.index(profile.along)
+        first, last = (bisect.bisect_right(profile.edges, x) for x in (self.least[k], self.most[k]))
+        return self.scenario.gain[i] > self._limit(i, profile.values[first : last + 1])[1]
+
+    def _advice(self, axis: str) -> str:
+        s = self.scenario
+        i = AXES.index(axis)
+        b, limit = self._limit(i, self._profile(i).values)
+        if s.gain[i] > limit:
+            return (
+                f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "
+                f"the limit of the linear loop at b = {b:g} N.s/m"
+            )
+        if any(x[1] for x in self.swings[i]):
+            return f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m: the motors saturate"
+        if not s.shaping:
+            return "turn shaping on: the loop is stable at the nominal pose, the arm's inertia changes along the path"
+        return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+def calm(rows, n, limit1, limit2, swings, seen):
+    """Whether Watch can have nothing to say of the next n rows of a run: an easier question than its own.
+
+    It is not calm where a row is no longer a run's, or where as many swings in a row did not shrink as a verdict takes.
+
+    Args:
+        swings: of each axis, (2, 6): last two velocities, that at the last turning point [m/s], size of the last
+            swing [m/s], number of swings that did not shrink, samples since the turn with a motor in its limit.
+        seen: as Watch has them, (4,): seen, moved, unbound, often.
+    """
+    for j in range(n):
+        row = rows[j]
+        vx, vy = abs(row[4]), abs(row[5])
+        bound = abs(row[8]) >= limit1 or abs(row[9]) >= limit2
+        if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[1])) >= FOLD):
+            return False
+        if vx > STILL or vy > STILL:
+            seen[1] = seen[0]
+        if bound:
+            seen[3] += 1
+        else:
+            seen[2] = seen[0]
+        seen[0] += 1
+        for i in range(2):
+            s, v = swings[i], row[4 + i]
+            s[5] += bound
+            if (v > s[0]) != (s[0] > s[1]):
+                size = abs(s[0] - s[2])
+                grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
+                if size < FLOOR:
+                    grown = 0.0
+                s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
+                if grown >= SWINGS:
+                    return False
+            s[1] = s[0]
+            s[0] = v
+    return True

@@ -1,0 +1,151 @@
+"""The accurate run: the engine's fourth-order Runge-Kutta, with the controller's states among the engine's."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model import arm
+from ..model.scenario import NO_HAND, Scenario
+from . import energy, loop
+from .engine import mujoco
+from .run import CHUNK, Run, root
+
+REACH = 0.5  # fastest rate times step up to which an explicit step is trusted
+SUBSTEPS = 1000  # most of them for one sample
+
+
+class RungeKutta(Run):
+    """The loop as a differential equation; steps end on borders. Explicit: stiff scenes take more steps.
+
+    Raises:
+        ParameterError: the scene is so stiff that a sample would take more than 1000 steps.
+    """
+
+    def __init__(self, scenario: Scenario, every: int):
+        super().__init__(scenario, every)
+        th = scenario.operator or NO_HAND
+        b = max((*scenario.clay.x.values, *scenario.clay.y.values)) if scenario.clay else 0.0
+        fastest = (b + th.damper) * arm.TRACE_W + math.sqrt(th.spring * arm.TRACE_W)
+        self.substeps = max(1, math.ceil(scenario.dt * fastest / REACH))
+        if self.substeps > SUBSTEPS:
+            bound = f"explicit: would take {self.substeps} steps a sample in so stiff a scene; choose 'fast'"
+            raise ParameterError("integrator", scenario.integrator, bound)
+        data = self.data
+        self.c = loop.instant(scenario)
+        self.drive: Any = memoryview(data.ctrl)
+        self.push: Any = memoryview(data.qfrc_applied)
+        self.act: Any = memoryview(data.act)
+        self.first = len(data.ctrl) - len(data.act)  # of the states among the actuators
+        data.act[:8] = loop.initial_state(scenario.start, scenario.velocity)[:8]
+        self.rows: list[tuple[float, ...]] = []
+        self.b: list[tuple[float, float]] = []
+        self.start = self._stored()
+
+    def _derivative(self, t: float):
+        """The loop's derivative at time t [s], for the state that the engine holds."""
+        (q1, q2), (w1, w2) = self.angles, self.rates
+        state = tuple(self.act[:8])
+        if self.command:
+            cx, cy = self.shift(0.0, t)
+            state = (state[0] + cx, state[1] + cy, *state[2:])
+        (bx, by), (uhx, uhy) = self.regions.b(t), self.uh(t, t)
+        return loop.derivative(self.c, bx, by, uhx, uhy, q1, q2, w1, w2, state)
+
+    def _control(self, model, data) -> None:
+        command, rates, _ = self._derivative(data.time)
+        drive, push, first = self.drive, self.push, self.first
+        drive[0], drive[1], push[0], push[1] = command
+        if first == 4:
+            drive[2], drive[3] = self.regions.b(data.time)
+        for i, x in enumerate(rates, first):
+            drive[i] = x
+
+    def go(self, progress) -> None:
+        mujoco.set_mjcb_control(self._control)
+        try:
+            super().go(progress)
+        finally:
+            mujoco.set_mjcb_control(None)
+
+    def advance(self) -> bool:
+        target, after, on_grid = self.target()
+        if on_grid or not after:
+            self._keep()
+        if not after:
+            self.finish("time limit")
+            return True
+        n = self.substeps
+        for j in range(n):
+            if self._step(after / n if j < n - 1 else target - self.t, target, j == n - 1):
+                return True
+            if self.t == target:
+                break
+        return len(self.rows) >= CHUNK
+
+    def _step(self, h: float, target: float, last: bool) -> bool:
+        """One engine step of h, or to the border in its way; True at the end of the path."""
+        before = (tuple(self.angles), tuple(self.rates), tuple(self.act))
+
+        def there(h: float) -> tuple[float, float]:
+            self.angles[0], self.angles[1] = before[0]
+            self.rates[0], self.rates[1] = before[1]
+            for i, x in enumerate(before[2]):
+                self.act[i] = x
+            self._leap(h)
+            self.steps += 1
+            return self.position(self.angles, self.rates, 0.0)
+
+        p = there(h)
+        hit = [i for i in (0, 1) if not self.inside(i, p[i])]
+        if not hit:
+            if last:
+                self.i, self.t = self.i + 1, target
+            else:
+                self.t += h
+            return False
+        spans = {}
+        for i in hit:
+            up = p[i] > self.regions.high[i]
+            border = self.regions.high[i] if up else self.regions.low[i]
+            spans[i] = (root(lambda x, i=i, border=border: there(x)[i] - border, h, p[i] - border), up)
+        i = min(spans, key=lambda i: spans[i][0])
+        h, up = spans[i]
+        there(h)
+        self.t += h
+        if target - self.t <= 1e-9 * self.scenario.dt:
+            self.i, self.t = self.i + 1, target
+        speed = self._derivative(self.t)[2][2 + i]
+        if self.cross(i, up, speed):
+            self._keep()
+            self.finish("finished")
+            return True
+        return False
+
+    def _leap(self, h: float) -> None:
+        """One step of h [s] from the state that the engine holds."""
+        self.model.opt.timestep, self.data.time = h, self.t
+        mujoco.mj_step(self.model, self.data)
+
+    def _keep(self) -> None:
+        command, _, sample = self._derivative(self.t)
+        cx, cy = self.shift(0.0, self.t)
+        self.rows.append((*self.angles, *sample, *command[:2], self.act[0] + cx, self.act[1] + cy))
+        self.b.append(self.regions.b(self.t))
+
+    def flush(self) -> None:
+        rows, b = np.array(self.rows).reshape(-1, 12).T.copy(), np.array(self.b).reshape(-1, 2).T
+        self.rows, self.b = [], []
+        self.judge(rows, lambda: b)
+
+    def _stored(self) -> tuple[float, float]:
+        """Energy of the arm, and of mass and spring of the hand [J]."""
+        w1, w2 = self.rates
+        px, py, vx, vy, *_ = self._derivative(self.t)[2]
+        return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
+
+    def balance(self) -> dict[str, float]:
+        return energy.balance(self.act[8:13].tolist(), self.start, self._stored())

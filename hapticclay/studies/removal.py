@@ -1,0 +1,210 @@
+"""What the tool takes out of the clay: a map of heights over the block, and the volume removed.
+
+The tool is a round cutter of `width` that stands `depth` deep in the block and is led by the handle; clay is
+where some damping is. Nothing here needs graphics: the scene draws this map, a headless run computes it
+from the record.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, number
+from ..model.clay import there_is
+from ..model.scenario import Scenario
+from ..simulation.record import Record
+
+CELL = 2e-3  # [m] of a picture's map, at most
+SEEN, COUNTED = 10, 32  # cells, at least, in the tool's width: in a picture, where volume counts
+BEND = 5e-4  # of the width: so far may a piece of the path be from the straight line that stands for it
+MARGIN = 0.02  # of a block without borders, before the start and beyond the end of the path [m]
+HALF = 0.08  # half the breadth of a block without borders, where the path has none [m]
+
+
+@dataclass(frozen=True)
+class Tool:
+    """The cutter at the handle.
+
+    Attributes:
+        width: of its round footprint [m]. depth: of the cut [m].
+    """
+
+    width: float = 0.02
+    depth: float = 0.01
+
+    def __post_init__(self):
+        object.__setattr__(self, "width", number("tool.width", self.width, 2.0 * CELL, 0.1, unit="m"))
+        object.__setattr__(self, "depth", number("tool.depth", self.depth, 1e-4, 0.025, unit="m"))
+
+
+TOOL = Tool()
+
+
+def block(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner of the block of clay to be seen, shape (2,) each [m]; without clay, of the work area.
+
+    Where the clay has borders they are the block's; where it has none, the block reaches a little beyond the path.
+    """
+    start, length = np.array(scenario.start), scenario.length
+    low, high = start - HALF, start + HALF
+    if length is not None:
+        across = scenario.clay is not None and scenario.clay.y.along == "y"
+        low, high[0] = low.copy(), length + MARGIN
+        low[0] = start[0] - MARGIN
+        if across:
+            low[1], high[1] = start[1] - MARGIN, start[1] + 2.1 * (length - start[0]) + MARGIN
+    for i in (0, 1):
+        spans = there_is(scenario.clay, i)
+        if scenario.clay and spans and all(f != math.inf for span in spans for f in map(abs, span)):
+            low[i], high[i] = spans[0][0], spans[-1][1]
+    return low, high
+
+
+class Removal:
+    """How much of the clay is left: coverage of each cell of a grid by what the tool has passed over.
+
+    A cell that the edge of the tool passes through is covered in part, in proportion; so a straight cut has its exact
+    area whatever the cell. Along a path, no cell straddles a border of the clay.
+
+    Attributes:
+        x, y: centres of the cells [m], shape (nx,), (ny,). wide, high: sizes of the cells [m], shape (nx,), (ny,).
+        cell: the largest size. cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
+        volume: removed so far [m^3].
+    """
+
+    def __init__(
+        self, scenario: Scenario, tool: Tool = TOOL, cell: float | None = None, path: np.ndarray | None = None
+    ):
+        """For the block of the scenario, and as far beyond as the tool goes along path [m], shape (n, 2).
+
+        Args:
+            cell: largest size of a cell [m]; None for what the tool's width asks for.
+        """
+        fit = min(CELL, tool.width / SEEN) if path is None else tool.width / COUNTED
+        self.tool, self.cell = tool, number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m")
+        low, high = block(scenario)
+        spans = [there_is(scenario.clay, i) for i in (0, 1)]
+        borders: list[list[float]] = [[], []]
+        if path is not None and len(path):
+            reach = 0.5 * tool.width + self.cell
+            low, high = path.min(axis=0) - reach, path.max(axis=0) + reach
+            borders = [[e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)]
+        if np.max((high - low) / self.cell) > 20_000:
+            raise ParameterError("record", scenario.name, "the path is too long for a map of the clay")
+        lines = [_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
+        self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
+        self.wide, self.high = (np.diff(at) for at in lines)
+        left = [1.0 - _share(spans[i], lines[i]) for i in (0, 1)]
+        self.clay = 1.0 - left[1][:, None] * left[0][None, :]  # share of each cell that is clay
+        self.cut = np.zeros(self.clay.shape)
+        self.volume = 0.0
+
+    def sweep(self, a: Any, b: Any) -> float:
+        """Leads the tool from a to b [m], each (2,); returns the volume that this removes [m^3]."""
+        r, h = 0.5 * self.tool.width, self.cell
+        (ax, ay), (bx, by) = a, b
+        i = _window(self.x, min(ax, bx) - r - h, max(ax, bx) + r + h)
+        j = _window(self.y, min(ay, by) - r - h, max(ay, by) + r + h)
+        if i.start >= i.stop or j.start >= j.stop:
+            return 0.0
+        x, y = self.x[i] - ax, self.y[j] - ay
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        x, y = x[None, :], y[:, None]
+        if square > 0.0:
+            along = np.clip((x * dx + y * dy) / square, 0.0, 1.0)
+            x, y = x - along * dx, y - along * dy
+        wide, high = self.wide[i], self.high[j][:, None]
+        away = np.maximum(np.sqrt(x * x + y * y), 1e-9)
+        across = np.maximum(np.hypot(x * wide, y * high) / away, 1e-9)  # the cell, as the edge moves
+        cover = np.clip(0.5 + (r - away) / across, 0.0, 1.0)
+        cut = self.cut[j, i]
+        np.maximum(cut, cover, out=cover)
+        gained = float(((cover - cut) * self.clay[j, i] * wide * high).sum()) * self.tool.depth
+        self.cut[j, i] = cover
+        self.volume += gained
+        return gained
+
+    def heights(self, thickness: float) -> np.ndarray:
+        """Height of the clay over the ground, where its block is so thick [m], at the cells, shape (ny, nx)."""
+        return np.where(self.clay > 0.5, thickness - self.tool.depth * self.cut, 0.0)
+
+
+def removed(
+    record: Record, width: float = TOOL.width, depth: float = TOOL.depth, cell: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
+
+    Args:
+        record: of the run. width, depth: of the tool [m].
+        cell: largest of the map [m]; None for 1/32 of the width, as the accuracy asks for.
+
+    Returns:
+        (volume [m^3], rate [m^3/s]), at the samples of the record, shape (n,) each.
+
+    Raises:
+        ParameterError: a value is out of its bounds.
+    """
+    p = record.p
+    tool = Tool(width, depth)
+    volume, rate = np.zeros(len(p)), np.zeros(len(p))
+    if record.scenario.clay is None or not len(p):
+        return volume, rate
+    grid = Removal(record.scenario, tool, cell, p)
+    way = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(p, axis=0).T))))
+    moving = np.concatenate(((True,), np.diff(way) > 0.0))
+    bends = way[moving][_bends(p[moving], BEND * tool.width)]
+    knots = np.union1d(np.arange(0.0, way[-1], grid.cell), bends)
+    at = np.column_stack([np.interp(knots, way[moving], p[moving, i]) for i in (0, 1)]).tolist()
+    gained = [grid.sweep(at[0], at[0]), *(grid.sweep(a, b) for a, b in zip(at, at[1:], strict=False))]
+    total = np.cumsum(gained)
+    if len(knots) < 2:
+        return np.full(len(p), total[0]), rate
+    slope = np.diff(total) / np.maximum(np.diff(knots), 1e-300)
+    piece = np.clip(np.searchsorted(knots, way, "right") - 1, 0, len(slope) - 1)
+    return np.interp(way, knots, total), slope[piece] * np.hypot(*record.v.T)
+
+
+def _bends(p: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which points of a path (n, 2) stand for all: none is that far from the lines between them (Douglas, Peucker)."""
+    keep = np.zeros(len(p), dtype=bool)
+    keep[[0, -1]] = True
+    spans = [(0, len(p) - 1)]
+    while spans:
+        a, b = spans.pop()
+        if b - a < 2:
+            continue
+        x, y = (p[a + 1 : b] - p[a]).T
+        dx, dy = p[b] - p[a]
+        along = np.clip((x * dx + y * dy) / max(dx * dx + dy * dy, 1e-300), 0.0, 1.0)
+        off = np.hypot(x - along * dx, y - along * dy)
+        i = int(np.argmax(off))
+        if off[i] > tolerance:
+            i += a + 1
+            keep[i] = True
+            spans += [(a, i), (i, b)]
+    return keep
+
+
+def _lines(low: float, high: float, borders: list[float], cell: float) -> np.ndarray:
+    """Edges of the cells from low to high or a little beyond, one at each of the borders between them [m]."""
+    if not borders:
+        return low + cell * np.arange(max(math.ceil((high - low) / cell - 1e-9), 2) + 1)
+    ends = np.unique([low, *borders, high])
+    pieces = [np.linspace(a, b, math.ceil((b - a) / cell) + 1)[:-1] for a, b in zip(ends, ends[1:], strict=False)]
+    return np.append(np.concatenate(pieces), high)
+
+
+def _share(spans: list[tuple[float, float]], lines: np.ndarray) -> np.ndarray:
+    """Share of each cell between the lines that lies in the spans."""
+    inside = sum(np.clip(lines, low, high) - low if low > -math.inf else np.minimum(lines, high) for low, high in spans)
+    return np.diff(inside) / np.diff(lines) if spans else np.zeros(len(lines) - 1)
+
+
+def _window(centres: np.ndarray, low: float, high: float) -> slice:
+    begin, end = np.searchsorted(centres, (low, high))
+    return slice(int(begin), int(end))

@@ -1,0 +1,272 @@
+"""Spaces of parameters: ranges, and grids, Latin hypercubes and Sobol sequences of scenarios over them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import inspect
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, choice, integer
+from ..model.experiments import SCENARIOS
+from ..model.scenario import AXES, Operator, Scenario
+from ..simulation.record import versions
+
+SCHEMA = "hapticclay-sweep-2"
+DESIGNS = ("grid", "lhs", "sobol")
+LETTERS = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
+MOST = 10_000_000  # runs in one sweep
+
+
+@dataclass(frozen=True)
+class Range:
+    """Values of one parameter: n from low to high, evenly spaced or, if log, by constant factors; or a list.
+
+    Without n it is for designs that sample: anything from low to high.
+    """
+
+    low: float
+    high: float
+    n: int | None = None
+    log: bool = False
+    values: tuple[float, ...] = ()
+
+    @classmethod
+    def parse(cls, field: str, text: object) -> Range:
+        """Reads "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5"; a number or a list of them is welcome too.
+
+        Raises:
+            ParameterError: it is none of these.
+        """
+        bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5"'
+        items = text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
+        try:
+            if items is None:
+                found = re.fullmatch(LETTERS, str(text).strip())
+                if found:
+                    low, high, n = float(found["low"]), float(found["high"]), int(found["n"]) if found["n"] else None
+                    finite = math.isfinite(low) and math.isfinite(high)
+                    if not finite or n == 0 or (found["log"] and low <= 0.0) or (n != 1 and low >= high):
+                        raise ValueError
+                    return cls(low, high, n, bool(found["log"]))
+                items = str(text).split(",")
+            values = tuple(float(x) for x in items)  # type: ignore[arg-type]
+            if not values or not all(map(math.isfinite, values)):
+                raise ValueError
+        except (TypeError, ValueError):
+            raise ParameterError(field, text, bound) from None
+        return cls(min(values), max(values), len(values), False, values)
+
+    def grid(self) -> np.ndarray:
+        """The values, shape (n,)."""
+        if self.values:
+            return np.array(self.values)
+        assert self.n
+        return np.geomspace(self.low, self.high, self.n) if self.log else np.linspace(self.low, self.high, self.n)
+
+    def spread(self, u: np.ndarray) -> np.ndarray:
+        """u in [0, 1) over the range; a list is drawn from."""
+        if self.values:
+            return np.array(self.values)[(u * len(self.values)).astype(int)]
+        if self.log:
+            return self.low * (self.high / self.low) ** u
+        return self.low + (self.high - self.low) * u
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What to run.
+
+    Attributes:
+        experiment: one of SCENARIOS.
+        vary: parameter -> Range. A parameter is one of the experiment's; "gain.x" is one axis of a pair, a pair without
+            axis gets the value on both; "operator.mass" (damper, spring) puts an arm at the handle.
+        fixed: parameters of the experiment that are the same in all runs.
+        design: "grid" (all combinations, the last parameter fastest), "lhs" (Latin hypercube) or "sobol".
+        runs: of "lhs" and "sobol". seed: of both.
+        chunk: runs in one file.
+    """
+
+    experiment: str
+    vary: dict[str, Range]
+    fixed: dict[str, Any] = dataclasses.field(default_factory=dict)
+    design: str = "grid"
+    runs: int | None = None
+    seed: int = 0
+    chunk: int = 64
+
+    def __post_init__(self):
+        choice("experiment", self.experiment, tuple(SCENARIOS))
+        choice("design", self.design, DESIGNS)
+        integer("seed", self.seed, 0, 2**32 - 1)
+        integer("chunk", self.chunk, 1, 100_000)
+        if not self.vary:
+            raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
+        if (self.runs is None) != (self.design == "grid"):
+            raise ParameterError("runs", self.runs, "must be given for 'lhs' and 'sobol', and for them alone")
+        for name, r in self.vary.items():
+            if not r.values and (r.n is None) == (self.design == "grid"):
+                told = "must have a count, as in 1:1000:50log" if self.runs is None else "takes no count: runs has it"
+                raise ParameterError(name, f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}", f"{told} ({self.design})")
+        integer("runs", len(self), 1, MOST)
+        known = tuple(inspect.signature(SCENARIOS[self.experiment]).parameters)
+        for name in (*self.vary, *self.fixed):
+            head, _, part = name.partition(".")
+            if head == "operator":
+                choice("parameter", part, ("mass", "damper", "spring"))
+            else:
+                choice("parameter", head, known)
+                if part:
+                    choice(f"axis of {head}", part, AXES)
+        self.scenario(self.points(0, 1)[0])  # refuses what the first run refuses
+
+    def __len__(self) -> int:
+        if self.runs is not None:
+            return integer("runs", self.runs, 1, MOST)
+        return math.prod(r.n or 1 for r in self.vary.values())
+
+    @property
+    def chunks(self) -> int:
+        """Number of files."""
+        return -(-len(self) // self.chunk)
+
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one file."""
+        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
+
+    def points(self, first: int, last: int) -> np.ndarray:
+        """Parameters of the runs first to last - 1, shape (last - first, parameters)."""
+        axes = list(self.vary.values())
+        if self.design == "grid":
+            index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
+            return np.column_stack([r.grid()[i] for r, i in zip(axes, index, strict=True)])
+        unit = _unit(self.design, len(axes), len(self), self.seed)[first:last]
+        return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
+
+    def scenario(self, point: np.ndarray) -> Scenario:
+        """The scenario of one run.
+
+        Raises:
+            ParameterError: a value is out of its bounds.
+        """
+        make = SCENARIOS[self.experiment]
+        known = inspect.signature(make).parameters
+        given: dict[str, Any] = dict(self.fixed)
+        hand: dict[str, float] = {}
+        for name, value in zip(self.vary, point.tolist(), strict=True):
+            given[name] = value
+        plain: dict[str, Any] = {}
+        for name, value in given.items():
+            head, _, part = name.partition(".")
+            if head == "operator":
+                hand[part] = value
+                continue
+            usual = plain.get(head, known[head].default)
+            if part:
+                pair = list(usual)
+                pair[AXES.index(part)] = value
+                plain[head] = tuple(pair)
+            elif isinstance(usual, tuple) and not isinstance(value, list | tuple):
+                plain[head] = (value,) * len(usual)
+            elif isinstance(usual, bool) or known[head].annotation in ("int", int):
+                plain[head] = type(usual)(value)
+            else:
+                plain[head] = tuple(value) if isinstance(value, list) else value
+        scenario = make(**plain)
+        return dataclasses.replace(scenario, operator=Operator(**hand)) if hand else scenario
+
+    def described(self) -> dict[str, Any]:
+        """The sweep as data, from which `digest` tells two apart."""
+        return {"schema": SCHEMA, **dataclasses.asdict(self)}
+
+    def digest(self) -> str:
+        """Fingerprint of what is run, and of the release it is run with."""
+        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@functools.lru_cache(1)  # a worker is asked for it with each chunk
+def _unit(design: str, dimensions: int, runs: int, seed: int) -> np.ndarray:
+    """A sample of the unit cube, shape (runs, dimensions)."""
+    from scipy.stats import qmc
+
+    kind = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
+    with np.errstate(all="ignore"):
+        engine = kind(dimensions, rng=np.random.default_rng(seed))
+    if design == "sobol":  # balance needs a power of two; the first runs of that are taken
+        return engine.random_base2(max(0, math.ceil(math.log2(runs))))[:runs]  # type: ignore[attr-defined]
+    return engine.random(runs)
+
+
+def parse_grid(text: str) -> dict[str, Range]:
+    """Reads "b=1:1000:50log gain=0.2:2:20 force=1:2 log".
+
+    Raises:
+        ParameterError: a word is not name=range, or a name stands twice.
+    """
+    how = "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, each name once"
+    together = re.sub(r"\s+log(?!\S)", "log", text)
+    return {name: Range.parse(name, values) for name, values in _words("grid", together, how).items()}
+
+
+def parse_fixed(text: str) -> dict[str, Any]:
+    """Reads "t_max=2 shaping=true force=1,0 growth=30/s".
+
+    Raises:
+        ParameterError: a word is not name=value, or a name stands twice.
+    """
+    return {name: _value(value) for name, value in _words("fixed", text, "must be name=value, each name once").items()}
+
+
+def _words(field: str, text: str, how: str) -> dict[str, str]:
+    """Words name=value, apart; how they must look."""
+    out: dict[str, str] = {}
+    for word in text.split():
+        name, equals, value = word.partition("=")
+        if not equals or not name or name in out:
+            raise ParameterError(field, word, how)
+        out[name] = value
+    return out
+
+
+def _value(text: str) -> Any:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        parts = [float(x) for x in text.split(",")]
+    except ValueError:
+        return text
+    return parts if len(parts) > 1 else parts[0]
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Reads a sweep from TOML: experiment, design, runs, seed, chunk; tables [vary] and [fixed].
+
+    Returns:
+        Arguments of `Sweep`.
+
+    Raises:
+        ParameterError: the file cannot be read, or holds something else.
+    """
+    import tomllib
+
+    try:
+        data = tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ParameterError("spec", str(path), f"must be a TOML file ({error})") from None
+    fields = [f.name for f in dataclasses.fields(Sweep)]
+    for name in data:
+        choice("field of the spec", name, fields)
+    for name in ("vary", "fixed"):
+        if not isinstance(data.get(name, {}), dict):
+            raise ParameterError(name, data[name], "must be a table")
+    data["vary"] = {k: Range.parse(k, v) for k, v in data.get("vary", {}).items()}
+    return {"experiment": "constant", **data}

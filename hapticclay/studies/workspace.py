@@ -1,0 +1,106 @@
+"""How the coefficients of G and Sh drift over the workspace, with and without inertia shaping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import integer, number
+from ..model.scenario import AXES, L1, L2
+from .estimation import NAMES, printed
+from .identification import NOMINAL, identify, mobility
+
+BLOCKS = ("G", "S")
+MARGIN = 0.04  # [m] from the stretched and the folded arm: nearer, joint rates grow without bound
+SETTINGS: dict[str, Any] = dict(  # a mm of motion would let the pose change; without noise, a hundredth will do
+    band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """Coefficients fitted over the workspace.
+
+    Attributes:
+        x, y: where [m], (m,), points of a square grid. y >= 0: turning the arm by 180 degrees changes none of it.
+        spacing: of the grid [m].
+        coefficients: (m, 2, 2, 2, 3): without and with shaping; G and Sh; axis x and y; gain, damping, stiffness.
+        mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2), which Sh's gain should be without shaping.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    spacing: float
+    coefficients: np.ndarray
+    mobility: np.ndarray
+
+    def ranges(self) -> list[dict[str, Any]]:
+        """Lowest and highest value of each coefficient over the poses, beside the printed one."""
+        out = []
+        for j, i, n, k in np.ndindex(2, 2, 3, 2):
+            what, axis, values = BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
+            out.append(
+                {
+                    "what": what,
+                    "axis": axis,
+                    "name": NAMES[what][n],
+                    "shaping": bool(k),
+                    "printed": printed(what, axis)[n],
+                    "lowest": float(values.min()),
+                    "highest": float(values.max()),
+                }
+            )
+        return out
+
+    def summary(self) -> dict[str, Any]:
+        """Everything there is, ready for JSON."""
+        return {
+            "x": self.x.tolist(),
+            "y": self.y.tolist(),
+            "spacing": self.spacing,
+            "coefficients": self.coefficients.tolist(),
+            "order": ["pose", "shaping (off, on)", "block (G, S)", "axis (x, y)", "gain, damping, stiffness"],
+            "mobility": self.mobility.tolist(),
+            "ranges": self.ranges(),
+            "units": {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"},
+        }
+
+
+def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """World x and y [m] of the points of a square grid through the nominal pose that lie within reach, y >= 0."""
+    reach = L1 + L2
+    x = NOMINAL[0] + spacing * np.arange(
+        -np.floor((reach + NOMINAL[0]) / spacing), np.ceil((reach - NOMINAL[0]) / spacing)
+    )
+    y = NOMINAL[1] + spacing * np.arange(-np.floor(NOMINAL[1] / spacing), np.ceil((reach - NOMINAL[1]) / spacing))
+    x, y = (z.ravel() for z in np.meshgrid(x, y))
+    r = np.hypot(x, y)
+    inside = (r >= abs(L2 - L1) + MARGIN) & (r <= L1 + L2 - MARGIN)
+    return x[inside], y[inside]
+
+
+def drift_map(spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None) -> Drift:
+    """Identifies G and Sh on both axes over the workspace, without and with inertia shaping; a few minutes.
+
+    Args:
+        spacing: of the grid of poses [m], 0.01 to 0.3. seed: of the phases.
+        progress: called after each pose with (poses done, poses in all).
+
+    Raises:
+        ParameterError: a value is out of its bounds.
+    """
+    spacing = number("spacing", spacing, 0.01, 0.3, unit="m")
+    seed = integer("seed", seed, 0, 2**32 - 1)
+    x, y = poses(spacing)
+    out = np.empty((len(x), 2, 2, 2, 3))
+    for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        for k, j, i in np.ndindex(2, 2, 2):
+            found = identify(AXES[i], BLOCKS[j], origin=at, shaping=bool(k), seed=seed, **SETTINGS)
+            out[m, k, j, i] = found.values
+        if progress:
+            progress(m + 1, len(x))
+    w = np.array([mobility(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
+    return Drift(x, y, spacing, out, w)

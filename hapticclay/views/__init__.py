@@ -1,0 +1,1 @@
+"""Plots, windows, pages and films."""
