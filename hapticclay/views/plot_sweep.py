@@ -118,9 +118,9 @@ def _mesh(ax: Axes, px, py, z, why, worst: bool, how: dict[str, Any]) -> tuple[A
     """Colours the cells of a grid; gives the image, and what its legend needs: a patch for each kind without figure."""
     gx, gy = np.unique(px), np.unique(py)
     ex, ey = _edges(gx), _edges(gy)
-    shown = _cells(px, py, z, gx, gy, worst)
+    shown = _sweep_cells(px, py, z, gx, gy, worst)
     image = ax.pcolormesh(ex, ey, shown, rasterized=True, **how)
-    kind = np.where(np.isnan(shown), _cells(px, py, why, gx, gy, True), -1.0)
+    kind = np.where(np.isnan(shown), _sweep_cells(px, py, why, gx, gy, True), -1.0)
     handles = []
     for k, (name, look) in enumerate(ABSENT.items()):
         j, i = np.nonzero(kind == k)
@@ -170,7 +170,7 @@ def _edges(values: np.ndarray) -> np.ndarray:
     return np.exp(out) if log else out
 
 
-def _cells(px: np.ndarray, py: np.ndarray, z: np.ndarray, gx: np.ndarray, gy: np.ndarray, worst: bool) -> np.ndarray:
+def _sweep_cells(px: np.ndarray, py: np.ndarray, z: np.ndarray, gx: np.ndarray, gy: np.ndarray, worst: bool) -> np.ndarray:
     """z over the grid, shape (len(gy), len(gx)); NaN where there is no run."""
     i, j = np.searchsorted(gx, px), np.searchsorted(gy, py)
     out = np.full((len(gy), len(gx)), -np.inf if worst else 0.0)
