@@ -23,7 +23,7 @@ import stiffness  # noqa: E402
 import throughput  # noqa: E402
 import work_precision  # noqa: E402
 
-from hapticclay.simulation import record  # noqa: E402
+from hapticclay import files  # noqa: E402
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
@@ -73,11 +73,11 @@ def recommended(data: dict[str, dict[str, Any]]) -> str:
 def publish(out: Path, readme: Path | None = None) -> None:
     """Writes the page from the data in out, and the table in readme."""
     data = load(out)
-    with record.atomic(out / "bench.md") as f:
+    with files.atomic(out / "bench.md") as f:
         f.write(page(data).encode())
     if readme:
         head, _, rest = readme.read_text().partition(BEGIN)
-        with record.atomic(readme) as f:
+        with files.atomic(readme) as f:
             f.write(f"{head}{BEGIN}\n\n{recommended(data)}\n\n{END}{rest.partition(END)[2]}".encode())
 
 

@@ -29,7 +29,10 @@ from tqdm import tqdm  # noqa: E402
 from work_precision import number, write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.model.scenario import Clay, Multisine, Operator, Profile, Scenario  # noqa: E402
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.operator import Operator
+from hapticclay.model.scenario import Scenario  # noqa: E402
+from hapticclay.model.signals import Multisine
 
 # Ours is right if the reference says one of these; "diverged" ends a run where the reference may go on into the limits
 AGREE = {"diverged": ("unstable", "limit cycle"), "limit cycle": ("limit cycle",)}

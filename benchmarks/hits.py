@@ -30,8 +30,14 @@ from work_precision import number, write  # noqa: E402
 import oracles  # noqa: E402  isort: skip
 import hapticclay as hc  # noqa: E402
 from hapticclay.errors import ParameterError  # noqa: E402
-from hapticclay.model.clay import slab  # noqa: E402
-from hapticclay.model.scenario import AXES, L1, L2, ORIGIN, TS, Clay, Operator, Profile, Scenario  # noqa: E402
+from hapticclay.model.clay import (
+    Clay,
+    Profile,
+    slab,  # noqa: E402
+)
+from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
+from hapticclay.model.operator import Operator
+from hapticclay.model.scenario import Scenario  # noqa: E402
 from hapticclay.simulation import simulate  # noqa: E402
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]

@@ -27,8 +27,8 @@ from tqdm import tqdm  # noqa: E402
 from work_precision import machine  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.simulation import record  # noqa: E402
-from hapticclay.studies import estimation
+from hapticclay import files  # noqa: E402
+from hapticclay.studies import identification
 
 SENSORS = {
     "20000 counts, no force noise": hc.Noise(20_000, 0.0),
@@ -80,7 +80,7 @@ def page(found: list[dict[str, Any]]) -> str:
     return "\n\n".join(
         [
             "# Coverage of the intervals of `identify`",
-            f"Share of {n} seeds whose {100 * estimation.COVER:g} % interval holds the printed value, and half the "
+            f"Share of {n} seeds whose {100 * identification.COVER:g} % interval holds the printed value, and half the "
             f"median interval as a share of it. By chance alone, two thirds of the shares are within "
             f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do not edit.",
             tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],
@@ -98,9 +98,9 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
     found = summary(rows)
     print(page(found))
     if out:
-        with record.atomic(out / "intervals.json") as f:
+        with files.atomic(out / "intervals.json") as f:
             f.write((json.dumps({"machine": machine(), "rows": found}, indent=1) + "\n").encode())
-        with record.atomic(out / "intervals.md") as f:
+        with files.atomic(out / "intervals.md") as f:
             f.write(page(found).encode())
     return found
 

@@ -28,21 +28,22 @@ from work_precision import write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
 from hapticclay.model.hardware import Coupling, Interface  # noqa: E402
-from hapticclay.model.scenario import Multisine  # noqa: E402
-from hapticclay.stepping import energy, scene  # noqa: E402
+from hapticclay.model.signals import Multisine  # noqa: E402
+from hapticclay.stepping import energy, engine
+from hapticclay.views import stage  # noqa: E402
 
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:
     """The arm with these parts of mjcf/, and what change adds."""
-    spec = scene._compose(["arm.xml", *files])
+    spec = engine._compose(["arm.xml", *files])
     if change:
         change(spec)
     return spec.compile()
 
 
 def _skin(spec: Any) -> None:
-    for body, *skin in scene.SKIN:
-        scene._skin(spec.body(body) if body else spec.worldbody, *skin[:-1], "")
+    for body, *skin in stage.SKIN:
+        stage._skin(spec.body(body) if body else spec.worldbody, *skin[:-1], "")
 
 
 def _sensors(spec: Any) -> None:
@@ -61,7 +62,7 @@ def _contact(spec: Any) -> None:
 
 
 def _heights(spec: Any) -> None:
-    scene._block(spec, scene.Block((0.0, 0.0), (0.2, 0.2), 200, 200, 0.03, np.zeros((16, 16, 3))))
+    stage._block(spec, stage.Block((0.0, 0.0), (0.2, 0.2), 200, 200, 0.03, np.zeros((16, 16, 3))))
 
 
 ENGINE: dict[str, Callable[[], mujoco.MjModel]] = {

@@ -30,7 +30,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG  # noqa: E402
 
-from hapticclay.model.scenario import Profile, Scenario  # noqa: E402
+from hapticclay.model.clay import Profile
+from hapticclay.model.scenario import Scenario  # noqa: E402
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
 STILL, WHILE = 1e-5, 1.0  # [m/s], [s] stalled is slower than this for so long; saturated, in the limit for so long

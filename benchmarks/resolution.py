@@ -24,8 +24,8 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import machine, number  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.model.scenario import B_CONSTANT, L2, TS  # noqa: E402
-from hapticclay.simulation import record  # noqa: E402
+from hapticclay import files  # noqa: E402
+from hapticclay.model.constants import B_CONSTANT, L2, TS  # noqa: E402
 from hapticclay.theory import linear_loop
 
 FORCE = 5.0  # [N] of the hand: 5 cm/s in the clay
@@ -94,9 +94,9 @@ def main(out: Path | None, **kw: Any) -> list[dict[str, Any]]:
     rows = measure(**kw)
     print(page(rows))
     if out:
-        with record.atomic(out / "resolution.json") as f:
+        with files.atomic(out / "resolution.json") as f:
             f.write((json.dumps({"rows": rows}, indent=1, allow_nan=False) + "\n").encode())
-        with record.atomic(out / "resolution.md") as f:
+        with files.atomic(out / "resolution.md") as f:
             f.write(page(rows).encode())
     return rows
 

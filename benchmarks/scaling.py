@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from tabulate import tabulate  # noqa: E402
 from work_precision import write  # noqa: E402
 
-from hapticclay.simulation.record import atomic  # noqa: E402
+from hapticclay.files import atomic  # noqa: E402
 from hapticclay.studies import sweep  # noqa: E402
 from hapticclay.studies.sampling import Sweep, parse_grid  # noqa: E402
 

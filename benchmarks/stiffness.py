@@ -26,8 +26,8 @@ from tabulate import tabulate  # noqa: E402
 from work_precision import number, write  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.model.scenario import S  # noqa: E402
-from hapticclay.stepping.scene import warnings_caught  # noqa: E402
+from hapticclay.model.constants import S  # noqa: E402
+from hapticclay.stepping.engine import warnings_caught  # noqa: E402
 
 T = 2.0  # [s] simulated
 SWEEP = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)

@@ -30,7 +30,7 @@ from tabulate import tabulate  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.simulation import record  # noqa: E402
+from hapticclay import files  # noqa: E402
 
 PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
 DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "numba", "control", "pybullet", "drake", "pin")
@@ -199,7 +199,7 @@ def draw(rows: list[dict], problem: str):
     import matplotlib
     from matplotlib.figure import Figure
 
-    from hapticclay.views.run_plots import STYLE
+    from hapticclay.views.style import STYLE
 
     mine = [r for r in rows if r["problem"] == problem]
     kinds = [k for k in ERRORS if any(r[k] is not None for r in mine)]
@@ -337,7 +337,7 @@ def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
     problems = list(PROBLEMS)[: 1 if quick else None]
     rows, omissions = measure(quick, problems)
     for problem in problems:
-        with record.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
+        with files.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
             draw(rows, problem).savefig(f, format="png")
     found = {"omissions": omissions, "rows": rows, "hybrid": against_hybrid(quick)}
     return write(out, "work_precision", found)
@@ -346,7 +346,7 @@ def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
 def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
     """Writes out/name.json, with schema and machine; returns what it holds."""
     data = {"schema": f"hapticclay-{name.replace('_', '-')}-2", "machine": machine(), **found}
-    with record.atomic(out / f"{name}.json") as f:
+    with files.atomic(out / f"{name}.json") as f:
         f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
     return data
 

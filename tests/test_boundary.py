@@ -13,11 +13,11 @@ from oracles import Linear
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
 from hapticclay.studies.boundary import Loop
 from hapticclay.theory import gain_limit, linear_loop
-from hapticclay.views import plot_boundary
+from hapticclay.views import study_plots
 
 
 @settings(max_examples=10)
@@ -177,7 +177,7 @@ def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(po
 
 
 def test_picture_shows_the_map_with_units(poses, tmp_path):
-    figure = plot_boundary.boundaries(poses)
+    figure = study_plots.boundaries(poses)
     ax = figure.axes[0]
     assert "[cm]" in ax.get_xlabel() and "[1/kg]" in ax.get_ylabel()
     shown = {line.get_label(): line for line in ax.lines}

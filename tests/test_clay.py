@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from hapticclay.errors import ParameterError
 from hapticclay.model import clay
-from hapticclay.model.scenario import Clay, Profile
+from hapticclay.model.clay import Clay, Profile
 
 
 @given(st.floats(0, 1e9), st.floats(1e-6, 1e-1))

@@ -14,8 +14,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli import app as cli_words
 from hapticclay.cli import run as cli_run
-from hapticclay.cli import words as cli_words
 from hapticclay.views import run_plots
 
 

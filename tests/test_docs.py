@@ -9,9 +9,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.model import scenario
+from hapticclay.model import constants
 from hapticclay.simulation import record
-from hapticclay.stepping import scene
+from hapticclay.stepping import engine
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -37,7 +37,7 @@ def test_stability_page_says_what_its_snippets_print():
 def test_every_limit_in_the_stability_page_is_recomputed():
     text = (ROOT / "docs" / "stability.md").read_text()
     rows = re.findall(r"^\| ([xy]) \| (nominal|none) \| (\d+) \|(.*)\|$", text, re.M)
-    Ts = scenario.TS
+    Ts = constants.TS
     columns = ({}, dict(Ts=Ts), dict(Ts=Ts, delay=Ts), dict(delay=1e-3), dict(Ts=Ts, render="implicit"))
     assert len(rows) == 12
     for axis, hand, b, cells in rows:
@@ -90,8 +90,8 @@ def test_inertias_in_the_documents_are_those_of_the_model():
     model = hc.build(hc.free())
     link1 = model.body("link1").inertia[2]
     assert repr(float(link1)) in text
-    assert repr(scenario.L1**2 / scenario.S[0].gain) in text and repr(scenario.L2**2 / scenario.S[1].gain) in text
-    mujoco.MjModel.from_xml_path(str(scene.folder() / "arm.xml"))
+    assert repr(constants.L1**2 / constants.S[0].gain) in text and repr(constants.L2**2 / constants.S[1].gain) in text
+    mujoco.MjModel.from_xml_path(str(engine.folder() / "arm.xml"))
 
 
 def test_every_public_name_has_a_docstring():

@@ -12,8 +12,9 @@ from oracles import G0, G1, Linear, piecewise_linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.model.scenario import Clay, Multisine, Operator, Profile
-from hapticclay.model.signals import Signal
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.operator import Operator
+from hapticclay.model.signals import Multisine, Signal
 
 TH = (0.25, 2.0, 6.0)
 

@@ -6,7 +6,7 @@ from oracles import Linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.stepping import run
+from hapticclay.stepping import engine
 
 
 def exact_clay_and_hand(b, K, uh, th):
@@ -61,14 +61,14 @@ def test_residual_with_a_hand_is_small_and_converges():
 
 def test_an_engine_that_disobeys_shows_in_the_balance(monkeypatch):
     """The dampers left out of the engine, as a wrong model would: the residual tells."""
-    plain = run.scene.build
+    plain = engine.scene.build
 
     def build(scenario):
         model = plain(scenario)
         model.actuator_gainprm[2:] = 0.0
         return model
 
-    monkeypatch.setattr(run.scene, "build", build)
+    monkeypatch.setattr(engine.scene, "build", build)
     e = hc.simulate(hc.constant_cut(t_max=2.0)).energy
     assert abs(e["residual"]) > 1e-3 * e["throughput"]
 

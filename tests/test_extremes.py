@@ -16,7 +16,8 @@ import extremes
 import reference
 
 import hapticclay as hc
-from hapticclay.model.scenario import Clay, Multisine, Profile
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.signals import Multisine
 
 CASES = extremes.cases()
 LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",

@@ -16,8 +16,10 @@ import hits
 import reference
 
 import hapticclay as hc
-from hapticclay.model.clay import slab
-from hapticclay.model.scenario import TS, Clay, Operator, Profile, Scenario
+from hapticclay.model.clay import Clay, Profile, slab
+from hapticclay.model.constants import TS
+from hapticclay.model.operator import Operator
+from hapticclay.model.scenario import Scenario
 
 REBOUND = Scenario(
     clay=slab(1e4, 0.05, 0.15), force=(-0.5, 0.0), velocity=(0.3, 0.0), start=(0.03, 0.0),

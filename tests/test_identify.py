@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.studies import estimation
-from hapticclay.studies.estimation import fit, response
-from hapticclay.studies.identification import measured
+from hapticclay.studies import identification
+from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -53,7 +52,7 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
     """The fitted form is the loop's own difference equation; what is left is 1e-6, and for Sh the pose: (p/l1)^2."""
     r = quick(what, axis)
     left = 1e-4 if what == "S" else 1e-6
-    assert [c.name for c in r.coefficients] == list(estimation.NAMES[what])
+    assert [c.name for c in r.coefficients] == list(identification.NAMES[what])
     np.testing.assert_allclose(r.values, PRINTED[what + axis], rtol=left)
     assert [c.printed for c in r.coefficients] == list(PRINTED[what + axis])
     assert np.all(r.coherence > 1.0 - 1e-6)
@@ -131,7 +130,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
         r = np.cos(2 * np.pi * np.outer(t, bins) + rng.uniform(0, 2 * np.pi, len(bins))).sum(axis=1)
         # as much noise in each bin as signal: variance n/4 per line, over n/2 bins
         signals.append((r, r + rng.normal(0.0, np.sqrt(n / 4), n), 2.0 * r))
-    H, deviation, coherence, _ = estimation.estimate(np.array(signals), n, bins)
+    H, deviation, coherence, _ = identification.estimate(np.array(signals), n, bins)
     assert np.abs(H.mean() - 2.0) < 4.0 * np.sqrt(np.mean(deviation**2) / len(bins))
     assert 0.35 < coherence.mean() < 0.65
 
@@ -194,9 +193,9 @@ def test_drift_over_the_workspace(drift):
 
 
 def test_map_is_drawn(drift):
-    from hapticclay.views import plot_identify
+    from hapticclay.views import study_plots
 
-    figure = plot_identify.workspace(drift)
+    figure = study_plots.workspace(drift)
     assert [ax.get_xlabel() for ax in figure.axes[2:4]] == ["world x [m]", "world x [m]"]
     figure.savefig("/dev/null", format="png")
 

@@ -72,7 +72,7 @@ def test_inlining_the_loop_is_quick():
     import time
     from pathlib import Path
 
-    from hapticclay.stepping import glide, loop
+    from hapticclay.stepping import leapfrog, loop
 
     source = Path(loop.__file__).read_text()
     ratios = []
@@ -80,7 +80,7 @@ def test_inlining_the_loop_is_quick():
         begin = time.perf_counter()
         compile(source, "loop.py", "exec")
         middle = time.perf_counter()
-        inline.inline(glide.advance)
+        inline.inline(leapfrog.advance)
         ratios.append((time.perf_counter() - middle) / (middle - begin))
     assert min(ratios) < 200
 

@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm, interface
-from hapticclay.model.scenario import TS, Clay, Operator, Profile
+from hapticclay.model import arm, hardware
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.constants import TS
+from hapticclay.model.operator import Operator
 from hapticclay.theory import gain_limit
 
 EVERYWHERE = Profile((), (90.0,))
@@ -109,17 +111,17 @@ def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
 @given(st.floats(-20.0, 20.0), st.integers(2, 24), st.floats(0.1, 100.0))
 def test_a_converter_is_off_by_half_a_level_and_ends_at_its_range(x, bits, span):
     level = 2.0 * span / 2**bits
-    y = interface.converted(x, bits, span)
+    y = hardware.converted(x, bits, span)
     assert -span <= y <= span - level * (1.0 - 1e-12)
     if -span <= x <= span - level:
         assert abs(y - x) <= 0.5 * level * (1.0 + 1e-9)
-    assert interface.converted(y, bits, span) == y  # idempotent
+    assert hardware.converted(y, bits, span) == y  # idempotent
     assert abs(y / level - round(y / level)) < 1e-6
 
 
 @given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=20), st.integers(2, 16))
 def test_converters_are_monotone(xs, bits):
-    ys = [interface.converted(x, bits, 5.0) for x in sorted(xs)]
+    ys = [hardware.converted(x, bits, 5.0) for x in sorted(xs)]
     assert ys == sorted(ys)
 
 
@@ -127,16 +129,16 @@ def test_converters_are_monotone(xs, bits):
 def test_quantisation_error_has_the_variance_of_a_uniform_one(bits):
     rng = np.random.default_rng(0)
     x, level = rng.uniform(-4.0, 4.0, 200_000), 10.0 / 2**bits
-    error = np.array([interface.converted(v, bits, 5.0) for v in x]) - x
+    error = np.array([hardware.converted(v, bits, 5.0) for v in x]) - x
     # mean of n uniform errors: level/sqrt(12 n); variance of the squares: level^4/180; five sigma
     assert abs(error.mean()) < 5.0 * level / math.sqrt(12 * len(x))
     assert abs((error**2).mean() - level**2 / 12) < 5.0 * level**2 / math.sqrt(180 * len(x))
 
 
 def test_halves_go_to_the_even_level():
-    assert [interface.rounded(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
-    assert interface.encoded(math.tau * 3 / 1000, 1000) == pytest.approx(math.tau * 3 / 1000, rel=1e-15)
-    assert interface.encoded(0.123, None) == 0.123
+    assert [hardware.rounded(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
+    assert hardware.encoded(math.tau * 3 / 1000, 1000) == pytest.approx(math.tau * 3 / 1000, rel=1e-15)
+    assert hardware.encoded(0.123, None) == 0.123
 
 
 def test_in_a_run_torques_lie_on_levels_within_the_range():
@@ -154,7 +156,7 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
 def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
     at = lambda k: (1.0 + k * Ts * w1, -0.5 + k * Ts * w2)  # noqa: E731
-    found = interface.difference(tuple((j, at(j)) for j in range(-window, 0)), 0, at(0), Ts)
+    found = hardware.difference(tuple((j, at(j)) for j in range(-window, 0)), 0, at(0), Ts)
     assert found == pytest.approx((w1, w2), abs=16 * EPS / (window * Ts))
 
 
@@ -162,8 +164,8 @@ def test_window_divides_the_noise_of_an_encoder():
     """m samples hold n or n + 1 counts, the latter as often as the fraction f says: rms sqrt(f (1 - f)) of a count."""
     counts, Ts, w = 4096, 1e-3, 0.7391
     for m in (1, 4, 16):
-        q = [interface.encoded(w * k * Ts, counts) for k in range(4000)]
-        v = np.array([interface.difference(((k - m, (q[k - m], 0.0)),), k, (q[k], 0.0), Ts)[0] for k in range(m, 4000)])
+        q = [hardware.encoded(w * k * Ts, counts) for k in range(4000)]
+        v = np.array([hardware.difference(((k - m, (q[k - m], 0.0)),), k, (q[k], 0.0), Ts)[0] for k in range(m, 4000)])
         step = math.tau / counts / (m * Ts)
         np.testing.assert_allclose(v / step, np.round(v / step), atol=1e-6)
         assert np.abs(v - w).max() < step  # two roundings of half a count
@@ -180,7 +182,7 @@ def test_velocity_filter_is_an_exact_first_order_lag_of_held_means():
     a = cont2discrete((np.array([[-w]]), np.array([[w]]), np.eye(1), np.zeros((1, 1))), Ts)
     rng, y, z = np.random.default_rng(1), 0.0, 0.0
     for u in rng.standard_normal(50):
-        y, z = interface.smoothed(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
+        y, z = hardware.smoothed(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
         assert y == pytest.approx(z, abs=1e-12)
 
 
@@ -213,24 +215,24 @@ def test_difference_lags_half_its_window_in_a_run():
 def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
     from scipy import signal
 
-    A, B = interface.butterworth(cutoff, order, TS)
+    A, B = hardware.butterworth(cutoff, order, TS)
     b, a = signal.butter(order, math.tau * cutoff, analog=True)
     n, d, _ = signal.cont2discrete((b, a), TS, method="zoh")
     u = np.random.default_rng(2).standard_normal(200)
     x, y = (0.0,) * order, []
     for v in u:
         y.append(x[0])
-        x = interface.filtered(A, B, x, v)
+        x = hardware.filtered(A, B, x, v)
     np.testing.assert_allclose(y, signal.lfilter(n[0], d, u), atol=1e-9)  # polynomials of order 2 near z = 1
     still = (0.0,) * order
     for _ in range(20_000):
-        still = interface.filtered(A, B, still, 1.0)
+        still = hardware.filtered(A, B, still, 1.0)
     assert still[0] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_noise_has_its_rms_and_each_part_its_own_stream():
     n = 20_000
-    a, b = (interface.Chance(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
+    a, b = (hardware.Chance(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
     noise = np.array([a(k)[2] for k in range(n)])
     assert np.all(np.abs(noise.std(axis=0) - 0.3) < 5 * 0.3 / math.sqrt(2 * n))
     assert np.abs(np.corrcoef(noise.T)[0, 1]) < 5 / math.sqrt(n)
@@ -242,7 +244,7 @@ def test_noise_has_its_rms_and_each_part_its_own_stream():
 
 def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
     n, rms = 20_000, 0.28 * TS
-    c = interface.Chance(hc.Interface(jitter=rms))
+    c = hardware.Chance(hc.Interface(jitter=rms))
     late = np.array([c(k)[0] for k in range(n)])
     assert late[0] == 0.0 and np.all(np.diff(np.arange(n) * TS + late) > 0.0)
     assert abs(late.std() - rms) < 5 * rms / math.sqrt(5 * n)  # kurtosis 9/5: variance of the variance 4/5 rms^4/n
@@ -321,7 +323,7 @@ def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(a
 )  # fmt: skip
 def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
     a12 = share * math.sqrt(a11 * a22)
-    f = interface.stuck(w, a11, a12, a22, limit)
+    f = hardware.stuck(w, a11, a12, a22, limit)
     after = (w[0] + a11 * f[0] + a12 * f[1], w[1] + a12 * f[0] + a22 * f[1])
     for j in (0, 1):
         assert abs(f[j]) <= limit[j]
@@ -368,7 +370,7 @@ def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
 
 @given(st.floats(-1e-3, 1.0), st.floats(0.0, 1e6), st.floats(-2.0, 2.0), st.floats(1e-5, 1e-2), st.floats(0.05, 5.0))
 def test_the_controllers_force_is_never_active_in_the_hold(energy, b, v, Ts, W):
-    f = interface.guarded(energy, b * v, v, Ts, W)
+    f = hardware.guarded(energy, b * v, v, Ts, W)
     gain = Ts * f * (v - 0.5 * Ts * W * f)
     assert f * v >= 0.0
     best = 0.5 * v * v / W
@@ -385,7 +387,7 @@ def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, b):
     assume(2.0 * W * -energy < 1e-3 * v * v)
     need = -energy / (Ts * v)
     assume(need > b * v)
-    assert interface.guarded(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
+    assert hardware.guarded(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
 
 
 @pytest.mark.parametrize("b", [8e3, 1e6])
@@ -422,7 +424,7 @@ def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exac
 
 @given(st.floats(0.0, 1e9), st.floats(1.0, 1e5), st.floats(0.1, 1e3), st.floats(-1.0, 1.0), st.floats(1e-5, 1e-2))
 def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k, d, v, Ts):
-    tool, u = interface.coupled(0.0, 0.0, v, b, k, d, Ts)
+    tool, u = hardware.coupled(0.0, 0.0, v, b, k, d, Ts)
     assert abs(b * u) <= min(b, d + k * Ts) * abs(v) * (1.0 + 1e-12)
     assert b * u == pytest.approx(k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v)))
 
@@ -430,7 +432,7 @@ def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k
 def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     tool, b, v, Ts = 0.0, 90.0, 0.1, 1e-3
     for i in range(3000):
-        tool, u = interface.coupled(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
+        tool, u = hardware.coupled(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 

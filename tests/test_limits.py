@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.theory import gain_limit, linear_loop
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}

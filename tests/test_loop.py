@@ -8,8 +8,8 @@ import pytest
 from oracles import Arm
 
 import hapticclay as hc
-from hapticclay.model.scenario import Operator
-from hapticclay.stepping import glide, inline, leapfrog
+from hapticclay.model.operator import Operator
+from hapticclay.stepping import inline, leapfrog
 
 CASES = {
     "plain": hc.constant_cut(t_max=1.0),
@@ -29,7 +29,7 @@ def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
     monkeypatch.setattr(leapfrog, "_fused", {})
     monkeypatch.setattr(leapfrog, "FUSE_FROM", 10**9)
     plain = hc.simulate(CASES[name])
-    assert not leapfrog._fused and inline.inline(glide.advance) is not glide.advance
+    assert not leapfrog._fused and inline.inline(leapfrog.advance) is not leapfrog.advance
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(fused, field), getattr(plain, field), err_msg=field)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from oracles import Linear, piecewise_linear
 
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop
 
 TH = Operator()

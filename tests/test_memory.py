@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation import memory, simulate
+from hapticclay.simulation import simulate
 
 GB = 10**9
 WIRED = dataclasses.replace(hc.constant_cut(control="sampled", dt=1e-4, t_max=1.5), interface=hc.Interface())
@@ -32,11 +32,11 @@ def machine(root, files):
       "sys/fs/cgroup/memory/memory.usage_in_bytes": "1200000\n", "sys/fs/cgroup/memory/memory.stat": ""}, -200_000),
 ])  # fmt: skip
 def test_the_least_of_machine_and_container_counts(files, left, tmp_path):
-    assert memory.left(machine(tmp_path, files)) == left
+    assert simulate.left(machine(tmp_path, files)) == left
 
 
 def test_there_is_less_left_than_installed():
-    assert 0 < memory.left() < 1e14
+    assert 0 < simulate.left() < 1e14
 
 
 @pytest.mark.parametrize("scenario,engine,every", [
@@ -58,7 +58,7 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
     assert record.outcome.code == "time limit"  # so it took what the longest run would
     monkeypatch.setattr(simulate, "SMALL", 0.0)
     for left, fits in ((0.9 * peak, False), (1.5 * peak, True)):
-        monkeypatch.setattr(memory, "left", lambda left=left: left)
+        monkeypatch.setattr(simulate, "left", lambda left=left: left)
         if fits:
             simulate._check_memory(scenario, every)
         else:
@@ -67,7 +67,7 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
 
 
 def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
-    monkeypatch.setattr(memory, "left", lambda: 4.0 * GB)
+    monkeypatch.setattr(simulate, "left", lambda: 4.0 * GB)
     monkeypatch.setattr(simulate, "_kind", lambda *a: pytest.fail("ran"))
     scenario = hc.constant_cut(dt=1e-6)
     with pytest.raises(hc.ParameterError) as error:
@@ -82,7 +82,7 @@ def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
 
 
 def test_no_every_helps_where_each_step_is_remembered(monkeypatch):
-    monkeypatch.setattr(memory, "left", lambda: 4.0 * GB)
+    monkeypatch.setattr(simulate, "left", lambda: 4.0 * GB)
     with pytest.raises(hc.ParameterError, match="t_max = 10000.0: up to 100000000 steps take"):
         hc.simulate(dataclasses.replace(WIRED, t_max=1e4), every=1000)
 

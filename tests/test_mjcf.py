@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.model.scenario import Multisine
-from hapticclay.stepping import scene
+from hapticclay.model.signals import Multisine
+from hapticclay.stepping import engine
+from hapticclay.views import stage
 
 
 def test_operational_inertia_at_home_is_read_from_the_engine():
@@ -77,7 +78,7 @@ def test_looking_at_a_run_leaves_its_model_as_it_is():
     """Pictures have a model of their own."""
     s = hc.constant_cut()
     before = binary(hc.build(s))
-    scene.picture(None, (0.01, 0.005))
+    stage.picture(None, (0.01, 0.005))
     assert binary(hc.build(s)) == before
 
 
@@ -109,8 +110,8 @@ def test_scenario_sets_step_and_torque_limits():
 
 
 def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
-    with scene.warnings_caught() as caught:
-        model = mujoco.MjModel.from_xml_path(str(scene.folder() / "scene.xml"))
+    with engine.warnings_caught() as caught:
+        model = mujoco.MjModel.from_xml_path(str(engine.folder() / "scene.xml"))
         data = mujoco.MjData(model)
         rng = np.random.default_rng(1)
         for _ in range(1000):

@@ -14,7 +14,8 @@ from test_loop import CASES
 
 import hapticclay as hc
 from hapticclay import stepping
-from hapticclay.model.scenario import Clay, Multisine, Profile
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.signals import Multisine
 from hapticclay.simulation import batch, record, simulate
 from hapticclay.stepping import leapfrog
 
@@ -112,12 +113,12 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     for run in (late, watched):
         run.go(None)
     assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
-    same(late.result(0.0), watched.result(0.0))
+    same(Record.of(late, 0.0), Record.of(watched, 0.0))
     assert late.watch.seen == watched.watch.seen >= late.looked
     calm = compiled.Native(hc.constant_cut(), 1)
     calm.watch.look = None  # is not called
     calm.go(None)
-    same(calm.result(0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
+    same(Record.of(calm, 0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
 
 
 @fast

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.model import arm
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.stepping import leapfrog, monitor
 
 CODES = {"finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"}
@@ -173,7 +173,7 @@ def test_numbers_beyond_floating_point_end_the_run(monkeypatch):
         run._careful()
     run.state = (*run.state[:6], 1e300, 1e300, *run.state[8:])
     run.go(None)
-    r = run.result(1.0)
+    r = Record.of(run, 1.0)
     assert r.outcome.code in ("diverged", "out of reach", "singular")
     check_finite(r)
 

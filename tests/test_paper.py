@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from hapticclay.model import scenario
+from hapticclay.model import constants, operator, scenario
 from hapticclay.paper import ledger, report
 
 SOURCE = Path(scenario.__file__)
 
 PRINTED = {  # as printed, Eqs. 14-28 and Secs. 4, 4.1
-    "Gx": (scenario.G[0], (910.19, 41.8, 910.19)),
-    "Gy": (scenario.G[1], (765.5, 30.3, 765.5)),
-    "Sx": (scenario.S[0], (0.7919, 41.1, 432.0)),  # 79.19 cm/N
-    "Sy": (scenario.S[1], (0.131, 32.4, 492.46)),  # 13.1 cm/N
+    "Gx": (constants.G[0], (910.19, 41.8, 910.19)),
+    "Gy": (constants.G[1], (765.5, 30.3, 765.5)),
+    "Sx": (constants.S[0], (0.7919, 41.1, 432.0)),  # 79.19 cm/N
+    "Sy": (constants.S[1], (0.131, 32.4, 492.46)),  # 13.1 cm/N
 }
 
 
@@ -25,13 +25,13 @@ def test_transfer_functions(name):
 
 
 def test_operator_clay_arm_and_sampling():
-    th = scenario.Operator()
+    th = operator.Operator()
     assert (th.mass, th.damper, th.spring) == (0.25, 2.0, 6.0)
-    assert (scenario.L1, scenario.L2, scenario.TS) == (0.24, 0.35, 0.36e-3)
-    assert (scenario.B_VARIABLE, scenario.BORDER, scenario.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
-    assert (scenario.GROWTH, scenario.GROWTH_EQ25, scenario.B_STABILITY) == (30.0, 0.15, 100.0)
-    assert (scenario.GAINS_FIG11, scenario.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
-    assert (scenario.C_POLE, scenario.B_CONSTANT, scenario.CLAY_X, scenario.PATH_LENGTH) == (
+    assert (constants.L1, constants.L2, constants.TS) == (0.24, 0.35, 0.36e-3)
+    assert (constants.B_VARIABLE, constants.BORDER, constants.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
+    assert (constants.GROWTH, constants.GROWTH_EQ25, constants.B_STABILITY) == (30.0, 0.15, 100.0)
+    assert (constants.GAINS_FIG11, constants.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
+    assert (constants.C_POLE, constants.B_CONSTANT, constants.CLAY_X, constants.PATH_LENGTH) == (
         10.0,
         90.0,
         (0.05, 0.15),
@@ -40,7 +40,7 @@ def test_operator_clay_arm_and_sampling():
 
 
 def test_path_is_centred_on_the_nominal_pose():
-    assert scenario.ORIGIN == pytest.approx((scenario.L2 - scenario.PATH_LENGTH / 2, scenario.L1), abs=1e-16)
+    assert constants.ORIGIN == pytest.approx((constants.L2 - constants.PATH_LENGTH / 2, constants.L1), abs=1e-16)
 
 
 def test_docs_paper_is_what_the_ledger_gives(ledger_rows):

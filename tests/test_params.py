@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors
 from hapticclay.errors import ParameterError
-from hapticclay.model import scenario
+from hapticclay.model import operator
 
 
 @pytest.mark.parametrize("kw,field", [
@@ -56,7 +56,7 @@ def test_replace_checks_too():
 @pytest.mark.parametrize("kw", [dict(mass=-1.0), dict(damper=math.nan), dict(spring="6")])
 def test_operator_is_checked(kw):
     with pytest.raises(ParameterError, match="operator"):
-        scenario.Operator(**kw)
+        operator.Operator(**kw)
 
 
 def test_numpy_numbers_and_arrays_are_welcome():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop, passivity
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay import files
 from hapticclay.errors import ParameterError
 from hapticclay.simulation import record
 
@@ -134,7 +135,7 @@ def test_a_full_disk_leaves_nothing_half_written(run, tmp_path, monkeypatch, mom
 def test_an_interrupted_write_keeps_the_old_file(tmp_path):
     file = tmp_path / "x"
     file.write_text("old")
-    with pytest.raises(KeyboardInterrupt), record.atomic(file) as f:
+    with pytest.raises(KeyboardInterrupt), files.atomic(file) as f:
         f.write(b"new")
         raise KeyboardInterrupt
     assert file.read_text() == "old" and len(list(tmp_path.iterdir())) == 1

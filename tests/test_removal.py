@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import hapticclay as hc
-from hapticclay.model.scenario import Clay, Profile
+from hapticclay.model.clay import Clay, Profile
 from hapticclay.studies.removal import Removal, Tool, removed
 from hapticclay.views.stage import Stage
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
-from hapticclay.theory import linear_loop, robustness
+from hapticclay.model.operator import Operator
+from hapticclay.theory import linear_loop, margins
 
 
 def spans(high):
@@ -78,7 +78,7 @@ def test_sampled_and_late_boxes_say_that_they_are_samples():
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
     """Closed-loop poles tend to the zeros of G C + Sh, left of the axis at every K: Th may be as large as it likes."""
-    limit, _ = robustness.rigid_limit(axis)
+    limit, _ = margins.rigid_limit(axis)
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
         zeros = np.sort_complex(np.roots(linear_loop.device(axis, K)[0]))
@@ -93,7 +93,7 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
 def test_a_rigid_arm_limits_a_slower_compensator():
     """C = K/(s (s + 1)) in y: the zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it."""
     c, arm = hc.Compensator(1.0), Operator(1e3, 1e8, 1e9)
-    limit, omega = robustness.rigid_limit("y", c)
+    limit, omega = margins.rigid_limit("y", c)
     assert 50.0 < omega < 200.0
     assert linear_loop.gain_limit("y", 90.0, arm, c) == pytest.approx(
         limit, rel=1e-3

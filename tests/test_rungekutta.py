@@ -9,7 +9,7 @@ from oracles import nonlinear_pieces, piecewise_linear
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 
 EDGES = (0.05, 0.15, 0.20)
 CASES = {

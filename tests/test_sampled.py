@@ -8,9 +8,9 @@ from oracles import hybrid
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Multisine, Operator
-from hapticclay.model.signals import Signal
-from hapticclay.theory import linear_loop
+from hapticclay.model import controller
+from hapticclay.model.operator import Operator
+from hapticclay.model.signals import Multisine, Signal
 
 CASES = {
     "held": dict(),
@@ -128,7 +128,7 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     s = control.tf("s")
     G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
     C = K / (s**2 + 10 * s)
-    A, B = linear_loop.held(axis, K, 0.01)
+    A, B = controller.held(axis, K, 0.01)
     z = np.zeros(4)
     found = []
     for _ in range(50):

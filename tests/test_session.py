@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.views.player import Player, Replay
-from hapticclay.views.session import FRAME, MOST, Clock, Session, played
+from hapticclay.views.session import FRAME, MOST, Clock, Player, Replay, Session, played
 from hapticclay.views.stage import Stage
 
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Multisine
-from hapticclay.model.signals import Signal
+from hapticclay.model.signals import Multisine, Signal
 
 
 def spelt_out(signal, t, axis):

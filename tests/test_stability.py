@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.scenario import Operator
+from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop, margins
 from hapticclay.theory.margins import BREAKS
 

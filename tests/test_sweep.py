@@ -21,7 +21,7 @@ from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
 from hapticclay.studies import sampling, sweep
 from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
-from hapticclay.views import plot_sweep
+from hapticclay.views import study_plots
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -243,13 +243,13 @@ def test_maps(tmp_path):
         Sweep("constant", parse_grid("b=10:1000:5log gain.y=0.3:1:3"), {"t_max": 2.0, "dt": 2e-3}), tmp_path, workers=1
     )
     table = sweep.read(tmp_path)
-    figure = plot_sweep.heat(table)
+    figure = study_plots.heat(table)
     ax = figure.axes[0]
     assert ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(table["status"].to_pylist())
-    plot_sweep.heat(table, "speed_x").savefig(tmp_path / "a.png")
+    study_plots.heat(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
-        plot_sweep.heat(table, "speedx")
+        study_plots.heat(table, "speedx")
 
 
 @pytest.mark.parametrize("package,extra", [("pyarrow", "sweep"), ("distributed", "cluster")])
@@ -407,25 +407,25 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     )
     table = sweep.read(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
-        assert plot_sweep.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
-        figure = plot_sweep.heat(table, value)
+        assert study_plots.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        figure = study_plots.heat(table, value)
         shown = figure.axes[0].collections[0].get_array()
         np.testing.assert_array_equal(np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3])
         np.testing.assert_allclose(shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0])
         assert hatched(figure) == {"no clay reached": 6}
-    assert hatched(plot_sweep.heat(table, "crossing1")) == {"border not reached": 6}
+    assert hatched(study_plots.heat(table, "crossing1")) == {"border not reached": 6}
     assert figure.axes[1].get_ylabel() == "speed x [m/s]"
     free = table.set_column(table.column_names.index("b_x"), "b_x", [[0.0] * 9])  # an experiment without clay
-    assert "no clay reached" not in plot_sweep.absent(free, "speed_x")
-    assert set(plot_sweep.absent(free, "fe_over_v_x")) == {"no clay reached"}
+    assert "no clay reached" not in study_plots.absent(free, "speed_x")
+    assert set(study_plots.absent(free, "fe_over_v_x")) == {"no clay reached"}
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     s = Sweep("constant", parse_grid("b=20:60 force=0.01:1 dt=0.5,0.002"), {"t_max": 0.5}, "lhs", 40, seed=4)
     sweep.run(s, tmp_path, workers=1)
     table = sweep.read(tmp_path)
-    why = plot_sweep.absent(table, "fe_over_v_x")
-    marks = {c.get_label(): len(c.get_offsets()) for c in plot_sweep.heat(table, "fe_over_v_x").axes[0].collections}
+    why = study_plots.absent(table, "fe_over_v_x")
+    marks = {c.get_label(): len(c.get_offsets()) for c in study_plots.heat(table, "fe_over_v_x").axes[0].collections}
     for name in ("refused", "no clay reached"):
         assert marks[name] == why.count(name) > 0
     assert sum(marks.values()) == 40 and why.count("refused") == table["status"].to_pylist().count("refused")
@@ -438,15 +438,15 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
              "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
     for name, unit in units.items():
-        assert name in table.column_names and plot_sweep._label(name).endswith(f" [{unit}]")
+        assert name in table.column_names and study_plots._label(name).endswith(f" [{unit}]")
     for name, unit in {"operator.damper": "N.s/m", "operator.mass": "kg", "gain.x": "1/kg", "force.y": "N"}.items():
-        assert plot_sweep._label(name).endswith(f" [{unit}]")
+        assert study_plots._label(name).endswith(f" [{unit}]")
     for make in hc.SCENARIOS.values():
         for name, parameter in inspect.signature(make).parameters.items():
             if isinstance(parameter.default, float) or (
                 isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
             ):
-                assert "[" in plot_sweep._label(name), name
+                assert "[" in study_plots._label(name), name
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
-            plot_sweep.heat(table, text)
+            study_plots.heat(table, text)

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.views import film
-from hapticclay.views.running import Running, draw, fits
+from hapticclay.views.film import Running, draw, fits
 from hapticclay.views.stage import Stage
 
 

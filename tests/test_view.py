@@ -18,8 +18,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.views import window
-from hapticclay.views.player import Replay
-from hapticclay.views.session import FRAME, Session
+from hapticclay.views.session import FRAME, Replay, Session
 from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]

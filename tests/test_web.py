@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.views.gate import Gate
+from hapticclay.views.page import Gate
 from hapticclay.views.session import Session
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
@@ -108,7 +108,7 @@ def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
 @pytest.mark.parametrize("width,height", [(580, 600), (960, 800), (1600, 1000)])
 def test_first_view_holds_arm_and_clay(scenario, width, height):
     """A pinhole camera, worked out here; 580 x 600 is what the controls leave of a page of 900 x 600."""
-    from hapticclay.stepping import scene
+    from hapticclay.views import stage
     from hapticclay.views.page import Page
 
     page = Page(Session(scenario()), port=0)
@@ -117,14 +117,14 @@ def test_first_view_holds_arm_and_clay(scenario, width, height):
         place, at = np.array(camera.position), np.array(camera.look_at)
         turn = np.linspace(0.0, 2.0 * np.pi, 60)
         ring = np.column_stack((np.cos(turn), np.sin(turn), np.zeros(60)))
-        shoulder = [0.06 * ring + (0.0, 0.0, scene.GROUND), 0.042 * ring + (0.0, 0.0, 0.022)]
+        shoulder = [0.06 * ring + (0.0, 0.0, stage.GROUND), 0.042 * ring + (0.0, 0.0, 0.022)]
         x, y = np.add(s.start, s.origin)
         hand = np.array([(x, y, 0.07), (x + 0.12, y, 0.052), (x, y + 0.12, 0.052)])
         q = page.session.run.angles[0]
         elbow = 0.026 * ring + (hc.params.L1 * np.cos(q), hc.params.L1 * np.sin(q), 0.024)
         corners = [
-            (cx + s.origin[0], cy + s.origin[1], scene.GROUND + cz)
-            for cx in grid.x[[0, -1]] for cy in grid.y[[0, -1]] for cz in (0.0, scene.THICKNESS)
+            (cx + s.origin[0], cy + s.origin[1], stage.GROUND + cz)
+            for cx in grid.x[[0, -1]] for cy in grid.y[[0, -1]] for cz in (0.0, stage.THICKNESS)
         ]  # fmt: skip
         ahead = (at - place) / np.linalg.norm(at - place)
         right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(ahead, (0.0, 0.0, 1.0)))

@@ -19,7 +19,7 @@ from problems import EDGES, PROBLEMS, Result  # noqa: E402
 
 from hapticclay import build, free  # noqa: E402
 from hapticclay.model.arm import I1, I2, inverse  # noqa: E402
-from hapticclay.model.scenario import C_POLE, L1, L2, G, S  # noqa: E402
+from hapticclay.model.constants import C_POLE, L1, L2, G, S  # noqa: E402
 
 WALL_LIMIT = 60.0  # [s] of wall time for one run
 MASS1, MASS2 = (float(m) for m in build(free()).body_mass[1:])  # [kg]; only I1 and I2 matter to the motion

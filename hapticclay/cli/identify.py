@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from ..simulation.record import atomic
-from ..studies.estimation import KINDS
-from ..studies.identification import SCHEMA, Identified, Noise, identify
+from ..files import atomic, writable
+from ..model.constants import AXES
+from ..studies.identification import KINDS, SCHEMA, Identified, Noise, identify
 from ..studies.workspace import Drift, drift_map
-from ..views import plot_identify
+from ..views import study_plots
 
 QUICK: dict[str, Any] = {"periods": 1, "lines": 20}
 QUICK_PERIOD = {"G": 2.5, "S": 2.5, "Th": 5.0}  # [s]
@@ -113,10 +114,39 @@ def save(results: Sequence[Identified], found: Drift | None, out: Path) -> None:
     with atomic(out / "identify.json") as f:
         f.write((json.dumps({**head, "map": found.summary() if found else None}, indent=1) + "\n").encode())
     figures = {
-        name: plot_identify.bode([r for r in results if r.what == what]) for what, name in plot_identify.FIGURES.items()
+        name: study_plots.bode([r for r in results if r.what == what]) for what, name in study_plots.FIGURES.items()
     }
     if found:
-        figures["map"] = plot_identify.workspace(found)
+        figures["map"] = study_plots.workspace(found)
     for name, figure in figures.items():
         with atomic(out / f"{name}.png") as f:
             figure.savefig(f, format="png")
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Identify G, Sh and Th on the simulated arm: frequency responses, fits, Figs. 4, 5, 6 (half a minute)."""
+
+    out: Path = Path("out/identify")
+    """Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png."""
+    axis: Literal["x", "y", "both"] = "both"
+    """Which axis."""
+    noise: bool = False
+    """Record with noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms."""
+    map: bool = False
+    """Also how G and Sh drift over the workspace, with and without inertia shaping (two minutes more)."""
+    quick: bool = False
+    """Shorter signals, a coarser map."""
+    seed: int = 0
+    """Of the signals' phases and of the noise."""
+    control: Literal["continuous", "sampled"] = "continuous"
+    """Sampled control is slow: some ten minutes, two with --quick."""
+
+    def __call__(self) -> int:
+        from . import identify
+
+        writable(self.out)
+        axes = AXES if self.axis == "both" else (self.axis,)
+        identify.run(self.out, axes, self.noise, self.map, self.quick, self.seed, self.control)
+        print(f"written to {self.out}")
+        return 0

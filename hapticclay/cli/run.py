@@ -12,9 +12,11 @@ from typing import Annotated
 
 import tyro
 
-from ..model.experiments import constant_cut, free, irregularity, stability_test, variable_cut
-from ..model.scenario import AXES, Scenario
-from ..simulation.record import Record, atomic, writable
+from ..files import atomic, writable
+from ..model.constants import AXES
+from ..model.experiments import constant_cut, free, stability_test, variable_cut
+from ..model.scenario import Scenario
+from ..simulation.record import Record, irregularity
 from ..simulation.simulate import simulate
 
 Experiment = (

@@ -11,8 +11,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..model.scenario import AXES, B_CONSTANT, GAIN, TS, Operator
-from ..simulation.record import atomic, versions, writable
+from ..files import atomic, versions, writable
+from ..model.constants import AXES, B_CONSTANT, GAIN, TS
+from ..model.operator import Operator
 from ..studies import boundary, stability_map
 from ..studies.stability_map import Map
 from ..theory import margins, passivity
@@ -72,10 +73,10 @@ class Stability:
         return 0
 
     def _draw(self, chart: Map) -> None:
-        from ..views import plot_boundary
+        from ..views import study_plots
 
         with atomic(self.out / f"{chart.kind}.png") as f:
-            plot_boundary.boundaries(chart).savefig(f, format="png")
+            study_plots.boundaries(chart).savefig(f, format="png")
 
 
 def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:

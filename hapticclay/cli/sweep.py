@@ -15,7 +15,7 @@ from typing import Annotated, Literal
 import tyro
 
 from ..errors import ParameterError, integer
-from ..simulation.record import atomic
+from ..files import atomic
 from ..studies import sampling, sweep
 
 LARGE = 1000  # runs from which an estimate, made of 20 at most, pays
@@ -109,15 +109,15 @@ class SweepCommand:
         )  # fmt: skip
 
     def _draw(self, table) -> None:
-        from ..views import plot_sweep
+        from ..views import study_plots
 
-        if len(plot_sweep.columns(table)) < 2:
+        if len(study_plots.columns(table)) < 2:
             return
         for value in ("status", "fe_over_v_x", "speed_x", "end_time"):
-            if all(plot_sweep.absent(table, value)):
+            if all(study_plots.absent(table, value)):
                 continue
             with atomic(self.out / f"{value}.png") as f:
-                plot_sweep.heat(table, value).savefig(f, format="png")
+                study_plots.heat(table, value).savefig(f, format="png")
             print(f"map: {self.out / f'{value}.png'}")
 
 

@@ -1,23 +1,22 @@
-"""`hapticclay view` and `video`: windows, pages and films around sessions, scenarios and records."""
+"""`hapticclay view`: windows and pages around sessions and records."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-import numpy as np
 import tyro
 
 from ..errors import ParameterError
+from ..files import writable
 from ..model.scenario import Scenario
-from ..simulation.record import Record, writable
+from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
-from ..views.player import Replay, stoppable
-from ..views.session import Session
-from .run import Experiment, deliver, simulate_with_progress
+from ..views.session import Replay, Session, stoppable
+from .run import Experiment, deliver
 
 
 def recorded(path: tyro.conf.Positional[Path]) -> Record:
@@ -76,40 +75,6 @@ class View:
         return 0
 
 
-@dataclass(frozen=True)
-class Video:
-    """Film a record (its folder) or an experiment: arm, clay and running plots side by side."""
-
-    scenario: Experiment | Recorded
-    out: Path = Path("out/film.mp4")
-    """The file: .mp4, .webp or .gif."""
-    camera: Literal["room", "top", "close"] = "room"
-    """Where to look from."""
-    speed: float = 1.0
-    """1 is real time, 2 twice as fast."""
-    size: tuple[int, int] = (960, 480)
-    """Width and height [pixels]."""
-    plots: bool = True
-    """Run the plots on the right, if there is room: from 320 x 100."""
-    smooth: bool = False
-    """Soften edges and shadows; takes twice as long without a graphics card."""
-    tool_width: float = TOOL.width
-    """Width of the tool [m]."""
-    tool_depth: float = TOOL.depth
-    """Depth of the cut [m]."""
-
-    def __call__(self) -> int:
-        tool = Tool(self.tool_width, self.tool_depth)
-        writable(self.out.parent)
-        s = self.scenario
-        made = film(
-            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1),
-            self.out, self.camera, self.speed, self.size, self.plots, tool, self.smooth,
-        )  # fmt: skip
-        print(f"written to {made}")
-        return 0
-
-
 def look(
     scenario: Scenario, stiffness: float, tool: Tool, every: int, web: bool, host: str, port: int
 ) -> Record | None:
@@ -143,29 +108,8 @@ def replay(record: Record, tool: Tool) -> None:
         Window(Replay(record, tool)).show(stop.is_set)
 
 
-def film(
-    record: Callable[[], Record], out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool,
-    smooth: bool,
-) -> Path:  # fmt: skip
-    """Writes a film, under a progress bar, of a record that is made once it is sure that it can be filmed.
-
-    Raises:
-        ParameterError: as video.film.
-    """
-    from tqdm import tqdm
-
-    from ..views import film
-
-    def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
-        return iter(tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False))
-
-    film.ready(out, speed, size)
-    return film.film(record(), out, camera, speed, size, plots, tool, progress, smooth)
-
-
 def _serve(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
-    from ..views.gate import LOCAL
-    from ..views.page import Page
+    from ..views.page import LOCAL, Page
 
     page = Page(session, host, port)
     if host not in LOCAL:

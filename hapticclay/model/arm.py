@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from math import cos, sin
 
-from .scenario import L1, L2, S
+from .constants import L1, L2, S
 
 I1 = L1 * L1 / S[0].gain  # [kg.m^2]; Sh at high frequency is 1/Lambda, so Lambda_x = 1/0.7919 kg (Eq. 17)
 I2 = L2 * L2 / S[1].gain  # [kg.m^2]; Lambda_y = 1/0.131 kg (Eq. 18)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import bisect
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from .scenario import AXES, B_MAX, Clay, Profile
+from ..errors import ParameterError, choice, numbers_of
+from .constants import AXES, B_MAX
 
 
 def kick(b0, b1, H, L, R, w, damper):
@@ -195,3 +197,55 @@ def at(base: tuple[float, float], rate: tuple[float, float], t: float) -> tuple[
     if rate[0] or rate[1]:
         x, y = min(x + rate[0] * t, B_MAX), min(y + rate[1] * t, B_MAX)
     return x, y
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Damping b of one axis as a piecewise constant function of one coordinate.
+
+    Attributes:
+        edges: borders [m], ascending, shape (n,).
+        values: b in each region [N.s/m], shape (n + 1,); region i lies between edges i - 1 and i.
+        along: coordinate that decides, "x" or "y".
+        growth: rate at which b of each region grows from when the handle first enters it
+            [N.s/m per s], shape (n + 1,); empty for none (Sec. 4.2).
+    """
+
+    edges: tuple[float, ...]
+    values: tuple[float, ...]
+    along: str = "x"
+    growth: tuple[float, ...] = ()
+
+    def __post_init__(self):
+        edges = numbers_of("clay.edges", self.edges, [str(i) for i in range(_len("clay.edges", self.edges))], unit="m")
+        values = numbers_of(
+            "clay.values", self.values, [str(i) for i in range(len(edges) + 1)], 0.0, B_MAX, unit="N.s/m"
+        )
+        names = [str(i) for i in range(len(values))] if _len("clay.growth", self.growth) else []
+        growth = numbers_of("clay.growth", self.growth, names, 0.0, B_MAX, unit="N.s/m per s")
+        if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+            raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
+        choice("clay.along", self.along, AXES)
+        object.__setattr__(self, "edges", edges)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "growth", growth if any(growth) else ())
+
+
+def _len(field: str, value: object) -> int:
+    try:
+        return len(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise ParameterError(field, value, "must be a sequence of numbers") from None
+
+
+@dataclass(frozen=True)
+class Clay:
+    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0)."""
+
+    x: Profile
+    y: Profile
+
+    def __post_init__(self):
+        for field in AXES:
+            if not isinstance(getattr(self, field), Profile):
+                raise ParameterError(f"clay.{field}", getattr(self, field), "must be a Profile")

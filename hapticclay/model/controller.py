@@ -10,12 +10,18 @@ pose. The functions below are one kick of that law (docs/equations.md, section 4
 
 from __future__ import annotations
 
-from ..theory import linear_loop
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import choice, number
 from . import arm
-from .scenario import SecondOrder
+from .constants import AXES, C_POLE, G, SecondOrder
 
 
-def kick(g: SecondOrder, s: SecondOrder, H: float, L: float, R: float) -> tuple[float, float, float, float, float]:
+def servo_coefficients(
+    g: SecondOrder, s: SecondOrder, H: float, L: float, R: float
+) -> tuple[float, float, float, float, float]:
     """Coefficients of one axis in one kick: (keep, take) of the reference model, (after, before,
     spring) of the handle.
 
@@ -23,7 +29,7 @@ def kick(g: SecondOrder, s: SecondOrder, H: float, L: float, R: float) -> tuple[
         g, s: closed position loop G (Eqs. 15, 16) and sensitivity Sh (Eqs. 17, 18).
         H: length of the kick [s]. L, R: its shares before and after the sample.
     """
-    keep, take = linear_loop.kick(g.damping, H, L, R)
+    keep, take = compensator_coefficients(g.damping, H, L, R)
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
@@ -113,3 +119,64 @@ def resolve(
         ffy = fy - dy * uy
         g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
+
+
+def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
+    """Coefficients (keep, take) of one kick of v' = -damping v + drive: v+ = keep v- + take drive.
+
+    Trapezoidal in the damping, exact in total impulse: any length, any split.
+
+    Args:
+        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
+    """
+    n = 1.0 / H + damping * R
+    return (1.0 / H - damping * L) / n, 1.0 / n
+
+
+def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
+
+    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,).
+    """
+    g = G[AXES.index(choice("axis", axis, AXES))]
+    m = np.zeros((5, 5))
+    m[0, 1] = m[2, 3] = 1.0
+    m[1, 1], m[1, 4] = -C_POLE, K
+    m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
+    e = exponential(T * m)
+    return e[:4, :4], e[:4, 4]
+
+
+def exponential(a: np.ndarray) -> np.ndarray:
+    """Matrix exponential of a, shape (n, n)."""
+    from scipy.linalg import expm
+
+    return expm(a)
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
+
+    Attributes:
+        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
+    """
+
+    pole: float = C_POLE
+    zero: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s"))
+        if self.zero is not None:
+            object.__setattr__(self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s"))
+
+    @property
+    def fraction(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numerator and denominator of C/K."""
+        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array([1.0, self.pole, 0.0])
+
+
+PRINTED = Compensator()

@@ -6,12 +6,9 @@ from collections.abc import Callable
 from math import cos, radians
 from typing import Literal
 
-import numpy as np
-
 from ..errors import ParameterError, choice, flag, number, numbers_of, pair
-from ..simulation.record import Record
-from .clay import slab
-from .scenario import (
+from .clay import Clay, Profile, slab
+from .constants import (
     AXES,
     B_CONSTANT,
     B_MAX,
@@ -30,12 +27,10 @@ from .scenario import (
     PATH_LENGTH,
     TORQUE_LIMIT,
     TS,
-    Clay,
-    Multisine,
-    Operator,
-    Profile,
-    Scenario,
 )
+from .operator import Operator
+from .scenario import Scenario
+from .signals import Multisine
 
 GROWTHS = {  # readings of the growth [N.s/m per s]
     "30/s": GROWTH,
@@ -311,29 +306,6 @@ def stability_test(
         render=render,
         stop=False,
     )
-
-
-def irregularity(record: Record, axis: str = "x") -> float:
-    """How irregular the operator's force is: the share of its rms that lies above the band of the maneuver.
-
-    A linear stable loop answers a maneuver within its own band, and gives 0; white noise gives nearly 1.
-    The second half of the record counts, under a Hann window.
-
-    Args:
-        record: of a run with a varying muscle force. axis: "x" or "y".
-
-    Raises:
-        ParameterError: the run's muscle force does not vary, or it kept fewer than 16 samples.
-    """
-    i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
-    if muscle is None or len(record.t) < 32:
-        raise ParameterError("record", record.scenario.name, "must be of a run with a varying muscle force")
-    n = len(record.t) // 2
-    t, f = record.t[-n:-1], record.fh[-n:-1, i]  # the last step may be short
-    power = np.abs(np.fft.rfft((f - f.mean()) * np.hanning(len(f)))) ** 2
-    frequency = np.fft.rfftfreq(len(f), t[1] - t[0])
-    leak = 4.0 / (t[-1] - t[0])  # main lobe of the window
-    return float(np.sqrt(power[frequency > muscle.high + leak].sum() / (power.sum() or 1.0)))
 
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {

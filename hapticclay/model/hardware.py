@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
+from math import copysign, exp, inf, sqrt, tau
 from typing import Any
+
+import numpy as np
 
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of
 
@@ -103,3 +107,176 @@ class Interface:
             raise ParameterError("interface.coupling", self.coupling, "must be a Coupling or None")
         if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
             raise ParameterError("interface.velocity", self.velocity, "must be 'difference' for a window or a filter")
+
+
+# MERGED model.interface
+# Laws of the hardware between computer and arm (Fig. 3): plain functions, their state explicit.
+
+
+BLOCK = 1024  # samples whose chances are drawn at once
+Pair = tuple[float, float]
+
+
+def rounded(x: float, step: float) -> float:
+    """The multiple of step nearest to x, of two the even one."""
+    return round(x / step) * step
+
+
+def converted(x: float, bits: int | None, span: float) -> float:
+    """What a converter of so many bits makes of x, from -span to span: 2^bits levels, the middle one zero.
+
+    Args:
+        x: in any unit. bits: None for an ideal converter without limits. span: the full scale, in the unit of x.
+    """
+    if bits is None:
+        return x
+    half = 2 ** (bits - 1)
+    return min(max(round(x * half / span), -half), half - 1) * span / half
+
+
+def encoded(q: float, counts: int | None) -> float:
+    """Joint angle q [rad] as an encoder of so many counts per turn shows it; exact for None."""
+    return q if counts is None else rounded(q, tau / counts)
+
+
+def difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float) -> Pair:
+    """Mean rates of two joints [rad/s] since the oldest sample in history.
+
+    Args:
+        history: (index, angles [rad]) of earlier samples, oldest first. k, q: of the present one. Ts: [s].
+    """
+    then, old = history[0]
+    span = (k - then) * Ts
+    return (q[0] - old[0]) / span, (q[1] - old[1]) / span
+
+
+def smoothed(y: float, mean: float, cutoff: float, span: float) -> float:
+    """First-order low-pass of a signal whose mean over the past `span` [s] is `mean`; exact if it was constant.
+
+    Args:
+        y: output before. mean: in the unit of y. cutoff: [Hz].
+    """
+    keep = exp(-tau * cutoff * span)
+    return keep * y + (1.0 - keep) * mean
+
+
+def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]], list[float]]:
+    """Low-pass of order 1 or 2 and unit gain under an input held for Ts [s]: x+ = A x + B u, y = x[0], exactly.
+
+    Poles on a circle of radius 2 pi cutoff (matrix exponential).
+    """
+    from scipy.linalg import expm
+
+    w = tau * cutoff
+    a = [[-w, w], [0.0, 0.0]] if order == 1 else [[0.0, 1.0, 0.0], [-w * w, -sqrt(2.0) * w, w * w], [0.0, 0.0, 0.0]]
+    e = expm(Ts * np.array(a))
+    return e[:order, :order].tolist(), e[:order, order].tolist()
+
+
+def filtered(A: list[list[float]], B: list[float], x: tuple[float, ...], u: float) -> tuple[float, ...]:
+    """State of the filter after a sample of input u."""
+    return tuple(sum(a * z for a, z in zip(row, x, strict=True)) + b * u for row, b in zip(A, B, strict=True))
+
+
+def stuck(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
+    """Coulomb friction of two joints in one kick, implicit: it stops a joint wherever its limit suffices for that.
+
+    Each joint either rests after the kick, at a torque within its limit, or slides against the limit. The rates after
+    it are w + a phi; with a positive definite one of the nine cases fits (a linear complementarity problem;
+    Stewart, Trinkle, Int. J. Numerical Methods in Engineering 39, 1996).
+
+    Args:
+        w: rates after the kick without friction [rad/s]. a11, a12, a22: rate per torque [rad/s per N.m].
+        limit: Coulomb torques [N.m].
+
+    Returns:
+        Torques on the joints [N.m].
+    """
+    best, least = (0.0, 0.0), inf
+    for s1, s2 in product((0, 1, -1), repeat=2):
+        if s1 and s2:
+            f1, f2 = -s1 * limit[0], -s2 * limit[1]
+        elif s1:
+            f1 = -s1 * limit[0]
+            f2 = -(w[1] + a12 * f1) / a22
+        elif s2:
+            f2 = -s2 * limit[1]
+            f1 = -(w[0] + a12 * f2) / a11
+        else:
+            det = a11 * a22 - a12 * a12
+            f1, f2 = (a12 * w[1] - a22 * w[0]) / det, (a12 * w[0] - a11 * w[1]) / det
+        v1, v2 = w[0] + a11 * f1 + a12 * f2, w[1] + a12 * f1 + a22 * f2
+        # how far the case is from fitting: a resting joint beyond its limit, a sliding one that goes the other way
+        wrong = max(
+            -s1 * v1 / a11 if s1 else abs(f1) - limit[0],
+            -s2 * v2 / a22 if s2 else abs(f2) - limit[1],
+        )
+        if wrong < least:
+            best, least = (f1, f2), wrong
+        if wrong <= 0.0:
+            break
+    return min(max(best[0], -limit[0]), limit[0]), min(max(best[1], -limit[1]), limit[1])
+
+
+def guarded(energy: float, f: float, v: float, Ts: float, W: float) -> float:
+    """The passivity controller of one axis: the resisting force f, changed where the clay would be active.
+
+    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held force itself causes:
+    over a sample the clay takes Ts f (v - Ts W f/2). A lack of energy is made up for, as Ts W goes to zero by their
+    damping -energy/(Ts v^2). A force that gives energy, because a hold overshoots, becomes the one that takes most,
+    v/(Ts W), which stops the handle; so does one that cannot make up for the lack in a sample. Earlier income is not
+    spent: clay gives nothing back.
+
+    Args:
+        energy: that the clay took until now [J]. f: force asked for [N]. v: velocity [m/s]. Ts: hold [s].
+        W: mobility of the handle [1/kg].
+    """
+    most, lack = v / (Ts * W), min(energy, 0.0)
+    left = v * v + 2.0 * W * lack
+    if lack and left <= 0.0:
+        return most
+    root = sqrt(left) if lack else abs(v)
+    along, low = copysign(1.0, v) * f, -2.0 * lack / (Ts * (abs(v) + root)) if lack else 0.0
+    if along * Ts * W > abs(v) + root:
+        return most
+    return copysign(low, v) if along < low else f
+
+
+def coupled(tool: float, p: float, v: float, b: float, spring: float, damper: float, Ts: float) -> Pair:
+    """Spring and damper between the handle and a massless tool in clay b, implicit over a sample.
+
+    b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown, IROS 1995).
+
+    Args:
+        tool: position of the tool before [m]. p, v: of the handle [m], [m/s]. b: clay [N.s/m]. Ts: [s].
+        spring: N/m. damper: N.s/m.
+
+    Returns:
+        (position of the tool after [m], its velocity [m/s]); b times that is the resisting force.
+    """
+    u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
+    return tool + Ts * u, u
+
+
+class Chance:
+    """What chance does to each sample: by index, the same for the same seed, each part from its own stream."""
+
+    def __init__(self, parts: Interface):
+        self.parts = parts
+        self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
+        self._rows: list[Any] = []
+
+    def __call__(self, k: int) -> tuple[float, bool, Pair]:
+        """(offset of the sampling instant [s], whether the sample is lost, noise on the force x, y [N]) of sample k.
+
+        The first is on time and never lost.
+        """
+        while k >= len(self._rows):
+            s, (time, loss, noise) = self.parts, self._streams
+            width = s.jitter * sqrt(3.0)
+            late = time.uniform(-width, width, BLOCK).tolist()
+            lost = (loss.random(BLOCK) < s.lost).tolist()
+            hiss = (s.force_noise * noise.standard_normal((BLOCK, 2))).tolist()
+            self._rows += zip(late, lost, map(tuple, hiss), strict=True)
+        late, lost, hiss = self._rows[k]
+        return (late, lost, hiss) if k else (0.0, False, hiss)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .scenario import Operator
+from dataclasses import dataclass
+
+from ..errors import number
+from .constants import B_MAX
 
 
 def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> tuple[float, float, float, float]:
@@ -35,3 +38,24 @@ def impedance(spring: float, mass: float, before: float, p: float, c: float, v: 
         p: handle position [m]. c: its centripetal acceleration, towards the centre [m/s^2]. v: velocity before [m/s].
     """
     return spring * p - mass * c + before * v
+
+
+@dataclass(frozen=True)
+class Operator:
+    """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).
+
+    Attributes:
+        mass: kg. damper: N.s/m. spring: N/m, pulling towards p = 0.
+    """
+
+    mass: float = 0.25
+    damper: float = 2.0
+    spring: float = 6.0
+
+    def __post_init__(self):
+        for field, high, unit in (("mass", 1e3, "kg"), ("damper", B_MAX, "N.s/m"), ("spring", 1e9, "N/m")):
+            value = number(f"operator.{field}", getattr(self, field), 0.0, high, unit=unit)
+            object.__setattr__(self, field, value)
+
+
+NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0

@@ -9,165 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
+from ..errors import ParameterError, choice, flag, number, numbers_of, pair
+from .clay import Clay
+from .constants import GAIN, L1, L2, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS
 from .hardware import Interface
+from .operator import Operator
+from .signals import Multisine
 
-AXES = ("x", "y")
 INTEGRATORS = ("fast", "accurate")
 CONTROLS = ("continuous", "sampled")
 RENDERS = ("held", "implicit")
-
-
-class SecondOrder(NamedTuple):
-    """gain / (s^2 + damping s + stiffness); damping in 1/s, stiffness in 1/s^2."""
-
-    gain: float
-    damping: float
-    stiffness: float
-
-
-CM = 1e-2  # the paper prints lengths in centimetres
-
-L1 = 0.24  # link lengths [m], Sec. 4
-L2 = 0.35
-TS = 0.36e-3  # sampling period [s], Sec. 4
-
-G = (SecondOrder(910.19, 41.8, 910.19), SecondOrder(765.5, 30.3, 765.5))  # [m/m], Eqs. 15, 16
-S = (SecondOrder(79.19 * CM, 41.1, 432.0), SecondOrder(13.1 * CM, 32.4, 492.46))  # [m/N], Eqs. 17, 18
-
-C_POLE = 10.0  # C = K/(s^2 + 10 s) [m/N], Eqs. 20, 22, 27: virtual mass 1/K, damper 10/K
-B_CONSTANT = 90.0  # clay of the constant cut [N.s/m], Eq. 21
-CLAY_X = (0.05, 0.15)  # the clay lies 5 cm ahead of the tool and is 10 cm long [m], Sec. 4.1
-PATH_LENGTH = 0.20  # the records of Fig. 8 run to 20 cm [m]
-B_VARIABLE = (50.0, 100.0)  # clay of the variable cut, before and after its border [N.s/m], Eqs. 23-26
-BORDER = 0.05  # that border, on each axis by its own coordinate [m], Sec. 4.2
-GROWTH = 30.0  # "(100 + 30t)" in x: we take t in s since entry [N.s/m per s], Sec. 4.2
-GROWTH_EQ25 = 0.15  # "(100 + 0.15t)", t not said: per second or per sample, Eq. 25
-COUNTERWEIGHT = (1.0, 45.0)  # force of the variable cut [N] and its angle to both axes [degrees], Sec. 4.2
-GAINS_FIG11 = (2.0, 3.0, 25.0)  # K of Fig. 11: 2 in its caption, 3 in the text, 25 in both
-B_STABILITY = 100.0  # clay of the stability test [N.s/m], Eq. 28
-GAIN_LIMIT_PRINTED = 5.0  # "should not exceed 5C", Sec. 4.3
-
-# Not printed. The middle of the 20 cm path is put at the nominal pose (elbow square, handle at
-# (L2, L1)): 20 cm of +x travel from the nominal pose itself would leave the reach of 0.59 m.
-ORIGIN = (0.25, 0.24)  # (L2 - PATH_LENGTH / 2, L1)
-NOMINAL = (L2, L1)  # handle at the nominal pose: link 1 along y, link 2 along x
-ORIGIN_VARIABLE = (0.30, 0.19)  # NOMINAL is the middle of a 10 cm square that the variable cut begins in the corner of
-GAIN = (1.0, 0.5)  # K = 1 on y is unstable in the printed model for 62 < b < 3900 N.s/m
-TORQUE_LIMIT = (40.0, 40.0)  # [N.m], ours: the class of direct-drive motors that carry such inertias
-
-B_MAX = 1e9  # [N.s/m]; the engine refuses controls above 1e10
-
-
-@dataclass(frozen=True)
-class Operator:
-    """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).
-
-    Attributes:
-        mass: kg. damper: N.s/m. spring: N/m, pulling towards p = 0.
-    """
-
-    mass: float = 0.25
-    damper: float = 2.0
-    spring: float = 6.0
-
-    def __post_init__(self):
-        for field, high, unit in (("mass", 1e3, "kg"), ("damper", B_MAX, "N.s/m"), ("spring", 1e9, "N/m")):
-            value = number(f"operator.{field}", getattr(self, field), 0.0, high, unit=unit)
-            object.__setattr__(self, field, value)
-
-
-NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Damping b of one axis as a piecewise constant function of one coordinate.
-
-    Attributes:
-        edges: borders [m], ascending, shape (n,).
-        values: b in each region [N.s/m], shape (n + 1,); region i lies between edges i - 1 and i.
-        along: coordinate that decides, "x" or "y".
-        growth: rate at which b of each region grows from when the handle first enters it
-            [N.s/m per s], shape (n + 1,); empty for none (Sec. 4.2).
-    """
-
-    edges: tuple[float, ...]
-    values: tuple[float, ...]
-    along: str = "x"
-    growth: tuple[float, ...] = ()
-
-    def __post_init__(self):
-        edges = numbers_of("clay.edges", self.edges, [str(i) for i in range(_len("clay.edges", self.edges))], unit="m")
-        values = numbers_of(
-            "clay.values", self.values, [str(i) for i in range(len(edges) + 1)], 0.0, B_MAX, unit="N.s/m"
-        )
-        names = [str(i) for i in range(len(values))] if _len("clay.growth", self.growth) else []
-        growth = numbers_of("clay.growth", self.growth, names, 0.0, B_MAX, unit="N.s/m per s")
-        if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
-            raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
-        choice("clay.along", self.along, AXES)
-        object.__setattr__(self, "edges", edges)
-        object.__setattr__(self, "values", values)
-        object.__setattr__(self, "growth", growth if any(growth) else ())
-
-
-def _len(field: str, value: object) -> int:
-    try:
-        return len(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise ParameterError(field, value, "must be a sequence of numbers") from None
-
-
-@dataclass(frozen=True)
-class Clay:
-    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0)."""
-
-    x: Profile
-    y: Profile
-
-    def __post_init__(self):
-        for field in AXES:
-            if not isinstance(getattr(self, field), Profile):
-                raise ParameterError(f"clay.{field}", getattr(self, field), "must be a Profile")
-
-
-@dataclass(frozen=True)
-class Multisine:
-    """A periodic signal of random phases: sum of cosines at multiples of 1/period between low and high.
-
-    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System Identification,
-    2012, sec. 2.3).
-
-    Attributes:
-        rms: root mean square on each axis, in the unit of what the signal adds to.
-        low, high: band [Hz]. period: [s].
-        lines: number of lines, spread evenly over the logarithm of frequency; None for every multiple.
-        seed: of the phases.
-    """
-
-    rms: tuple[float, float] = (1.0, 0.0)
-    low: float = 0.1
-    high: float = 2.0
-    period: float = 20.0
-    lines: int | None = None
-    seed: int = 0
-
-    def __post_init__(self):
-        put = lambda field, value: object.__setattr__(self, field, value)  # noqa: E731
-        put("rms", pair("multisine.rms", self.rms, 0.0, 1e6))
-        put("period", number("multisine.period", self.period, 1e-3, 1e5, unit="s"))
-        put("low", number("multisine.low", self.low, 0.0, above=True, unit="Hz"))
-        put("high", number("multisine.high", self.high, self.low, 1e6, unit="Hz"))
-        put("seed", integer("multisine.seed", self.seed, 0, 2**32 - 1))
-        most = math.floor(self.high * self.period + 1e-9) - math.ceil(self.low * self.period - 1e-9) + 1
-        if not 1 <= most <= 100_000:
-            bound = f"the band must hold 1 to 100000 multiples of 1/period = {1.0 / self.period:g} Hz, not {most}"
-            raise ParameterError("multisine.high", self.high, bound)
-        if self.lines is not None:
-            put("lines", integer("multisine.lines", self.lines, 1, most))
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .scenario import Multisine
+from ..errors import ParameterError, integer, number, pair
 
 
 def line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
@@ -42,3 +44,39 @@ class Signal:
     def __call__(self, t: Any) -> np.ndarray:
         """Value at t [s], shape (n, 2) or (2,)."""
         return self.mean(t, t)
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """A periodic signal of random phases: sum of cosines at multiples of 1/period between low and high.
+
+    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System Identification,
+    2012, sec. 2.3).
+
+    Attributes:
+        rms: root mean square on each axis, in the unit of what the signal adds to.
+        low, high: band [Hz]. period: [s].
+        lines: number of lines, spread evenly over the logarithm of frequency; None for every multiple.
+        seed: of the phases.
+    """
+
+    rms: tuple[float, float] = (1.0, 0.0)
+    low: float = 0.1
+    high: float = 2.0
+    period: float = 20.0
+    lines: int | None = None
+    seed: int = 0
+
+    def __post_init__(self):
+        put = lambda field, value: object.__setattr__(self, field, value)  # noqa: E731
+        put("rms", pair("multisine.rms", self.rms, 0.0, 1e6))
+        put("period", number("multisine.period", self.period, 1e-3, 1e5, unit="s"))
+        put("low", number("multisine.low", self.low, 0.0, above=True, unit="Hz"))
+        put("high", number("multisine.high", self.high, self.low, 1e6, unit="Hz"))
+        put("seed", integer("multisine.seed", self.seed, 0, 2**32 - 1))
+        most = math.floor(self.high * self.period + 1e-9) - math.ceil(self.low * self.period - 1e-9) + 1
+        if not 1 <= most <= 100_000:
+            bound = f"the band must hold 1 to 100000 multiples of 1/period = {1.0 / self.period:g} Hz, not {most}"
+            raise ParameterError("multisine.high", self.high, bound)
+        if self.lines is not None:
+            put("lines", integer("multisine.lines", self.lines, 1, most))

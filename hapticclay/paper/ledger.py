@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..model.experiments import constant_cut, free, stability_test, variable_cut
-from ..model.scenario import Operator
+from ..model.operator import Operator
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..studies.identification import Identified, identify

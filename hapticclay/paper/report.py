@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..model.scenario import B_CONSTANT, B_STABILITY, GAINS_FIG11
-from ..simulation.record import atomic, versions
+from ..files import atomic, versions
+from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from . import claims
 from .ledger import STATUSES, Row, Runs
 
@@ -38,9 +38,9 @@ def _plot(name: str, *args: Any, **kw: Any) -> Any:
 
 
 def _response(runs: Runs, what: str) -> Any:
-    from ..views import plot_identify
+    from ..views import study_plots
 
-    return plot_identify.bode([runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")])
+    return study_plots.bode([runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")])
 
 
 def _theory(name: str, *args: Any, **kw: Any) -> Any:
@@ -51,9 +51,9 @@ def _theory(name: str, *args: Any, **kw: Any) -> Any:
 
 def _map(runs: Runs) -> Any:
     from ..studies.workspace import drift_map
-    from ..views import plot_identify
+    from ..views import study_plots
 
-    return plot_identify.workspace(drift_map())
+    return study_plots.workspace(drift_map())
 
 
 PICTURES = (

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, choice, integer
-from ..model.scenario import AXES, Scenario
-from ..stepping import scene
+from ..model.constants import AXES
+from ..model.scenario import Scenario
+from ..stepping.engine import Crossing, warnings_caught
+from ..stepping.monitor import Outcome
 from . import record
 from .simulate import NUMBA, compiled, fits, has_numba, marches, simulate
 
@@ -74,9 +76,9 @@ def simulate_batch(
         pool = module.Pool(every)
 
         def run(i: int) -> None:
-            out[i] = entry(*pool.brief(jobs[i])) if summaries else pool.run(jobs[i])
+            out[i] = entry(*pool.brief(jobs[i])) if summaries else record.Record.of(*pool.run(jobs[i]))
 
-        with scene.warnings_caught():
+        with warnings_caught():
             _spread(native, run, min(threads, len(native)))
     elif native and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
@@ -124,7 +126,7 @@ def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
 
 
 def entry(
-    o: record.Outcome, steps: int, crossings: Sequence[record.Crossing], last: Sequence[Any], energy: dict[str, float]
+    o: Outcome, steps: int, crossings: Sequence[Crossing], last: Sequence[Any], energy: dict[str, float]
 ) -> tuple[Any, ...]:
     """A run's entry among summaries; of a record, entry(*record.brief(r)).
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import functools
 import json
+import math
 import os
-import platform
-import tempfile
 import zipfile
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ParameterError, choice
+from ..files import atomic, versions
+from ..model.clay import Clay, Profile
+from ..model.constants import AXES
 from ..model.hardware import Coupling, Interface
-from ..model.scenario import AXES, Clay, Multisine, Operator, Profile, Scenario
+from ..model.operator import Operator
+from ..model.scenario import Scenario
+from ..model.signals import Multisine
+from ..stepping.engine import Crossing, Run
+from ..stepping.monitor import Outcome
 from ..theory import linear_loop
+from ..theory.margins import Verdict
 
 SCHEMA = "hapticclay-record-1"
 ARRAYS = {
@@ -44,42 +48,6 @@ EXTRA = {  # arrays that some records have
 SCALAR = ("t", "removed", "removal_rate")  # arrays of one figure a sample; the others have one an axis
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a run ended.
-
-    Attributes:
-        code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
-            their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
-            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
-        time: simulated time of the end, or of the verdict where an unstable run went on [s].
-        step: index of the last good sample.
-        axis: the axis that is to blame, "" if none.
-        cause: what happened, in words. advice: what to change, in words.
-    """
-
-    code: str
-    time: float
-    step: int
-    axis: str = ""
-    cause: str = ""
-    advice: str = ""
-
-    def __str__(self) -> str:
-        where = f": {self.axis} axis" if self.axis else ""
-        return f"{self.code}{where} at {self.time:.4f} s" + (f" ({self.cause})" if self.cause else "")
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """The handle crossed a border: coordinate, border [m], time [s], speed along it [m/s]."""
-
-    axis: str
-    border: float
-    time: float
-    speed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +89,21 @@ class Record:
     versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
     extra: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     notes: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def of(cls, run: Run, wall: float) -> Record:
+        """The record of a run that is over and took wall seconds."""
+        assert run.outcome is not None
+        arrays: Any = run.arrays()
+        return cls(
+            **arrays,
+            scenario=run.scenario,
+            outcome=run.outcome,
+            crossings=tuple(run.crossings),
+            energy=run.balance(),
+            steps=run.steps,
+            wall_time=wall,
+        )
 
     @property
     def status(self) -> str:
@@ -309,74 +292,55 @@ def _scenario(d: dict[str, Any]) -> Scenario:
     return Scenario(**d)
 
 
-@functools.cache  # some milliseconds
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages a run depends on."""
-    out = {"python": platform.python_version()}
-    for package in ("hapticclay", "mujoco", "numpy", "scipy"):
-        try:
-            out[package] = version(package)
-        except PackageNotFoundError:
-            out[package] = "unknown"
-    return out
+def port_energy(record: Record) -> np.ndarray:
+    """Energy that the hand has put into the handle since the start, along each axis [J], shape (n, 2).
+
+    The observer of Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002): the integral of fh v.
+    """
+    power = record.fh * record.v
+    steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
+    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
 
 
-def writable(folder: Path) -> None:
-    """Refuses a folder that cannot be made or written, before any work is done.
+def observed_passivity(record: Record) -> Verdict:
+    """Whether a recorded run took more energy from the hand than it gave back, at every instant.
+
+    Active on one record proves that the device is not passive; passive on one proves nothing about others.
+
+    Returns:
+        Verdict with the least energy [J]. An energy within what the quadrature leaves open (the
+        integral over every other sample against that over all) counts as passive.
+    """
+    if len(record.t) < 3:
+        raise ParameterError("record", len(record.t), "must have three samples or more")
+    energy = port_energy(record).sum(axis=1)
+    power = (record.fh * record.v).sum(axis=1)[::2]
+    coarse = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1]))))
+    open_ = float(np.max(np.abs(coarse - energy[::2])))
+    i = int(np.argmin(energy))
+    how = f"energy observer on the record, trapezoidal, to {open_:.1e} J; least at {record.t[i]:.4g} s"
+    assumptions = ("the run started at rest", "this motion only")
+    return Verdict(bool(energy[i] >= -open_), float(energy[i]), math.nan, assumptions, how, "least energy put in [J]")
+
+
+def irregularity(record: Record, axis: str = "x") -> float:
+    """How irregular the operator's force is: the share of its rms that lies above the band of the maneuver.
+
+    A linear stable loop answers a maneuver within its own band, and gives 0; white noise gives nearly 1.
+    The second half of the record counts, under a Hann window.
+
+    Args:
+        record: of a run with a varying muscle force. axis: "x" or "y".
 
     Raises:
-        ParameterError: as said.
+        ParameterError: the run's muscle force does not vary, or it kept fewer than 16 samples.
     """
-    made = [p for p in (folder, *folder.parents) if not p.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
-    finally:
-        for p in made:  # left for the run itself to make
-            with contextlib.suppress(OSError):
-                p.rmdir()
-
-
-class atomic:
-    """Opens a file to be written under a temporary name and given its own only when complete.
-
-    Raises:
-        ParameterError: the file cannot be written; nothing is left behind.
-    """
-
-    def __init__(self, path: Path):
-        self.path = path
-
-    def __enter__(self):
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
-        except OSError as error:
-            raise self._refusal(error) from None
-        self.temporary = Path(name)
-        self.file = os.fdopen(handle, "wb")
-        return self.file
-
-    def __exit__(self, kind, error, trace):
-        try:
-            with self.file:
-                if kind is None:
-                    self.file.flush()
-                    os.fsync(self.file.fileno())
-                    umask = os.umask(0)
-                    os.umask(umask)
-                    os.fchmod(self.file.fileno(), 0o666 & ~umask)
-            if kind is None:
-                return os.replace(self.temporary, self.path)
-        except OSError as late:
-            error = error or late
-        self.temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise self._refusal(error) from None
-        return None
-
-    def _refusal(self, error: OSError) -> ParameterError:
-        return ParameterError("out", str(self.path), f"must be writable ({error.strerror or error})")
+    i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
+    if muscle is None or len(record.t) < 32:
+        raise ParameterError("record", record.scenario.name, "must be of a run with a varying muscle force")
+    n = len(record.t) // 2
+    t, f = record.t[-n:-1], record.fh[-n:-1, i]  # the last step may be short
+    power = np.abs(np.fft.rfft((f - f.mean()) * np.hanning(len(f)))) ** 2
+    frequency = np.fft.rfftfreq(len(f), t[1] - t[0])
+    leak = 4.0 / (t[-1] - t[0])  # main lobe of the window
+    return float(np.sqrt(power[frequency > muscle.high + leak].sum() / (power.sum() or 1.0)))

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import math
+import os
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError, choice, integer
 from ..model.scenario import Scenario
-from ..stepping import scene
+from ..stepping.engine import Run, warnings_caught
 from ..stepping.leapfrog import Leapfrog
-from ..stepping.run import Run
 from ..stepping.runge_kutta import RungeKutta
 from ..stepping.sampled import Sampled
-from . import memory, record
+from . import record
 
 ENGINES = ("auto", "python", "native")
 STAGES = 15  # steps of the fast run that one of the accurate run costs
@@ -52,13 +54,13 @@ def simulate(
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
     _check_memory(scenario, every)
-    with scene.warnings_caught():
+    with warnings_caught():
         kind = _kind(scenario, choice("engine", engine, ENGINES))
         run = kind(scenario, every)
         begin = time.perf_counter()
         run.go(progress)
         wall = time.perf_counter() - begin
-    return run.result(wall)
+    return record.Record.of(run, wall)
 
 
 def _check_memory(scenario: Scenario, every: int) -> None:
@@ -66,7 +68,7 @@ def _check_memory(scenario: Scenario, every: int) -> None:
     steps = scenario.t_max / scenario.dt
     fixed = WIRE * steps if scenario.interface else 0.0
     samples = math.floor(steps / every) + 2
-    if fixed + SAMPLE * samples < SMALL or fixed + SAMPLE * samples < (room := memory.left()):
+    if fixed + SAMPLE * samples < SMALL or fixed + SAMPLE * samples < (room := left()):
         return
     need = f"{(fixed + SAMPLE * samples) / 1e9:.3g} GB of memory, and {max(room, 0.0) / 1e9:.3g} GB are left"
     if room > 2.0 * fixed and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000:
@@ -81,7 +83,7 @@ def _kind(scenario: Scenario, engine: str) -> type[Run]:
         if engine == "native":
             print(f"hapticclay: native runs no {_beyond(scenario)}; Python does", file=sys.stderr)
         if scenario.interface:
-            from ..stepping.wired import Wired  # only a run with hardware pays for it
+            from ..stepping.sampled import Wired  # only a run with hardware pays for it
 
             return Wired
         return Sampled if scenario.control == "sampled" else RungeKutta
@@ -136,3 +138,53 @@ NUMBA = "needs numba: pip install hapticclay[fast]"
 def has_numba() -> bool:
     """Whether the compiled loop can be had."""
     return importlib.util.find_spec("numba") is not None
+
+
+# MERGED simulation.memory
+# How much memory there is left to take.
+
+
+GROUPS = (  # limit of a control group and what it has taken, as containers have; version 2, version 1
+    ("sys/fs/cgroup/memory.max", "sys/fs/cgroup/memory.current"),
+    ("sys/fs/cgroup/memory/memory.limit_in_bytes", "sys/fs/cgroup/memory/memory.usage_in_bytes"),
+)
+
+
+def left(root: Path = Path("/")) -> float:
+    """Bytes that this process may still take: the least of machine, container and ulimit; inf where nobody says.
+
+    Args:
+        root: where the system's files are looked for.
+    """
+    return min(_machine(root), *(_group(root / most, root / taken) for most, taken in GROUPS), _process(root))
+
+
+def _machine(root: Path) -> float:
+    with contextlib.suppress(OSError, ValueError, StopIteration):
+        lines = (root / "proc/meminfo").read_text().splitlines()
+        return 1024.0 * int(next(x for x in lines if x.startswith("MemAvailable:")).split()[1])
+    with contextlib.suppress(AttributeError, OSError, ValueError):  # not Linux: all there is, if that is said
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    return math.inf
+
+
+def _group(most: Path, taken: Path) -> float:
+    with contextlib.suppress(OSError, ValueError):  # no such group, or "max"
+        cache = 0
+        for line in most.with_name("memory.stat").read_text().splitlines():
+            name, _, value = line.partition(" ")
+            if name in ("inactive_file", "total_inactive_file"):  # given back when asked for
+                cache = int(value)
+        return float(int(most.read_text()) - int(taken.read_text()) + cache)
+    return math.inf
+
+
+def _process(root: Path) -> float:
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
+            pages = int((root / "proc/self/statm").read_text().split()[0])
+            return float(limit - pages * resource.getpagesize())
+    return math.inf

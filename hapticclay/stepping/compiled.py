@@ -27,12 +27,12 @@ from numba.extending import intrinsic, overload
 
 from ..model import arm, clay, signals
 from ..model.clay import slab
-from ..model.scenario import AXES, NO_HAND, Scenario
-from ..simulation import record
-from . import energy, loop, march, monitor, run, scene, stride
-from .engine import mujoco
+from ..model.constants import AXES
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
+from . import energy, engine, loop, monitor, runge_kutta, stride
+from .engine import CHUNK, Run, mujoco
 from .inline import inline
-from .run import CHUNK, Run
 from .runge_kutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
@@ -40,7 +40,7 @@ FLAT = (  # laws that are compiled with their own laws written into them
     stride.around, stride.enter, stride.place,
 )  # fmt: skip
 PLAIN = (
-    march.leap, march.slope, run.aim, run.root, signals.line,
+    runge_kutta.leap, runge_kutta.slope, engine.aim, engine.root, signals.line,
     stride.drive, stride.first_of_a_hit, stride.heading, stride.kick, stride.land, stride.limited,
     stride.mean, stride.miss, stride.move, stride.note, stride.side, stride.stride, stride.velocity, stride.write,
 )  # fmt: skip
@@ -118,7 +118,7 @@ def folder() -> Path:
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
 
 
-_stride, _calm, _march, _once = _compiled(_whole, monitor.calm, march.march, march.once)
+_stride, _calm, _march, _once = _compiled(_whole, monitor.calm, runge_kutta.march, runge_kutta.once)
 
 
 def _addresses(*names: str) -> list[int]:
@@ -153,7 +153,7 @@ class Bench:
     def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The engine as scene.build(s) would make it, at rest."""
         if (s.clay is not None) not in self.engines:
-            self._take(s.clay is not None, scene.build(s))
+            self._take(s.clay is not None, engine.build(s))
         model, data, _ = self.engines[s.clay is not None]
         model.opt.timestep = s.dt
         for i, limit in enumerate(s.torque_limit):
@@ -204,7 +204,7 @@ class Native(Run):
         now = self.now[0]
         self.t, self.i, self.steps = float(now["t"]), int(now["i"]), int(now["steps"])
         for axis, *crossing in self.crossed[:n].tolist():
-            self.crossings.append(record.Crossing(AXES[int(axis)], *crossing))
+            self.crossings.append(engine.Crossing(AXES[int(axis)], *crossing))
         if code == stride.NOT_FINITE:
             raise Suspicious if self.quiet else ArithmeticError
         if code:
@@ -227,7 +227,7 @@ class Native(Run):
             self.now[:], self.data.qpos[:], self.data.qvel[:] = self.before
             _stride(*self.given, CHUNK - 1, good)
 
-    def look(self, rows: np.ndarray) -> tuple[int, record.Outcome | None]:
+    def look(self, rows: np.ndarray) -> tuple[int, monitor.Outcome | None]:
         """As Run.look, which sees the rows of a calm run only once that has ceased to be calm."""
         if self.calm:
             if self._still_calm(rows.shape[1]):
@@ -247,7 +247,8 @@ class Native(Run):
         return True
 
     def brief(self) -> tuple[Any, ...]:
-        """What batch.entry takes."""
+        if not self.quiet:
+            return super().brief()
         px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.end
         last = (px, py), (vx, vy), (fx, fy), (bx * vx, by * vy), (bx, by)
         return self.outcome, self.steps, self.crossings, last, self.balance()
@@ -266,9 +267,9 @@ class March(RungeKutta):
         super().__init__(scenario, every)
         views = (self.data.qpos, self.data.qvel, self.data.qacc, self.data.ctrl, self.data.qfrc_applied)
         at = (x.ctypes.data for x in views)
-        self.arm = march.Engine(FORWARD, self.model._address, self.data._address, *at)
-        self.y, self.work = np.empty(march.STATES), np.empty((6, march.STATES))
-        self.room = np.empty((CHUNK, march.ROW))
+        self.arm = runge_kutta.Engine(FORWARD, self.model._address, self.data._address, *at)
+        self.y, self.work = np.empty(runge_kutta.STATES), np.empty((6, runge_kutta.STATES))
+        self.room = np.empty((CHUNK, runge_kutta.ROW))
 
     def go(self, progress: Any) -> None:
         Run.go(self, progress)
@@ -315,7 +316,7 @@ class Pool:
     def __init__(self, every: int):
         self.every = every
         self.own = threading.local()
-        self.models = {x.clay is not None: scene.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
+        self.models = {x.clay is not None: engine.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
 
     def _go(self, scenario: Scenario, every: int, quiet: bool) -> tuple[Native, float]:
         """The run, made, and the seconds it took."""
@@ -326,18 +327,16 @@ class Pool:
         run.go(None)
         return run, time.perf_counter() - begin
 
-    def run(self, scenario: Scenario) -> record.Record:
-        """The record of a run that native can make."""
-        run, wall = self._go(scenario, self.every, False)
-        return run.result(wall)
+    def run(self, scenario: Scenario) -> tuple[Native, float]:
+        """A run that native can make, and the seconds it took."""
+        return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
         """What batch.entry takes, of a run that native can make."""
         if scenario.stop:
             with contextlib.suppress(Suspicious):
                 return self._go(scenario, LAST, True)[0].brief()
-        run, wall = self._go(scenario, LAST, False)
-        return record.brief(run.result(wall))
+        return self._go(scenario, LAST, False)[0].brief()
 
 
 def _timestep(model: mujoco.MjModel) -> np.ndarray:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..model import arm
-from ..model.scenario import NO_HAND, Operator, Scenario
+from ..model.operator import NO_HAND, Operator
+from ..model.scenario import Scenario
 
 MEMO = ("friction", "passivity_controller", "coupling")  # entries of an interface; the last two are part of motors
 

@@ -1,6 +1,24 @@
 """MuJoCo, imported whatever MUJOCO_GL says: a run draws nothing, and what draws complains for itself."""
 
+import contextlib
+import ctypes
+import math
 import os
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model import arm
+from ..model.clay import Regions
+from ..model.constants import AXES
+from ..model.scenario import Scenario
+from ..model.signals import Multisine
+from . import monitor
 
 try:
     import mujoco
@@ -15,3 +33,323 @@ except (AttributeError, ImportError, OSError, RuntimeError):  # each backend has
         os.environ["MUJOCO_GL"] = wanted
 
 __all__ = ["mujoco"]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The handle crossed a border: coordinate, border [m], time [s], speed along it [m/s]."""
+
+    axis: str
+    border: float
+    time: float
+    speed: float
+
+
+# MERGED stepping.scene
+# Composes the engine's model from the parts in mjcf/, adding only what a scenario needs.
+
+
+def folder() -> Path:
+    """The folder of MJCF files: beside the package in a checkout, inside it when installed."""
+    package = Path(__file__).resolve().parents[1]
+    checkout = package.parent / "mjcf"
+    return checkout if (checkout / "arm.xml").is_file() else package / "mjcf"
+
+
+@contextlib.contextmanager
+def warnings_caught() -> Iterator[list[str]]:
+    """Collects the engine's warnings instead of letting it write MUJOCO_LOG.TXT."""
+    caught: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(caught.append)
+    try:
+        yield caught
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def build(scenario: Scenario) -> mujoco.MjModel:
+    """The model that simulate(scenario) steps: joints, inertias, motors; the clay's dampers
+    and the states of an accurate run if there are any.
+
+    It holds no geom, sensor, contact, mesh, material, light or camera.
+
+    Args:
+        scenario: what to build for.
+
+    Raises:
+        RuntimeError: the engine warned while compiling; the parts in mjcf/ do not fit together.
+    """
+    accurate = scenario.integrator == "accurate"
+    parts = ["arm.xml"] + ["clay.xml"] * (scenario.clay is not None) + ["states.xml"] * accurate
+    with warnings_caught() as caught:
+        spec = _compose(parts)
+        spec.option.timestep = scenario.dt
+        if accurate:
+            spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        for name, limit in zip(("shoulder", "elbow"), scenario.torque_limit, strict=True):
+            spec.actuator(name).ctrlrange = (-limit, limit)
+        model = spec.compile()
+    return _sound(model, caught)
+
+
+def _compose(parts: list[str]) -> mujoco.MjSpec:
+    text = "".join(f'<include file="{part}"/>' for part in parts)
+    files = {part: (folder() / part).read_bytes() for part in parts}
+    return mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
+
+
+def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
+    if caught:
+        raise RuntimeError(f"mjcf: {'; '.join(caught)}")
+    return model
+
+
+# MERGED stepping.run
+# What every way of running a scenario shares: the engine's model, the regions, the record.
+
+
+TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
+CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
+
+
+class Run:
+    """One run of a scenario. A subclass makes the steps; this keeps what comes of them.
+
+    Raises:
+        ParameterError: somebody's control callback is installed in the engine; it would meddle.
+
+    Attributes:
+        i: index of the sample at or before now. t: now [s]. last: number of whole steps.
+        steps: engine steps made. pause: index of the sample to pause at.
+    """
+
+    def __init__(self, scenario: Scenario, every: int):
+        if mujoco.get_mjcb_control() is not None:
+            raise ParameterError(
+                "mjcb_control", mujoco.get_mjcb_control(), "the engine must be free of control callbacks"
+            )
+        self.scenario, self.every = scenario, every
+        self.model, self.data = self.engine()
+        q1, q2 = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
+        self.data.qpos[:] = q1, q2
+        r1, r2 = arm.rates(*scenario.velocity, *arm.columns(*_trigonometry(q1, q2)), 1.0)
+        self.data.qvel[:] = r1, r2 - r1
+        self.muscle, self.command = _signal(scenario.muscle), _signal(scenario.command)
+        self.angles: Any = memoryview(self.data.qpos)  # floats, in the engine's own memory
+        self.rates: Any = memoryview(self.data.qvel)
+        self.regions = Regions(scenario.clay, scenario.length, scenario.start)
+        self.varies = bool(self.muscle or self.command or self.regions.grows)  # from step to step
+        self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
+        self.i, self.t, self.steps = 0, 0.0, 0
+        self.pause = math.inf
+        self.watch = monitor.Watch(scenario)
+        self.looked = 0  # samples judged so far
+        self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
+        self.crossings: list[Crossing] = []
+        self.outcome: monitor.Outcome | None = None
+        self.end_time: float | None = None
+
+    def engine(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The engine's model of the scenario, and a state of it."""
+        model = build(self.scenario)
+        return model, mujoco.MjData(model)
+
+    def advance(self) -> bool:
+        """Makes a step or many; True if it is time to look at what came of them."""
+        raise NotImplementedError
+
+    def flush(self) -> None:
+        """Judges what has been done since the last look, by `judge`."""
+        raise NotImplementedError
+
+    def balance(self) -> dict[str, float]:
+        """The energy ledger, as record.Record.energy."""
+        raise NotImplementedError
+
+    def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
+        """Runs to the end, until progress says so, or until sample `pause`; whoever paused it flushes."""
+        try:
+            while self.outcome is None and self.i < self.pause:
+                if self.advance() or self.outcome:
+                    enough = progress and progress(self.t, self.position(self.angles, self.rates, 0.0)[0])
+                    if enough and self.outcome is None:
+                        self.outcome = monitor.Outcome("interrupted", self.t, self.i)
+                    self.flush()
+        except (ArithmeticError, ValueError) as error:  # beyond floating point, or the arm exactly straight
+            if isinstance(error, ValueError) and all(map(math.isfinite, (*self.angles, *self.rates))):
+                raise
+            self.flush()
+            if self.outcome is None:
+                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
+
+    def uh(self, begin: Any, end: Any) -> Any:
+        """Mean muscle force over [begin, end] [s], or many such spans [N], (2,) or (n, 2)."""
+        force = self.scenario.force
+        one = isinstance(begin, float)
+        if self.muscle:
+            force = force + self.muscle.mean(begin, end)
+            return force.tolist() if one else force
+        return force if one else np.broadcast_to(force, (len(begin), 2))
+
+    def shift(self, begin: Any, end: Any) -> np.ndarray:
+        """Change of the command from begin to end [s] [m], (2,) or (n, 2)."""
+        if self.command:
+            return self.command(end) - self.command(begin)
+        return np.zeros(np.shape(begin) + (2,))
+
+    def position(self, q, w, h: float) -> tuple[float, float]:
+        """Handle position [m] when the joints have turned from q with w for h seconds."""
+        x, y = arm.position(q[0] + h * w[0], q[1] + h * w[1])
+        return x - self.scenario.origin[0], y - self.scenario.origin[1]
+
+    def target(self) -> tuple[float, float, bool]:
+        """(time of the next sample [s], length of the step to it [s], whether now is a sample); length 0 at the end."""
+        return aim(self.t, self.i, self.last, self.scenario.dt, self.scenario.t_max)
+
+    def inside(self, i: int, p: float) -> bool:
+        """Whether coordinate i at p [m] is in the present region (a NaN is: it is judged later)."""
+        return not (p > self.regions.high[i] + TOUCH or p < self.regions.low[i] - TOUCH)
+
+    def cross(self, i: int, up: bool, speed: float) -> bool:
+        """Steps over a border of coordinate i; True, and nothing stepped over, if it is the end of the path."""
+        end = self.regions.at_end(i, up)
+        border = self.regions.high[i] if up else self.regions.low[i]
+        self.crossings.append(Crossing(axis=AXES[i], border=border, time=self.t, speed=speed))
+        if not end:
+            self.regions.cross(i, up, self.t)
+        return end
+
+    def finish(self, code: str) -> None:
+        """Ends the run here."""
+        self.end_time = self.t
+        self.outcome = monitor.Outcome(code, self.t, self.i)
+
+    def look(self, rows: np.ndarray) -> tuple[int, monitor.Outcome | None]:
+        """outcome.Watch.look at the next rows."""
+        return self.watch.look(rows, self.looked)
+
+    def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
+        """Takes samples into the record, up to where the run ceases to be one; returns how many.
+
+        Args:
+            rows: (q, p, v, fh, tau, delta), shape (12, n). b: gives the clay at each, shape (2, n).
+        """
+        good, found = self.look(rows)
+        if found is not None:
+            self.outcome, self.end_time = found, None
+            self.crossings = [c for c in self.crossings if c.time <= found.time]
+        elif self.outcome is not None:
+            if self.outcome.code == "interrupted":  # anywhere: the record ends with its last sample
+                step = self.looked + good - 1
+                self.outcome = replace(self.outcome, time=step * self.scenario.dt, step=step)
+                self.crossings = [c for c in self.crossings if c.time <= self.outcome.time]
+            self.outcome = self.watch.end(self.outcome)
+        if good:
+            keep = np.arange(-self.looked % self.every, good, self.every)
+            if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
+                keep = np.append(keep, good - 1)
+            everything = len(keep) == rows.shape[1]
+            self.kept.append((self.looked + keep, rows if everything else rows[:, keep], b()[:, keep]))
+        self.looked += good
+        return good
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What the run kept, by the names that simulation.record.ARRAYS has for them."""
+        index, rows, b = (np.concatenate(x, axis=-1) for x in zip(*self.kept, strict=True))
+        t = index * self.scenario.dt
+        if self.end_time is not None and len(t):
+            t[-1] = self.end_time
+        q, p, v, fh, tau, delta = (rows[j : j + 2].T.copy() for j in range(0, 12, 2))
+        a = q.sum(axis=1)
+        u = arm.columns(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+        r1, r2 = arm.rates(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
+        qd = np.column_stack((r1, r2 - r1))
+        return dict(t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta)
+
+    def brief(self) -> tuple[Any, ...]:
+        """What simulation.batch.entry takes: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
+        arrays = self.arrays()
+        last = [x[-1] if len(x) else (np.nan, np.nan) for x in map(arrays.__getitem__, ("p", "v", "fh", "fe", "b"))]
+        return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
+
+
+def _trigonometry(q1: float, q2: float) -> tuple[float, float, float, float]:
+    return math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
+
+
+def _signal(multisine: Multisine | None) -> Any:
+    if multisine is None:
+        return None
+    from ..model.signals import Signal  # only a run that has one pays for it
+
+    return Signal(multisine)
+
+
+def window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
+    """A view of the engine's memory from a to b, two floats each, and what reads all four at once."""
+    first, second = a.ctypes.data, b.ctypes.data
+    gap = second - first - a.nbytes
+    view = memoryview((ctypes.c_char * (a.nbytes + gap + b.nbytes)).from_address(first))
+    return view, struct.Struct(f"2d{gap}x2d").unpack_from
+
+
+def outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
+    """A view of the engine's memory from ctrl on, and what writes a whole command into it.
+
+    ctrl holds the motors and, where there is clay, two dampers; its first 32 bytes are its own either
+    way if the next array begins only 64 bytes on (the engine aligns arrays so). One call then does
+    for both arrays; where they lie otherwise, two calls do.
+    """
+    first, second = ctrl.ctypes.data, push.ctypes.data
+    if second - first == 64:
+        view = memoryview((ctypes.c_char * 80).from_address(first))
+        return view, struct.Struct("4d32x2d").pack_into
+
+    def write(view, offset, t1, t2, bx, by, p1, p2):
+        ctrl[:] = (t1, t2, bx, by)[: len(ctrl)]
+        push[:] = p1, p2
+
+    return memoryview(ctrl), write  # type: ignore[arg-type]
+
+
+def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, float, bool]:
+    """Run.target, for the run at time t [s], at or after sample i, that has `last` whole steps."""
+    on_grid = t == i * dt
+    if i > last:
+        return t, 0.0, on_grid
+    target = (i + 1) * dt if i < last else t_max
+    after = dt if on_grid and i < last else target - t
+    return target, after if after > 1e-9 * dt else 0.0, on_grid
+
+
+def root(f: Callable[..., float], b: float, fb: float, *args: Any) -> float:
+    """Where f(x, *args), of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding.
+
+    f may be 0 at 0 itself, as of a handle that enters stiff clay, stops and comes back: then f/x is what must vanish.
+    Where f never is of the other sign, next to 0.
+    """
+    first, end = 1e-9 * b, b
+    a, fa = first, f(first, *args)
+    leaves = fa == 0.0 or (fa > 0.0) == (fb > 0.0)
+    if leaves:
+        while fa == 0.0 or (fa > 0.0) == (fb > 0.0):
+            a *= 8.0
+            if a > 0.5 * b:
+                return first
+            fa = f(a, *args)
+        fa, fb = fa / a, fb / b
+    for _ in range(60):
+        h = b - fb * (b - a) / (fb - fa)
+        fh = f(h, *args)
+        small = abs(fh) < 4e-16  # rounding of a position
+        if leaves:
+            fh /= h
+        if (fh > 0.0) != (fb > 0.0):
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = h, fh
+        if abs(b - a) <= 1e-12 * end or small:
+            break
+    return b

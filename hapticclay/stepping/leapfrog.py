@@ -12,11 +12,11 @@ import numpy as np
 
 from ..model import arm
 from ..model.clay import at
-from ..model.scenario import NO_HAND, Scenario
-from . import energy, glide, loop
-from .engine import mujoco
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
+from . import energy, loop
+from .engine import CHUNK, TOUCH, Run, mujoco, outlet, root, window
 from .inline import inline
-from .run import CHUNK, TOUCH, Run, outlet, root, window
 
 LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
 FIRST, WIDER = 0.02, 1.01  # first step of such a hit, in decay times of the speed; each step over the one before
@@ -33,7 +33,7 @@ def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
     if law not in _fused:
         if steps < FUSE_FROM:
             return law
-        _fused[law] = inline(law, frozenset({"stiff"} if law is glide.advance else ()))
+        _fused[law] = inline(law, frozenset({"stiff"} if law is advance else ()))
     return _fused[law]
 
 
@@ -92,16 +92,16 @@ class Leapfrog(Run):
         self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
         self.hand = scenario.operator or NO_HAND
         if scenario.control == "continuous":  # what `_glide` will need is written out before the run is timed
-            _written_out(glide.vary if self.varies else glide.advance, self.last)
+            _written_out(vary if self.varies else advance, self.last)
             if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-                _written_out(glide.vary, self.last)
+                _written_out(vary, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
         self.final: Any = None  # velocity of the handle at the end [m/s]
         self.before = 0.0  # length of the step that led here [s]
         self.clay = self.regions.base, self.regions.rate  # before the sample
-        self.rows = bytearray(CHUNK * glide.ROW)
+        self.rows = bytearray(CHUNK * ROW)
         self.filled = 0
         self.stretches: list[_Stretch] = []
         self.ledger = energy.Ledger(scenario)
@@ -124,7 +124,7 @@ class Leapfrog(Run):
                 way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
                 n = min(n, max(16, int(min(0.95 * way, n))))
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
-        rows = range(self.filled * glide.ROW, (self.filled + n) * glide.ROW, glide.ROW)
+        rows = range(self.filled * ROW, (self.filled + n) * ROW, ROW)
         rest: list[tuple[float, float]] = []
         if self.varies:
             b, inputs, shift = self._ahead(n)
@@ -134,7 +134,7 @@ class Leapfrog(Run):
             inputs = loop.inputs(b, b, self.scenario.force, dt, dt, self.hand)
             b, k, shift = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1)), ([0.0] * n, [0.0] * n)
         simple = not self.varies and not k[7, 0]
-        many = _written_out(glide.advance if simple else glide.vary, self.last)
+        many = _written_out(advance if simple else vary, self.last)
         if simple:
             steps, given = rows, (self.whole, inputs)
         else:
@@ -339,7 +339,7 @@ class Leapfrog(Run):
 
     def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool) -> None:
         """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
-        _row.pack_into(self.rows, self.filled * glide.ROW, *row[:14])
+        _row.pack_into(self.rows, self.filled * ROW, *row[:14])
         b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
         self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
         self.filled += 1
@@ -389,3 +389,64 @@ class Leapfrog(Run):
 
     def balance(self) -> dict[str, float]:
         return self.ledger.close()
+
+
+# MERGED stepping.glide
+# Whole steps within one region of the clay, many at a time; `inline` writes the laws into these loops.
+
+
+ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
+
+
+def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
+    """Whole steps within one region of the clay, which is not stiff.
+
+    Args:
+        rows: range of offsets into the record, one for each step [bytes].
+        c, k: from `loop.coefficients` and `loop.inputs`, for whole steps before and after.
+        state: see `loop.tick`.
+        read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
+        write: packs a command into the engine's memory, drive.
+        keep: packs one row into the record, buffer. step, model, data: the engine.
+
+    Returns:
+        The state after the last step.
+    """
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
+    for row in rows:
+        q1, q2, w1, w2 = read(motion)
+        (
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
+            (t1, t2, bx, by, p1, p2),
+            (px, py, vx, vy, fx, fy, dx, dy, _, _),
+            (ux, uy, n1, n2),
+        ) = loop.tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
+        write(drive, 0, t1, t2, bx, by, p1, p2)
+        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
+        step(model, data)
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
+
+
+def vary(steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data):
+    """As `advance`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
+
+    Args:
+        steps: for each step its offset into the record [bytes], `loop.inputs`, change of the command x, y over it [m].
+        rest: list that gets the clay's force beside its dampers x, y in each kick [N].
+    """
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
+    for row, k, cx, cy in steps:
+        q1, q2, w1, w2 = read(motion)
+        (
+            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
+            (t1, t2, bx, by, p1, p2),
+            (px, py, vx, vy, fx, fy, dx, dy, rx, ry),
+            (ux, uy, n1, n2),
+        ) = loop.tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
+        s0 += cx
+        s1 += cy
+        write(drive, 0, t1, t2, bx, by, p1, p2)
+        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
+        rest.append((rx, ry))
+        step(model, data)
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11

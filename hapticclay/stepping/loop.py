@@ -14,8 +14,9 @@ from __future__ import annotations
 from math import cos, sin
 
 from ..model import arm, clay, controller, operator
-from ..model.scenario import C_POLE, NO_HAND, G, S, Scenario
-from ..theory import linear_loop
+from ..model.constants import C_POLE, G, S
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
 
 SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
@@ -36,9 +37,9 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     """
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
-    keepx, takex, nx, mx, kpx = controller.kick(G[0], S[0], H, L, R)
-    keepy, takey, ny, my, kpy = controller.kick(G[1], S[1], H, L, R)
-    keep, take = linear_loop.kick(C_POLE, H, L, R)
+    keepx, takex, nx, mx, kpx = controller.servo_coefficients(G[0], S[0], H, L, R)
+    keepy, takey, ny, my, kpy = controller.servo_coefficients(G[1], S[1], H, L, R)
+    keep, take = controller.compensator_coefficients(C_POLE, H, L, R)
     step = H if before > 0.0 and after > 0.0 else max(before, after)  # at start and end the kick is half of one
     spring, mass, behind, ahead = operator.kick(scenario.operator, H, L, R, step)
     limit1, limit2 = scenario.torque_limit

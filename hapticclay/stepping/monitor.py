@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.scenario import AXES, Profile, Scenario
-from ..simulation.record import Outcome
+from ..model.clay import Profile
+from ..model.constants import AXES
+from ..model.scenario import Scenario
 from ..theory import linear_loop
 
 LIMITS = "oscillation against the torque limits"
@@ -291,3 +292,29 @@ def calm(rows, n, limit1, limit2, swings, seen):
             s[1] = s[0]
             s[0] = v
     return True
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
+            their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
+            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
+        time: simulated time of the end, or of the verdict where an unstable run went on [s].
+        step: index of the last good sample.
+        axis: the axis that is to blame, "" if none.
+        cause: what happened, in words. advice: what to change, in words.
+    """
+
+    code: str
+    time: float
+    step: int
+    axis: str = ""
+    cause: str = ""
+    advice: str = ""
+
+    def __str__(self) -> str:
+        where = f": {self.axis} axis" if self.axis else ""
+        return f"{self.code}{where} at {self.time:.4f} s" + (f" ({self.cause})" if self.cause else "")

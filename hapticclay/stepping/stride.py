@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model import arm, clay, signals
-from ..model.scenario import L1, L2
+from ..model.constants import L1, L2
 from . import energy, loop
+from .engine import TOUCH, aim, root
 from .leapfrog import FIRST, LANDINGS, WIDER
-from .run import TOUCH, aim, root
 
 MORE, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # why `stride` returned
 ROW = 14  # floats of a row: q, p, v, fh, tau, delta, b, two axes each

@@ -10,26 +10,15 @@ from itertools import combinations
 import numpy as np
 
 from ..errors import choice, flag, number, pair
-from ..model import arm
+from ..model import arm, controller
+from ..model.clay import Clay, Profile
+from ..model.constants import AXES, B_MAX, C_POLE, NOMINAL, TORQUE_LIMIT, TS, G, S
 from ..model.hardware import Interface
-from ..model.scenario import (
-    AXES,
-    B_MAX,
-    C_POLE,
-    NO_HAND,
-    NOMINAL,
-    TORQUE_LIMIT,
-    TS,
-    Clay,
-    G,
-    Operator,
-    Profile,
-    S,
-    Scenario,
-)
+from ..model.operator import NO_HAND, Operator
+from ..model.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit, linear_loop
+from ..theory import gain_limit
 
 SMALL = 1e-4  # [m/s] a push that leaves the arm linear
 LARGE = 0.05  # [m/s] one that a hand gives
@@ -258,7 +247,7 @@ def pose_step(loop: Loop) -> np.ndarray:
     rate[2:4] = np.linalg.solve(
         inertia + th.mass * np.eye(2), np.hstack([-x * np.eye(2) for x in (th.spring, th.damper, -1.0)])
     )
-    head, rest = (linear_loop.exponential(span * rate) for span in (part, loop.Ts - part))
+    head, rest = (controller.exponential(span * rate) for span in (part, loop.Ts - part))
     x = np.eye(m)
     old, v = x[-2:], x[[1, 7]]
     acceleration = rate[2:4] @ np.vstack((x[where], old))  # under the force before the sample, which the sensor feels
@@ -270,7 +259,7 @@ def pose_step(loop: Loop) -> np.ndarray:
     half = head[:4] @ np.vstack((x[where], old))
     M[where] = rest[:4] @ np.vstack((half, x[10 + 2 * n : 12 + 2 * n] if n else u))
     for j, axis in enumerate(AXES):
-        A, B = linear_loop.held(axis, loop.K if axis == loop.axis else 0.0, loop.Ts)
+        A, B = controller.held(axis, loop.K if axis == loop.axis else 0.0, loop.Ts)
         M[6 * j + 2 : 6 * j + 6] = A @ x[6 * j + 2 : 6 * j + 6] + np.outer(B, f[j])
     M[12:14] = u
     M[14:] = x[12 : m - 2]

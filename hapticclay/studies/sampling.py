@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, choice, integer
+from ..files import versions
+from ..model.constants import AXES
 from ..model.experiments import SCENARIOS
-from ..model.scenario import AXES, Operator, Scenario
-from ..simulation.record import versions
+from ..model.operator import Operator
+from ..model.scenario import Scenario
 
 SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import choice
-from ..model.scenario import TS
+from ..model.constants import TS
 from ..theory import gain_limit, margins, passivity
 from . import boundary
 from .boundary import Loop

@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
-from ..model.scenario import AXES
+from ..files import atomic
+from ..model.constants import AXES
 from ..simulation.batch import cores
-from ..simulation.record import Record, atomic
+from ..simulation.record import Record
 from ..simulation.simulate import fits, has_numba, simulate
 from ..theory import gain_limit
 from .sampling import Sweep

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import integer, number
-from ..model.scenario import AXES, L1, L2
-from .estimation import NAMES, printed
-from .identification import NOMINAL, identify, mobility
+from ..model.constants import AXES, L1, L2
+from .identification import NAMES, NOMINAL, identify, mobility, printed
 
 BLOCKS = ("G", "S")
 MARGIN = 0.04  # [m] from the stretched and the folded arm: nearer, joint rates grow without bound

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, number, pair
-from ..model.scenario import Operator
+from ..model.controller import PRINTED, Compensator
+from ..model.operator import Operator
 from . import gain_limit, linear_loop, margins
-from .linear_loop import PRINTED, Compensator
 
 K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain
 BAND = (0.3, 30.0)  # [rad/s]: where a hand moves on purpose, up to about 5 Hz

@@ -18,7 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ParameterError, choice, flag, number
-from ..model.scenario import AXES, B_MAX, C_POLE, NO_HAND, RENDERS, G, Operator, S
+from ..model import controller
+from ..model.constants import AXES, B_MAX, C_POLE, G, S
+from ..model.operator import NO_HAND, Operator
+from ..model.scenario import RENDERS
 from . import linear_loop
 
 STEP = 1.01  # the frequency grid grows by this factor ...
@@ -348,7 +351,7 @@ def differences(
     gamma[:2] -= th.mass * own
     gamma[-1] -= th.mass * w
 
-    A, B = linear_loop.held(axis, 1.0, Ts)
+    A, B = controller.held(axis, 1.0, Ts)
     less = np.zeros((m, m))
     less[:2, :2] = rest + head + rest @ head
     less[:2, -1] = old + rest @ old
@@ -381,7 +384,7 @@ def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]
     if abs(fast) * t > 1.0:
         sums = (pulse - mean(slow * t) * t) / fast
     else:
-        sums = linear_loop.exponential(t * np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]]))[0, 2]
+        sums = controller.exponential(t * np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]]))[0, 2]
     pulse, sums = pulse.real, sums.real
     change = [[own[0] * sums, pulse], [own[0] * pulse, own[1] * pulse + own[0] * sums]]
     return np.array(change), w * np.array([sums, pulse])

@@ -7,49 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import choice, number
-from ..model.scenario import AXES, C_POLE, NO_HAND, G, Operator, S
-
-
-def kick(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
-    """Coefficients (keep, take) of one kick of v' = -damping v + drive: v+ = keep v- + take drive.
-
-    Trapezoidal in the damping, exact in total impulse: any length, any split.
-
-    Args:
-        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
-    """
-    n = 1.0 / H + damping * R
-    return (1.0 / H - damping * L) / n, 1.0 / n
-
-
-def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
-
-    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
-
-    Returns:
-        A, shape (4, 4), and B, shape (4,).
-    """
-    g = G[AXES.index(choice("axis", axis, AXES))]
-    m = np.zeros((5, 5))
-    m[0, 1] = m[2, 3] = 1.0
-    m[1, 1], m[1, 4] = -C_POLE, K
-    m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
-    e = exponential(T * m)
-    return e[:4, :4], e[:4, 4]
-
-
-def exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential of a, shape (n, n)."""
-    from scipy.linalg import expm
-
-    return expm(a)
+from ..model.constants import AXES, C_POLE, G, S
+from ..model.controller import PRINTED, Compensator
+from ..model.operator import NO_HAND, Operator
 
 
 def steady_speed(K: float, f: float, b: Any) -> Any:
@@ -58,31 +23,6 @@ def steady_speed(K: float, f: float, b: Any) -> Any:
     The compensator's damper and the clay carry the force together: f = (10/K + b) v (Eqs. 20, 21).
     """
     return K * f / (C_POLE + K * b)
-
-
-@dataclass(frozen=True)
-class Compensator:
-    """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
-
-    Attributes:
-        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
-    """
-
-    pole: float = C_POLE
-    zero: float | None = None
-
-    def __post_init__(self):
-        object.__setattr__(self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s"))
-        if self.zero is not None:
-            object.__setattr__(self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s"))
-
-    @property
-    def fraction(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator of C/K."""
-        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array([1.0, self.pole, 0.0])
-
-
-PRINTED = Compensator()
 
 
 def characteristic(

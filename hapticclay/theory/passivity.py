@@ -5,15 +5,13 @@ A sampled loop that is stable with one hand may still be active; coupled stabili
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import ParameterError, number
-from ..simulation.record import Record
+from ..errors import number
+from ..model.controller import PRINTED, Compensator
 from . import linear_loop
-from .linear_loop import PRINTED, Compensator
 from .margins import LINEAR, Verdict, bands, least, real, square
 
 
@@ -85,34 +83,3 @@ def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float =
     """
     b, k = number("b", b, 0.0, unit="N.s/m"), number("stiffness", stiffness, 0.0, unit="N/m")
     return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
-
-
-def port_energy(record: Record) -> np.ndarray:
-    """Energy that the hand has put into the handle since the start, along each axis [J], shape (n, 2).
-
-    The observer of Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002): the integral of fh v.
-    """
-    power = record.fh * record.v
-    steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
-    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
-
-
-def observed_passivity(record: Record) -> Verdict:
-    """Whether a recorded run took more energy from the hand than it gave back, at every instant.
-
-    Active on one record proves that the device is not passive; passive on one proves nothing about others.
-
-    Returns:
-        Verdict with the least energy [J]. An energy within what the quadrature leaves open (the
-        integral over every other sample against that over all) counts as passive.
-    """
-    if len(record.t) < 3:
-        raise ParameterError("record", len(record.t), "must have three samples or more")
-    energy = port_energy(record).sum(axis=1)
-    power = (record.fh * record.v).sum(axis=1)[::2]
-    coarse = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1]))))
-    open_ = float(np.max(np.abs(coarse - energy[::2])))
-    i = int(np.argmin(energy))
-    how = f"energy observer on the record, trapezoidal, to {open_:.1e} J; least at {record.t[i]:.4g} s"
-    assumptions = ("the run started at rest", "this motion only")
-    return Verdict(bool(energy[i] >= -open_), float(energy[i]), math.nan, assumptions, how, "least energy put in [J]")

@@ -12,27 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 
-from ..model.scenario import AXES, C_POLE, Scenario
+from ..model.constants import AXES, C_POLE
+from ..model.scenario import Scenario
 from ..model.signals import Signal
 from ..simulation.record import Record
 from ..theory import linear_loop
+from .style import BLACK, BLUE, CLAY, GREEN, GREY, ORANGE, STYLE
 
-BLUE, ORANGE, GREEN, BLACK = "#0072B2", "#D55E00", "#009E73", "#222222"  # Okabe and Ito, safe for all eyes
-CLAY, GREY = "#E8C9A8", "#555555"
 TITLE = 9.0  # size of a title's type [points]
 MARGIN = 0.9  # of a figure's width that its title has not: what stands left of the axes, and a little [inch]
-STYLE: Any = {
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.6,
-    "legend.frameon": False,
-    "savefig.dpi": 160,
-    "figure.constrained_layout.use": True,
-}
 
 
 def velocity_position(record: Record, axis: str = "x") -> Figure:

@@ -6,21 +6,32 @@ has passed; a script can do as much. A slice is computed as any run is, by the l
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
+import signal
+import threading
+import time
 from collections import deque
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import ParameterError, integer, number
-from ..model.scenario import B_MAX, L1, L2, Clay, Multisine, Operator, Profile, Scenario
+from ..model.clay import Clay, Profile
+from ..model.constants import AXES, B_MAX, L1, L2
+from ..model.operator import Operator
+from ..model.scenario import Scenario
+from ..model.signals import Multisine
 from ..simulation import record
-from ..stepping import glide, loop, monitor
+from ..simulation.record import Record
+from ..stepping import leapfrog, loop, monitor
 from ..stepping.leapfrog import Leapfrog, _written_out
+from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
-from .verdict import Verdict, limits, verdict
+from ..theory import linear_loop
 
 FRAME = 1.0 / 60.0  # [s] between two looks at the person
 MOST = 0.05  # longest slice of simulated time; a machine that needs longer for it slows the clock [s]
@@ -73,7 +84,7 @@ class _Live(Leapfrog):
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        _written_out(glide.vary, self.last)  # now, not while the hand waits
+        _written_out(leapfrog.vary, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
         self.watch = monitor.Watch(replace(scenario, muscle=Multisine()))
@@ -280,7 +291,7 @@ class Session:
             run.end()
         if not run.kept:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
-        out = run.result(max(self.clock.real, 1e-9))
+        out = record.Record.of(run, max(self.clock.real, 1e-9))
         volume, rate = self._removed(out)
         knots = np.array(run.muscle.knots)
         index = np.rint(out.t / self.scenario.dt)
@@ -360,3 +371,159 @@ def scaled(clay: Clay | None, factor: float) -> Clay | None:
         return replace(f, values=times(f.values), growth=times(f.growth))
 
     return None if clay is None else Clay(x=law(clay.x), y=law(clay.y))
+
+
+# MERGED views.player
+# Plays in real time, beside whatever is shown: a session that a person takes part in, or a record.
+
+
+class Replay:
+    """A record, played as the session it may have been; the attributes are those of Session."""
+
+    def __init__(self, record: Record, tool: Tool = TOOL):
+        self.source, self.scenario = record, record.scenario
+        self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
+        self.restart()
+
+    def restart(self) -> None:
+        """Plays from the beginning."""
+        self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
+        self.frames: list[tuple] = [self._frame(0)]
+
+    @property
+    def ended(self) -> str:
+        """How the record ended, once it has."""
+        return self.source.status if self.n >= len(self.source.t) - 1 else ""
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Goes on by so much simulated time, but not while paused."""
+        if self.paused or self.ended:
+            return np.empty((0, 2))
+        self.t += seconds
+        before = self.n
+        self.n = int(np.searchsorted(self.source.t, self.t, "right").clip(1, len(self.source.t))) - 1
+        self.frames.append(self._frame(self.n))
+        return self.source.p[before : self.n + 1]
+
+    @property
+    def gain(self) -> tuple[float, float]:
+        """K now."""
+        x, y = self.source.extra["gain"][self.n].tolist() if "gain" in self.source.extra else self.scenario.gain
+        return x, y
+
+    @property
+    def b(self) -> tuple[float, float]:
+        """Damping of the clay where the handle is [N.s/m]."""
+        x, y = self.source.b[self.n].tolist()
+        return x, y
+
+    def verdict(self) -> Verdict:
+        """As of a session; what the monitor found is the outcome of the record."""
+        r, n, s = self.source, self.n, self.scenario
+        found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
+        limit = limits(self.b, s.operator) if s.control == "continuous" else None
+        return verdict(self.gain, limit, r.outcome if found else None, True)
+
+    def _frame(self, n: int) -> tuple:
+        r = self.source
+        return (float(r.t[n]), *(tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh)))
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[threading.Event]:
+    """An event that Ctrl-C sets, in place of an exception in the midst of anything; a second Ctrl-C is one."""
+    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def heard(*_) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, heard)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class Player(threading.Thread):
+    """Plays until `stop`. Whoever reads or changes what is played holds the lock.
+
+    Attributes:
+        error: what went wrong, None if nothing did.
+    """
+
+    def __init__(self, play: Session | Replay):
+        super().__init__(name="player", daemon=True)
+        self.play, self.lock = play, threading.RLock()  # what changes a page is told of the change at once
+        self.error: Exception | None = None
+        self._stop_now = threading.Event()
+
+    def run(self) -> None:
+        at = time.perf_counter()
+        try:
+            while not self._stop_now.is_set():
+                with self.lock:
+                    play = self.play
+                    if play.paused or play.ended:
+                        play.clock.rest()
+                    else:
+                        play.advance(play.clock.due(time.perf_counter()))
+                at = max(at + FRAME, time.perf_counter())
+                self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
+        except Exception as error:  # shown by whoever joins
+            self.error = error
+
+    def stop(self) -> None:
+        """Ends the thread; raises what it died of, if it did."""
+        self._stop_now.set()
+        self.join()
+        if self.error is not None:
+            raise self.error
+
+
+# MERGED views.verdict
+# What to say of the stability of the loop while it runs.
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What to say of the loop now.
+
+    Attributes:
+        text: in a line. unstable: whether the arm swings out of hand.
+    """
+
+    text: str
+    unstable: bool
+
+
+def verdict(
+    gain: tuple[float, float], limit: tuple[float, float] | None, onset: Outcome | None, swings: bool
+) -> Verdict:
+    """Says what the stability monitor has found, or else how far the gain is from its limit.
+
+    Args:
+        gain: K. limit: of it, in the clay at the handle; None if unknown. onset: the instability that the monitor has
+            found. swings: whether the arm still swings.
+    """
+    far = limit or (math.inf, math.inf)
+    above = [f"K{a} {k:.3g} > {most:.3g}" for a, k, most in zip(AXES, gain, far, strict=True) if k > most]
+    text = "stable"
+    if onset is not None and swings:
+        text = f"UNSTABLE since {onset.time:.1f} s: {onset.cause}" + (f" of {onset.axis}" if onset.axis else "")
+    elif above:
+        text = "beyond the limit of K"
+    elif onset is not None:
+        text = f"calm again, was unstable at {onset.time:.1f} s"
+    if above:
+        text += f"; here {', '.join(above)}"
+    elif limit:
+        each = ("none" if most == math.inf else f"{most:.3g}" for most in limit)
+        text += f"; limit of K here: {'none' if limit == (math.inf, math.inf) else ', '.join(each)}"
+    return Verdict(text, bool(onset and swings))
+
+
+def limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
+    """The gain limit of the linear loop on each axis, with this clay at the handle [N.s/m]; inf for none."""
+    x, y = (linear_loop.gain_limit(axis, damping, operator) for axis, damping in zip(AXES, b, strict=True))
+    return x, y

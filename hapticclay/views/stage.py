@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from ..model.scenario import AXES, Scenario
-from ..stepping import scene
-from ..stepping.engine import mujoco
+from ..model.constants import AXES, L1, L2
+from ..model.scenario import Scenario
+from ..stepping.engine import _compose, _sound, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
 
 CAMERAS = ("room", "top", "close")
@@ -42,8 +45,8 @@ class Stage:
         if scenario.clay is not None:
             low, high = [np.array([grid.x[j], grid.y[j]]) + origin for j in (0, -1)]
             rows, columns = len(grid.y), len(grid.x)
-            clay = scene.Block((low[0], low[1]), (high[0], high[1]), rows, columns, scene.THICKNESS, self._colors())
-        self.model = scene.picture(clay, (tool.width, tool.depth))
+            clay = Block((low[0], low[1]), (high[0], high[1]), rows, columns, THICKNESS, self._colors())
+        self.model = picture(clay, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if clay else -1
         self.place: tuple[float, float] | None = None  # of the tool, where it last cut [m]
@@ -80,7 +83,7 @@ class Stage:
         if not self.stale or self.field < 0:
             return False
         self.stale = False
-        self.model.hfield_data[:] = (self.removal.heights(scene.THICKNESS) / scene.THICKNESS).ravel()
+        self.model.hfield_data[:] = (self.removal.heights(THICKNESS) / THICKNESS).ravel()
         return True
 
     def _colors(self) -> np.ndarray:
@@ -97,3 +100,90 @@ class Stage:
         return np.clip((PALE + (b / top)[..., None] ** 2 * (DEEP - PALE)) * grain, 0, 255)[
             ::-1
         ]  # images start at the top
+
+
+@dataclass(frozen=True)
+class Block:
+    """The block of clay in a picture.
+
+    Attributes:
+        low, high: corners [m], in world coordinates. rows, columns: of its map of heights. thickness: [m].
+        colors: image over the block, shape (n, m, 3) of bytes, row 0 at the +y edge.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    rows: int
+    columns: int
+    thickness: float
+    colors: np.ndarray
+
+
+def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
+    """A model to look at, not to step: the same arm with skin on, the room, the block of clay as a heightfield.
+
+    Its joints are those of `build`; whoever draws copies the angles. The target of the hand is the mocap body
+    "target", the tool's tip the body "tool".
+
+    Args:
+        clay: the block; None for none. tool: width of the tool, and depth of its tip under the surface [m].
+    """
+    with warnings_caught() as caught:
+        spec = _compose(["arm.xml", "room.xml"])
+        for body, *skin in SKIN:
+            _skin(spec.body(body) if body else spec.worldbody, *skin)
+        surface = GROUND + (clay.thickness if clay else THICKNESS)
+        body = spec.body("link2").add_body(name="tool", pos=(L2, 0.0, 0.0))
+        _skin(body, "cylinder", (0.0, 0.0, surface - tool[1]), (0.0, 0.0, 0.0), 0.5 * tool[0], "steel")
+        _skin(body, "cylinder", (0.0, 0.0, 0.0), (0.0, 0.0, 0.045), 0.008, "dark")
+        _skin(body, "sphere", (0.0, 0.0, 0.052), (0.0, 0.0, 0.052), 0.016, "orange")
+        target = spec.worldbody.add_body(name="target", mocap=True)
+        _skin(target, "sphere", (0.0, 0.0, 0.052), (0.0, 0.0, 0.052), 0.012, "", (0.9, 0.42, 0.05, 0.45))
+        if clay:
+            _block(spec, clay)
+        model = spec.compile()
+    return _sound(model, caught)
+
+
+GROUND = -0.06  # height of the table under the plane of the arm [m], as in room.xml
+THICKNESS = 0.03  # of a block of clay [m]
+SKIN: Any = (  # body ("" for the world), shape, from, to [m], radius [m], material
+    ("", "cylinder", (0.0, 0.0, GROUND), (0.0, 0.0, -0.03), 0.060, "dark"),
+    ("", "cylinder", (0.0, 0.0, -0.03), (0.0, 0.0, 0.022), 0.042, "steel"),
+    ("link1", "cylinder", (0.0, 0.0, 0.022), (0.0, 0.0, 0.034), 0.034, "dark"),
+    ("link1", "capsule", (0.0, 0.0, 0.0), (L1, 0.0, 0.0), 0.017, "dark"),
+    ("link1", "cylinder", (L1, 0.0, -0.024), (L1, 0.0, 0.024), 0.026, "steel"),
+    ("link2", "cylinder", (0.0, 0.0, 0.024), (0.0, 0.0, 0.034), 0.021, "blue"),
+    ("link2", "capsule", (0.0, 0.0, 0.0), (L2, 0.0, 0.0), 0.012, "blue"),
+)
+
+
+def _skin(body, shape: str, begin, end, radius: float, material: str, rgba=(0.5, 0.5, 0.5, 1.0)) -> None:
+    """Adds a geom that is only seen: it weighs nothing and touches nothing."""
+    kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.upper()}")
+    place = {"pos": begin, "size": (radius, 0.0, 0.0)} if begin == end else {"fromto": (*begin, *end)}
+    geom = body.add_geom(type=kind, material=material, mass=0.0, contype=0, conaffinity=0, **place)
+    geom.size[0] = radius
+    if not material:
+        geom.rgba = rgba
+
+
+def _block(spec: mujoco.MjSpec, clay: Block) -> None:
+    size = [0.5 * (high - low) for low, high in zip(clay.low, clay.high, strict=True)]
+    middle = [0.5 * (high + low) for low, high in zip(clay.low, clay.high, strict=True)]
+    height, width = clay.colors.shape[:2]
+    spec.add_texture(
+        name="block", type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=3,
+        data=clay.colors.astype(np.uint8).ravel().tolist(),
+    )  # fmt: skip
+    textures = [""] * int(mujoco.mjtTextureRole.mjNTEXROLE)
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "block"
+    spec.add_material(name="block", textures=textures, specular=0.12, shininess=0.15)
+    spec.add_hfield(
+        name="clay", nrow=clay.rows, ncol=clay.columns, size=(*size, clay.thickness, 1e-3),
+        userdata=np.ones(clay.rows * clay.columns),
+    )  # fmt: skip
+    spec.worldbody.add_geom(
+        name="clay", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="clay", material="block",
+        pos=(*middle, GROUND), contype=0, conaffinity=0,
+    )  # fmt: skip

@@ -11,10 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import choice
-from ..model.scenario import AXES, Operator
+from ..model import controller
+from ..model.constants import AXES
+from ..model.operator import Operator
 from ..theory import linear_loop, margins
 from ..theory.design import BAND
-from .run_plots import BLACK, BLUE, GREEN, ORANGE, STYLE
+from .style import BLACK, BLUE, GREEN, ORANGE, STYLE
 
 PINK, SKY = "#CC79A7", "#56B4E9"  # Okabe and Ito
 CURVES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PINK, ":"), (SKY, "-"))
@@ -30,7 +32,7 @@ def bode(
     impedance: bool = True,
     operator: Operator | None = None,
     at: str = "compensator",
-    compensator: linear_loop.Compensator = linear_loop.PRINTED,
+    compensator: controller.Compensator = controller.PRINTED,
     omega: tuple[float, float] = (0.1, 1000.0),
 ) -> Figure:
     """Magnitude and phase of the loop, its gain and phase margins marked.
@@ -171,7 +173,7 @@ def small_gain(
 def transparency(
     axis: str,
     b: float,
-    designs: list[tuple[str, float, linear_loop.Compensator]],
+    designs: list[tuple[str, float, controller.Compensator]],
     *,
     omega: tuple[float, float] = (0.1, 300.0),
     band: tuple[float, float] = BAND,

@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from ..model.scenario import AXES, Scenario
+from ..model.constants import AXES
+from ..model.scenario import Scenario
 from ..stepping.engine import mujoco
 from ..studies.removal import Tool
 from .session import FRAME

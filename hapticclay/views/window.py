@@ -17,8 +17,7 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..model.experiments import SCENARIOS
-from .player import Player, Replay
-from .session import Session
+from .session import Player, Replay, Session
 from .stage import hardest
 from .viewer import Rows, Sight, Writing
 

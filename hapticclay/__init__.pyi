@@ -1,0 +1,52 @@
+# Public names and the modules they come from; lazy_loader imports each when it is first used.
+
+from .errors import ParameterError as ParameterError
+from .model.clay import Clay as Clay
+from .model.clay import Profile as Profile
+from .model.controller import Compensator as Compensator
+from .model.experiments import SCENARIOS as SCENARIOS
+from .model.experiments import constant_cut as constant_cut
+from .model.experiments import free as free
+from .model.experiments import stability_test as stability_test
+from .model.experiments import variable_cut as variable_cut
+from .model.hardware import Coupling as Coupling
+from .model.hardware import Interface as Interface
+from .model.operator import Operator as Operator
+from .model.scenario import Scenario as Scenario
+from .model.signals import Multisine as Multisine
+from .simulation.batch import simulate_batch as simulate_batch
+from .simulation.record import Record as Record
+from .simulation.record import irregularity as irregularity
+from .simulation.record import observed_passivity as observed_passivity
+from .simulation.record import port_energy as port_energy
+from .simulation.simulate import simulate as simulate
+from .stepping.engine import Crossing as Crossing
+from .stepping.engine import build as build
+from .stepping.monitor import Outcome as Outcome
+from .studies.identification import Identified as Identified
+from .studies.identification import Noise as Noise
+from .studies.identification import identify as identify
+from .studies.removal import removed as removed
+from .studies.workspace import Drift as Drift
+from .studies.workspace import drift_map as drift_map
+from .theory.design import Design as Design
+from .theory.design import compare as compare
+from .theory.design import design_gain as design_gain
+from .theory.design import transparency_error as transparency_error
+from .theory.gain_limit import gain_limit as gain_limit
+from .theory.linear_loop import closed_loop_poles as closed_loop_poles
+from .theory.margins import Box as Box
+from .theory.margins import Margins as Margins
+from .theory.margins import Nyquist as Nyquist
+from .theory.margins import Verdict as Verdict
+from .theory.margins import WorstCase as WorstCase
+from .theory.margins import coupled_stability as coupled_stability
+from .theory.margins import margins as margins
+from .theory.margins import nyquist as nyquist
+from .theory.margins import small_gain as small_gain
+from .theory.margins import transparency as transparency
+from .theory.margins import worst_case as worst_case
+from .theory.passivity import clay_passivity as clay_passivity
+from .theory.passivity import passivity as passivity
+
+__version__: str
