@@ -9,21 +9,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+from hapticclay import files
 
-import extremes  # noqa: E402
-import hits  # noqa: E402
-import parts  # noqa: E402
-import scaling  # noqa: E402
-import stiffness  # noqa: E402
-import throughput  # noqa: E402
-import work_precision  # noqa: E402
-
-from hapticclay import files  # noqa: E402
+from . import extremes, hits, parts, scaling, stiffness, throughput, work_precision
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,

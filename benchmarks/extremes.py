@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import sys
 import tempfile
 import time
 import warnings
@@ -19,20 +18,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tabulate import tabulate
+from tqdm import tqdm
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-import reference  # noqa: E402
-from oracles import I1, I2  # noqa: E402
-from tabulate import tabulate  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-from work_precision import number, write  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
+import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario  # noqa: E402
+from hapticclay.model.scenario import Scenario
 from hapticclay.model.signals import Multisine
+from tests.oracles import I1, I2
+
+from . import reference
+from .work_precision import number, write
 
 # Ours is right if the reference says one of these; "diverged" ends a run where the reference may go on into the limits
 AGREE = {"diverged": ("unstable", "limit cycle"), "limit cycle": ("limit cycle",)}

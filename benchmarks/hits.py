@@ -14,31 +14,28 @@ import dataclasses
 import functools
 import math
 import statistics
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tabulate import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-import reference  # noqa: E402
-from problems import EDGES  # noqa: E402
-from tabulate import tabulate  # noqa: E402
-from work_precision import number, write  # noqa: E402
-
-import oracles  # noqa: E402  isort: skip
-import hapticclay as hc  # noqa: E402
-from hapticclay.errors import ParameterError  # noqa: E402
+import hapticclay as hc
+from hapticclay.errors import ParameterError
 from hapticclay.model.clay import (
     Clay,
     Profile,
-    slab,  # noqa: E402
+    slab,
 )
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario  # noqa: E402
-from hapticclay.simulation import simulate  # noqa: E402
+from hapticclay.model.scenario import Scenario
+from hapticclay.simulation import simulate
+from tests import oracles
+
+from . import reference
+from .problems import EDGES
+from .work_precision import number, write
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
 STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...

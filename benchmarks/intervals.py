@@ -15,20 +15,18 @@ import json
 import math
 import multiprocessing
 import statistics
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+from tabulate import tabulate
+from tqdm import tqdm
 
-from tabulate import tabulate  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-from work_precision import machine  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay import files  # noqa: E402
+import hapticclay as hc
+from hapticclay import files
 from hapticclay.studies import identification
+
+from .work_precision import machine
 
 SENSORS = {
     "20000 counts, no force noise": hc.Noise(20_000, 0.0),

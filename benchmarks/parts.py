@@ -11,7 +11,6 @@ import argparse
 import contextlib
 import dataclasses
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,17 +19,15 @@ from unittest import mock
 
 import mujoco
 import numpy as np
+from tabulate import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from tabulate import tabulate  # noqa: E402
-from work_precision import write  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay.model.hardware import Coupling, Interface  # noqa: E402
-from hapticclay.model.signals import Multisine  # noqa: E402
+import hapticclay as hc
+from hapticclay.model.hardware import Coupling, Interface
+from hapticclay.model.signals import Multisine
 from hapticclay.stepping import energy, engine
-from hapticclay.views import stage  # noqa: E402
+from hapticclay.views import stage
+
+from .work_precision import write
 
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:

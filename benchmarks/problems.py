@@ -8,17 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-
-from oracles import Pieces, nonlinear_pieces  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
+import hapticclay as hc
+from tests.oracles import Pieces, nonlinear_pieces
 
 EDGES = (0.05, 0.15, 0.20)  # [m] the clay begins, ends; the path ends
 

@@ -15,10 +15,8 @@ from __future__ import annotations
 
 import bisect
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,12 +24,9 @@ from scipy.integrate import DOP853, LSODA, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-
-from oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG  # noqa: E402
-
 from hapticclay.model.clay import Profile
-from hapticclay.model.scenario import Scenario  # noqa: E402
+from hapticclay.model.scenario import Scenario
+from tests.oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
 STILL, WHILE = 1e-5, 1.0  # [m/s], [s] stalled is slower than this for so long; saturated, in the limit for so long

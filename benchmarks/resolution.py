@@ -12,21 +12,18 @@ import argparse
 import dataclasses
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tabulate import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from tabulate import tabulate  # noqa: E402
-from work_precision import machine, number  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay import files  # noqa: E402
-from hapticclay.model.constants import B_CONSTANT, L2, TS  # noqa: E402
+import hapticclay as hc
+from hapticclay import files
+from hapticclay.model.constants import B_CONSTANT, L2, TS
 from hapticclay.theory import linear_loop
+
+from .work_precision import machine, number
 
 FORCE = 5.0  # [N] of the hand: 5 cm/s in the clay
 END = 0.20  # [m] of the cut

@@ -11,20 +11,18 @@ import argparse
 import importlib.util
 import os
 import statistics
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+from tabulate import tabulate
 
-from tabulate import tabulate  # noqa: E402
-from work_precision import write  # noqa: E402
+from hapticclay.files import atomic
+from hapticclay.studies import sweep
+from hapticclay.studies.sampling import Sweep, parse_grid
 
-from hapticclay.files import atomic  # noqa: E402
-from hapticclay.studies import sweep  # noqa: E402
-from hapticclay.studies.sampling import Sweep, parse_grid  # noqa: E402
+from .work_precision import write
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 NEEDS = ("distributed", "pyarrow")

@@ -11,23 +11,20 @@ page.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tabulate import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+import hapticclay as hc
+from hapticclay.model.constants import S
+from hapticclay.stepping.engine import warnings_caught
 
-import hits  # noqa: E402
-from peers import mujoco_plain, ours  # noqa: E402
-from problems import EDGES, PROBLEMS, nonlinear_pieces  # noqa: E402
-from tabulate import tabulate  # noqa: E402
-from work_precision import number, write  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay.model.constants import S  # noqa: E402
-from hapticclay.stepping.engine import warnings_caught  # noqa: E402
+from . import hits
+from .peers import mujoco_plain, ours
+from .problems import EDGES, PROBLEMS, nonlinear_pieces
+from .work_precision import number, write
 
 T = 2.0  # [s] simulated
 SWEEP = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)

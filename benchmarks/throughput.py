@@ -22,15 +22,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from tabulate import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from tabulate import tabulate  # noqa: E402
-from work_precision import write  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay.simulation import simulate  # noqa: E402
+import hapticclay as hc
+from hapticclay.simulation import simulate
 from hapticclay.stepping import leapfrog
+
+from .work_precision import write
 
 LONG = 5555  # steps of 2 s, as the runs of the map
 OFTEN = 5  # compiled runs to one in Python, which takes as long

@@ -15,22 +15,19 @@ import math
 import os
 import platform
 import statistics
-import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tabulate import tabulate
+from tqdm import tqdm
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+import hapticclay as hc
+from hapticclay import files
 
-import reference as hybrid  # noqa: E402
-from problems import EDGES, PROBLEMS, Result, reference  # noqa: E402
-from tabulate import tabulate  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import hapticclay as hc  # noqa: E402
-from hapticclay import files  # noqa: E402
+from . import reference as hybrid
+from .problems import EDGES, PROBLEMS, Result, reference
 
 PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
 DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "numba", "control", "pybullet", "drake", "pin")
@@ -77,7 +74,7 @@ def measure(quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS) ->
     modules, omissions = [], []
     for name in peers:
         try:
-            modules.append(importlib.import_module(f"peers.{name}"))
+            modules.append(importlib.import_module(f".peers.{name}", __package__))
         except ImportError as error:
             omissions.append(f"{name}: {error}")
     jobs = []

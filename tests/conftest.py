@@ -1,12 +1,9 @@
 import os
 import signal
-import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-sys.path.insert(0, str(Path(__file__).parent))  # oracles
 os.environ.setdefault("MPLBACKEND", "agg")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's, and then its children's
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import importlib
 
-from hapticclay.common import PROBLEMS
+from .common import PROBLEMS
 
 FILES = ("scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
 
 
 def main() -> None:
     """Largest error of the crossing times [s] and wall time [s] per method and setting."""
-    from problems import reference
+    from ..problems import reference
 
     args = argparse.ArgumentParser(description=__doc__)
     args.add_argument("files", nargs="*", default=FILES)
@@ -23,7 +23,7 @@ def main() -> None:
         exact = [float(t) for t in reference(problem).crossings]
         for file in a.files:
             try:
-                peer = importlib.import_module(f"peers.{file}")
+                peer = importlib.import_module(f".{file}", __package__)
             except ImportError as error:
                 print(f"{file}: {error}")
                 continue

@@ -5,21 +5,17 @@ The formulas are those of docs/equations.md (sections 2 and 3, without shaping);
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass
 from math import cos, sin
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from hapticclay import build, free
+from hapticclay.model.arm import I1, I2, inverse
+from hapticclay.model.constants import C_POLE, L1, L2, G, S
 
-from problems import EDGES, PROBLEMS, Result  # noqa: E402
-
-from hapticclay import build, free  # noqa: E402
-from hapticclay.model.arm import I1, I2, inverse  # noqa: E402
-from hapticclay.model.constants import C_POLE, L1, L2, G, S  # noqa: E402
+from ..problems import EDGES, PROBLEMS, Result
 
 WALL_LIMIT = 60.0  # [s] of wall time for one run
 MASS1, MASS2 = (float(m) for m in build(free()).body_mass[1:])  # [kg]; only I1 and I2 matter to the motion

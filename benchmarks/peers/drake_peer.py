@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from hapticclay.common import C_POLE, EDGES, I2, IZZ1, L1, MASS1, MASS2, Job, Result
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
@@ -25,7 +24,8 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from hapticclay import common
+from . import common
+from .common import C_POLE, EDGES, I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
 NAME = "Drake"
 MAX_STEP = 0.03  # [s]; with the default 0.1 a trial step of runge_kutta5 in clay meets NaN, which Drake does not reject

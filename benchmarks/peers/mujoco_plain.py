@@ -7,9 +7,11 @@ velocity; controller states take semi-implicit Euler steps; borders are noticed 
 from __future__ import annotations
 
 import mujoco
-from hapticclay.common import PROBLEMS, Job, Result
 
-from hapticclay import build, common
+from hapticclay import build
+
+from . import common
+from .common import PROBLEMS, Job, Result
 
 NAME = "MuJoCo, plain"
 

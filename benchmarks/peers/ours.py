@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from hapticclay.common import PROBLEMS, Result
-
 import hapticclay as hc
 from hapticclay.simulation import simulate
+
+from .common import PROBLEMS, Result
 
 NAME = "hapticclay"
 

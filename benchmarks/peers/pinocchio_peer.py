@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from hapticclay.common import C_POLE, I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
-from hapticclay import common
+from . import common
+from .common import C_POLE, I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
 NAME = "Pinocchio"
 

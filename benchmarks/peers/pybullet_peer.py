@@ -10,9 +10,9 @@ import tempfile
 from pathlib import Path
 
 import pybullet
-from hapticclay.common import I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
-from hapticclay import common
+from . import common
+from .common import I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
 NAME = "PyBullet"
 

@@ -11,9 +11,9 @@ import time
 
 import control
 import numpy as np
-from hapticclay.common import EDGES, L1, L2, Job, Result
 
-from hapticclay import common
+from . import common
+from .common import EDGES, L1, L2, Job, Result
 
 NAME = "python-control"
 SAMPLE = 1e-3  # [s] of the output, where crossings are interpolated

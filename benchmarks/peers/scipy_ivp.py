@@ -11,10 +11,10 @@ import importlib.util
 import time
 
 import numpy as np
-from hapticclay.common import EDGES, GRID, L1, L2, Job, Result
 from scipy.integrate import solve_ivp
 
-from hapticclay import common
+from . import common
+from .common import EDGES, GRID, L1, L2, Job, Result
 
 NAME = "SciPy"
 COMPILED = ", compiled"  # end of the name of a method whose right-hand side is

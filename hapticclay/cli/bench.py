@@ -23,14 +23,13 @@ class Bench:
     """Fewer jobs, settings and scenes: about a minute."""
 
     def __call__(self) -> int:
-        folder = Path(__file__).resolve().parents[2] / "benchmarks"
-        if not (folder / "bench.py").is_file():
-            raise ParameterError(
-                "benchmarks", str(folder), "not found: run from a checkout, after pip install -e .[bench]"
-            )
+        checkout = Path(__file__).resolve().parents[2]
+        if not (checkout / "benchmarks" / "bench.py").is_file():
+            bound = "not found: run from a checkout, after pip install -e .[bench]"
+            raise ParameterError("benchmarks", str(checkout / "benchmarks"), bound)
         writable(self.out)
-        sys.path.insert(0, str(folder))
+        sys.path.insert(0, str(checkout))
         import importlib
 
-        importlib.import_module("bench").main(self.out, self.quick)
+        importlib.import_module("benchmarks.bench").main(self.out, self.quick)
         return 0

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from oracles import Linear, piecewise_linear
 
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop
+from tests.oracles import Linear, piecewise_linear
 
 TH = Operator()
 

@@ -13,7 +13,7 @@ from hapticclay.model import constants
 from hapticclay.simulation import record
 from hapticclay.stepping import engine
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from oracles import Arm
 
 from hapticclay.model import arm
+from tests.oracles import Arm
 
 EPS = np.finfo(float).eps
 angle = st.floats(-3.1, 3.1)

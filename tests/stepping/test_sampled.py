@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles import hybrid
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import controller
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine, Signal
+from tests.oracles import hybrid
 
 CASES = {
     "held": dict(),

@@ -8,13 +8,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles import G0, G1, Linear, piecewise_linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine, Signal
+from tests.oracles import G0, G1, Linear, piecewise_linear
 
 TH = (0.25, 2.0, 6.0)
 

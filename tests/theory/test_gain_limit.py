@@ -6,7 +6,6 @@ from decimal import Decimal, localcontext
 import control
 import numpy as np
 import pytest
-from oracles import G0, G1, S0, S1, SG
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -14,6 +13,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.theory import gain_limit, linear_loop
+from tests.oracles import G0, G1, S0, S1, SG
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}
 PRINTED = {

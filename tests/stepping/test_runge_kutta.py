@@ -5,11 +5,11 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from oracles import nonlinear_pieces, piecewise_linear
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
+from tests.oracles import nonlinear_pieces, piecewise_linear
 
 EDGES = (0.05, 0.15, 0.20)
 CASES = {

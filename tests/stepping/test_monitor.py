@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.model import arm
 from hapticclay.model.operator import Operator
+from hapticclay.simulation.record import Record
 from hapticclay.stepping import leapfrog, monitor
 
 CODES = {"finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"}

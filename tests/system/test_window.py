@@ -186,7 +186,7 @@ def test_a_record_is_replayed(screen, tmp_path):
 def test_every_key_of_the_page_does_what_it_says():
     from hapticclay.views.window import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
 
-    page = (Path(__file__).parents[1] / "docs" / "view.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "view.md").read_text()
     named = [k for row in re.findall(r"^\| (?!key|---)(.+?) \|.*\|$", page, re.M) for k in row.split(", ")]
     assert named == ["space", "backspace", "up", "down", "left", "right", "1", "2", "3", "R", "H"]
     session = Session(hc.constant_cut(), stiffness=10.0)

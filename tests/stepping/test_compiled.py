@@ -10,14 +10,15 @@ import time
 
 import numpy as np
 import pytest
-from test_loop import CASES
 
 import hapticclay as hc
 from hapticclay import stepping
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import batch, record, simulate
+from hapticclay.simulation.record import Record
 from hapticclay.stepping import leapfrog
+from tests.stepping.test_loop import CASES
 
 fast = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]")
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")

@@ -2,22 +2,16 @@
 
 import dataclasses
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles import piecewise_linear
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import bench
-import extremes
-import reference
 
 import hapticclay as hc
+from benchmarks import bench, extremes, reference
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.signals import Multisine
+from tests.oracles import piecewise_linear
 
 CASES = extremes.cases()
 LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",
@@ -60,7 +54,7 @@ def test_registry_covers_the_list():
 
 
 def test_published_verdicts_agree_and_nothing_escaped():
-    rows = bench.load(Path(__file__).parents[1] / "docs" / "bench")["extremes"]["rows"]
+    rows = bench.load(Path(__file__).parents[2] / "docs" / "bench")["extremes"]["rows"]
     assert [(r["group"], r["name"]) for r in rows] == [(c.group, c.name) for c in CASES]
     for r in rows:
         assert r["nan"] == 0 and r["warnings"] == 0 and r["ours"] != "raised", r

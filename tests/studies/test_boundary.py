@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import Linear
 
 import hapticclay as hc
 from hapticclay.cli import app
@@ -18,6 +17,7 @@ from hapticclay.studies import boundary, stability_map
 from hapticclay.studies.boundary import Loop
 from hapticclay.theory import gain_limit, linear_loop
 from hapticclay.views import study_plots
+from tests.oracles import Linear
 
 
 @settings(max_examples=10)

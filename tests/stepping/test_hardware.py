@@ -457,9 +457,8 @@ def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():
 
 
 def test_published_resolution_page_was_made_from_the_published_data():
-    folder = Path(__file__).parents[1]
-    sys.path.insert(0, str(folder / "benchmarks"))
-    import resolution
+    folder = Path(__file__).parents[2]
+    from benchmarks import resolution
 
     rows = json.loads((folder / "docs" / "bench" / "resolution.json").read_text())["rows"]
     page = (folder / "docs" / "bench" / "resolution.md").read_text()
@@ -471,8 +470,7 @@ def test_published_resolution_page_was_made_from_the_published_data():
 
 
 def test_resolution_is_measured(monkeypatch):
-    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-    import resolution
+    from benchmarks import resolution
 
     monkeypatch.setattr(resolution, "WITHIN", (0.052, 0.058))
     monkeypatch.setattr(resolution, "END", 0.059)

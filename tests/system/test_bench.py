@@ -2,24 +2,14 @@
 
 import dataclasses
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import bench
-import extremes
-import hits
-import parts
-import problems
-import scaling
-import stiffness
-import throughput
-import work_precision as wp
-from peers import common, scipy_ivp
+from benchmarks import bench, extremes, hits, parts, problems, scaling, stiffness, throughput
+from benchmarks import work_precision as wp
+from benchmarks.peers import common, scipy_ivp
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +150,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
 
 
 def test_published_page_was_made_from_the_published_data():
-    folder = Path(__file__).parents[1] / "docs" / "bench"
+    folder = Path(__file__).parents[2] / "docs" / "bench"
     data = bench.load(folder)
     assert set(data) == set(bench.PARTS)
     assert (folder / "bench.md").read_text() == bench.page(data)
@@ -183,7 +173,7 @@ def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
 
 
 def test_published_stiff_clay_breaks_nothing_of_ours():
-    rows = bench.load(Path(__file__).parents[1] / "docs" / "bench")["stiffness"]["rows"]
+    rows = bench.load(Path(__file__).parents[2] / "docs" / "bench")["stiffness"]["rows"]
     assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in rows)
 
 

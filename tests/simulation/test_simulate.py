@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from oracles import Linear, nonlinear, piecewise_linear
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from tests.oracles import Linear, nonlinear, piecewise_linear
 
 EDGES = (0.05, 0.15, 0.20)
 TH = (0.25, 2.0, 6.0)
@@ -266,11 +266,7 @@ def test_runs_are_repeatable_bit_for_bit():
 
 def test_speed_is_a_small_multiple_of_the_bare_engine():
     """A guard, not the measurement: benchmarks/throughput.py measures 2.5."""
-    import sys
-    from pathlib import Path
-
-    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-    import throughput
+    from benchmarks import throughput
 
     scene = throughput.SCENES["constant cut"]
     ratio = min(throughput.loop(scene, 8000) / throughput.floor(scene, 8000) for _ in range(3))

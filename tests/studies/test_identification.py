@@ -5,8 +5,6 @@ Signals are short: 1.5 s (Th 2.5 s) instead of 5 s (10 s), one period of each ru
 
 import dataclasses
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
+from benchmarks import intervals
 from hapticclay.cli import app
 from hapticclay.studies import identification
 from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import intervals
 
 DT = 0.36e-3
 PRINTED = {  # Eqs. 15 to 19, lengths in m

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from oracles import Linear
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
 from hapticclay.stepping import engine
+from tests.oracles import Linear
 
 
 def exact_clay_and_hand(b, K, uh, th):

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles import Linear, piecewise_linear
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import experiments
+from tests.oracles import Linear, piecewise_linear
 
 F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis
 

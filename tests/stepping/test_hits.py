@@ -1,25 +1,19 @@
 """Hits and rebounds on clay of any stiffness, against solutions that are not ours (oracles, benchmarks/reference)."""
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from oracles import bounces
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import hits
-import reference
 
 import hapticclay as hc
+from benchmarks import hits, reference
 from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
 from hapticclay.model.scenario import Scenario
+from tests.oracles import bounces
 
 REBOUND = Scenario(
     clay=slab(1e4, 0.05, 0.15), force=(-0.5, 0.0), velocity=(0.3, 0.0), start=(0.03, 0.0),

@@ -5,11 +5,11 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from oracles import Arm
 
 import hapticclay as hc
 from hapticclay.model.operator import Operator
 from hapticclay.stepping import inline, leapfrog
+from tests.oracles import Arm
 
 CASES = {
     "plain": hc.constant_cut(t_max=1.0),
