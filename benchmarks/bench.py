@@ -36,7 +36,10 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
 
 def page(data: dict[str, dict[str, Any]]) -> str:
     """The Markdown page."""
-    text = ["# Benchmarks", "Every figure here comes from the runs of `hapticclay bench`; do not edit."]
+    text = [
+        "# Benchmarks",
+        "Every figure here comes from the runs of `hapticclay bench`; do not edit.",
+    ]
     if {"work_precision", "hits"} <= set(data):
         text += [
             "## Which step to take",
@@ -51,7 +54,10 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     made: dict[tuple[str, ...], list[str]] = {}
     for name, found in data.items():
         made.setdefault(tuple(found["machine"]), []).append(name.replace("_", " "))
-    text += ["\n".join((f"- {', '.join(names)}:", *(f"  - {x}" for x in lines))) for lines, names in made.items()]
+    text += [
+        "\n".join((f"- {', '.join(names)}:", *(f"  - {x}" for x in lines)))
+        for lines, names in made.items()
+    ]
     return "\n\n".join(text) + "\n"
 
 
@@ -69,7 +75,9 @@ def publish(out: Path, readme: Path | None = None) -> None:
     if readme:
         head, _, rest = readme.read_text().partition(BEGIN)
         with files.atomic(readme) as f:
-            f.write(f"{head}{BEGIN}\n\n{recommended(data)}\n\n{END}{rest.partition(END)[2]}".encode())
+            f.write(
+                f"{head}{BEGIN}\n\n{recommended(data)}\n\n{END}{rest.partition(END)[2]}".encode()
+            )
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None = None) -> None:
@@ -80,20 +88,34 @@ def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None
     publish(out, readme)
     data = load(out)
     print(f"\n{recommended(data)}\n")
-    print(work_precision.tabulate(work_precision.dominance(data["work_precision"]["rows"]), headers="keys"))
+    print(
+        work_precision.tabulate(
+            work_precision.dominance(data["work_precision"]["rows"]), headers="keys"
+        )
+    )
     rows = data["extremes"]["rows"]
-    print(f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of the reference")
+    print(
+        f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of the reference"
+    )
     for x in data["work_precision"]["omissions"]:
         print(f"left out: {x}")
     print(f"written to {out}, the page is {out / 'bench.md'}")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute"
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
-    parser.add_argument("--readme", type=Path, help="a README whose table of recommended settings is to be renewed")
-    parser.add_argument("--page-only", action="store_true", help="make the page anew from the data in the folder")
+    parser.add_argument(
+        "--readme", type=Path, help="a README whose table of recommended settings is to be renewed"
+    )
+    parser.add_argument(
+        "--page-only", action="store_true", help="make the page anew from the data in the folder"
+    )
     args = parser.parse_args()
     if args.page_only:
         publish(args.out, args.readme)

@@ -51,15 +51,23 @@ class Case:
 
 def cut(velocity=(0.0, 0.0), **kw) -> Scenario:
     """The constant cut; fields that constant_cut() does not take are replaced."""
-    own = {k: kw.pop(k) for k in ("operator", "clay", "length", "stop", "muscle", "gain") if k in kw}
+    own = {
+        k: kw.pop(k) for k in ("operator", "clay", "length", "stop", "muscle", "gain") if k in kw
+    }
     return replace(hc.constant_cut(**kw), velocity=velocity, **own)
 
 
 NONE = Profile((), (0.0,))
-WALL = Clay(Profile((0.0,), (0.0, 90.0), along="y"), Profile((0.0,), (0.0, 90.0), along="y"))  # clay for y > 0
-CORNER = Clay(Profile((0.05,), (0.0, 200.0)), Profile((0.02,), (0.0, 200.0), along="y"))  # own borders on each axis
+WALL = Clay(
+    Profile((0.0,), (0.0, 90.0), along="y"), Profile((0.0,), (0.0, 90.0), along="y")
+)  # clay for y > 0
+CORNER = Clay(
+    Profile((0.05,), (0.0, 200.0)), Profile((0.02,), (0.0, 200.0), along="y")
+)  # own borders on each axis
 EVERYWHERE = Clay(Profile((), (100.0,)), Profile((), (100.0,)))
-STRIPES = Clay(*[Profile(tuple(0.02 + 1e-3 * i for i in range(100)), (50.0, 100.0) * 50 + (50.0,))] * 2)
+STRIPES = Clay(
+    *[Profile(tuple(0.02 + 1e-3 * i for i in range(100)), (50.0, 100.0) * 50 + (50.0,))] * 2
+)
 HEAVY, STRONG = Operator(100.0, 0.0, 0.0), Operator(0.0, 0.0, 1e7)
 
 
@@ -83,28 +91,51 @@ def cases() -> list[Case]:
     add(g, "b = 1e4 hit at 2 m/s", cut((2.0, 0.0), b=1e4, t_max=1.0))
     add(g, "b = 1e9 hit at 2 m/s", cut((2.0, 0.0), b=1e9, t_max=1.0), True)
     add(g, "b = 1e9 hit at 2 m/s aslant", cut((1.6, 1.2), b=1e9, t_max=1.0))
-    add(g, "b = 1e9 hit at 2 m/s, motors of 0.1 N.m", cut((2.0, 0.0), b=1e9, t_max=1.5, torque_limit=(0.1, 0.1)))
-    add(g, "b = 1e9 hit at 2 m/s, hand of 100 kg", cut((2.0, 0.0), b=1e9, t_max=1.0, operator=HEAVY))
+    add(
+        g,
+        "b = 1e9 hit at 2 m/s, motors of 0.1 N.m",
+        cut((2.0, 0.0), b=1e9, t_max=1.5, torque_limit=(0.1, 0.1)),
+    )
+    add(
+        g, "b = 1e9 hit at 2 m/s, hand of 100 kg", cut((2.0, 0.0), b=1e9, t_max=1.0, operator=HEAVY)
+    )
     add(g, "b = 1e9 hit at 2 m/s, shaped", cut((2.0, 0.0), b=1e9, t_max=1.0, shaping=True))
 
     g = "hand"
-    add(g, "mass 0, spring 6 N/m", cut(t_max=4.0, operator=Operator(0.0, 2.0, 6.0), force=(2.0, 0.0)))
+    add(
+        g,
+        "mass 0, spring 6 N/m",
+        cut(t_max=4.0, operator=Operator(0.0, 2.0, 6.0), force=(2.0, 0.0)),
+    )
     add(g, "mass 100 kg", cut(t_max=6.0, operator=HEAVY, gain=(0.02, 0.02), b=0.0), True)
     add(g, "spring 1e7 N/m, mass 0", cut(t_max=0.5, operator=STRONG, gain=(1e-3, 1e-3)), True)
-    add(g, "spring 1e7 N/m, mass 100 kg", cut(t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)))
+    add(
+        g,
+        "spring 1e7 N/m, mass 100 kg",
+        cut(t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)),
+    )
     add(g, "spring 1e7 N/m, mass 0, K = (1, 0.5)", cut(t_max=0.5, operator=STRONG))
     add(g, "spring 1e7 N/m, mass 100 kg, moving at 0.2 m/s",
         cut((0.2, 0.0), t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)))  # fmt: skip
     add(g, "spring 1e7 N/m, mass 100 kg, damper 1e3 N.s/m, moving at 2 m/s",
         cut((2.0, 0.0), t_max=1.0, operator=Operator(100.0, 1e3, 1e7), gain=(1e-3, 1e-3)))  # fmt: skip
-    add(g, "spring 1e7 N/m, damper 1e5 N.s/m", cut(t_max=2.0, operator=Operator(0.25, 1e5, 1e7), gain=(1e-3, 1e-3)))
+    add(
+        g,
+        "spring 1e7 N/m, damper 1e5 N.s/m",
+        cut(t_max=2.0, operator=Operator(0.25, 1e5, 1e7), gain=(1e-3, 1e-3)),
+    )
 
     g = "gain K"
     add(g, "K = 1e-6", cut(gain=(1e-6, 1e-6), t_max=5.0), True)
     add(g, "K = 1 on y, unstable", cut(gain=(1.0, 1.0)), True)
     add(g, "K = 1 on y, goes on", cut(gain=(1.0, 1.0), stop=False, t_max=8.0, force=(0.1, 0.02), start=(0.06, 0.0),
                                     length=None))  # fmt: skip
-    add(g, "K = 3 on x, hand, shaped", cut(gain=(3.0, 0.3), b=100.0, impedance=True, shaping=True, t_max=5.0), True)
+    add(
+        g,
+        "K = 3 on x, hand, shaped",
+        cut(gain=(3.0, 0.3), b=100.0, impedance=True, shaping=True, t_max=5.0),
+        True,
+    )
     add(g, "K = 25 on x, goes on", cut(gain=(25.0, 0.3), b=100.0, impedance=True, stop=False, t_max=4.0, length=None,
                                      start=(0.1, 0.0), clay=EVERYWHERE))  # fmt: skip
     add(g, "K = 1e4", cut(gain=(1e4, 1e4)), True)
@@ -114,13 +145,26 @@ def cases() -> list[Case]:
     add(g, "dt = 1e-5", cut(dt=1e-5, t_max=1.0, force=(1.5, 0.0)))
     add(g, "dt = 1e-2", cut(dt=1e-2))
     add(g, "dt = 1e-2, b = 1e9 hit at 2 m/s", cut((2.0, 0.0), b=1e9, dt=1e-2, t_max=1.0), True)
-    add(g, "dt = 1e-2, spring 1e7 N/m, mass 0", cut(dt=1e-2, t_max=1.5, operator=STRONG, gain=(1e-3, 1e-3)))
+    add(
+        g,
+        "dt = 1e-2, spring 1e7 N/m, mass 0",
+        cut(dt=1e-2, t_max=1.5, operator=STRONG, gain=(1e-3, 1e-3)),
+    )
 
     g = "torque limits"
     add(g, "0.1 N.m, 1 N", cut(torque_limit=(0.1, 0.1)))
     add(g, "0.1 N.m, 3 N aslant", cut(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0))
-    add(g, "0.1 N.m, held by the motors' limit", cut(torque_limit=(0.1, 0.1), force=(0.0, 5.0), b=1e3, t_max=1.5), True)
-    add(g, "0.1 N.m, b = 1e4 hit at 2 m/s", cut((2.0, 0.0), torque_limit=(0.1, 0.1), b=1e4, t_max=1.0))
+    add(
+        g,
+        "0.1 N.m, held by the motors' limit",
+        cut(torque_limit=(0.1, 0.1), force=(0.0, 5.0), b=1e3, t_max=1.5),
+        True,
+    )
+    add(
+        g,
+        "0.1 N.m, b = 1e4 hit at 2 m/s",
+        cut((2.0, 0.0), torque_limit=(0.1, 0.1), b=1e4, t_max=1.0),
+    )
 
     g = "start"
     add(g, "at rest inside b = 90", cut(start=(0.1, 0.0)))
@@ -129,14 +173,25 @@ def cases() -> list[Case]:
     add(g, "on the far border", cut(start=(0.15, 0.0), t_max=4.0))
 
     g = "borders"
-    add(g, "along the border, from on it", cut(start=(0.05, 0.0), force=(0.0, 1.0), t_max=1.5), True)
+    add(
+        g, "along the border, from on it", cut(start=(0.05, 0.0), force=(0.0, 1.0), t_max=1.5), True
+    )
     add(g, "along the border, onto it from both sides",
         cut(clay=WALL, start=(0.0, -1e-4), force=(1.0, 0.05), t_max=3.0), True)  # fmt: skip
-    add(g, "along the border, at a shallow angle", cut(clay=WALL, start=(0.0, -5e-4), force=(1.0, -0.02), t_max=4.0))
+    add(
+        g,
+        "along the border, at a shallow angle",
+        cut(clay=WALL, start=(0.0, -5e-4), force=(1.0, -0.02), t_max=4.0),
+    )
     add(
         g,
         "along the border of b = 1e4",
-        cut(clay=Clay(NONE, Profile((0.0,), (0.0, 1e4), along="y")), start=(0.0, -1e-4), force=(1.0, 0.5), t_max=2.0),
+        cut(
+            clay=Clay(NONE, Profile((0.0,), (0.0, 1e4), along="y")),
+            start=(0.0, -1e-4),
+            force=(1.0, 0.5),
+            t_max=2.0,
+        ),
     )
     add(g, "against the border, swinging through it", cut(
         clay=Clay(Profile((0.0,), (0.0, 500.0)), NONE), start=(0.0, 0.0), force=(0.0, 0.0), t_max=6.0, length=None,
@@ -173,7 +228,13 @@ def cases() -> list[Case]:
         False,
         1000,
     )
-    add(g, "1 h on the hand's spring", cut(b=1.0, t_max=3600.0, dt=1e-2, impedance=True, force=(0.5, 0.0)), False, 100)
+    add(
+        g,
+        "1 h on the hand's spring",
+        cut(b=1.0, t_max=3600.0, dt=1e-2, impedance=True, force=(0.5, 0.0)),
+        False,
+        100,
+    )
 
     g = "sampled"
     add(g, "held", cut(control="sampled", t_max=1.5), True)
@@ -189,14 +250,26 @@ def cases() -> list[Case]:
     add(g, "cut, dt = 2e-3", cut(integrator="accurate", dt=2e-3), True)
     add(g, "b = 1e4 hit at 2 m/s", cut((2.0, 0.0), integrator="accurate", b=1e4, t_max=0.5))
     add(g, "K = 1 on y, unstable", cut(integrator="accurate", gain=(1.0, 1.0), dt=1e-3))
-    add(g, "grazing a corner", cut(integrator="accurate", clay=CORNER, force=(1.0, 0.8), t_max=5.0, dt=1e-3))
+    add(
+        g,
+        "grazing a corner",
+        cut(integrator="accurate", clay=CORNER, force=(1.0, 0.8), t_max=5.0, dt=1e-3),
+    )
     return out
 
 
 def run(case: Case) -> dict[str, Any]:
     """One row: what became of the scene, here and in the reference."""
-    row: dict[str, Any] = {"group": case.group, "name": case.name, "ours": "raised", "reference": "", "agree": False}
-    row |= dict.fromkeys(("position", "energy", "residual", "nan", "sigma", "wall", "reference wall"))
+    row: dict[str, Any] = {
+        "group": case.group,
+        "name": case.name,
+        "ours": "raised",
+        "reference": "",
+        "agree": False,
+    }
+    row |= dict.fromkeys(
+        ("position", "energy", "residual", "nan", "sigma", "wall", "reference wall")
+    )
     row |= {"warnings": 0, "slides": 0, "note": ""}
     home = os.getcwd()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
@@ -212,7 +285,9 @@ def run(case: Case) -> dict[str, Any]:
     row |= {
         "ours": r.outcome.code,
         "nan": int(sum(np.sum(~np.isfinite(getattr(r, name))) for name in ARRAYS)),
-        "residual": abs(r.energy["residual"]) / r.energy["throughput"] if r.energy["throughput"] else 0.0,
+        "residual": abs(r.energy["residual"]) / r.energy["throughput"]
+        if r.energy["throughput"]
+        else 0.0,
         "warnings": len(caught) + len(left),
         "wall": r.wall_time,
         "note": r.outcome.cause,
@@ -278,7 +353,9 @@ def main(out: Path = Path("out/bench"), quick: bool = False, only: str = "") -> 
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="half of the scenes")
     parser.add_argument("--only", default="", help="scenes whose 'group: name' holds this text")
     parser.add_argument("--out", type=Path, default=Path("out/bench"))

@@ -22,11 +22,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.clay import (
-    Clay,
-    Profile,
-    slab,
-)
+from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
 from hapticclay.model.scenario import Scenario
@@ -39,7 +35,10 @@ from .work_precision import number, write
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
 STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...
-NOMINAL_BORDER = (L2 - EDGES[0], L1)  # ... where shaping has least to do: the border lies at the nominal pose
+NOMINAL_BORDER = (
+    L2 - EDGES[0],
+    L1,
+)  # ... where shaping has least to do: the border lies at the nominal pose
 FELT = 0.05  # [s] after the hit, at which the force on the hand is compared
 SLOW = 1e-3  # [m/s] the time at which a border is passed more slowly than this says little
 LIMIT_TIME, LIMIT_PLACE = 1e-4, 1e-5  # [s], [m] what random hits at 0.36 ms keep
@@ -47,17 +46,29 @@ LIMIT_TIME, LIMIT_PLACE = 1e-4, 1e-5  # [s], [m] what random hits at 0.36 ms kee
 
 def jobs(b: float) -> dict[str, Scenario]:
     """One of each kind in clay b [N.s/m]."""
-    s = Scenario(clay=slab(b, *EDGES[:2]), length=None, shaping=True, torque_limit=STRONG, origin=NOMINAL_BORDER)
+    s = Scenario(
+        clay=slab(b, *EDGES[:2]),
+        length=None,
+        shaping=True,
+        torque_limit=STRONG,
+        origin=NOMINAL_BORDER,
+    )
     hand = Operator(0.25, 2.0, 60.0)
     thin = Profile((0.05, 0.051, 0.052, 0.053), (0.0, b, 0.1 * b, b, 0.0))
     return {
         "cut": dataclasses.replace(s, t_max=2.0),
-        "hit": dataclasses.replace(s, force=(-0.5, 0.0), velocity=(0.3, 0.0), start=(0.03, 0.0), t_max=0.6),
+        "hit": dataclasses.replace(
+            s, force=(-0.5, 0.0), velocity=(0.3, 0.0), start=(0.03, 0.0), t_max=0.6
+        ),
         "hit, hand": dataclasses.replace(
             s, force=(0.0, 0.0), velocity=(0.5, 0.0), start=(0.02, 0.0), operator=hand, t_max=0.4
         ),
-        "layers": dataclasses.replace(s, clay=Clay(thin, thin), velocity=(0.3, 0.0), start=(0.03, 0.0), t_max=0.6),
-        "grazing": dataclasses.replace(s, force=(-0.5, 0.0), velocity=(0.03, 0.0), start=(0.0495, 0.0), t_max=0.3),
+        "layers": dataclasses.replace(
+            s, clay=Clay(thin, thin), velocity=(0.3, 0.0), start=(0.03, 0.0), t_max=0.6
+        ),
+        "grazing": dataclasses.replace(
+            s, force=(-0.5, 0.0), velocity=(0.03, 0.0), start=(0.0495, 0.0), t_max=0.3
+        ),
     }
 
 
@@ -82,14 +93,29 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
     """One run of one job: the shape of a row of work_precision.py."""
     integrator, _, how = method.partition(", ")
     s = dataclasses.replace(jobs(b)[kind], dt=dt, integrator=integrator)
-    out: dict[str, Any] = {"problem": kind, "b": b, "package": "hapticclay", "method": method, "setting": dt}
+    out: dict[str, Any] = {
+        "problem": kind,
+        "b": b,
+        "package": "hapticclay",
+        "method": method,
+        "setting": dt,
+    }
     try:
         runs = [hc.simulate(s, engine="native" if how else "python")]
-        runs += [hc.simulate(s, engine="native") for _ in range(2) if how and runs[0].wall_time < 0.3]
+        runs += [
+            hc.simulate(s, engine="native") for _ in range(2) if how and runs[0].wall_time < 0.3
+        ]
     except ParameterError as error:  # an explicit method in clay too stiff for it
-        return {**out, **dict.fromkeys(("crossing", "leaves", "position", "force", "wall")), "note": error.bound}
+        return {
+            **out,
+            **dict.fromkeys(("crossing", "leaves", "position", "force", "wall")),
+            "note": error.bound,
+        }
     r, (crossings, place, felt) = runs[0], exact(kind, b)
-    mine, clear = [c.time for c in r.crossings if abs(c.speed) > SLOW], [e[0] for e in crossings if abs(e[2]) > SLOW]
+    mine, clear = (
+        [c.time for c in r.crossings if abs(c.speed) > SLOW],
+        [e[0] for e in crossings if abs(e[2]) > SLOW],
+    )
     same = len(mine) == len(clear)
     i = np.searchsorted(r.t, crossings[0][0] + FELT)
     force = float(np.interp(crossings[0][0] + FELT, r.t[i - 1 : i + 1], r.fe[i - 1 : i + 1, 0]))
@@ -109,7 +135,7 @@ def methods() -> dict[str, tuple[float, ...]]:
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
     if not simulate.has_numba():
         return {"fast": fast, "accurate": accurate}
-    simulate.compiled(), simulate.compiled(accurate=True)
+    simulate.load_compiled(), simulate.load_compiled(accurate=True)
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}
 
 
@@ -146,7 +172,11 @@ def against_reference(seed: int, dt: float = TS) -> dict[str, Any]:
     x = reference.solve(s, index * dt)
     r = hc.simulate(s)
     # a handle that hardly leaves the clay may pass the border some times more, as slowly: the nearest time counts
-    late = [(abs(c.speed), min(abs(c.time - e[2]) for e in x.crossings)) for c in r.crossings if x.crossings]
+    late = [
+        (abs(c.speed), min(abs(c.time - e[2]) for e in x.crossings))
+        for c in r.crossings
+        if x.crossings
+    ]
     n = min(len(x.p), int(np.searchsorted(index, len(r.p))))
     return {
         "seed": seed,
@@ -173,7 +203,13 @@ def sections(data: dict[str, Any]) -> list[str]:
             found = [r[what] for r in mine]
             line.append("refused" if None in found else number(max(found)))
         cells.append(line)
-    head = ["method", "step [s]", *(f"{k} [s]" for k in kinds), "position [m]", f"force after {FELT:g} s"]
+    head = [
+        "method",
+        "step [s]",
+        *(f"{k} [s]" for k in kinds),
+        "position [m]",
+        f"force after {FELT:g} s",
+    ]
     return [
         "## Hits",
         f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit at 0.3 m/s and its "
@@ -192,7 +228,13 @@ def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
     ladder = methods()
     if quick:
         ladder = {m: x[2:4] for m, x in ladder.items()}
-    rows = [row(kind, b, m, dt) for m, x in ladder.items() for dt in x for b in clays for kind in jobs(b)]
+    rows = [
+        row(kind, b, m, dt)
+        for m, x in ladder.items()
+        for dt in x
+        for b in clays
+        for kind in jobs(b)
+    ]
     return write(out, "hits", {"clays": clays, "rows": rows})
 
 
@@ -202,14 +244,21 @@ def study(n: int) -> None:
     for seed in range(n):
         r = against_reference(seed)
         kept += r["crossing"] <= LIMIT_TIME and r["position"] <= LIMIT_PLACE
-        print(*(f"{k} {v:.1e}" if isinstance(v, float) else f"{k} {v}" for k, v in r.items()), flush=True)
+        print(
+            *(f"{k} {v:.1e}" if isinstance(v, float) else f"{k} {v}" for k, v in r.items()),
+            flush=True,
+        )
     print(f"{kept} of {n} within {LIMIT_TIME:g} s and {LIMIT_PLACE:g} m")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="fewer clays and steps")
-    parser.add_argument("--random", type=int, metavar="N", help="compare N random hits with the reference instead")
+    parser.add_argument(
+        "--random", type=int, metavar="N", help="compare N random hits with the reference instead"
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     if args.random:

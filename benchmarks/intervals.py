@@ -33,15 +33,24 @@ SENSORS = {
     "10000 counts, 0.1 N": hc.Noise(10_000, 0.1),
     "2^30 counts, no force noise": hc.Noise(2**30, 0.0),
 }
-BLOCKS: tuple[tuple[str, bool], ...] = (("G", False), ("S", False), ("S", True), ("Th", False))  # what, shaping
+BLOCKS: tuple[tuple[str, bool], ...] = (
+    ("G", False),
+    ("S", False),
+    ("S", True),
+    ("Th", False),
+)  # what, shaping
 
 
-def one(seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any) -> list[dict[str, Any]]:
+def one(
+    seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any
+) -> list[dict[str, Any]]:
     """A row for each coefficient of each block and sensor: its share of error, and of half its interval."""
     module = importlib.import_module("hapticclay.studies.identification")
     simulate = module.simulate
     runs = kw.get("realisations", 4)
-    module.simulate = functools.lru_cache(runs)(functools.partial(simulate, engine="native"))  # for every sensor
+    module.simulate = functools.lru_cache(runs)(
+        functools.partial(simulate, engine="native")
+    )  # for every sensor
     try:
         return [
             {"what": what, "shaping": shaping, "axis": axis, "sensors": name, "coefficient": c.name,
@@ -59,7 +68,9 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Coverage and median half interval, of each coefficient and sensor."""
     groups: dict[tuple, list[dict[str, Any]]] = {}
     for r in rows:
-        groups.setdefault(tuple(r[k] for k in ("what", "shaping", "axis", "coefficient", "sensors")), []).append(r)
+        groups.setdefault(
+            tuple(r[k] for k in ("what", "shaping", "axis", "coefficient", "sensors")), []
+        ).append(r)
     return [
         dict(zip(("what", "shaping", "axis", "coefficient", "sensors"), key, strict=True))
         | {"seeds": len(g), "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
@@ -73,7 +84,9 @@ def page(found: list[dict[str, Any]]) -> str:
     cells: dict[tuple, list[str]] = {}
     for x in found:
         block = x["what"] + (", shaped" if x["shaping"] else "")
-        cells.setdefault((block, x["axis"], x["coefficient"]), []).append(f"{x['covered']:.3f}, {x['half']:.1e}")
+        cells.setdefault((block, x["axis"], x["coefficient"]), []).append(
+            f"{x['covered']:.3f}, {x['half']:.1e}"
+        )
     n = found[0]["seeds"]
     return "\n\n".join(
         [
@@ -92,7 +105,9 @@ def page(found: list[dict[str, Any]]) -> str:
 def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[dict[str, Any]]:
     """Measures, prints and, with a folder, writes both files."""
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        rows = [r for some in tqdm(pool.map(one, range(seeds)), total=seeds, disable=None) for r in some]
+        rows = [
+            r for some in tqdm(pool.map(one, range(seeds)), total=seeds, disable=None) for r in some
+        ]
     found = summary(rows)
     print(page(found))
     if out:
@@ -104,7 +119,9 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path)

@@ -53,7 +53,9 @@ def _sensors(spec: Any) -> None:
 
 def _contact(spec: Any) -> None:
     spec.option.disableflags = 0
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(1.0, 1.0, 0.1), pos=(0.0, 0.0, -0.06))
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=(1.0, 1.0, 0.1), pos=(0.0, 0.0, -0.06)
+    )
     ball = {"size": (0.0601, 0.0, 0.0), "pos": (0.35, 0.0, 0.0)}
     spec.body("link2").add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, mass=0.0, **ball)
 
@@ -67,7 +69,9 @@ ENGINE: dict[str, Callable[[], mujoco.MjModel]] = {
     "clay": lambda: arm("clay.xml"),
     "controller's states, RK4": lambda: hc.build(hc.free(integrator="accurate")),
     "skin": lambda: arm("room.xml", change=lambda spec: _skin(spec)),
-    "skin, room, heightfield": lambda: arm("room.xml", change=lambda spec: (_skin(spec), _heights(spec))),
+    "skin, room, heightfield": lambda: arm(
+        "room.xml", change=lambda spec: (_skin(spec), _heights(spec))
+    ),
     "sensors": lambda: arm(change=_sensors),
     "contact of tool and table": lambda: arm(change=_contact),
 }
@@ -91,7 +95,10 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     "muscle force": (dataclasses.replace(CUT, muscle=WAVE), {}),
     "sampled control": (_sampled(), {}),
     "sampled, encoder": (_sampled(encoder=65536), {}),
-    "sampled, A/D, noise, filter": (_sampled(adc_bits=16, force_noise=0.01, force_filter=500.0), {}),
+    "sampled, A/D, noise, filter": (
+        _sampled(adc_bits=16, force_noise=0.01, force_filter=500.0),
+        {},
+    ),
     "sampled, D/A": (_sampled(dac_bits=16), {}),
     "sampled, delay": (_sampled(delay=1e-4), {}),
     "sampled, jitter, lost samples": (_sampled(jitter=1e-5, lost=0.01), {}),
@@ -118,7 +125,7 @@ def run(name: str, steps: int) -> float:
     """Seconds a step of the whole loop in Python, the inlining (once a process) not counted."""
     scenario, how = LOOP[name]
     scenario = dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, stop=False)
-    off = mock.patch.object(energy.Ledger, "add", lambda *_: None)
+    off = mock.patch.object(energy.EnergyLedger, "add", lambda *_: None)
     with off if name == "no energy ledger" else contextlib.nullcontext():
         r = hc.simulate(scenario, engine="python", **how)
     return r.wall_time / r.steps
@@ -137,7 +144,10 @@ def compare(names: list[str], cost: Callable[[str], float], rounds: int) -> list
             base += [first, again]
         rows.append({"part": name, "ratio": statistics.median(ratios)})
     least = 1e6 * statistics.median(base)
-    return [{"part": plain, "ratio": 1.0, "us": least}, *({**r, "us": least * r["ratio"]} for r in rows)]
+    return [
+        {"part": plain, "ratio": 1.0, "us": least},
+        *({**r, "us": least * r["ratio"]} for r in rows),
+    ]
 
 
 TITLES = {
@@ -148,15 +158,24 @@ TITLES = {
 
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
-    out = ["## What each part costs", "A scene holds what it needs and no more: a part that is off costs nothing."]
+    out = [
+        "## What each part costs",
+        "A scene holds what it needs and no more: a part that is off costs nothing.",
+    ]
     for name, title in TITLES.items():
-        cells = [{"part": r["part"], "over plain": f"{r['ratio']:.2f}", "us": f"{r['us']:.2f}"} for r in data[name]]
+        cells = [
+            {"part": r["part"], "over plain": f"{r['ratio']:.2f}", "us": f"{r['us']:.2f}"}
+            for r in data[name]
+        ]
         out += [title, tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)]
     return out
 
 
 def main(
-    out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None, steps: int | None = None
+    out: Path = Path("out/bench"),
+    quick: bool = False,
+    rounds: int | None = None,
+    steps: int | None = None,
 ) -> dict[str, Any]:
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (1 if quick else 5), steps or (2000 if quick else 10_000)
@@ -169,7 +188,9 @@ def main(
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)

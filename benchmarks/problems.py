@@ -50,4 +50,6 @@ def reference(name: str) -> Pieces:
     s = PROBLEMS[name]
     assert s.clay is not None
     th = dataclasses.astuple(s.operator) if s.operator else None
-    return nonlinear_pieces(s.clay.x.values, EDGES, s.gain, s.force, th, s.shaping, s.t_max, 1e-12, 1e-14)
+    return nonlinear_pieces(
+        s.clay.x.values, EDGES, s.gain, s.force, th, s.shaping, s.t_max, 1e-12, 1e-14
+    )

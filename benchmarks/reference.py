@@ -29,10 +29,17 @@ from hapticclay.model.scenario import Scenario
 from tests.oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
-STILL, WHILE = 1e-5, 1.0  # [m/s], [s] stalled is slower than this for so long; saturated, in the limit for so long
+STILL, WHILE = (
+    1e-5,
+    1.0,
+)  # [m/s], [s] stalled is slower than this for so long; saturated, in the limit for so long
 BOUNCE = 1e-10  # [m] height of a bounce on a border below which it is sliding
-GROWTH = math.log(1e4)  # an excitation that the linear loop would have made so much larger is an instability
-SATURATED = 0.1  # share of the last WHILE in the torque limits from which an oscillation is bounded by them
+GROWTH = math.log(
+    1e4
+)  # an excitation that the linear loop would have made so much larger is an instability
+SATURATED = (
+    0.1  # share of the last WHILE in the torque limits from which an oscillation is bounded by them
+)
 STIFF = 3e3  # [1/s] rate from which LSODA is used
 RTOL = {DOP853: 1e-10, LSODA: 1e-10}
 ATOL = 1e-13
@@ -68,7 +75,9 @@ class Loop:
         th = s.operator
         self.m, self.d, self.k = (th.mass, th.damper, th.spring) if th else (0.0, 0.0, 0.0)
         self.muscle, self.command = _signal(s.muscle), _signal(s.command)
-        self.first = self.command(0.0) if self.command else (0.0, 0.0)  # a command is counted from t = 0
+        self.first = (
+            self.command(0.0) if self.command else (0.0, 0.0)
+        )  # a command is counted from t = 0
 
     def uh(self, t: float) -> tuple[float, float]:
         if not self.muscle:
@@ -106,7 +115,9 @@ class Loop:
         """Handle acceleration and net hand force f = rest - m p'' under motor torques tau."""
         k1, k2 = (tau[0] - tau[1]) / I1, (-tau[0] + (1.0 + I1 / I2) * tau[1]) / I1
         gx, gy = J[0] * k1 + J[1] * k2 + c[0], J[2] * k1 + J[3] * k2 + c[1]
-        a = _solve(self.m, W, gx + W[0] * rest[0] + W[1] * rest[1], gy + W[1] * rest[0] + W[2] * rest[1])
+        a = _solve(
+            self.m, W, gx + W[0] * rest[0] + W[1] * rest[1], gy + W[1] * rest[0] + W[2] * rest[1]
+        )
         return a, (rest[0] - self.m * a[0], rest[1] - self.m * a[1])
 
     def at(self, t: float, z, b, clip: bool = True, uh=None):
@@ -119,10 +130,16 @@ class Loop:
         J, p, v, c, W = self.kinematics(*z[:4])
         want, y2 = self.want(z, p, v)
         ux, uy = uh or self.uh(t)
-        rest = (ux - (self.d + b[0]) * v[0] - self.k * p[0], uy - (self.d + b[1]) * v[1] - self.k * p[1])
+        rest = (
+            ux - (self.d + b[0]) * v[0] - self.k * p[0],
+            uy - (self.d + b[1]) * v[1] - self.k * p[1],
+        )
         S = (float(SG[0]), 0.0, float(SG[1])) if self.s.shaping else W
         a = _solve(
-            self.m, S, want[0] + S[0] * rest[0] + S[1] * rest[1], want[1] + S[1] * rest[0] + S[2] * rest[1]
+            self.m,
+            S,
+            want[0] + S[0] * rest[0] + S[1] * rest[1],
+            want[1] + S[1] * rest[0] + S[2] * rest[1],
         )  # p'' = want + S f
         f = (rest[0] - self.m * a[0], rest[1] - self.m * a[1])
         # tau = J^T W^-1 (p'' - c - W f)
@@ -179,7 +196,9 @@ class Loop:
 
 def _oscillating(poles: np.ndarray) -> float:
     """Largest real part; slow drift along the path (the integrators, moved by the pose) does not count."""
-    return float(np.max(poles.real[(np.abs(poles.imag) > 0.5) | (poles.real > 0.5)], initial=-math.inf))
+    return float(
+        np.max(poles.real[(np.abs(poles.imag) > 0.5) | (poles.real > 0.5)], initial=-math.inf)
+    )
 
 
 def _solve(m: float, S, x: float, y: float) -> tuple[float, float]:
@@ -197,7 +216,9 @@ def _signal(multisine) -> Callable[[float], Any] | None:
     from hapticclay.model.signals import Signal  # its phases are the scenario's, by definition
 
     s = Signal(multisine)
-    return lambda t: [float(np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))) for i in (0, 1)]
+    return lambda t: [
+        float(np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))) for i in (0, 1)
+    ]
 
 
 class Map:
@@ -217,7 +238,9 @@ class Map:
         e, k = self.edges[i], self.place[i]
         return e[k - 1] if k else -math.inf, e[k] if k < len(e) else math.inf
 
-    def law(self, t: float, place: list[int] | None = None) -> Callable[[float], tuple[float, float]]:
+    def law(
+        self, t: float, place: list[int] | None = None
+    ) -> Callable[[float], tuple[float, float]]:
         """b(t) on both axes in the present region, entered now unless it was before; or in that of place."""
         terms = [(0.0, 0.0, 0.0)] * 2
         where = place or self.place
@@ -240,8 +263,12 @@ class Run:
         self.times, self.done = times, 0
         self.out = Solution()
         self.p: list[np.ndarray] = []
-        self.trace: list[tuple[float, float, bool, float, float]] = []  # t, speed, motor in its limit, v
-        self.sum = self.worst = 0.0  # growth of an excitation since it last began to grow, and at most [1]
+        self.trace: list[
+            tuple[float, float, bool, float, float]
+        ] = []  # t, speed, motor in its limit, v
+        self.sum = self.worst = (
+            0.0  # growth of an excitation since it last began to grow, and at most [1]
+        )
         self.judged = self.looked = 0.0
         self.sigma, self.where = 0.0, None
         self.spacing = max(0.02, s.t_max / 500)
@@ -286,7 +313,11 @@ class Run:
             z - self.base,
             self.s.t_max,
             rtol=RTOL[kind] * scale,
-            atol=ATOL * scale * min(1.0, max(1e-3, 1e3 / max(b, 1.0))),  # of a position, b times of which is an impulse
+            atol=ATOL
+            * scale
+            * min(
+                1.0, max(1e-3, 1e3 / max(b, 1.0))
+            ),  # of a position, b times of which is an impulse
             max_step=max(self.s.t_max / 50, 0.05),
         )
 
@@ -313,7 +344,9 @@ class Run:
             while solver.status == "running" and what < 0:
                 solver.step()
                 if solver.status == "failed":
-                    raise RuntimeError(f"reference: {type(solver).__name__} failed at {solver.t:g} s")
+                    raise RuntimeError(
+                        f"reference: {type(solver).__name__} failed at {solver.t:g} s"
+                    )
                 gained, a, b = solver.dense_output(), solver.t_old, solver.t
                 dense = lambda t, base=base, gained=gained: base + gained(t)  # noqa: E731
                 t, z, what = self.first(dense, a, b, low, high)
@@ -340,7 +373,9 @@ class Run:
                     g = lambda t, k=k: self.events(dense(t), t, low, high)[k]  # noqa: E731
                     # a run that has just left the border may come back to it within the same step
                     clear = [u for u in np.linspace(before, t, 17)[:-1] if g(u) > 0.0]
-                    found.append((brentq(g, clear[-1], t, xtol=1e-15, rtol=1e-15) if clear else before, k))
+                    found.append(
+                        (brentq(g, clear[-1], t, xtol=1e-15, rtol=1e-15) if clear else before, k)
+                    )
                 when, k = min(found)
                 return when, dense(when), k
             before = t
@@ -465,7 +500,10 @@ class SampledRun:
         """New torques, and the states after the sample. b: clay at the sample."""
         J, p, v, c, W = self.loop.kinematics(*z)
         if tau is None:
-            fh = (uh[0] - self.loop.d * v[0] - self.loop.k * p[0], uh[1] - self.loop.d * v[1] - self.loop.k * p[1])
+            fh = (
+                uh[0] - self.loop.d * v[0] - self.loop.k * p[0],
+                uh[1] - self.loop.d * v[1] - self.loop.k * p[1],
+            )
         else:
             fh = self.arm(z, tau, b if self.physical else (0.0, 0.0), uh)[1]
         fe = np.array(b) * v
@@ -481,7 +519,11 @@ class SampledRun:
         limit = np.array(self.s.torque_limit)
         bound = bool(np.any(np.abs(new) > limit))
         new = np.clip(new, -limit, limit) if clip else new
-        return tuple(map(float, new)), [(self.blocks[i] @ np.append(x[i], f[i]))[:4] for i in (0, 1)], bound
+        return (
+            tuple(map(float, new)),
+            [(self.blocks[i] @ np.append(x[i], f[i]))[:4] for i in (0, 1)],
+            bound,
+        )
 
     def between(self, z, tau, span, uh):
         """The arm over a span under held torques; (state, time of reaching length or None)."""
@@ -502,7 +544,11 @@ class SampledRun:
             edges.append((0, self.s.length))
         for _ in range(50):
             p, v = self.loop.kinematics(*z)[1:3]
-            b = self.b([p[i] + math.copysign(1e-12, v[i]) for i in (0, 1)]) if self.physical else (0.0, 0.0)
+            b = (
+                self.b([p[i] + math.copysign(1e-12, v[i]) for i in (0, 1)])
+                if self.physical
+                else (0.0, 0.0)
+            )
             stiff = max(b) * 0.93 > STIFF
             marks = []
             for i, e in edges:
@@ -514,7 +560,10 @@ class SampledRun:
                 rtol=1e-10 if stiff else 1e-11, atol=1e-14, events=marks or None,
             )  # fmt: skip
             t, z = r.t[-1], r.y[:, -1]
-            if self.s.length is not None and self.loop.kinematics(*z)[1][0] >= self.s.length - 1e-12:
+            if (
+                self.s.length is not None
+                and self.loop.kinematics(*z)[1][0] >= self.s.length - 1e-12
+            ):
                 return z, t
             if t >= span:
                 break
@@ -583,7 +632,9 @@ class SampledRun:
                 break
             t, n = end, n + 1
         out.end = t
-        out.p = np.array([x for x, at in zip(p, self.times, strict=False) if at <= t]).reshape(-1, 2)
+        out.p = np.array([x for x, at in zip(p, self.times, strict=False) if at <= t]).reshape(
+            -1, 2
+        )
         out.code = judged(code, np.array(trace, float), worst > GROWTH)
         return out
 

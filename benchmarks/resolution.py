@@ -33,13 +33,18 @@ WINDOWS = (1, 16)
 BITS = 12  # of both converters
 
 
-def run(counts: int | None, window: int, bits: int | None = BITS, delay: float = TS) -> dict[str, Any]:
+def run(
+    counts: int | None, window: int, bits: int | None = BITS, delay: float = TS
+) -> dict[str, Any]:
     """One cut: what its clay felt like. Errors are relative to b."""
     velocity = "exact" if counts is None else "difference"
     span = window if counts else 1
-    parts = hc.Interface(encoder=counts, velocity=velocity, window=span, adc_bits=bits, dac_bits=bits, delay=delay)
+    parts = hc.Interface(
+        encoder=counts, velocity=velocity, window=span, adc_bits=bits, dac_bits=bits, delay=delay
+    )
     s = dataclasses.replace(
-        hc.constant_cut(force=(FORCE, 0.0), shaping=True, control="sampled", length=END), interface=parts
+        hc.constant_cut(force=(FORCE, 0.0), shaping=True, control="sampled", length=END),
+        interface=parts,
     )
     r = hc.simulate(s)
     mine = (r.p[:, 0] > WITHIN[0]) & (r.p[:, 0] < WITHIN[1])
@@ -56,7 +61,9 @@ def run(counts: int | None, window: int, bits: int | None = BITS, delay: float =
     return out
 
 
-def measure(counts: tuple[int, ...] = COUNTS, windows: tuple[int, ...] = WINDOWS) -> list[dict[str, Any]]:
+def measure(
+    counts: tuple[int, ...] = COUNTS, windows: tuple[int, ...] = WINDOWS
+) -> list[dict[str, Any]]:
     """All rows: the ideal interface, converters alone, then encoders."""
     rows = [run(None, 1, None, 0.0), run(None, 1, None), run(None, 1)]
     return rows + [run(c, w) for c in counts for w in windows]
@@ -68,7 +75,12 @@ def page(rows: list[dict[str, Any]]) -> str:
             "mean error of fe/v", "rms error of fe/v", "status"]  # fmt: skip
     cells = []
     for r in rows:
-        text = [r["counts"] or "exact", r["window"] or "-", r["bits"] or "exact", f"{1e3 * r['delay']:g}"]
+        text = [
+            r["counts"] or "exact",
+            r["window"] or "-",
+            r["bits"] or "exact",
+            f"{1e3 * r['delay']:g}",
+        ]
         figures = ["-" if r[k] is None else number(r[k]) for k in ("least", "mean", "rms")]
         cells.append([str(x) for x in text] + figures + [r["status"]])
     return "\n\n".join(
@@ -99,6 +111,8 @@ def main(out: Path | None, **kw: Any) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--out", type=Path)
     main(parser.parse_args().out)

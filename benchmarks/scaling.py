@@ -33,7 +33,12 @@ ASKED = 10.0  # [s] that docs/sweep.md advises for a chunk
 def job(quick: bool) -> Sweep:
     """Chunks of equal work: runs to the time limit."""
     n = 4 if quick else 32
-    return Sweep("constant", parse_grid(f"b=20:200:{n}log gain.x=0.2:1:4"), {"t_max": 0.2 if quick else 2.0}, chunk=4)
+    return Sweep(
+        "constant",
+        parse_grid(f"b=20:200:{n}log gain.x=0.2:1:4"),
+        {"t_max": 0.2 if quick else 2.0},
+        chunk=4,
+    )
 
 
 def nothing(n: int) -> int:
@@ -54,7 +59,7 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
         for k in range(rounds + 1):
             for n in times:
                 out = Path(folder) / f"{k}-{n}"
-                sweep.begin(todo, out)
+                sweep.begin_sweep(todo, out)
                 begin = time.perf_counter()
                 jobs = client.map(
                     sweep.run_chunk, [todo] * todo.chunks, range(todo.chunks), [str(out)] * todo.chunks,
@@ -67,7 +72,13 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
         begin = time.perf_counter()
         client.gather(client.map(nothing, range(TASKS), pure=False))
         task = (time.perf_counter() - begin) / TASKS
-    return {"chunks": todo.chunks, "runs": len(todo), "times": times, "task_s": task, "chunk_bytes": bytes_}
+    return {
+        "chunks": todo.chunks,
+        "runs": len(todo),
+        "times": times,
+        "task_s": task,
+        "chunk_bytes": bytes_,
+    }
 
 
 def rows(found: dict[str, Any]) -> list[dict[str, float]]:
@@ -103,7 +114,10 @@ def sections(data: dict[str, Any]) -> list[str]:
         return []
 
     def table(found: list[dict[str, float]]) -> str:
-        cells = [{k.replace("_", " "): (f"{x:.3g}" if x < 1e3 else f"{x:.0f}") for k, x in r.items()} for r in found]
+        cells = [
+            {k.replace("_", " "): (f"{x:.3g}" if x < 1e3 else f"{x:.0f}") for k, x in r.items()}
+            for r in found
+        ]
         return tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)
 
     return [
@@ -139,19 +153,33 @@ def draw(data: dict[str, Any], out: Path) -> None:
         figure.savefig(f, dpi=150)
 
 
-def main(out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None) -> dict[str, Any]:
+def main(
+    out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None
+) -> dict[str, Any]:
     """Measures, writes the data and the diagram; returns the data."""
     missing = [name for name in NEEDS if not importlib.util.find_spec(name)]
     if missing:
-        return write(out, "scaling", {"rows": [], "omissions": [f"scaling: {x} is not installed" for x in missing]})
+        return write(
+            out,
+            "scaling",
+            {"rows": [], "omissions": [f"scaling: {x} is not installed" for x in missing]},
+        )
     found = measure(quick, rounds or (1 if quick else 5))
-    data = {**found, "cores": CORES, "asked_s": ASKED, "rows": rows(found), "projection": projection(found)}
+    data = {
+        **found,
+        "cores": CORES,
+        "asked_s": ASKED,
+        "rows": rows(found),
+        "projection": projection(found),
+    }
     draw(data, out)
     return write(out, "scaling", data)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--rounds", type=int)
     args = parser.parse_args()

@@ -28,7 +28,9 @@ from .work_precision import number, write
 
 T = 2.0  # [s] simulated
 SWEEP = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
-BROKEN = 1e-3  # [m] of error in the final position, or ten times the exact peak of energy: broken down
+BROKEN = (
+    1e-3  # [m] of error in the final position, or ten times the exact peak of energy: broken down
+)
 
 
 def row(b: float, dt: float) -> dict[str, Any]:
@@ -36,7 +38,9 @@ def row(b: float, dt: float) -> dict[str, Any]:
     name = f"b = {b:g}"
     PROBLEMS[name] = s = hc.constant_cut(b=b, t_max=T, gain=(1.0, 0.1))
     try:
-        exact = nonlinear_pieces((0.0, b, 0.0), EDGES, s.gain, s.force, None, False, T, 1e-8, 1e-12, method="Radau")
+        exact = nonlinear_pieces(
+            (0.0, b, 0.0), EDGES, s.gain, s.force, None, False, T, 1e-8, 1e-12, method="Radau"
+        )
         p, _ = exact(np.array([T - 1e-9]))
         _, v = exact(np.linspace(0.0, T, 4001)[:-1])
         out: dict[str, Any] = {"b": b, "b dt/Lambda": b * dt * S[0].gain}
@@ -63,14 +67,20 @@ def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
     rows = data["rows"]
     labels = [k for k in rows[0] if isinstance(rows[0][k], dict)]
-    head = ["b [N.s/m]", "b dt/Lambda"] + [f"{k}: {x}" for k in labels for x in ("error [m]", "energy")]
+    head = ["b [N.s/m]", "b dt/Lambda"] + [
+        f"{k}: {x}" for k in labels for x in ("error [m]", "energy")
+    ]
     head += ["default: rebound [s]", f"default: force after {hits.FELT:g} s"]
     cells = []
     for r in rows:
         line = [format(r["b"], "g"), format(r["b dt/Lambda"], ".3g")]
         for k in labels:
             x = r[k]
-            line += ["broken", "broken"] if x["broken"] else [number(x["error"]), format(x["energy"], ".3f")]
+            line += (
+                ["broken", "broken"]
+                if x["broken"]
+                else [number(x["error"]), format(x["energy"], ".3f")]
+            )
         line += [number(r["rebound"]), number(r["felt"])]
         cells.append(line)
     return [
@@ -86,11 +96,17 @@ def sections(data: dict[str, Any]) -> list[str]:
 
 def main(out: Path = Path("out/bench"), quick: bool = False, dt: float = 3.6e-4) -> dict[str, Any]:
     """Measures, writes the data; returns it."""
-    return write(out, "stiffness", {"dt": dt, "rows": [row(b, dt) for b in (SWEEP[1::3] if quick else SWEEP)]})
+    return write(
+        out,
+        "stiffness",
+        {"dt": dt, "rows": [row(b, dt) for b in (SWEEP[1::3] if quick else SWEEP)]},
+    )
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--dt", type=float, default=3.6e-4)
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()

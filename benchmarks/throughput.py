@@ -41,7 +41,9 @@ SCENES = {
 }
 
 
-def floor(scenario: hc.Scenario, steps: int, clock: Callable[[], float] = time.perf_counter) -> float:
+def floor(
+    scenario: hc.Scenario, steps: int, clock: Callable[[], float] = time.perf_counter
+) -> float:
     """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
     model = hc.build(scenario)
     data = mujoco.MjData(model)
@@ -87,12 +89,12 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
 
     In processor time, which others on the machine disturb less.
     """
-    from hapticclay.stepping.compiled import Pool
+    from hapticclay.stepping.compiled import BatchPool
 
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
 
-    s, pool = lasting(scenario, steps), Pool(1)
+    s, pool = lasting(scenario, steps), BatchPool(1)
     first, short, then = bare(), timed(pool.brief, s)[1], bare()
     whole = timed(hc.simulate, s, engine="native")[1]
     return short / (0.5 * (first + then)), whole / (0.5 * (then + bare()))
@@ -104,8 +106,16 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     for name, scenario in SCENES.items():
         times = []
         for _ in range(rounds):
-            times.append((floor(scenario, steps), loop(scenario, steps), loop(scenario, steps, inlined=False)))
-        compiled = [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
+            times.append(
+                (
+                    floor(scenario, steps),
+                    loop(scenario, steps),
+                    loop(scenario, steps, inlined=False),
+                )
+            )
+        compiled = (
+            [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
+        )
         rows.append(
             {
                 "scene": name,
@@ -115,7 +125,9 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
                 "ratio_not_inlined": statistics.median(t[2] / t[0] for t in times),
             }
         )
-        for what, ratios in zip(("native", "native_recorded"), zip(*compiled, strict=True), strict=False):
+        for what, ratios in zip(
+            ("native", "native_recorded"), zip(*compiled, strict=True), strict=False
+        ):
             rows[-1][what] = statistics.median(ratios)
     return rows
 
@@ -123,8 +135,15 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
 def jobs(n: int, steps: int) -> list[hc.Scenario]:
     """Runs that differ in clay, gain and start, and cross a border."""
     rng = np.random.default_rng(n)
-    b, gain, start = rng.uniform(10.0, 200.0, n), rng.uniform(0.2, 1.0, n), rng.uniform(0.0, 0.049, n)
-    cuts = (hc.constant_cut(b=x, gain=(k, 0.2), start=(p, 0.0)) for x, k, p in zip(b, gain, start, strict=True))
+    b, gain, start = (
+        rng.uniform(10.0, 200.0, n),
+        rng.uniform(0.2, 1.0, n),
+        rng.uniform(0.0, 0.049, n),
+    )
+    cuts = (
+        hc.constant_cut(b=x, gain=(k, 0.2), start=(p, 0.0))
+        for x, k, p in zip(b, gain, start, strict=True)
+    )
     return [lasting(s, steps) for s in cuts]
 
 
@@ -133,7 +152,9 @@ def both() -> np.ndarray:
     return np.array((time.perf_counter(), time.thread_time()))
 
 
-def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tuple[np.ndarray, np.ndarray]:
+def beside(
+    todo: list[hc.Scenario], steps: int, keep: str = "summaries"
+) -> tuple[np.ndarray, np.ndarray]:
     """A batch whose threads take turns with the floor, so that a drift of the machine moves both.
 
     Returns:
@@ -145,7 +166,7 @@ def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tupl
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
-    class Turns(compiled.Pool):
+    class Turns(compiled.BatchPool):
         def _go(self, *args: Any) -> Any:
             made = self.own.__dict__.setdefault("made", 0)
             if made % each == 0:
@@ -155,11 +176,11 @@ def beside(todo: list[hc.Scenario], steps: int, keep: str = "summaries") -> tupl
             self.own.made = made + 1
             return super()._go(*args)
 
-    usual, compiled.Pool = compiled.Pool, Turns
+    usual, compiled.BatchPool = compiled.BatchPool, Turns
     try:
         took = timed(hc.simulate_batch, todo, keep=keep) * (CORES, 1.0)
     finally:
-        compiled.Pool = usual
+        compiled.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
 
 
@@ -185,7 +206,10 @@ def first_calls() -> dict[str, float]:
     )
     with tempfile.TemporaryDirectory() as folder:
         env = {**os.environ, "NUMBA_CACHE_DIR": folder}
-        run = [subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, check=True) for _ in range(3)]
+        run = [
+            subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, check=True)
+            for _ in range(3)
+        ]
     first, *rest = (float(r.stdout) for r in run)
     return {"uncached_s": first, "cached_s": min(rest)}
 
@@ -242,10 +266,16 @@ def sections(data: dict[str, Any]) -> list[str]:
     for name, title in TITLES.items():
         if data.get(name):
             cells = [
-                {k.replace("_", " "): format(x, ".2f") if isinstance(x, float) else x for k, x in r.items()}
+                {
+                    k.replace("_", " "): format(x, ".2f") if isinstance(x, float) else x
+                    for k, x in r.items()
+                }
                 for r in data[name]
             ]
-            out += [title, tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)]
+            out += [
+                title,
+                tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True),
+            ]
     return out
 
 
@@ -272,10 +302,14 @@ def main(
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
     parser.add_argument("--full", action="store_true")
     args = parser.parse_args()
-    print("\n\n".join(sections(main(args.out, rounds=args.rounds, steps=args.steps, full=args.full))))
+    print(
+        "\n\n".join(sections(main(args.out, rounds=args.rounds, steps=args.steps, full=args.full)))
+    )

@@ -29,15 +29,41 @@ from hapticclay import files
 from . import reference as hybrid
 from .problems import EDGES, PROBLEMS, Result, reference
 
-PEERS = ("ours", "mujoco_plain", "scipy_ivp", "python_control", "pybullet_peer", "drake_peer", "pinocchio_peer")
-DISTRIBUTIONS = ("hapticclay", "mujoco", "numpy", "scipy", "numba", "control", "pybullet", "drake", "pin")
+PEERS = (
+    "ours",
+    "mujoco_plain",
+    "scipy_ivp",
+    "python_control",
+    "pybullet_peer",
+    "drake_peer",
+    "pinocchio_peer",
+)
+DISTRIBUTIONS = (
+    "hapticclay",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "control",
+    "pybullet",
+    "drake",
+    "pin",
+)
 ERRORS = {
     "crossing": "largest error of the three crossing times [s]",
     "position": "largest error of the handle position [m]",
     "force": "root mean square error of the clay force along x [N]",
     "b": "error of b fitted to the cut's speed [N.s/m]",
 }
-ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # errors in crossing time [s] of the `recommend` table
+ASKED = (
+    1e-2,
+    1e-3,
+    1e-4,
+    1e-5,
+    1e-6,
+    1e-7,
+    1e-8,
+)  # errors in crossing time [s] of the `recommend` table
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
 MARKERS = "osD^v<>P"
 SAMPLED = "sampled"  # methods that model hardware; their error is the hold's, no matter how well they are computed
@@ -58,10 +84,14 @@ def errors(problem: str, r: Result) -> dict[str, float | None]:
     s = PROBLEMS[problem]
     assert s.clay is not None
     b = np.array(s.clay.x.values)[np.searchsorted(exact.crossings[:2], r.t[mine], side="right")]
-    clear = np.min(np.abs(r.t[mine, None] - exact.crossings), axis=1) > 1e-5  # on a border, b has two values
+    clear = (
+        np.min(np.abs(r.t[mine, None] - exact.crossings), axis=1) > 1e-5
+    )  # on a border, b has two values
     out["force"] = float(np.sqrt(np.mean((r.fe[mine] - b * v[:, 0])[clear] ** 2)))
     i = np.flatnonzero((r.p[:, 0] >= 0.10) & (r.p[:, 0] <= 0.14))
-    if s.operator is None and len(i) > 1:  # f = (10/K + b) v, from the time between 10 and 14 cm, ours and exact
+    if (
+        s.operator is None and len(i) > 1
+    ):  # f = (10/K + b) v, from the time between 10 and 14 cm, ours and exact
         i = i[[0, -1]]
         span, ways = r.t[i[1]] - r.t[i[0]], (r.p[i, 0], exact(r.t[i])[0][:, 0])
         mine_b, exact_b = (s.force[0] * span / (x[1] - x[0]) - 10.0 / s.gain[0] for x in ways)
@@ -69,7 +99,9 @@ def errors(problem: str, r: Result) -> dict[str, float | None]:
     return out
 
 
-def measure(quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS) -> tuple[list[dict], list[str]]:
+def measure(
+    quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS
+) -> tuple[list[dict], list[str]]:
     """All rows, and what was left out. Every setting is run once a round; times are medians over rounds."""
     modules, omissions = [], []
     for name in peers:
@@ -97,7 +129,11 @@ def measure(quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS) ->
                 bar.update()
     rows = []
     for (problem, m, method, setting), r, wall in zip(jobs, first, walls, strict=True):
-        simulated = r.crossings[-1] if len(r.crossings) == len(EDGES) else (float(r.t[-1]) if len(r.t) else 0.0)
+        simulated = (
+            r.crossings[-1]
+            if len(r.crossings) == len(EDGES)
+            else (float(r.t[-1]) if len(r.t) else 0.0)
+        )
         rows.append(
             {
                 "problem": problem,
@@ -118,13 +154,17 @@ def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[s
     for r in rows:
         if (packages is None or r["package"] in packages) and not r["method"].startswith(SAMPLED):
             groups.setdefault((r["package"], r["method"], r["setting"]), []).append(r)
-    most = {package: max(len(g) for key, g in groups.items() if key[0] == package) for package, *_ in groups}
+    most = {
+        package: max(len(g) for key, g in groups.items() if key[0] == package)
+        for package, *_ in groups
+    }
     out = []
     for asked in ASKED:
         fit = {
             key: (max(r["crossing"] for r in g), statistics.mean(r["wall"] for r in g))
             for key, g in groups.items()
-            if len(g) == most[key[0]] and all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
+            if len(g) == most[key[0]]
+            and all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
         }
         if fit:
             key = min(fit, key=lambda k: fit[k][1])
@@ -157,7 +197,9 @@ def who_leads(found: list[dict[str, Any]]) -> str:
         else:
             spans.append([x])
     told = [
-        f"{s[0]['package']} at {s[0]['asked']:.0e}" + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s") for s in spans
+        f"{s[0]['package']} at {s[0]['asked']:.0e}"
+        + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s")
+        for s in spans
     ]
     return "Fastest, by asked error: " + "; ".join(told) + "."
 
@@ -165,7 +207,12 @@ def who_leads(found: list[dict[str, Any]]) -> str:
 def table_of_leaders(found: list[dict[str, Any]]) -> str:
     cells = [[format(x["asked"], ".0e"), x["first"], x["next"], "-" if x["factor"] is None else f"{x['factor']:.1f}"]
              for x in found]  # fmt: skip
-    head = ["asked error [s]", "fastest", "fastest of another package", "takes so many times as long"]
+    head = [
+        "asked error [s]",
+        "fastest",
+        "fastest of another package",
+        "takes so many times as long",
+    ]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
 
@@ -174,7 +221,9 @@ def dominance(rows: list[dict]) -> list[dict[str, Any]]:
     ours = [
         r
         for r in rows
-        if r["package"] == "hapticclay" and r["crossing"] is not None and not r["method"].startswith(SAMPLED)
+        if r["package"] == "hapticclay"
+        and r["crossing"] is not None
+        and not r["method"].startswith(SAMPLED)
     ]
     out = []
     for package in dict.fromkeys(r["package"] for r in rows if r["package"] != "hapticclay"):
@@ -182,12 +231,22 @@ def dominance(rows: list[dict]) -> list[dict[str, Any]]:
         failed = sum(r["crossing"] is None for r in points)
         beaten = sum(
             any(
-                o["problem"] == r["problem"] and o["crossing"] <= r["crossing"] and o["wall"] <= r["wall"] for o in ours
+                o["problem"] == r["problem"]
+                and o["crossing"] <= r["crossing"]
+                and o["wall"] <= r["wall"]
+                for o in ours
             )
             for r in points
             if r["crossing"] is not None
         )
-        out.append({"package": package, "points": len(points), "failed": failed, "behind hapticclay in both": beaten})
+        out.append(
+            {
+                "package": package,
+                "points": len(points),
+                "failed": failed,
+                "behind hapticclay in both": beaten,
+            }
+        )
     return out
 
 
@@ -207,7 +266,9 @@ def draw(rows: list[dict], problem: str):
         for ax, kind in zip(axes, kinds, strict=False):
             for package, method in dict.fromkeys((r["package"], r["method"]) for r in mine):
                 methods = list(dict.fromkeys(r["method"] for r in mine if r["package"] == package))
-                points = [r for r in mine if (r["package"], r["method"]) == (package, method) and r[kind]]
+                points = [
+                    r for r in mine if (r["package"], r["method"]) == (package, method) and r[kind]
+                ]
                 if not points:
                     continue
                 label = package if len(methods) == 1 else f"{package}, {method}"
@@ -222,7 +283,9 @@ def draw(rows: list[dict], problem: str):
         for ax in axes[len(kinds) :]:
             ax.remove()
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8, handlelength=4.0)
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=4, fontsize=8, handlelength=4.0
+        )
         figure.suptitle(f"{problem}: down and left is better", fontsize=11)
     return figure
 
@@ -238,12 +301,18 @@ def machine() -> list[str]:
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
-        names = [x.split(":", 1)[1].strip() for x in info.read_text().splitlines() if x.startswith("model name")]
+        names = [
+            x.split(":", 1)[1].strip()
+            for x in info.read_text().splitlines()
+            if x.startswith("model name")
+        ]
         cpu = names[0] if names else cpu
-    load = (
-        f"load average {os.getloadavg()[1]:.1f} at the end; run times are those of a quiet machine only where it is low"
-    )
-    return [f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}", ", ".join(found), load]
+    load = f"load average {os.getloadavg()[1]:.1f} at the end; run times are those of a quiet machine only where it is low"
+    return [
+        f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        ", ".join(found),
+        load,
+    ]
 
 
 def number(x: float | None) -> str:
@@ -299,7 +368,12 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
     for render in ("held", "implicit"):
         for Ts in (4e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 3.6e-4):
             s = dataclasses.replace(
-                PROBLEMS["default cut"], control="sampled", render=render, dt=Ts, t_max=HYBRID_END, length=None
+                PROBLEMS["default cut"],
+                control="sampled",
+                render=render,
+                dt=Ts,
+                t_max=HYBRID_END,
+                length=None,
             )
             r = hc.simulate(s)
             x = hybrid.solve(s, r.t)
@@ -314,7 +388,10 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
 
 
 def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
-    cells = [[x["render"], format(x["Ts"], "g"), number(x["hybrid"]), number(x["continuous"])] for x in rows]
+    cells = [
+        [x["render"], format(x["Ts"], "g"), number(x["hybrid"]), number(x["continuous"])]
+        for x in rows
+    ]
     head = ["render", "Ts [s]", "against the hybrid system [m]", "against continuous time [m]"]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
@@ -349,7 +426,9 @@ def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="one job, three settings a method")
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()

@@ -63,7 +63,11 @@ def number(
 
 def integer(field: str, value: object, low: int, high: int) -> int:
     """Returns value as an int within [low, high]; raises ParameterError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, numbers.Integral)
+        or not low <= int(value) <= high
+    ):
         raise ParameterError(field, value, f"must be a whole number from {low} to {high}")
     return int(value)
 

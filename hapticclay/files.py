@@ -37,7 +37,9 @@ def writable(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise ParameterError("out", str(folder), f"must be a writable folder ({error.strerror})") from None
+        raise ParameterError(
+            "out", str(folder), f"must be a writable folder ({error.strerror})"
+        ) from None
     finally:
         for p in made:  # left for the run itself to make
             with contextlib.suppress(OSError):
@@ -83,4 +85,6 @@ class atomic:
         return None
 
     def _refusal(self, error: OSError) -> ParameterError:
-        return ParameterError("out", str(self.path), f"must be writable ({error.strerror or error})")
+        return ParameterError(
+            "out", str(self.path), f"must be writable ({error.strerror or error})"
+        )

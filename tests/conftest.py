@@ -5,7 +5,9 @@ import pytest
 from hypothesis import settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's, and then its children's
+if (
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):  # as a background job's, and then its children's
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing
@@ -26,4 +28,4 @@ def ledger_rows(paper_runs):
     """The rows of the ledger."""
     from hapticclay.paper import claims
 
-    return claims.rows(paper_runs)
+    return claims.ledger_rows(paper_runs)

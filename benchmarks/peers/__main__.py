@@ -31,7 +31,9 @@ def main() -> None:
                 for setting in settings:
                     r = peer.solve(problem, method, setting)
                     gaps = [abs(x - y) for x, y in zip(r.crossings, exact, strict=False)]
-                    worst = f"{max(gaps):9.2e}" if len(gaps) == len(exact) else f"{len(gaps)} of 3  "
+                    worst = (
+                        f"{max(gaps):9.2e}" if len(gaps) == len(exact) else f"{len(gaps)} of 3  "
+                    )
                     line = f"{problem:16s} {peer.NAME:15s} {method:20s} {setting:8.1e} {worst} {r.wall:8.3f}"
                     print(line, [f"{g:.1e}" for g in gaps], r.note, flush=True)
 

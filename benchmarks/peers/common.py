@@ -12,14 +12,18 @@ from math import cos, sin
 import numpy as np
 
 from hapticclay import build, free
-from hapticclay.model.arm import I1, I2, inverse
+from hapticclay.model.arm import I1, I2, inverse_kinematics
 from hapticclay.model.constants import C_POLE, L1, L2, G, S
 
 from ..problems import EDGES, PROBLEMS, Result
 
 WALL_LIMIT = 60.0  # [s] of wall time for one run
-MASS1, MASS2 = (float(m) for m in build(free()).body_mass[1:])  # [kg]; only I1 and I2 matter to the motion
-IZZ1 = I1 - MASS2 * L1**2  # [kg.m^2] of link 1 about the shoulder, link 2 being a balanced mass at the elbow
+MASS1, MASS2 = (
+    float(m) for m in build(free()).body_mass[1:]
+)  # [kg]; only I1 and I2 matter to the motion
+IZZ1 = (
+    I1 - MASS2 * L1**2
+)  # [kg.m^2] of link 1 about the shoulder, link 2 being a balanced mass at the elbow
 GRID = 0.01  # [s] samples of solvers with dense output
 
 
@@ -38,11 +42,18 @@ class Job:
     @classmethod
     def of(cls, problem: str) -> Job:
         s = PROBLEMS[problem]
-        assert s.clay is not None and s.clay.x == s.clay.y and s.clay.x.edges == EDGES[:2] and s.length == EDGES[2]
+        assert (
+            s.clay is not None
+            and s.clay.x == s.clay.y
+            and s.clay.x.edges == EDGES[:2]
+            and s.length == EDGES[2]
+        )
         assert not s.shaping and s.start == (0.0, 0.0)
         o = s.operator
         th = (o.mass, o.damper, o.spring) if o else (0.0, 0.0, 0.0)
-        return cls(s.force, s.gain, th, s.clay.x.values, s.origin, inverse(*s.origin), s.t_max)
+        return cls(
+            s.force, s.gain, th, s.clay.x.values, s.origin, inverse_kinematics(*s.origin), s.t_max
+        )
 
 
 def law(job: Job):
@@ -108,7 +119,20 @@ def ode(job: Job):
         _, _, _, _, fx, fy, ax, ay, t1, t2, h1, h2, _ = o
         n2 = t2 + h2
         n1 = t1 + h1 - n2
-        return [w1, w2, n1 / I1, n2 / I2, ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay]
+        return [
+            w1,
+            w2,
+            n1 / I1,
+            n2 / I2,
+            ex,
+            ey,
+            Kx * fx - C_POLE * ex,
+            Ky * fy - C_POLE * ey,
+            rx,
+            ry,
+            ax,
+            ay,
+        ]
 
     return rhs
 
@@ -127,7 +151,20 @@ def compiled_ode(job: Job):
         n2 = t2 + h2
         n1 = t1 + h1 - n2
         return np.array(
-            [w1, w2, n1 / I1, n2 / I2, ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay]
+            [
+                w1,
+                w2,
+                n1 / I1,
+                n2 / I2,
+                ex,
+                ey,
+                Kx * fx - C_POLE * ex,
+                Ky * fy - C_POLE * ey,
+                rx,
+                ry,
+                ax,
+                ay,
+            ]
         )
 
     return rhs

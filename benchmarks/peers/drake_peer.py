@@ -13,7 +13,12 @@ import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RotationalInertia, SpatialInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    RevoluteJoint,
+    RotationalInertia,
+    SpatialInertia,
+)
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import (
     DiagramBuilder,
@@ -68,10 +73,18 @@ class Controller(LeafSystem):
             up = WitnessFunctionDirection.kNegativeThenNonNegative
             for edge in EDGES:
                 gap = self._gap(edge)
-                self._borders.append(self.MakeWitnessFunction(f"border at {edge} m", up, gap, event))
-        self._now = self.DeclareCacheEntry("law", ValueProducer(lambda: AbstractValue.Make(()), self._calc))
-        self.DeclareVectorOutputPort("motors", 2, lambda context, out: out.SetFromVector(self.now(context)[8:10]))
-        self.DeclareVectorOutputPort("hand", 2, lambda context, out: out.SetFromVector(self.now(context)[10:12]))
+                self._borders.append(
+                    self.MakeWitnessFunction(f"border at {edge} m", up, gap, event)
+                )
+        self._now = self.DeclareCacheEntry(
+            "law", ValueProducer(lambda: AbstractValue.Make(()), self._calc)
+        )
+        self.DeclareVectorOutputPort(
+            "motors", 2, lambda context, out: out.SetFromVector(self.now(context)[8:10])
+        )
+        self.DeclareVectorOutputPort(
+            "hand", 2, lambda context, out: out.SetFromVector(self.now(context)[10:12])
+        )
 
     def now(self, context) -> tuple:
         """Everything common.law gives; computed once for a context's state."""
@@ -84,7 +97,9 @@ class Controller(LeafSystem):
             c, b = context.get_discrete_state_vector().value(), None
         else:
             c = context.get_continuous_state_vector().CopyToVector()
-            b = self._job.b[min(int(context.get_discrete_state_vector().value()[0]), len(self._job.b) - 1)]
+            b = self._job.b[
+                min(int(context.get_discrete_state_vector().value()[0]), len(self._job.b) - 1)
+            ]
         value.set_value(self._law(*self._plant.Eval(context).tolist(), *c.tolist(), b))
 
     def DoCalcTimeDerivatives(self, context, derivatives):
@@ -93,7 +108,9 @@ class Controller(LeafSystem):
         _, _, ex, ey, _, _, rx, ry = context.get_continuous_state_vector().CopyToVector().tolist()
         _, _, _, _, fx, fy, ax, ay = self.now(context)[:8]
         Kx, Ky = self._job.K
-        derivatives.SetFromVector((ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay))
+        derivatives.SetFromVector(
+            (ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay)
+        )
 
     def _advance(self, context, state):
         c = context.get_discrete_state_vector().value().tolist()
@@ -118,13 +135,17 @@ def _build(job: Job, dt: float):
     """(diagram, plant, controller)."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(time_step=dt))
-    if dt:  # with sampled ports the plant steps before, not with, the discrete update of the controller
+    if (
+        dt
+    ):  # with sampled ports the plant steps before, not with, the discrete update of the controller
         plant.SetUseSampledOutputPorts(False)
     plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
     parent, frame = plant.world_frame(), np.zeros(3)
     for name, mass, inertia in (("shoulder", MASS1, IZZ1), ("elbow", MASS2, I2)):
         moments = RotationalInertia(inertia, inertia, inertia)
-        body = plant.AddRigidBody(name + "_link", SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), moments))
+        body = plant.AddRigidBody(
+            name + "_link", SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), moments)
+        )
         at = plant.AddFrame(FixedOffsetFrame(name + "_at", parent, RigidTransform(frame)))
         joint = plant.AddJoint(RevoluteJoint(name, at, body.body_frame(), [0.0, 0.0, 1.0]))
         plant.AddJointActuator(name, joint)
@@ -133,7 +154,9 @@ def _build(job: Job, dt: float):
     controller = builder.AddSystem(Controller(job, dt))
     builder.Connect(plant.get_state_output_port(), controller.get_input_port())
     builder.Connect(controller.GetOutputPort("motors"), plant.get_actuation_input_port())
-    builder.Connect(controller.GetOutputPort("hand"), plant.get_applied_generalized_force_input_port())
+    builder.Connect(
+        controller.GetOutputPort("hand"), plant.get_applied_generalized_force_input_port()
+    )
     return builder.Build(), plant, controller
 
 
@@ -145,7 +168,10 @@ def solve(problem: str, method: str, setting: float) -> Result:
     simulator = Simulator(diagram)
     if not dt:
         config = SimulatorConfig(
-            integration_scheme=method, max_step_size=MAX_STEP, accuracy=setting, use_error_control=True
+            integration_scheme=method,
+            max_step_size=MAX_STEP,
+            accuracy=setting,
+            use_error_control=True,
         )
         ApplySimulatorConfig(config, simulator)
     root = simulator.get_mutable_context()

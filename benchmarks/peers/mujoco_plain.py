@@ -30,7 +30,9 @@ def solve(problem: str, method: str, setting: float) -> Result:
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
     data = mujoco.MjData(model)
     data.qpos[:] = job.q
-    angles, rates, drive, push = (memoryview(x) for x in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied))
+    angles, rates, drive, push = (
+        memoryview(x) for x in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied)
+    )
     go = mujoco.mj_step
 
     def step():

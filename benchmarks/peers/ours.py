@@ -20,7 +20,7 @@ def methods() -> dict[str, list[float]]:
     sampled = [4e-3, 2e-3, 1e-3, 3.6e-4, 1e-4]
     native: dict[str, list[float]] = {}
     if simulate.has_numba():
-        simulate.compiled(), simulate.compiled(accurate=True)  # before the clock runs
+        simulate.load_compiled(), simulate.load_compiled(accurate=True)  # before the clock runs
         native["fast, native"] = [*fast, 3.6e-5, 1e-5]
         native["accurate, native"] = [*accurate, 2.5e-4, 1.6e-4]
     return {
@@ -35,7 +35,9 @@ def methods() -> dict[str, list[float]]:
 def solve(problem: str, method: str, setting: float) -> Result:
     """One run with steps of `setting`, every sample recorded."""
     kind, _, how = method.partition(", ")
-    way: dict[str, Any] = dict(control=kind, render=how) if kind == "sampled" else dict(integrator=kind)
+    way: dict[str, Any] = (
+        dict(control=kind, render=how) if kind == "sampled" else dict(integrator=kind)
+    )
     engine = "native" if how == "native" else "python"
     r = hc.simulate(dataclasses.replace(PROBLEMS[problem], dt=setting, **way), engine=engine)
     note = "" if r.outcome.code == "finished" else r.status

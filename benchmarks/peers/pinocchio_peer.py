@@ -26,7 +26,9 @@ def build() -> pin.Model:
     zero = np.zeros(3)
     j1 = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "shoulder")
     model.appendBodyToJoint(j1, pin.Inertia(MASS1, zero, IZZ1 * np.eye(3)), pin.SE3.Identity())
-    j2 = model.addJoint(j1, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([L1, 0.0, 0.0])), "elbow")
+    j2 = model.addJoint(
+        j1, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([L1, 0.0, 0.0])), "elbow"
+    )
     model.appendBodyToJoint(j2, pin.Inertia(MASS2, zero, I2 * np.eye(3)), pin.SE3.Identity())
     return model
 

@@ -42,7 +42,9 @@ def _load(client: int, dt: float, q: tuple[float, float]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "arm.urdf"
         path.write_text(URDF)
-        arm = pybullet.loadURDF(str(path), useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, **on)
+        arm = pybullet.loadURDF(
+            str(path), useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, **on
+        )
     for link in (-1, 0, 1):
         pybullet.changeDynamics(arm, link, linearDamping=0, angularDamping=0, jointDamping=0, **on)
     pybullet.setJointMotorControlArray(arm, [0, 1], pybullet.VELOCITY_CONTROL, forces=[0, 0], **on)
@@ -58,7 +60,11 @@ def solve(problem: str, method: str, setting: float) -> Result:
     client = pybullet.connect(pybullet.DIRECT)
     try:
         arm = _load(client, setting, job.q)
-        states, torques, go = pybullet.getJointStates, pybullet.setJointMotorControlArray, pybullet.stepSimulation
+        states, torques, go = (
+            pybullet.getJointStates,
+            pybullet.setJointMotorControlArray,
+            pybullet.stepSimulation,
+        )
         joints, mode = [0, 1], pybullet.TORQUE_CONTROL
 
         def step():

@@ -21,7 +21,10 @@ SAMPLE = 1e-3  # [s] of the output, where crossings are interpolated
 
 def methods() -> dict[str, list[float]]:
     """Method -> rtol, coarse to fine."""
-    return {name: [1e-4, 1e-6, 1e-8, 1e-10] for name in ("RK45", "LSODA", "RK45, events", "LSODA, events")}
+    return {
+        name: [1e-4, 1e-6, 1e-8, 1e-10]
+        for name in ("RK45", "LSODA", "RK45, events", "LSODA, events")
+    }
 
 
 def _border(x: float):
@@ -40,7 +43,9 @@ def solve(problem: str, method: str, setting: float) -> Result:
     name, _, events = method.partition(", ")
     rhs = common.ode(job)
     # the muscle force is constant and part of the ODE; the one input is there for input_output_response and unused
-    system = control.nlsys(lambda t, z, u, params: rhs(t, z, params["b"]), inputs=1, states=12, params={"b": None})
+    system = control.nlsys(
+        lambda t, z, u, params: rhs(t, z, params["b"]), inputs=1, states=12, params={"b": None}
+    )
     z, tolerances = common.initial(job), {"rtol": setting, "atol": setting * 1e-2}
     crossings: list[float] = []
     T, Z, B, note = [], [], [], ""
@@ -65,7 +70,12 @@ def solve(problem: str, method: str, setting: float) -> Result:
             grid = np.arange(0.0, job.t_max, SAMPLE)
             stop = _border(job.origin[0] + EDGES[-1] + 1e-3)
             r = control.input_output_response(
-                system, grid, 0.0, z, solve_ivp_method=name, solve_ivp_kwargs=tolerances | {"events": stop}
+                system,
+                grid,
+                0.0,
+                z,
+                solve_ivp_method=name,
+                solve_ivp_kwargs=tolerances | {"events": stop},
             )
             T, Z = [r.time], [r.states.T]
     except Exception as error:  # noqa: BLE001  a result, not a crash

@@ -51,13 +51,21 @@ COMMANDS = {
     "video": Video,
     "version": Version,
 }
-Command = Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items())]  # noqa: UP007
-MARKERS = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes, tyro.conf.CascadeSubcommandArgs)
+Command = Union[
+    tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items())
+]  # noqa: UP007
+MARKERS = (
+    tyro.conf.OmitSubcommandPrefixes,
+    tyro.conf.OmitArgPrefixes,
+    tyro.conf.CascadeSubcommandArgs,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line; returns its exit status: 0, 1 if it failed, 2 for bad input, 130 for Ctrl-C."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home that cannot be written
+    logging.getLogger("matplotlib").setLevel(
+        logging.ERROR
+    )  # it warns of a home that cannot be written
     with contextlib.suppress(AttributeError, ValueError):
         sys.stdout.reconfigure(errors="replace")  # a terminal that knows no frames or bullets
     try:
@@ -184,7 +192,9 @@ def _names(known: dict[str, Any]) -> list[str]:
     return names + [f"no-{n}" for n in names if known[n] is bool]
 
 
-def unknown(words: Sequence[str], rest: Sequence[str], commands: Mapping[str, type]) -> ParameterError:
+def unknown(
+    words: Sequence[str], rest: Sequence[str], commands: Mapping[str, type]
+) -> ParameterError:
     """What to say of the words that were left over."""
     path = " ".join(words[: 2 if words[1:2] and words[1] in SCENARIOS else 1])
     word = rest[0].partition("=")[0]
@@ -200,9 +210,13 @@ def refused(words: Sequence[str], complaint: str, commands: Mapping[str, type]) 
     """What to say of the parser's framed complaint: what the option takes, in plain words."""
     text = _one_line(complaint)
     known = (
-        options(commands[words[0]], words[1] if len(words) > 1 else "") if words[:1] and words[0] in commands else {}
+        options(commands[words[0]], words[1] if len(words) > 1 else "")
+        if words[:1] and words[0] in commands
+        else {}
     )
-    strange = [w for w in words[1:] if _is_option(w) and _plain(w.partition("=")[0]) not in _names(known)]
+    strange = [
+        w for w in words[1:] if _is_option(w) and _plain(w.partition("=")[0]) not in _names(known)
+    ]
     if strange:
         return unknown(words, strange, commands)
     found = re.match(r"(?:Error parsing|invalid choice|Missing value).*?--([\w-]+)", text)

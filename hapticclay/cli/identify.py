@@ -10,9 +10,8 @@ from typing import Any, Literal
 
 from ..files import atomic, writable
 from ..model.constants import AXES
-from ..studies.identification import KINDS, SCHEMA, Identified, Noise, identify
+from ..studies.identification import BLOCK_KINDS, IDENTIFICATION_SCHEMA, Identified, Noise, identify
 from ..studies.workspace import Drift, drift_map
-from ..views import study_plots
 
 QUICK: dict[str, Any] = {"periods": 1, "lines": 20}
 QUICK_PERIOD = {"G": 2.5, "S": 2.5, "Th": 5.0}  # [s]
@@ -20,7 +19,15 @@ QUICK_BAND = {"G": (0.3, 20.0), "S": (0.3, 20.0), "Th": (0.15, 3.0)}  # [Hz]
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
 
 
-def run(out: Path, axes: Sequence[str], noise: bool, with_map: bool, quick: bool, seed: int, control: str) -> None:
+def run(
+    out: Path,
+    axes: Sequence[str],
+    noise: bool,
+    with_map: bool,
+    quick: bool,
+    seed: int,
+    control: str,
+) -> None:
     """Does all of it, under a progress bar.
 
     Args:
@@ -35,12 +42,14 @@ def run(out: Path, axes: Sequence[str], noise: bool, with_map: bool, quick: bool
     form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
     results: list[Identified] = []
     found = None
-    with tqdm(total=1.0, desc="identify", bar_format=form, delay=2.0, disable=None, leave=False) as bar:
+    with tqdm(
+        total=1.0, desc="identify", bar_format=form, delay=2.0, disable=None, leave=False
+    ) as bar:
 
         def show(done: int, total: int) -> None:
             bar.update(done / total - bar.n)
 
-        jobs = [(what, axis) for what in KINDS for axis in axes]
+        jobs = [(what, axis) for what in BLOCK_KINDS for axis in axes]
         for i, (what, axis) in enumerate(jobs):
             kw = {**QUICK, "period": QUICK_PERIOD[what], "band": QUICK_BAND[what]} if quick else {}
             results.append(
@@ -78,7 +87,11 @@ def table(results: Sequence[Identified]) -> str:
         for c in r.coefficients
     ]
     head = ["", "axis", "coefficient", "printed", "fitted", "95 % interval", "error"]
-    lines = [tabulate(rows, head, colalign=("left", "left", "left", *("right",) * 4), disable_numparse=True)]
+    lines = [
+        tabulate(
+            rows, head, colalign=("left", "left", "left", *("right",) * 4), disable_numparse=True
+        )
+    ]
     low = min(float(r.coherence.min()) for r in results)
     counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
     return "\n".join([*lines, f"lines: {counts}; lowest coherence {low:.6f}"])
@@ -100,7 +113,9 @@ def map_table(found: Drift) -> str:
         for a, b in zip(ranges[::2], ranges[1::2], strict=True)
     ]
     head = ["", "axis", "coefficient", "printed", "without shaping", "with shaping"]
-    text = tabulate(rows, head, colalign=("left", "left", "left", *("right",) * 3), disable_numparse=True)
+    text = tabulate(
+        rows, head, colalign=("left", "left", "left", *("right",) * 3), disable_numparse=True
+    )
     return f"over {len(found.x)} poses of the workspace:\n{text}"
 
 
@@ -110,11 +125,18 @@ def save(results: Sequence[Identified], found: Drift | None, out: Path) -> None:
     Raises:
         ParameterError: a file cannot be written.
     """
-    head = {"schema": SCHEMA, "results": [r.summary() for r in results]}
+    head = {"schema": IDENTIFICATION_SCHEMA, "results": [r.summary() for r in results]}
     with atomic(out / "identify.json") as f:
-        f.write((json.dumps({**head, "map": found.summary() if found else None}, indent=1) + "\n").encode())
+        f.write(
+            (
+                json.dumps({**head, "map": found.summary() if found else None}, indent=1) + "\n"
+            ).encode()
+        )
+    from ..views import study_plots
+
     figures = {
-        name: study_plots.bode([r for r in results if r.what == what]) for what, name in study_plots.FIGURES.items()
+        name: study_plots.bode([r for r in results if r.what == what])
+        for what, name in study_plots.FIGURES.items()
     }
     if found:
         figures["map"] = study_plots.workspace(found)
@@ -143,10 +165,8 @@ class Identify:
     """Sampled control is slow: some ten minutes, two with --quick."""
 
     def __call__(self) -> int:
-        from . import identify
-
         writable(self.out)
         axes = AXES if self.axis == "both" else (self.axis,)
-        identify.run(self.out, axes, self.noise, self.map, self.quick, self.seed, self.control)
+        run(self.out, axes, self.noise, self.map, self.quick, self.seed, self.control)
         print(f"written to {self.out}")
         return 0

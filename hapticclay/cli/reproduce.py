@@ -28,15 +28,23 @@ class Reproduce:
 
         from ..paper import report
 
-        with tqdm(total=0, delay=2.0, bar_format="{elapsed} {desc}", disable=None, leave=False) as bar:
-            rows = report.reproduce(self.out, self.quick, lambda name: bar.set_description_str(name))
+        with tqdm(
+            total=0, delay=2.0, bar_format="{elapsed} {desc}", disable=None, leave=False
+        ) as bar:
+            rows = report.reproduce(
+                self.out, self.quick, lambda name: bar.set_description_str(name)
+            )
         if self.page:
             with atomic(self.page) as f:
                 f.write(report.paper_page(rows).encode())
         wrong = [r for r in rows if r.agrees is False]
         for r in wrong:
-            print(f"does not agree: {r.what} ({r.where}): {report.number(r.ours, r.unit)}, {report.error(r)}")
+            print(
+                f"does not agree: {r.what} ({r.where}): {report.format_number(r.ours, r.unit)}, {report.format_error(r)}"
+            )
         agree = sum(r.agrees is True for r in rows)
-        print(f"{agree} of {agree + len(wrong)} numbers agree; {len(rows) - agree - len(wrong)} more are explained")
+        print(
+            f"{agree} of {agree + len(wrong)} numbers agree; {len(rows) - agree - len(wrong)} more are explained"
+        )
         print(f"report: {(self.out / 'report.html').resolve()}")
         return 1 if wrong else 0

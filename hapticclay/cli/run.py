@@ -37,7 +37,9 @@ class Run:
     """
 
     scenario: Experiment
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/run/EXPERIMENT)")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/run/EXPERIMENT)")
+    ] = None
     """Folder for record.npz, summary.json and the plots."""
     every: int = 1
     """Keep every n-th sample in the record."""
@@ -66,7 +68,9 @@ def ctrl_c() -> Iterator[Callable[[], bool]]:
         pressed.set()
         signal.signal(signal.SIGINT, before)
 
-    if before is signal.default_int_handler:  # not where somebody ignores it, as nohup and shells do for jobs behind
+    if (
+        before is signal.default_int_handler
+    ):  # not where somebody ignores it, as nohup and shells do for jobs behind
         signal.signal(signal.SIGINT, note)
     try:
         yield pressed.is_set
@@ -74,13 +78,17 @@ def ctrl_c() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def simulate_with_progress(scenario: Scenario, every: int, stop: Callable[[], bool] = lambda: False) -> Record:
+def simulate_with_progress(
+    scenario: Scenario, every: int, stop: Callable[[], bool] = lambda: False
+) -> Record:
     """simulate() under a progress bar that shows itself after two seconds, on a terminal; until stop() is true."""
     from tqdm import tqdm
 
     start, length = scenario.start[0], scenario.length
     form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
-    with tqdm(total=1.0, desc=scenario.name, delay=2.0, bar_format=form, disable=None, leave=False) as bar:
+    with tqdm(
+        total=1.0, desc=scenario.name, delay=2.0, bar_format=form, disable=None, leave=False
+    ) as bar:
 
         def show(t: float, x: float) -> bool:
             way = (x - start) / (length - start) if length is not None else 0.0
@@ -138,11 +146,21 @@ def table(record: Record) -> str:
                 f"{r['b']:g}" if r["b"] == r["b_end"] else f"{r['b']:.4g} - {r['b_end']:.4g}",
                 f"{fe['mean']:.5g}" if fe and r["b"] == r["b_end"] else "-",
                 f"{fh['mean']:.5g}" if fh else "-",
-                *("-" if r[k] is None else fixed(r[k], 6) for k in ("steady_speed", "expected_speed")),
+                *(
+                    "-" if r[k] is None else fixed(r[k], 6)
+                    for k in ("steady_speed", "expected_speed")
+                ),
             ]
         )
     force = "[N.s/m]"
-    head = ["path\n[cm]", f"b\n{force}", f"fe/v\n{force}", f"fh/v\n{force}", "steady v\n[m/s]", "expected v\n[m/s]"]
+    head = [
+        "path\n[cm]",
+        f"b\n{force}",
+        f"fe/v\n{force}",
+        f"fh/v\n{force}",
+        "steady v\n[m/s]",
+        "expected v\n[m/s]",
+    ]
     lines = [tabulate(rows, head, colalign=("right",) * 6, disable_numparse=True), ""]
     if len(pieces) > ROWS:
         lines.insert(1, f"... and {len(pieces) - ROWS} more stretches")
@@ -154,7 +172,9 @@ def table(record: Record) -> str:
     if s.muscle is not None and len(record.t) >= 32:  # irregularity() asks for so many
         axis = AXES[s.muscle.rms.index(max(s.muscle.rms))]
         rms = float((record.fh[:, AXES.index(axis)] ** 2).mean() ** 0.5)
-        lines.append(f"operator's force along {axis}: rms {rms:.4g} N, irregularity {irregularity(record, axis):.4f}")
+        lines.append(
+            f"operator's force along {axis}: rms {rms:.4g} N, irregularity {irregularity(record, axis):.4f}"
+        )
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")

@@ -15,7 +15,7 @@ from ..files import atomic, versions, writable
 from ..model.constants import AXES, B_CONSTANT, GAIN, TS
 from ..model.operator import Operator
 from ..studies import boundary, stability_map
-from ..studies.stability_map import Map
+from ..studies.stability_map import StabilityMap
 from ..theory import margins, passivity
 
 SCHEMA = "hapticclay-stability-1"
@@ -62,7 +62,7 @@ class Stability:
             "schema": SCHEMA, "asked": asked, "units": UNITS, "verdicts": rows, "map": None, "versions": versions(),
         }  # fmt: skip
         if self.map != "none":
-            chart = stability_map.chart(self.map, replace(loop, delay=0.0 if self.map == "delay-damping" else loop.delay),
+            chart = stability_map.stability_map(self.map, replace(loop, delay=0.0 if self.map == "delay-damping" else loop.delay),
                                self.quick, _progress)  # fmt: skip
             found["map"] = asdict(chart)
             self._draw(chart)
@@ -72,7 +72,7 @@ class Stability:
         print(f"written to {self.out}")
         return 0
 
-    def _draw(self, chart: Map) -> None:
+    def _draw(self, chart: StabilityMap) -> None:
         from ..views import study_plots
 
         with atomic(self.out / f"{chart.kind}.png") as f:
@@ -89,7 +89,9 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
 
     def add(question: str, answer: bool | None, value: float, what: str, omega: float) -> None:
-        rows.append({"question": question, "answer": answer, "value": value, "what": what, "omega": omega})
+        rows.append(
+            {"question": question, "answer": answer, "value": value, "what": what, "omega": omega}
+        )
 
     def judge(question: str, v: margins.Verdict, what: str) -> None:
         add(question, v.verdict, v.margin, what, v.omega)
@@ -105,7 +107,9 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
     m = margins.margins(axis, K, b, **kw)
 
-    def response(question: str, value: float, what: str, omega: float) -> None:  # none without a steady state
+    def response(
+        question: str, value: float, what: str, omega: float
+    ) -> None:  # none without a steady state
         add(question, None, value if m.stable else math.nan, what, omega if m.stable else math.nan)
 
     response("gain margin", m.gain[1], "factor on K", m.gain_omega[1])
@@ -117,7 +121,11 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
         judge(f"small gain, Eq. {equation}", small, "right over left side")
     judge("passive: stable with every hand", passivity.passivity(axis, K, b), "least Re Z [N.s/m]")
     damper = loop.operator.damper if loop.operator else 0.0
-    judge("held clay passive with this hand", passivity.clay_passivity(b, Ts, damper), "N.s/m to spare")
+    judge(
+        "held clay passive with this hand",
+        passivity.clay_passivity(b, Ts, damper),
+        "N.s/m to spare",
+    )
     felt = margins.transparency(axis, K, b, np.array([ONE_HZ]))[0]
     response("transparency |fe/fh| at 1 Hz", float(abs(felt)), "1 at best", ONE_HZ)
     return rows
@@ -128,21 +136,29 @@ def table(rows: list[dict[str, Any]]) -> str:
     from tabulate import tabulate
 
     said = {True: "yes", False: "no", None: ""}
-    cells = [[r["question"], said[r["answer"]], _number(r["value"]), r["what"], _number(r["omega"])] for r in rows]
+    cells = [
+        [r["question"], said[r["answer"]], _number(r["value"]), r["what"], _number(r["omega"])]
+        for r in rows
+    ]
     return tabulate(cells, ["", "", "value", "what it is", "at rad/s"], disable_numparse=True)
 
 
-def disagreements(chart: Map) -> str:
+def disagreements(chart: StabilityMap) -> str:
     """The cells in which a run does not do what continuous time without delay at the nominal pose says; the cause."""
     from tabulate import tabulate
 
     wrong = [c for c in chart.cells if c.cause]
-    lines = [f"boundary found by runs against the exact one of the same loop: within {100.0 * chart.gap():.2g} %"]
+    lines = [
+        f"boundary found by runs against the exact one of the same loop: within {100.0 * chart.gap():.2g} %"
+    ]
     lines += chart.notes
-    lines.append(f"{len(wrong)} of {len(chart.cells)} cells are not as continuous time says, no delay, nominal pose")
+    lines.append(
+        f"{len(wrong)} of {len(chart.cells)} cells are not as continuous time says, no delay, nominal pose"
+    )
     if wrong:
         cells = [
-            [f"{c.x:.4g}", f"{c.y:.4g}", "stable" if c.theory else "unstable", c.simulated, c.cause] for c in wrong
+            [f"{c.x:.4g}", f"{c.y:.4g}", "stable" if c.theory else "unstable", c.simulated, c.cause]
+            for c in wrong
         ]
         head = [chart.x_name, chart.y_name, "theory", "run", "cause"]
         lines.append(tabulate(cells, head, disable_numparse=True))

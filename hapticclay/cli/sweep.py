@@ -68,15 +68,21 @@ class SweepCommand:
                     self._foretell(plan, left, todo)
                 with (
                     _progress(plan, len(plan) - left) as show,
-                    closing(sweep.work(plan, self.out, todo, self.workers, self.scheduler)) as results,
+                    closing(
+                        sweep.sweep_worker(plan, self.out, todo, self.workers, self.scheduler)
+                    ) as results,
                 ):
                     for n in results:
                         show(n)
         except KeyboardInterrupt:
-            here = len(plan) - sum(len(plan.chunk_runs(n)) for n in sweep.missing(plan, self.out))
-            print(f"{here} of {len(plan)} runs are in {self.out / 'data'}; the same command goes on from there")
+            here = len(plan) - sum(
+                len(plan.chunk_runs(n)) for n in sweep.missing_parts(plan, self.out)
+            )
+            print(
+                f"{here} of {len(plan)} runs are in {self.out / 'data'}; the same command goes on from there"
+            )
             raise
-        table = sweep.read(self.out)
+        table = sweep.read_sweep(self.out)
         for status, n in Counter(table["status"].to_pylist()).most_common():
             print(f"{n:8d}  {status}")
         print(f"{table.num_rows} runs in {self.out / 'data'}")
@@ -88,7 +94,7 @@ class SweepCommand:
         """Says what time and room the runs that are left will take."""
         from tqdm import tqdm
 
-        seconds, size = sweep.estimate(plan)
+        seconds, size = sweep.estimate_time(plan)
         crew = 1 if self.scheduler else sweep.processes(todo, self.workers)
         time_ = f"{tqdm.format_interval(seconds * left / crew)} on {crew} process{'es' if crew > 1 else ''}"
         free, room = shutil.disk_usage(self.out).free, size * left
@@ -102,7 +108,7 @@ class SweepCommand:
         if (self.spec is None) == (self.grid is None):
             raise ParameterError("grid", self.grid, "give either a SPEC.toml or --grid")
         if self.spec is not None:
-            return sampling.Sweep(**sampling.load(self.spec))
+            return sampling.Sweep(**sampling.load_sweep(self.spec))
         return sampling.Sweep(
             self.experiment, sampling.parse_grid(self.grid or ""), sampling.parse_fixed(self.fixed or ""), self.design,
             self.runs, self.seed, self.chunk,

@@ -64,7 +64,9 @@ def film_with_progress(
     from ..views import film
 
     def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
-        return iter(tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False))
+        return iter(
+            tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False)
+        )
 
     film.ready(out, speed, size)
     return film.film(record(), out, camera, speed, size, plots, tool, progress, smooth)

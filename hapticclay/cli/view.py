@@ -46,7 +46,9 @@ class View:
     """Width of the tool [m]."""
     tool_depth: float = TOOL.depth
     """Depth of the cut [m]."""
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")
+    ] = None
     """Folder for record.npz, summary.json and the plots."""
     every: int = 10
     """Keep every n-th sample in the record."""
@@ -63,11 +65,17 @@ class View:
         tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
             if self.web:
-                raise ParameterError("web", True, "shows sessions only: make a film of a record with hapticclay video")
+                raise ParameterError(
+                    "web",
+                    True,
+                    "shows sessions only: make a film of a record with hapticclay video",
+                )
             replay(self.scenario, tool)
             return 0
         writable(self.out or Path("out/view"))
-        record = look(self.scenario, self.stiffness, tool, self.every, self.web, self.host, self.port)
+        record = look(
+            self.scenario, self.stiffness, tool, self.every, self.web, self.host, self.port
+        )
         if record is None:
             print("nothing was recorded")
             return 0

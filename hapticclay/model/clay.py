@@ -12,7 +12,7 @@ from ..errors import ParameterError, choice, numbers_of
 from .constants import AXES, B_MAX
 
 
-def kick(b0, b1, H, L, R, w, damper):
+def split_damping(b0, b1, H, L, R, w, damper):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     A step gives half of its clay to the kick before it and half to the one after: Crank-Nicolson, second order.
@@ -54,7 +54,7 @@ def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):
 
     Args:
         gx, gy: acceleration of the handle without clay [m/s^2]. sxx, sxy, syy: acceleration per force [1/kg].
-        sharex, sharey: from `kick`: on which axes the clay is stiff. fx, fy: force of the clay where it is not [N].
+        sharex, sharey: from `split_damping`: on which axes the clay is stiff. fx, fy: force of the clay where it is not [N].
     """
     if sharex and sharey:
         det = sxx * syy - sxy * sxy
@@ -77,7 +77,7 @@ def slab(b: float, start: float, end: float) -> Clay:
     return Clay(x=profile, y=profile)
 
 
-def there_is(clay: Clay | None, i: int) -> list[tuple[float, float]]:
+def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
     """Where coordinate i alone says that there is clay: disjoint spans of it [m], ascending, perhaps infinite."""
     inf = float("inf")
     out: list[tuple[float, float]] = []
@@ -100,11 +100,11 @@ def there_is(clay: Clay | None, i: int) -> list[tuple[float, float]]:
 # [N.s/m, N.s/m per s], by region of the coordinate that decides; region of the axis's own profile in which that one
 # lies; time at which this was first entered [s], NaN before. Then, in one row: which coordinate decides on the x
 # and on the y axis, and where the path ends [m], inf if nowhere.
-EDGE, VALUE, RATE, OWN, ENTERED, MORE = 0, 2, 4, 6, 8, 10
+EDGE_ROW, VALUE_ROW, RATE_ROW, OWN_ROW, ENTERED_ROW, AXIS_ROWS = 0, 2, 4, 6, 8, 10
 
 
-def table(clay: Clay | None, length: float | None) -> np.ndarray:
-    """Tabulates clay and the end of the path, length [m], for `settle`: shape (11, n)."""
+def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
+    """Tabulates clay and the end of the path, length [m], for `enter_region`: shape (11, n)."""
     profiles = (clay.x, clay.y) if clay else ()
     end = math.inf if length is None else length
     edges = [sorted({e for f in profiles if f.along == axis for e in f.edges}) for axis in AXES]
@@ -112,38 +112,42 @@ def table(clay: Clay | None, length: float | None) -> np.ndarray:
         edges[0] = sorted({e for e in edges[0] if e < end} | {end})
     width = max(map(len, edges)) + 3
     out = [[-math.inf, *e] + [math.inf] * (width - 1 - len(e)) for e in edges]
-    out += [[0.0] * width for _ in range(ENTERED - VALUE)] + [[math.nan] * width for _ in AXES] + [[0.0] * width]
+    out += (
+        [[0.0] * width for _ in range(ENTERED_ROW - VALUE_ROW)]
+        + [[math.nan] * width for _ in AXES]
+        + [[0.0] * width]
+    )
     for i, f in enumerate(profiles):
         along = AXES.index(f.along)
-        out[MORE][i] = float(along)
+        out[AXIS_ROWS][i] = float(along)
         for k, low in enumerate([-math.inf, *edges[along]]):
             j = bisect.bisect_right(f.edges, low)
-            out[VALUE + i][k], out[OWN + i][k] = f.values[j], float(j)
-            out[RATE + i][k] = f.growth[j] if f.growth else 0.0
-    out[MORE][2] = end
+            out[VALUE_ROW + i][k], out[OWN_ROW + i][k] = f.values[j], float(j)
+            out[RATE_ROW + i][k] = f.growth[j] if f.growth else 0.0
+    out[AXIS_ROWS][2] = end
     return np.array(out)
 
 
-def settle(table, ix, iy, t):
+def enter_region(table, ix, iy, t):
     """The region with these indices along x and y, which the handle enters at time t [s].
 
     Returns:
-        (low, high, base, rate), x and y each: its borders [m] and its clay, see `at`.
+        (low, high, base, rate), x and y each: its borders [m] and its clay, see `damping_at`.
     """
-    basex, ratex = _law(table, 0, iy if table[MORE, 0] else ix, t)
-    basey, ratey = _law(table, 1, iy if table[MORE, 1] else ix, t)
-    low = (table[EDGE, ix], table[EDGE + 1, iy])
-    high = (table[EDGE, ix + 1], table[EDGE + 1, iy + 1])
+    basex, ratex = _region_law(table, 0, iy if table[AXIS_ROWS, 0] else ix, t)
+    basey, ratey = _region_law(table, 1, iy if table[AXIS_ROWS, 1] else ix, t)
+    low = (table[EDGE_ROW, ix], table[EDGE_ROW + 1, iy])
+    high = (table[EDGE_ROW, ix + 1], table[EDGE_ROW + 1, iy + 1])
     return low, high, (basex, basey), (ratex, ratey)
 
 
-def _law(table, axis, k, t):
-    value, rate = table[VALUE + axis, k], table[RATE + axis, k]
+def _region_law(table, axis, k, t):
+    value, rate = table[VALUE_ROW + axis, k], table[RATE_ROW + axis, k]
     if rate:
-        j = int(table[OWN + axis, k])
-        if table[ENTERED + axis, j] != table[ENTERED + axis, j]:
-            table[ENTERED + axis, j] = t
-        value -= rate * table[ENTERED + axis, j]
+        j = int(table[OWN_ROW + axis, k])
+        if table[ENTERED_ROW + axis, j] != table[ENTERED_ROW + axis, j]:
+            table[ENTERED_ROW + axis, j] = t
+        value -= rate * table[ENTERED_ROW + axis, j]
     return value, rate
 
 
@@ -158,25 +162,27 @@ class Regions:
     """
 
     def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
-        self.table = table(clay, length)
-        self.index = [bisect.bisect_right(row[1:].tolist(), x) for row, x in zip(self.table, p, strict=False)]
-        self.stiffest = float(self.table[VALUE : VALUE + 2].max())
-        self.grows = bool(self.table[RATE : RATE + 2].any())
+        self.table = region_table(clay, length)
+        self.index = [
+            bisect.bisect_right(row[1:].tolist(), x) for row, x in zip(self.table, p, strict=False)
+        ]
+        self.stiffest = float(self.table[VALUE_ROW : VALUE_ROW + 2].max())
+        self.grows = bool(self.table[RATE_ROW : RATE_ROW + 2].any())
         self._settle(0.0)
 
     def _settle(self, t: float) -> None:
-        found = settle(self.table, self.index[0], self.index[1], t)
+        found = enter_region(self.table, self.index[0], self.index[1], t)
         self.low, self.high, self.base, self.rate = ((float(x), float(y)) for x, y in found)
 
     def b(self, t: float) -> tuple[float, float]:
         """Damping of the present region at time t [s] on each axis [N.s/m]."""
-        return at(self.base, self.rate, t)
+        return damping_at(self.base, self.rate, t)
 
     def change(self, clay: Clay, t: float) -> None:
         """Puts other damping between the same borders, from time t [s] on."""
-        end, entered = self.table[MORE, 2], self.table[ENTERED : ENTERED + 2]
-        self.table = table(clay, float(end) if end < math.inf else None)
-        self.table[ENTERED : ENTERED + 2] = entered
+        end, entered = self.table[AXIS_ROWS, 2], self.table[ENTERED_ROW : ENTERED_ROW + 2]
+        self.table = region_table(clay, float(end) if end < math.inf else None)
+        self.table[ENTERED_ROW : ENTERED_ROW + 2] = entered
         self._settle(t)
 
     def cross(self, i: int, up: bool, t: float) -> float:
@@ -188,10 +194,12 @@ class Regions:
 
     def at_end(self, i: int, up: bool) -> bool:
         """True if the border ahead on coordinate i is the end of the path."""
-        return i == 0 and up and self.high[0] == self.table[MORE, 2]
+        return i == 0 and up and self.high[0] == self.table[AXIS_ROWS, 2]
 
 
-def at(base: tuple[float, float], rate: tuple[float, float], t: float) -> tuple[float, float]:
+def damping_at(
+    base: tuple[float, float], rate: tuple[float, float], t: float
+) -> tuple[float, float]:
     """b = base + rate t on each axis [N.s/m]; growth ends at the largest damping there is."""
     x, y = base
     if rate[0] or rate[1]:
@@ -217,11 +225,21 @@ class Profile:
     growth: tuple[float, ...] = ()
 
     def __post_init__(self):
-        edges = numbers_of("clay.edges", self.edges, [str(i) for i in range(_len("clay.edges", self.edges))], unit="m")
-        values = numbers_of(
-            "clay.values", self.values, [str(i) for i in range(len(edges) + 1)], 0.0, B_MAX, unit="N.s/m"
+        edges = numbers_of(
+            "clay.edges",
+            self.edges,
+            [str(i) for i in range(_length("clay.edges", self.edges))],
+            unit="m",
         )
-        names = [str(i) for i in range(len(values))] if _len("clay.growth", self.growth) else []
+        values = numbers_of(
+            "clay.values",
+            self.values,
+            [str(i) for i in range(len(edges) + 1)],
+            0.0,
+            B_MAX,
+            unit="N.s/m",
+        )
+        names = [str(i) for i in range(len(values))] if _length("clay.growth", self.growth) else []
         growth = numbers_of("clay.growth", self.growth, names, 0.0, B_MAX, unit="N.s/m per s")
         if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
             raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
@@ -231,7 +249,7 @@ class Profile:
         object.__setattr__(self, "growth", growth if any(growth) else ())
 
 
-def _len(field: str, value: object) -> int:
+def _length(field: str, value: object) -> int:
     try:
         return len(value)  # type: ignore[arg-type]
     except TypeError:

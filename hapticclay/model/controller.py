@@ -33,8 +33,16 @@ def servo_coefficients(
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
-def acceleration(
-    after: float, before: float, spring: float, yd1: float, yd0: float, v: float, y: float, p: float, c: float
+def servo_acceleration(
+    after: float,
+    before: float,
+    spring: float,
+    yd1: float,
+    yd0: float,
+    v: float,
+    y: float,
+    p: float,
+    c: float,
 ) -> float:
     """Acceleration of one axis in a kick before any force and without its outcome [m/s^2].
 
@@ -47,14 +55,14 @@ def acceleration(
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def outcome(
+def solve_velocity(
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Solves n u = a + S (f - d u) for the handle velocity u after the kick.
 
     Args:
-        nx, ny: the servo's own weight of u [1/s]. ax, ay: from `acceleration` [m/s^2].
+        nx, ny: the servo's own weight of u [1/s]. ax, ay: from `servo_acceleration` [m/s^2].
         sxx, sxy, syy: acceleration per unit of net hand force [1/kg].
         fx, fy: net hand force without u [N]. dx, dy: force per unit of u, resisting [N.s/m].
 
@@ -75,21 +83,21 @@ def outcome(
     return ux, uy
 
 
-def pushed(
+def velocity_under_torque(
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Handle velocity after a kick of length H under given motor torques t1, t2 [N.m]; the rest as in `outcome`."""
+    """Handle velocity after a kick of length H under given motor torques t1, t2 [N.m]; the rest as in `solve_velocity`."""
     a1 = (t1 - t2) / arm.I1
     a2 = t2 / arm.I2
-    ax, ay = arm.along(a1, a2, u1x, u1y, u2x, u2y)
+    ax, ay = arm.handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
     sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
     n = 1.0 / H
-    ux, uy = outcome(n, n, n * vx + ax, n * vy + ay, sxx, sxy, syy, fx, fy, dx, dy)
+    ux, uy = solve_velocity(n, n, n * vx + ax, n * vy + ay, sxx, sxy, syy, fx, fy, dx, dy)
     return ux, uy
 
 
-def resolve(
+def saturated_step(
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
@@ -97,27 +105,27 @@ def resolve(
     """The kick that the servo wants, as far as the motors can give it.
 
     Args:
-        H: length of the kick [s]. vx, vy: handle velocity before [m/s]. u1, u2: arm.columns [m].
-        nx .. dy: as in `outcome`.
+        H: length of the kick [s]. vx, vy: handle velocity before [m/s]. u1, u2: arm.jacobian [m].
+        nx .. dy: as in `solve_velocity`.
         limit1, limit2, square1, square2: torque limits [N.m] and their squares.
 
     Returns:
         (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after [m/s], link accelerations [rad/s^2], net
         hand force [N], motor torques [N.m].
     """
-    ux, uy = outcome(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+    ux, uy = solve_velocity(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
     ffx = fx - dx * ux
     ffy = fy - dy * uy
-    g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
     t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
     t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
     if t1 * t1 > square1 or t2 * t2 > square2:
         t1 = min(max(t1, -limit1), limit1)
         t2 = min(max(t2, -limit2), limit2)
-        ux, uy = pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+        ux, uy = velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
         ffx = fx - dx * ux
         ffy = fy - dy * uy
-        g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
 
 
@@ -133,7 +141,7 @@ def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tu
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
-def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
     """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
 
     z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
@@ -146,11 +154,11 @@ def held(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
     m[0, 1] = m[2, 3] = 1.0
     m[1, 1], m[1, 4] = -C_POLE, K
     m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
-    e = exponential(T * m)
+    e = matrix_exponential(T * m)
     return e[:4, :4], e[:4, 4]
 
 
-def exponential(a: np.ndarray) -> np.ndarray:
+def matrix_exponential(a: np.ndarray) -> np.ndarray:
     """Matrix exponential of a, shape (n, n)."""
     from scipy.linalg import expm
 
@@ -169,14 +177,20 @@ class Compensator:
     zero: float | None = None
 
     def __post_init__(self):
-        object.__setattr__(self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s"))
+        object.__setattr__(
+            self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s")
+        )
         if self.zero is not None:
-            object.__setattr__(self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s"))
+            object.__setattr__(
+                self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s")
+            )
 
     @property
     def fraction(self) -> tuple[np.ndarray, np.ndarray]:
         """Numerator and denominator of C/K."""
-        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array([1.0, self.pole, 0.0])
+        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array(
+            [1.0, self.pole, 0.0]
+        )
 
 
 PRINTED = Compensator()

@@ -31,7 +31,9 @@ class Coupling:
 
     def __post_init__(self):
         for field, unit in (("spring", "N/m"), ("damper", "N.s/m")):
-            value = number(f"coupling.{field}", getattr(self, field), 0.0, STIFF, above=True, unit=unit)
+            value = number(
+                f"coupling.{field}", getattr(self, field), 0.0, STIFF, above=True, unit=unit
+            )
             object.__setattr__(self, field, value)
 
 
@@ -106,23 +108,21 @@ class Interface:
         if not isinstance(self.coupling, Coupling | None):
             raise ParameterError("interface.coupling", self.coupling, "must be a Coupling or None")
         if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
-            raise ParameterError("interface.velocity", self.velocity, "must be 'difference' for a window or a filter")
+            raise ParameterError(
+                "interface.velocity", self.velocity, "must be 'difference' for a window or a filter"
+            )
 
 
-# MERGED model.interface
-# Laws of the hardware between computer and arm (Fig. 3): plain functions, their state explicit.
-
-
-BLOCK = 1024  # samples whose chances are drawn at once
+NOISE_BLOCK = 1024  # samples whose chances are drawn at once
 Pair = tuple[float, float]
 
 
-def rounded(x: float, step: float) -> float:
+def round_to_even(x: float, step: float) -> float:
     """The multiple of step nearest to x, of two the even one."""
     return round(x / step) * step
 
 
-def converted(x: float, bits: int | None, span: float) -> float:
+def quantize(x: float, bits: int | None, span: float) -> float:
     """What a converter of so many bits makes of x, from -span to span: 2^bits levels, the middle one zero.
 
     Args:
@@ -134,12 +134,12 @@ def converted(x: float, bits: int | None, span: float) -> float:
     return min(max(round(x * half / span), -half), half - 1) * span / half
 
 
-def encoded(q: float, counts: int | None) -> float:
+def encode(q: float, counts: int | None) -> float:
     """Joint angle q [rad] as an encoder of so many counts per turn shows it; exact for None."""
-    return q if counts is None else rounded(q, tau / counts)
+    return q if counts is None else round_to_even(q, tau / counts)
 
 
-def difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float) -> Pair:
+def velocity_difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float) -> Pair:
     """Mean rates of two joints [rad/s] since the oldest sample in history.
 
     Args:
@@ -150,7 +150,7 @@ def difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float
     return (q[0] - old[0]) / span, (q[1] - old[1]) / span
 
 
-def smoothed(y: float, mean: float, cutoff: float, span: float) -> float:
+def low_pass(y: float, mean: float, cutoff: float, span: float) -> float:
     """First-order low-pass of a signal whose mean over the past `span` [s] is `mean`; exact if it was constant.
 
     Args:
@@ -168,17 +168,25 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]]
     from scipy.linalg import expm
 
     w = tau * cutoff
-    a = [[-w, w], [0.0, 0.0]] if order == 1 else [[0.0, 1.0, 0.0], [-w * w, -sqrt(2.0) * w, w * w], [0.0, 0.0, 0.0]]
+    a = (
+        [[-w, w], [0.0, 0.0]]
+        if order == 1
+        else [[0.0, 1.0, 0.0], [-w * w, -sqrt(2.0) * w, w * w], [0.0, 0.0, 0.0]]
+    )
     e = expm(Ts * np.array(a))
     return e[:order, :order].tolist(), e[:order, order].tolist()
 
 
-def filtered(A: list[list[float]], B: list[float], x: tuple[float, ...], u: float) -> tuple[float, ...]:
+def filter_step(
+    A: list[list[float]], B: list[float], x: tuple[float, ...], u: float
+) -> tuple[float, ...]:
     """State of the filter after a sample of input u."""
-    return tuple(sum(a * z for a, z in zip(row, x, strict=True)) + b * u for row, b in zip(A, B, strict=True))
+    return tuple(
+        sum(a * z for a, z in zip(row, x, strict=True)) + b * u for row, b in zip(A, B, strict=True)
+    )
 
 
-def stuck(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
+def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
     """Coulomb friction of two joints in one kick, implicit: it stops a joint wherever its limit suffices for that.
 
     Each joint either rests after the kick, at a torque within its limit, or slides against the limit. The rates after
@@ -218,7 +226,7 @@ def stuck(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
     return min(max(best[0], -limit[0]), limit[0]), min(max(best[1], -limit[1]), limit[1])
 
 
-def guarded(energy: float, f: float, v: float, Ts: float, W: float) -> float:
+def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float) -> float:
     """The passivity controller of one axis: the resisting force f, changed where the clay would be active.
 
     Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held force itself causes:
@@ -242,7 +250,9 @@ def guarded(energy: float, f: float, v: float, Ts: float, W: float) -> float:
     return copysign(low, v) if along < low else f
 
 
-def coupled(tool: float, p: float, v: float, b: float, spring: float, damper: float, Ts: float) -> Pair:
+def virtual_coupling(
+    tool: float, p: float, v: float, b: float, spring: float, damper: float, Ts: float
+) -> Pair:
     """Spring and damper between the handle and a massless tool in clay b, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown, IROS 1995).
@@ -258,7 +268,7 @@ def coupled(tool: float, p: float, v: float, b: float, spring: float, damper: fl
     return tool + Ts * u, u
 
 
-class Chance:
+class SampleNoise:
     """What chance does to each sample: by index, the same for the same seed, each part from its own stream."""
 
     def __init__(self, parts: Interface):
@@ -274,9 +284,9 @@ class Chance:
         while k >= len(self._rows):
             s, (time, loss, noise) = self.parts, self._streams
             width = s.jitter * sqrt(3.0)
-            late = time.uniform(-width, width, BLOCK).tolist()
-            lost = (loss.random(BLOCK) < s.lost).tolist()
-            hiss = (s.force_noise * noise.standard_normal((BLOCK, 2))).tolist()
+            late = time.uniform(-width, width, NOISE_BLOCK).tolist()
+            lost = (loss.random(NOISE_BLOCK) < s.lost).tolist()
+            hiss = (s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))).tolist()
             self._rows += zip(late, lost, map(tuple, hiss), strict=True)
         late, lost, hiss = self._rows[k]
         return (late, lost, hiss) if k else (0.0, False, hiss)

@@ -8,7 +8,9 @@ from ..errors import number
 from .constants import B_MAX
 
 
-def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> tuple[float, float, float, float]:
+def operator_coefficients(
+    operator: Operator | None, H: float, L: float, R: float, h: float
+) -> tuple[float, float, float, float]:
     """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
 
     The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
@@ -30,11 +32,13 @@ def kick(operator: Operator | None, H: float, L: float, R: float, h: float) -> t
     return spring, mass, damper * L - mass / H, damper * R + mass / H
 
 
-def impedance(spring: float, mass: float, before: float, p: float, c: float, v: float) -> float:
+def operator_force(
+    spring: float, mass: float, before: float, p: float, c: float, v: float
+) -> float:
     """Resisting force of the operator's arm in a kick, less the part that depends on its outcome [N].
 
     Args:
-        spring, mass, before: from `kick`.
+        spring, mass, before: from `operator_coefficients`.
         p: handle position [m]. c: its centripetal acceleration, towards the centre [m/s^2]. v: velocity before [m/s].
     """
     return spring * p - mass * c + before * v
@@ -53,7 +57,11 @@ class Operator:
     spring: float = 6.0
 
     def __post_init__(self):
-        for field, high, unit in (("mass", 1e3, "kg"), ("damper", B_MAX, "N.s/m"), ("spring", 1e9, "N/m")):
+        for field, high, unit in (
+            ("mass", 1e3, "kg"),
+            ("damper", B_MAX, "N.s/m"),
+            ("spring", 1e9, "N/m"),
+        ):
             value = number(f"operator.{field}", getattr(self, field), 0.0, high, unit=unit)
             object.__setattr__(self, field, value)
 

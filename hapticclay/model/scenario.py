@@ -97,26 +97,40 @@ class Scenario:
         choice("control", self.control, CONTROLS)
         choice("render", self.render, RENDERS)
         if self.control == "sampled" and self.integrator != "fast":
-            raise ParameterError("integrator", self.integrator, "must be 'fast' where control is 'sampled'")
+            raise ParameterError(
+                "integrator", self.integrator, "must be 'fast' where control is 'sampled'"
+            )
         put("dt", number("dt", self.dt, 1e-6, 0.02, unit="s"))
         if self.Ts is not None:
             put("Ts", number("Ts", self.Ts, self.dt, 1.0, unit="s"))
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
             if abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
-                raise ParameterError("Ts", self.Ts, f"must be a whole multiple of dt = {self.dt:g} s")
+                raise ParameterError(
+                    "Ts", self.Ts, f"must be a whole multiple of dt = {self.dt:g} s"
+                )
         self._check_interface()
         put("t_max", number("t_max", self.t_max, 0.0, 1e5, above=True, unit="s"))
         put("start", pair("start", self.start, unit="m"))
         put("velocity", pair("velocity", self.velocity, -10.0, 10.0, unit="m/s"))
         put("origin", pair("origin", self.origin, unit="m"))
-        limit = numbers_of("torque_limit", self.torque_limit, ("shoulder", "elbow"), 0.0, 1e6, above=True, unit="N.m")
+        limit = numbers_of(
+            "torque_limit",
+            self.torque_limit,
+            ("shoulder", "elbow"),
+            0.0,
+            1e6,
+            above=True,
+            unit="N.m",
+        )
         put("torque_limit", limit)
         self._check_reach("start", self.start)
         if self.length is not None:
             put("length", number("length", self.length, -10.0, 10.0, unit="m"))
             if self.length <= self.start[0]:
-                raise ParameterError("length", self.length, f"must lie ahead of start x = {self.start[0]:g} m")
+                raise ParameterError(
+                    "length", self.length, f"must lie ahead of start x = {self.start[0]:g} m"
+                )
             self._check_reach("length", (self.length, self.start[1]))
 
     def _check_interface(self) -> None:
@@ -128,7 +142,9 @@ class Scenario:
         if self.control != "sampled":
             raise ParameterError("interface", given, "must be None unless control is 'sampled'")
         if (given.passivity or given.coupling) and self.render != "held":
-            raise ParameterError("render", self.render, "must be 'held' for a passivity controller or a coupling")
+            raise ParameterError(
+                "render", self.render, "must be 'held' for a passivity controller or a coupling"
+            )
         number("interface.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("interface.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ParameterError, integer, number, pair
 
 
-def line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
+def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
     """Mean over [t - h, t + h] [s] of cos(omega t + phase): numbers, or arrays of them."""
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
@@ -38,7 +38,7 @@ class Signal:
         """Mean over [begin, end] [s], shape (n, 2) for n spans, or (2,) for one; the value where they are equal."""
         begin, end = np.asarray(begin), np.asarray(end)
         t, h = 0.5 * (begin + end)[..., None], 0.5 * (end - begin)[..., None]
-        lines = (line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
+        lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
         return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
     def __call__(self, t: Any) -> np.ndarray:
@@ -74,7 +74,11 @@ class Multisine:
         put("low", number("multisine.low", self.low, 0.0, above=True, unit="Hz"))
         put("high", number("multisine.high", self.high, self.low, 1e6, unit="Hz"))
         put("seed", integer("multisine.seed", self.seed, 0, 2**32 - 1))
-        most = math.floor(self.high * self.period + 1e-9) - math.ceil(self.low * self.period - 1e-9) + 1
+        most = (
+            math.floor(self.high * self.period + 1e-9)
+            - math.ceil(self.low * self.period - 1e-9)
+            + 1
+        )
         if not 1 <= most <= 100_000:
             bound = f"the band must hold 1 to 100000 multiples of 1/period = {1.0 / self.period:g} Hz, not {most}"
             raise ParameterError("multisine.high", self.high, bound)

@@ -38,7 +38,7 @@ from ..theory import linear_loop, margins
 from .ledger import Row, Runs, rightmost, steady
 
 
-def rows(runs: Runs | None = None) -> list[Row]:
+def ledger_rows(runs: Runs | None = None) -> list[Row]:
     """All rows, in the paper's order.
 
     Args:
@@ -46,14 +46,10 @@ def rows(runs: Runs | None = None) -> list[Row]:
     """
     runs = runs or Runs()
     parts = (
-        machine, blocks, constant, variable, limits,
+        machine, blocks, constant, variable, gain_limits,
         maneuver,
     )  # fmt: skip
     return [row for part in parts for row in part(runs)]
-
-
-# MERGED paper.blocks
-# Rows of the ledger on the machine and its model: Secs. 2, 3, 4 and Eqs. 1 to 19.
 
 
 def machine(runs: Runs) -> Iterator[Row]:
@@ -79,12 +75,24 @@ def machine(runs: Runs) -> Iterator[Row]:
         "given",
         "half the sum of the handle's distance with the arm stretched and folded, in the engine's model",
     )
-    yield Row("l2", "Sec. 4", f"{L2:g} m", "m", L2, 0.5 * (straight - folded), 1e-12, "given", "half the difference")
+    yield Row(
+        "l2",
+        "Sec. 4",
+        f"{L2:g} m",
+        "m",
+        L2,
+        0.5 * (straight - folded),
+        1e-12,
+        "given",
+        "half the difference",
+    )
     q = (1.2, -0.9)
     at(*q)
     engine = np.zeros((3, 2))
     mujoco.mj_jacSite(model, data, engine, None, handle)
-    u1x, u1y, u2x, u2y = arm.columns(math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q)))
+    u1x, u1y, u2x, u2y = arm.jacobian(
+        math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q))
+    )
     eq14 = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
     yield Row(
         "Jacobian J(q)",
@@ -97,7 +105,7 @@ def machine(runs: Runs) -> Iterator[Row]:
         "given",
         "largest difference between the printed formula and the engine's own at q = (1.2, -0.9)",
     )
-    at(*arm.inverse(*NOMINAL))
+    at(*arm.inverse_kinematics(*NOMINAL))
     mujoco.mj_jacSite(model, data, engine, None, handle)
     M = np.zeros((2, 2))
     mujoco.mj_fullM(model, data, M)
@@ -126,7 +134,10 @@ def machine(runs: Runs) -> Iterator[Row]:
         "elbow square, link 2 balanced about it",
     )
     w = np.array([1.0 / lam[0, 0] for lam in (Lambda,)])
-    ends = [np.linalg.inv(_mobility(x, NOMINAL[1]))[0, 0] for x in (NOMINAL[0] - 0.1, NOMINAL[0] + 0.1)]
+    ends = [
+        np.linalg.inv(_engine_mobility(x, NOMINAL[1]))[0, 0]
+        for x in (NOMINAL[0] - 0.1, NOMINAL[0] + 0.1)
+    ]
     yield Row(
         "Λx at the ends of a 20 cm path",
         "Sec. 4",
@@ -139,7 +150,16 @@ def machine(runs: Runs) -> Iterator[Row]:
         f"the printed Sh holds at one pose: Λx is {1 / w[0]:.4g} kg there and "
         f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; shaping=True keeps it",
     )
-    yield Row("sampling period", "Sec. 4", "0.36 ms", "s", TS, float(np.diff(runs.constant().t[:2])[0]), 1e-12, "given")
+    yield Row(
+        "sampling period",
+        "Sec. 4",
+        "0.36 ms",
+        "s",
+        TS,
+        float(np.diff(runs.constant().t[:2])[0]),
+        1e-12,
+        "given",
+    )
     yield Row(
         "torque limits",
         "Sec. 4",
@@ -154,21 +174,28 @@ def machine(runs: Runs) -> Iterator[Row]:
     )
 
 
-def _mobility(x: float, y: float) -> np.ndarray:
-    q1, q2 = arm.inverse(x, y)
-    w = arm.mobility(*arm.columns(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)))
+def _engine_mobility(x: float, y: float) -> np.ndarray:
+    q1, q2 = arm.inverse_kinematics(x, y)
+    w = arm.mobility(
+        *arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
+    )
     return np.array([[w[0], w[1]], [w[1], w[2]]])
 
 
 def blocks(runs: Runs) -> Iterator[Row]:
     symbols = {"gain": "numerator", "damping": "s", "stiffness": "constant term"}
-    for what, places, tolerance, unit in (("G", (15, 16), 5e-3, "m/m"), ("S", (17, 18), 2e-2, "m/N")):
+    for what, places, tolerance, unit in (
+        ("G", (15, 16), 5e-3, "m/m"),
+        ("S", (17, 18), 2e-2, "m/N"),
+    ):
         for i, axis in enumerate(AXES):
             found = runs.identified(what, axis)
             for c in found.coefficients:
                 value = c.printed
                 scale = CM if (what, c.name) == ("S", "gain") else 1.0
-                term = f"coefficient of {symbols[c.name]}" if c.name == "damping" else symbols[c.name]
+                term = (
+                    f"coefficient of {symbols[c.name]}" if c.name == "damping" else symbols[c.name]
+                )
                 yield Row(
                     f"{what}{axis}: {term}",
                     f"Eq. {places[i]}",
@@ -231,9 +258,9 @@ def _corner(th: Operator) -> float:
     return float(omega[np.argmax((size > math.sqrt(2.0) * th.spring) & (omega > 1.0))])
 
 
-def limits(runs: Runs) -> Iterator[Row]:
+def gain_limits(runs: Runs) -> Iterator[Row]:
     text = "; ".join(
-        f"{axis}, b = {b:g}: {linear_loop.gain_limit(axis, b, Operator()):.4g} with Th, {linear_loop.gain_limit(axis, b):.4g} without"
+        f"{axis}, b = {b:g}: {linear_loop.continuous_gain_limit(axis, b, Operator()):.4g} with Th, {linear_loop.continuous_gain_limit(axis, b):.4g} without"
         for axis in AXES
         for b in (B_VARIABLE[0], B_CONSTANT, B_STABILITY)
     )
@@ -243,12 +270,12 @@ def limits(runs: Runs) -> Iterator[Row]:
         "should not exceed 5C",
         "1",
         GAIN_LIMIT_PRINTED,
-        linear_loop.gain_limit("x", B_STABILITY, Operator()),
+        linear_loop.continuous_gain_limit("x", B_STABILITY, Operator()),
         None,
         "contradicted",
         f"exact limits of the printed loop: {text}. The printed 5 is nearest x at b = 50",
     )
-    y = linear_loop.gain_limit("y", B_STABILITY, Operator())
+    y = linear_loop.continuous_gain_limit("y", B_STABILITY, Operator())
     yield Row(
         "limit of K on y, from which the 5C is derived",
         "Sec. 4.3, Eqs. 16, 19",
@@ -277,7 +304,10 @@ def limits(runs: Runs) -> Iterator[Row]:
             f"{tiny.fails[0][1]:.3g} rad/s: C integrates and Th(0) = {Operator().spring:g} N/m, so |GC(Te + Th)| has "
             "no bound at low frequency, whatever K. The condition is sufficient, not necessary",
         )
-    stiff = [linear_loop.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n)) for n in (1.0, 10.0, 100.0)]
+    stiff = [
+        linear_loop.continuous_gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
+        for n in (1.0, 10.0, 100.0)
+    ]
     yield Row(
         "a more rigid operator needs a smaller C",
         "Sec. 3.2",
@@ -289,12 +319,12 @@ def limits(runs: Runs) -> Iterator[Row]:
         "given" if stiff[0] > stiff[1] > stiff[2] else "contradicted",
         "limit of K on x with Th, 10 Th, 100 Th: "
         + ", ".join(f"{k:.4g}" for k in stiff)
-        + ("; the zeros of GC + Sh lie left of the axis, so a rigid hand bears any K" if math.isinf(stiff[-1]) else ""),
+        + (
+            "; the zeros of GC + Sh lie left of the axis, so a rigid hand bears any K"
+            if math.isinf(stiff[-1])
+            else ""
+        ),
     )
-
-
-# MERGED paper.cuts
-# Rows of the ledger on the three experiments: Secs. 4.1 to 4.3, Figs. 7 to 11.
 
 
 def constant(runs: Runs) -> Iterator[Row]:
@@ -311,7 +341,16 @@ def constant(runs: Runs) -> Iterator[Row]:
         "given",
         "first sample in the clay",
     )
-    yield Row("length of the clay", "Sec. 4.1", "10 cm", "m", CLAY_X[1] - CLAY_X[0], edges[1] - edges[0], 1e-9, "given")
+    yield Row(
+        "length of the clay",
+        "Sec. 4.1",
+        "10 cm",
+        "m",
+        CLAY_X[1] - CLAY_X[0],
+        edges[1] - edges[0],
+        1e-9,
+        "given",
+    )
     yield Row(
         "force/velocity in the clay",
         "Sec. 4.1, Fig. 8",
@@ -437,7 +476,16 @@ def constant(runs: Runs) -> Iterator[Row]:
 
 def variable(runs: Runs) -> Iterator[Row]:
     r, shaped = runs.variable("none"), runs.variable("none", shaping=True)
-    yield Row("input force", "Sec. 4.2", "1 N at 45 degrees", "N", 1.0, math.hypot(*r.scenario.force), 1e-12, "given")
+    yield Row(
+        "input force",
+        "Sec. 4.2",
+        "1 N at 45 degrees",
+        "N",
+        1.0,
+        math.hypot(*r.scenario.force),
+        1e-12,
+        "given",
+    )
     for axis in AXES:
         i = AXES.index(axis)
         for k, b in enumerate(B_VARIABLE):
@@ -467,8 +515,13 @@ def variable(runs: Runs) -> Iterator[Row]:
                 "with shaping",
             )
     for i, axis in enumerate(AXES):
-        (exact,) = linear_loop.crossing_times(axis, r.scenario.gain[i], r.scenario.force[i], (BORDER,), B_VARIABLE[:1])
-        mine, other = (next(c.time for c in x.crossings if (c.axis, c.border) == (axis, BORDER)) for x in (r, shaped))
+        (exact,) = linear_loop.crossing_times(
+            axis, r.scenario.gain[i], r.scenario.force[i], (BORDER,), B_VARIABLE[:1]
+        )
+        mine, other = (
+            next(c.time for c in x.crossings if (c.axis, c.border) == (axis, BORDER))
+            for x in (r, shaped)
+        )
         yield Row(
             f"time at which {axis} passes 5 cm",
             "Fig. 10",
@@ -517,7 +570,11 @@ def variable(runs: Runs) -> Iterator[Row]:
             1e-3,
             "corrected" if reading == "30/s" else "contradicted",
             f"b = {x.b[-1, 0]:.1f} N·s/m and {x.v[-1, 0]:.5f} m/s in x at the end, {x.status}"
-            + ("; taken: it alone falls slowly, and far enough to be seen" if reading == "30/s" else ""),
+            + (
+                "; taken: it alone falls slowly, and far enough to be seen"
+                if reading == "30/s"
+                else ""
+            ),
         )
     bad = runs.variable(as_printed=True)
     pole = rightmost("y", 1.0, B_STABILITY, None)
@@ -556,7 +613,10 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         GAINS_FIG11[2]: "25",
     }
     for K in GAINS_FIG11:
-        r, stable = runs.stability(K), K < linear_loop.gain_limit("x", B_STABILITY, Operator())
+        r, stable = (
+            runs.stability(K),
+            K < linear_loop.continuous_gain_limit("x", B_STABILITY, Operator()),
+        )
         pole = rightmost("x", K, B_STABILITY, Operator())
         rms = float(np.sqrt(np.mean(r.fh[:, 0] ** 2)))
         yield Row(

@@ -79,22 +79,30 @@ class Runs:
         return self._kept[name]
 
     def constant(self, **kw) -> Record:
-        return self._get(f"constant cut {_words(kw)}", lambda: simulate(constant_cut(**kw)))
+        return self._get(f"constant cut {_first_words(kw)}", lambda: simulate(constant_cut(**kw)))
 
     def variable(self, growth: Any = "30/s", **kw) -> Record:
-        return self._get(f"variable cut, growth {growth} {_words(kw)}", lambda: simulate(variable_cut(growth, **kw)))
+        return self._get(
+            f"variable cut, growth {growth} {_first_words(kw)}",
+            lambda: simulate(variable_cut(growth, **kw)),
+        )
 
     def stability(self, gain: float, **kw) -> Record:
-        return self._get(f"stability test, K = {gain:g} {_words(kw)}", lambda: simulate(stability_test(gain, **kw)))
+        return self._get(
+            f"stability test, K = {gain:g} {_first_words(kw)}",
+            lambda: simulate(stability_test(gain, **kw)),
+        )
 
     def free(self, **kw) -> Record:
-        return self._get(f"free {_words(kw)}", lambda: simulate(free(**kw)))
+        return self._get(f"free {_first_words(kw)}", lambda: simulate(free(**kw)))
 
     def identified(self, what: str, axis: str) -> Identified:
-        return self._get(f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1))
+        return self._get(
+            f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1)
+        )
 
 
-def _words(kw: dict) -> str:
+def _first_words(kw: dict) -> str:
     return " ".join(f"{k}={v}" for k, v in kw.items())
 
 

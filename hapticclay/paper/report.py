@@ -16,7 +16,7 @@ from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from . import claims
 from .ledger import STATUSES, Row, Runs
 
-SCHEMA = "hapticclay-ledger-1"
+LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -37,10 +37,12 @@ def _plot(name: str, *args: Any, **kw: Any) -> Any:
     return getattr(run_plots, name)(*args, **kw)
 
 
-def _response(runs: Runs, what: str) -> Any:
+def _response_figure(runs: Runs, what: str) -> Any:
     from ..views import study_plots
 
-    return study_plots.bode([runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")])
+    return study_plots.bode(
+        [runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")]
+    )
 
 
 def _theory(name: str, *args: Any, **kw: Any) -> Any:
@@ -58,11 +60,11 @@ def _map(runs: Runs) -> Any:
 
 PICTURES = (
     Picture("fig04", "Fig. 4: closed position loop G",
-            "Response of the simulated arm to commands, and Eqs. 15 and 16.", lambda r: _response(r, "G")),
+            "Response of the simulated arm to commands, and Eqs. 15 and 16.", lambda r: _response_figure(r, "G")),
     Picture("fig05", "Fig. 5: sensitivity Sh",
-            "Response to forces at the handle, and Eqs. 17 and 18.", lambda r: _response(r, "S")),
+            "Response to forces at the handle, and Eqs. 17 and 18.", lambda r: _response_figure(r, "S")),
     Picture("fig06", "Fig. 6: operator's arm Th",
-            "Hand force over handle position, and Eq. 19.", lambda r: _response(r, "Th")),
+            "Hand force over handle position, and Eq. 19.", lambda r: _response_figure(r, "Th")),
     Picture("fig07", "Fig. 7: path of the constant cut",
             "Straight through the slab; without shaping the arm's inertia pulls it aside by less than a millimetre.",
             lambda r: _plot("path", r.constant())),
@@ -102,7 +104,7 @@ PICTURES = (
 )  # fmt: skip
 
 
-def number(x: float | None, unit: str = "") -> str:
+def format_number(x: float | None, unit: str = "") -> str:
     """x for a table, to six digits; an empty cell for None."""
     if x is None:
         return ""
@@ -112,17 +114,17 @@ def number(x: float | None, unit: str = "") -> str:
     return f"{text} {unit}".strip() if unit != "1" else text
 
 
-def error(row: Row) -> str:
+def format_error(row: Row) -> str:
     """The row's error for a table: percent, or in its unit where 0 is expected."""
     if row.error is None or math.isnan(row.error):
         return ""
     if row.expected == 0.0:
-        return number(row.error if abs(row.error) > 1e-6 else 0.0, row.unit)
+        return format_number(row.error if abs(row.error) > 1e-6 else 0.0, row.unit)
     percent = 100.0 * row.error
     return "0 %" if abs(percent) < 5e-4 else f"{percent:+.3f} %"
 
 
-def verdict(row: Row) -> str:
+def format_verdict(row: Row) -> str:
     """Whether the row agrees, for a table."""
     return {True: "yes", False: "NO", None: ""}[row.agrees]
 
@@ -134,7 +136,12 @@ def _environment():
         loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=jinja2.select_autoescape(["html"]), trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    env.filters |= {"number": number, "error": error, "verdict": verdict, "cell": lambda s: s.replace("|", "\\|")}
+    env.filters |= {
+        "number": format_number,
+        "error": format_error,
+        "verdict": format_verdict,
+        "cell": lambda s: s.replace("|", "\\|"),
+    }
     return env
 
 
@@ -144,7 +151,10 @@ def paper_page(rows: list[Row]) -> str:
 
 
 def reproduce(
-    out: Path, quick: bool = False, progress: Callable[[str], None] | None = None, runs: Runs | None = None
+    out: Path,
+    quick: bool = False,
+    progress: Callable[[str], None] | None = None,
+    runs: Runs | None = None,
 ) -> list[Row]:
     """Runs everything and writes report.html (self-contained), report.md, ledger.json and figures/ into out.
 
@@ -155,7 +165,7 @@ def reproduce(
         The rows of the ledger.
     """
     runs = runs or Runs(progress)
-    rows = claims.rows(runs)
+    rows = claims.ledger_rows(runs)
     pictures = []
     for p in PICTURES:
         if quick and not p.quick:
@@ -175,5 +185,12 @@ def reproduce(
             f.write(env.get_template(name).render(found).encode())
     with atomic(out / "ledger.json") as f:
         table = [{**asdict(r), "error": r.error, "agrees": r.agrees} for r in rows]
-        f.write((json.dumps({"schema": SCHEMA, "versions": versions(), "rows": table}, indent=1) + "\n").encode())
+        f.write(
+            (
+                json.dumps(
+                    {"schema": LEDGER_SCHEMA, "versions": versions(), "rows": table}, indent=1
+                )
+                + "\n"
+            ).encode()
+        )
     return rows

@@ -16,11 +16,20 @@ from ..model.scenario import Scenario
 from ..stepping.engine import Crossing, warnings_caught
 from ..stepping.monitor import Outcome
 from . import record
-from .simulate import NUMBA, compiled, fits, has_numba, marches, simulate
+from .simulate import NUMBA, has_numba, load_compiled, native_fits, native_marches, simulate
 
 KEEP = ("records", "summaries")
-BORDERS = 8  # crossings that a summary has room for
-WORKS = ("muscle", "motors", "clay", "hand_damper", "kinetic", "hand_stored", "residual", "throughput")
+SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
+WORKS = (
+    "muscle",
+    "motors",
+    "clay",
+    "hand_damper",
+    "kinetic",
+    "hand_stored",
+    "residual",
+    "throughput",
+)
 SUMMARY = np.dtype(
     [
         ("code", "U12"),  # record.Outcome.code; the rest of it: record.status of a run made again
@@ -29,9 +38,13 @@ SUMMARY = np.dtype(
         ("step", "i8"),  # last good sample
         ("steps", "i8"),  # engine steps made
         ("crossings", "i8"),  # number of borders crossed; of the first of them:
-        ("crossing_axis", "i8", BORDERS),  # 0 for x, 1 for y, -1 for none
-        ("crossing_time", "f8", BORDERS),  # [s], NaN for none
-        ("crossing_speed", "f8", BORDERS),  # along the axis [m/s]: the steady one, if the region was long enough
+        ("crossing_axis", "i8", SUMMARY_CROSSINGS),  # 0 for x, 1 for y, -1 for none
+        ("crossing_time", "f8", SUMMARY_CROSSINGS),  # [s], NaN for none
+        (
+            "crossing_speed",
+            "f8",
+            SUMMARY_CROSSINGS,
+        ),  # along the axis [m/s]: the steady one, if the region was long enough
         ("p", "f8", 2),  # at the last good sample: position [m]
         ("v", "f8", 2),  # velocity [m/s]
         ("fh", "f8", 2),  # force of the operator [N]
@@ -43,7 +56,11 @@ SUMMARY = np.dtype(
 
 
 def simulate_batch(
-    scenarios: Iterable[Scenario], *, threads: int | None = None, every: int = 1, keep: str = "records"
+    scenarios: Iterable[Scenario],
+    *,
+    threads: int | None = None,
+    every: int = 1,
+    keep: str = "records",
 ) -> Any:
     """Runs scenarios, which may differ in anything, side by side; each comes out as simulate(engine="native") has it.
 
@@ -65,27 +82,33 @@ def simulate_batch(
     jobs = list(scenarios)
     for i, s in enumerate(jobs):
         if not isinstance(s, Scenario):
-            raise ParameterError(f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns")
+            raise ParameterError(
+                f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns"
+            )
     threads = integer("threads", cores() if threads is None else threads, 1, 1024)
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
     out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
-    native = [i for i, s in enumerate(jobs) if fits(s)]
-    module = compiled() if native and has_numba() else None
+    native = [i for i, s in enumerate(jobs) if native_fits(s)]
+    module = load_compiled() if native and has_numba() else None
     if module:
-        pool = module.Pool(every)
+        pool = module.BatchPool(every)
 
         def run(i: int) -> None:
-            out[i] = entry(*pool.brief(jobs[i])) if summaries else record.Record.of(*pool.run(jobs[i]))
+            out[i] = (
+                summary_entry(*pool.brief(jobs[i]))
+                if summaries
+                else record.Record.of(*pool.run(jobs[i]))
+            )
 
         with warnings_caught():
-            _spread(native, run, min(threads, len(native)))
+            _on_threads(native, run, min(threads, len(native)))
     elif native and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
     for i in sorted(set(range(len(jobs))) - set(native if module else ())):
-        engine = "native" if marches(jobs[i]) and has_numba() else "python"
+        engine = "native" if native_marches(jobs[i]) and has_numba() else "python"
         r = simulate(jobs[i], every=every, engine=engine)
-        out[i] = entry(*record.brief(r)) if summaries else r
+        out[i] = summary_entry(*record.brief(r)) if summaries else r
     return out
 
 
@@ -94,7 +117,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
+def _on_threads(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
     """run(job) for each, on so many threads; the first exception ends them all and is raised."""
     todo = iter(jobs)
     lock = threading.Lock()
@@ -125,8 +148,12 @@ def _spread(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
         raise failed[0]
 
 
-def entry(
-    o: Outcome, steps: int, crossings: Sequence[Crossing], last: Sequence[Any], energy: dict[str, float]
+def summary_entry(
+    o: Outcome,
+    steps: int,
+    crossings: Sequence[Crossing],
+    last: Sequence[Any],
+    energy: dict[str, float],
 ) -> tuple[Any, ...]:
     """A run's entry among summaries; of a record, entry(*record.brief(r)).
 
@@ -134,8 +161,8 @@ def entry(
         o: how it ended. steps: of the engine. crossings: of borders. last: p, v, fh, fe, b at the last good sample.
         energy: as Record.energy.
     """
-    first = crossings[:BORDERS]
-    rest = BORDERS - len(first)
+    first = crossings[:SUMMARY_CROSSINGS]
+    rest = SUMMARY_CROSSINGS - len(first)
     return (
         o.code, o.axis, o.time, o.step, steps, len(crossings),
         [AXES.index(c.axis) for c in first] + [-1] * rest,

@@ -26,7 +26,7 @@ from ..stepping.monitor import Outcome
 from ..theory import linear_loop
 from ..theory.margins import Verdict
 
-SCHEMA = "hapticclay-record-1"
+RECORD_SCHEMA = "hapticclay-record-1"
 ARRAYS = {
     "t": "s",
     "p": "m",
@@ -45,7 +45,11 @@ EXTRA = {  # arrays that some records have
     "target": "m",
     "gain": "1/kg",
 }
-SCALAR = ("t", "removed", "removal_rate")  # arrays of one figure a sample; the others have one an axis
+SCALAR = (
+    "t",
+    "removed",
+    "removal_rate",
+)  # arrays of one figure a sample; the others have one an axis
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -153,7 +157,10 @@ class Record:
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
         out = []
         for piece in self.stretches(axis):
-            entry: dict[str, Any] = {"from_s": float(self.t[piece[0]]), "to_s": float(self.t[piece[-1]])}
+            entry: dict[str, Any] = {
+                "from_s": float(self.t[piece[0]]),
+                "to_s": float(self.t[piece[-1]]),
+            }
             for name in [axis] if axis else AXES:
                 i = AXES.index(name)
                 s = piece[steady[piece, i]]
@@ -163,18 +170,22 @@ class Record:
                     "to_m": float(self.p[piece[-1], i]),
                     "b": b,
                     "b_end": last,
-                    "fe_over_v": _spread(fe_v[piece, i]),
+                    "fe_over_v": _mean_and_std(fe_v[piece, i]),
                     "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
                     "expected_speed": self._expected(i, b) if b == last else None,
-                    "steady_fe_over_v": _spread(fe_v[s, i]),
-                    "steady_fh_over_v": _spread(fh_v[s, i]),
+                    "steady_fe_over_v": _mean_and_std(fe_v[s, i]),
+                    "steady_fh_over_v": _mean_and_std(fh_v[s, i]),
                 }
             out.append(entry)
         return out
 
     def _expected(self, i: int, b: float) -> float | None:
         s = self.scenario
-        return linear_loop.steady_speed(s.gain[i], s.force[i], b) if s.operator is None and s.muscle is None else None
+        return (
+            linear_loop.steady_speed(s.gain[i], s.force[i], b)
+            if s.operator is None and s.muscle is None
+            else None
+        )
 
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
@@ -182,7 +193,7 @@ class Record:
         more = {"notes": self.notes} if self.notes else {}
         extra = {name: EXTRA[name] for name in self.extra}
         return {
-            "schema": SCHEMA,
+            "schema": RECORD_SCHEMA,
             "status": self.status,
             "outcome": dataclasses.asdict(self.outcome),
             "scenario": dataclasses.asdict(self.scenario),
@@ -194,7 +205,13 @@ class Record:
             "simulated_time_s": end,
             "wall_time_s": self.wall_time,
             "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
-            "units": {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s", **ARRAYS, **extra},
+            "units": {
+                "energy": "J",
+                "crossings": "m, s, m/s",
+                "regions": "m, N.s/m, m/s",
+                **ARRAYS,
+                **extra,
+            },
             "versions": self.versions,
             **more,
         }
@@ -235,7 +252,7 @@ class Record:
                 extra = {name: z[name] for name in EXTRA if name in z}
             _check(arrays | extra)
             schema = head["schema"]
-            if schema == SCHEMA:
+            if schema == RECORD_SCHEMA:
                 return cls(
                     **arrays,
                     scenario=_scenario(head["scenario"]),
@@ -248,10 +265,18 @@ class Record:
                     extra=extra,
                     notes=head.get("notes", {}),
                 )
-        except (OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+        except (
+            OSError,
+            EOFError,
+            KeyError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            zipfile.BadZipFile,
+        ) as error:
             what = " ".join(str(error).split()) or type(error).__name__
             raise ParameterError("record", str(path), f"must be a saved record ({what})") from None
-        raise ParameterError("record", str(path), f"must have schema {SCHEMA}, has {schema}")
+        raise ParameterError("record", str(path), f"must have schema {RECORD_SCHEMA}, has {schema}")
 
 
 def _check(arrays: dict[str, np.ndarray]) -> None:
@@ -260,7 +285,9 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
     for name, x in arrays.items():
         shape = (t.size,) if name in SCALAR else (t.size, 2)
         if x.shape != shape or x.dtype != np.float64:
-            raise ValueError(f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}")
+            raise ValueError(
+                f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}"
+            )
         if not np.isfinite(x).all():
             raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
     if (np.diff(t) < 0.0).any():
@@ -273,7 +300,7 @@ def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dic
     return r.outcome, r.steps, r.crossings, last, r.energy
 
 
-def _spread(x: np.ndarray) -> dict[str, float] | None:
+def _mean_and_std(x: np.ndarray) -> dict[str, float] | None:
     x = x[np.isfinite(x)]
     return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
 
@@ -288,7 +315,9 @@ def _scenario(d: dict[str, Any]) -> Scenario:
             d[field] = Multisine(**d[field])
     if d.get("interface"):
         coupling = d["interface"].get("coupling")
-        d["interface"] = Interface(**{**d["interface"], "coupling": Coupling(**coupling) if coupling else None})
+        d["interface"] = Interface(
+            **{**d["interface"], "coupling": Coupling(**coupling) if coupling else None}
+        )
     return Scenario(**d)
 
 
@@ -315,12 +344,21 @@ def observed_passivity(record: Record) -> Verdict:
         raise ParameterError("record", len(record.t), "must have three samples or more")
     energy = port_energy(record).sum(axis=1)
     power = (record.fh * record.v).sum(axis=1)[::2]
-    coarse = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1]))))
+    coarse = np.concatenate(
+        ([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1])))
+    )
     open_ = float(np.max(np.abs(coarse - energy[::2])))
     i = int(np.argmin(energy))
     how = f"energy observer on the record, trapezoidal, to {open_:.1e} J; least at {record.t[i]:.4g} s"
     assumptions = ("the run started at rest", "this motion only")
-    return Verdict(bool(energy[i] >= -open_), float(energy[i]), math.nan, assumptions, how, "least energy put in [J]")
+    return Verdict(
+        bool(energy[i] >= -open_),
+        float(energy[i]),
+        math.nan,
+        assumptions,
+        how,
+        "least energy put in [J]",
+    )
 
 
 def irregularity(record: Record, axis: str = "x") -> float:
@@ -337,7 +375,9 @@ def irregularity(record: Record, axis: str = "x") -> float:
     """
     i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
     if muscle is None or len(record.t) < 32:
-        raise ParameterError("record", record.scenario.name, "must be of a run with a varying muscle force")
+        raise ParameterError(
+            "record", record.scenario.name, "must be of a run with a varying muscle force"
+        )
     n = len(record.t) // 2
     t, f = record.t[-n:-1], record.fh[-n:-1, i]  # the last step may be short
     power = np.abs(np.fft.rfft((f - f.mean()) * np.hanning(len(f)))) ** 2

@@ -22,9 +22,14 @@ from . import record
 
 ENGINES = ("auto", "python", "native")
 STAGES = 15  # steps of the fast run that one of the accurate run costs
-SAMPLE, WIRE = 470, 480  # bytes that a run needs at its end, measured: a sample kept; a step, where there is hardware
-SMALL = 2.0**28  # [bytes] runs that need less need not ask what there is
-NATIVE_FROM = 300_000  # steps from which loading the compiled loop (a second, once per process) pays
+SAMPLE, WIRE = (
+    470,
+    480,
+)  # bytes that a run needs at its end, measured: a sample kept; a step, where there is hardware
+SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
+NATIVE_FROM = (
+    300_000  # steps from which loading the compiled loop (a second, once per process) pays
+)
 
 
 def simulate(
@@ -55,7 +60,7 @@ def simulate(
     every = integer("every", every, 1, 1_000_000)
     _check_memory(scenario, every)
     with warnings_caught():
-        kind = _kind(scenario, choice("engine", engine, ENGINES))
+        kind = _stepper(scenario, choice("engine", engine, ENGINES))
         run = kind(scenario, every)
         begin = time.perf_counter()
         run.go(progress)
@@ -68,42 +73,55 @@ def _check_memory(scenario: Scenario, every: int) -> None:
     steps = scenario.t_max / scenario.dt
     fixed = WIRE * steps if scenario.interface else 0.0
     samples = math.floor(steps / every) + 2
-    if fixed + SAMPLE * samples < SMALL or fixed + SAMPLE * samples < (room := left()):
+    if fixed + SAMPLE * samples < SMALL_MEMORY or fixed + SAMPLE * samples < (
+        room := memory_left()
+    ):
         return
     need = f"{(fixed + SAMPLE * samples) / 1e9:.3g} GB of memory, and {max(room, 0.0) / 1e9:.3g} GB are left"
-    if room > 2.0 * fixed and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000:
+    if (
+        room > 2.0 * fixed
+        and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000
+    ):
         bound = f"up to {samples} samples take {need}: keep fewer (--every {more}), or lower t_max"
         raise ParameterError("every", every, bound)
-    raise ParameterError("t_max", scenario.t_max, f"up to {math.floor(steps)} steps take {need}: lower it")
+    raise ParameterError(
+        "t_max", scenario.t_max, f"up to {math.floor(steps)} steps take {need}: lower it"
+    )
 
 
-def _kind(scenario: Scenario, engine: str) -> type[Run]:
+def _stepper(scenario: Scenario, engine: str) -> type[Run]:
     """What runs this scenario."""
-    if not fits(scenario) and not marches(scenario):
+    if not native_fits(scenario) and not native_marches(scenario):
         if engine == "native":
-            print(f"hapticclay: native runs no {_beyond(scenario)}; Python does", file=sys.stderr)
+            print(
+                f"hapticclay: native runs no {_not_native(scenario)}; Python does", file=sys.stderr
+            )
         if scenario.interface:
-            from ..stepping.sampled import Wired  # only a run with hardware pays for it
+            from ..stepping.sampled import HardwareLoop  # only a run with hardware pays for it
 
-            return Wired
+            return HardwareLoop
         return Sampled if scenario.control == "sampled" else RungeKutta
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
-    accurate = marches(scenario)
+    accurate = native_marches(scenario)
     work = scenario.t_max / scenario.dt * (STAGES if accurate else 1)
     compile_it = engine == "native" or (engine == "auto" and work >= NATIVE_FROM and has_numba())
-    native = compiled(accurate) if compile_it else None
+    native = load_compiled(accurate) if compile_it else None
     if accurate:
-        return native.March if native else RungeKutta
-    return native.Native if native else Leapfrog
+        return native.NativeRungeKutta if native else RungeKutta
+    return native.NativeLeapfrog if native else Leapfrog
 
 
-def _beyond(scenario: Scenario) -> str:
+def _not_native(scenario: Scenario) -> str:
     """What native cannot do of this scenario."""
-    return "sampled control" if scenario.control == "sampled" else "'accurate' run that is driven or whose clay grows"
+    return (
+        "sampled control"
+        if scenario.control == "sampled"
+        else "'accurate' run that is driven or whose clay grows"
+    )
 
 
-def compiled(accurate: bool = False) -> Any:
+def load_compiled(accurate: bool = False) -> Any:
     """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails.
 
     Args:
@@ -114,22 +132,34 @@ def compiled(accurate: bool = False) -> Any:
 
         compiled.warm(accurate)
         return compiled
-    except (ImportError, OSError, StopIteration, AttributeError) as error:  # of numba, or the engine's library
-        print(f"hapticclay: Python runs what native cannot: {error or type(error).__name__}", file=sys.stderr)
+    except (
+        ImportError,
+        OSError,
+        StopIteration,
+        AttributeError,
+    ) as error:  # of numba, or the engine's library
+        print(
+            f"hapticclay: Python runs what native cannot: {error or type(error).__name__}",
+            file=sys.stderr,
+        )
         return None
 
 
-def fits(scenario: Scenario) -> bool:
+def native_fits(scenario: Scenario) -> bool:
     """Whether native's leapfrog can run this: continuous control, the fast integrator."""
     return scenario.control == "continuous" and scenario.integrator == "fast"
 
 
-def marches(scenario: Scenario) -> bool:
+def native_marches(scenario: Scenario) -> bool:
     """Whether native can run this accurately: nothing in it may change with time."""
     clay = scenario.clay
     grows = clay is not None and any((*(clay.x.growth or ()), *(clay.y.growth or ())))
     driven = scenario.muscle is not None or scenario.command is not None
-    return scenario.control == "continuous" and scenario.integrator == "accurate" and not (grows or driven)
+    return (
+        scenario.control == "continuous"
+        and scenario.integrator == "accurate"
+        and not (grows or driven)
+    )
 
 
 NUMBA = "needs numba: pip install hapticclay[fast]"
@@ -140,30 +170,32 @@ def has_numba() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-# MERGED simulation.memory
-# How much memory there is left to take.
-
-
 GROUPS = (  # limit of a control group and what it has taken, as containers have; version 2, version 1
     ("sys/fs/cgroup/memory.max", "sys/fs/cgroup/memory.current"),
     ("sys/fs/cgroup/memory/memory.limit_in_bytes", "sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 
 
-def left(root: Path = Path("/")) -> float:
+def memory_left(root: Path = Path("/")) -> float:
     """Bytes that this process may still take: the least of machine, container and ulimit; inf where nobody says.
 
     Args:
         root: where the system's files are looked for.
     """
-    return min(_machine(root), *(_group(root / most, root / taken) for most, taken in GROUPS), _process(root))
+    return min(
+        _machine(root),
+        *(_group(root / most, root / taken) for most, taken in GROUPS),
+        _process(root),
+    )
 
 
 def _machine(root: Path) -> float:
     with contextlib.suppress(OSError, ValueError, StopIteration):
         lines = (root / "proc/meminfo").read_text().splitlines()
         return 1024.0 * int(next(x for x in lines if x.startswith("MemAvailable:")).split()[1])
-    with contextlib.suppress(AttributeError, OSError, ValueError):  # not Linux: all there is, if that is said
+    with contextlib.suppress(
+        AttributeError, OSError, ValueError
+    ):  # not Linux: all there is, if that is said
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return math.inf
 

@@ -36,18 +36,18 @@ from .inline import inline
 from .runge_kutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    arm.position, clay.at, clay.settle, loop.at_sample, loop.coefficients, loop.derivative, loop.entire, loop.tick,
-    stride.around, stride.enter, stride.place,
+    arm.handle_position, clay.damping_at, clay.enter_region, loop.velocity_at_sample, loop.loop_coefficients, loop.vector_field, loop.whole_kick, loop.step_loop,
+    stride.kick_inputs, stride.add_work, stride.position_after,
 )  # fmt: skip
 PLAIN = (
-    runge_kutta.leap, runge_kutta.slope, engine.aim, engine.root, signals.line,
-    stride.drive, stride.first_of_a_hit, stride.heading, stride.kick, stride.land, stride.limited,
-    stride.mean, stride.miss, stride.move, stride.note, stride.side, stride.stride, stride.velocity, stride.write,
+    runge_kutta.one_step, runge_kutta.stage_derivative, engine.next_sample, engine.find_root, signals.multisine_line,
+    stride.write_command, stride.first_step_of_hit, stride.region_exit, stride.kick_loop, stride.locate_event, stride.motors_limited,
+    stride.mean_signal, stride.distance_beyond, stride.step_engine, stride.record_crossing, stride.border_side, stride.step_many, stride.velocity_at_border, stride.write_row,
 )  # fmt: skip
-LAST = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
+LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
 NOTICE = "hapticclay: compiling, this once"
-ROOM = 64  # crossings between two looks at them
+CROSSINGS_ROOM = 64  # crossings between two looks at them
 
 
 def _pointer(builder, address, kind):
@@ -76,15 +76,17 @@ def _call(typing, address, a, b):
     def build(context, builder, signature, args):
         byte = cgutils.ir.IntType(8)
         kind = cgutils.ir.FunctionType(cgutils.ir.VoidType(), [byte.as_pointer()] * 2)
-        builder.call(_pointer(builder, args[0], kind), [_pointer(builder, x, byte) for x in args[1:]])
+        builder.call(
+            _pointer(builder, args[0], kind), [_pointer(builder, x, byte) for x in args[1:]]
+        )
         return context.get_dummy_value()
 
     return types.void(address, a, b), build
 
 
-overload(stride.load)(lambda address: lambda address: _load(address))  # type: ignore
-overload(stride.store)(lambda address, x: lambda address, x: _store(address, x))  # type: ignore
-overload(stride.call)(lambda address, a, b: lambda address, a, b: _call(address, a, b))  # type: ignore
+overload(stride.load_double)(lambda address: lambda address: _load(address))  # type: ignore
+overload(stride.store_double)(lambda address, x: lambda address, x: _store(address, x))  # type: ignore
+overload(stride.call_engine)(lambda address, a, b: lambda address, a, b: _call(address, a, b))  # type: ignore
 
 
 def _compiled(*functions: Any) -> list[Any]:
@@ -95,7 +97,7 @@ def _compiled(*functions: Any) -> list[Any]:
     options: Any = {"nogil": True, "error_model": "numpy"}
     before = numba.config.CACHE_DIR
     try:
-        numba.config.CACHE_DIR = str(folder())
+        numba.config.CACHE_DIR = str(cache_folder())
         return [numba.njit(cache=True, **options)(f) for f in functions]
     except (OSError, RuntimeError):  # nowhere to keep it
         return [numba.njit(**options)(f) for f in functions]
@@ -104,21 +106,27 @@ def _compiled(*functions: Any) -> list[Any]:
 
 
 def _whole(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
-    """stride.stride, compiled as the laws are: each law once, for it and for the others."""
-    return stride.stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room)
+    """stride.step_many, compiled as the laws are: each law once, for it and for the others."""
+    return stride.step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, room)
 
 
-def folder() -> Path:
+def cache_folder() -> Path:
     """Where compiled code is kept: NUMBA_CACHE_DIR or the user's cache folder, by the sources it is made from."""
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(__file__).resolve().parents[1]
     for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
         digest.update(file.read_bytes())
-    root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    root = (
+        os.environ.get("NUMBA_CACHE_DIR")
+        or os.environ.get("XDG_CACHE_HOME")
+        or Path.home() / ".cache"
+    )
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
 
 
-_stride, _calm, _march, _once = _compiled(_whole, monitor.calm, runge_kutta.march, runge_kutta.once)
+_stride, _calm, _march, _once = _compiled(
+    _whole, monitor.is_quiet, runge_kutta.march, runge_kutta.march_once
+)
 
 
 def _addresses(*names: str) -> list[int]:
@@ -128,10 +136,10 @@ def _addresses(*names: str) -> list[int]:
     return [x for x in found if x is not None]
 
 
-STEP, FORWARD = _addresses("mj_step", "mj_forward")
+MJ_STEP, MJ_FORWARD = _addresses("mj_step", "mj_forward")
 
 
-class Bench:
+class EngineStore:
     """Engines of one thread, used again by run after run: one with clay, one without.
 
     Args:
@@ -139,16 +147,16 @@ class Bench:
     """
 
     def __init__(self, models: dict[bool, mujoco.MjModel]):
-        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.Engine]] = {}
+        self.engines: dict[bool, tuple[mujoco.MjModel, mujoco.MjData, stride.StrideEngine]] = {}
         for with_clay, model in models.items():
             self._take(with_clay, copy.copy(model))
-        self.rows = np.empty((CHUNK - 1, stride.ROW))
+        self.rows = np.empty((CHUNK - 1, stride.STRIDE_ROW))
 
     def _take(self, with_clay: bool, model: mujoco.MjModel) -> None:
         data = mujoco.MjData(model)
         views = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, _timestep(model)
-        at = STEP, model._address, data._address, *(x.ctypes.data for x in views)
-        self.engines[with_clay] = model, data, stride.Engine(*at)
+        at = MJ_STEP, model._address, data._address, *(x.ctypes.data for x in views)
+        self.engines[with_clay] = model, data, stride.StrideEngine(*at)
 
     def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The engine as scene.build(s) would make it, at rest."""
@@ -162,7 +170,7 @@ class Bench:
         return model, data
 
 
-class Native(Run):
+class NativeLeapfrog(Run):
     """The leapfrog, compiled: a chunk of steps at a time, borders included.
 
     Args:
@@ -170,8 +178,10 @@ class Native(Run):
         quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look.
     """
 
-    def __init__(self, scenario: Scenario, every: int, bench: Bench | None = None, quiet: bool = False):
-        self.bench = bench or Bench({})
+    def __init__(
+        self, scenario: Scenario, every: int, bench: EngineStore | None = None, quiet: bool = False
+    ):
+        self.bench = bench or EngineStore({})
         super().__init__(scenario, every)
         s, engine = scenario, self.bench.engines[scenario.clay is not None][2]
         th = s.operator or NO_HAND
@@ -185,11 +195,17 @@ class Native(Run):
         self.now["clay"] = *self.regions.base, *self.regions.rate
         self.now["index"] = self.regions.index
         self.rows, self.filled = self.bench.rows, 0
-        self.crossed = np.empty((ROOM, 4))
-        given = given, _lines(self.muscle), _lines(self.command), self.regions.table, engine
+        self.crossed = np.empty((CROSSINGS_ROOM, 4))
+        given = (
+            given,
+            _signal_lines(self.muscle),
+            _signal_lines(self.command),
+            self.regions.table,
+            engine,
+        )
         self.given = (*given, self.now, self.rows, self.crossed)
         w1, w2 = self.data.qvel
-        self.first = energy.stored(th, w1, w1 + w2, s.start, s.velocity)
+        self.first = energy.stored_energy(th, w1, w1 + w2, s.start, s.velocity)
         self.quiet = quiet
         self.calm = s.stop and every == 1  # so far; later `look` may want all rows once more
         self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
@@ -206,7 +222,7 @@ class Native(Run):
         for axis, *crossing in self.crossed[:n].tolist():
             self.crossings.append(engine.Crossing(AXES[int(axis)], *crossing))
         if code == stride.NOT_FINITE:
-            raise Suspicious if self.quiet else ArithmeticError
+            raise NeedsMonitor if self.quiet else ArithmeticError
         if code:
             self.finish("finished" if code == stride.FINISHED else "time limit")
         return True
@@ -215,7 +231,7 @@ class Native(Run):
         n, self.filled = self.filled, 0
         if self.quiet:
             if not n or not self._still_calm(n):
-                raise Suspicious
+                raise NeedsMonitor
             if self.outcome is not None:
                 self.outcome = self.watch.end(self.outcome)
                 self.end = self.rows[n - 1, 2:].tolist()
@@ -255,21 +271,31 @@ class Native(Run):
 
     def balance(self) -> dict[str, float]:
         px, py, vx, vy, w1, w2 = self.now["last"][0].tolist()
-        last = energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
+        last = energy.stored_energy(
+            self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy)
+        )
         made = self.looked > 0
-        return energy.balance(self.now["work"][0].tolist(), self.first if made else last, last)
+        return energy.energy_balance(
+            self.now["work"][0].tolist(), self.first if made else last, last
+        )
 
 
-class March(RungeKutta):
+class NativeRungeKutta(RungeKutta):
     """The accurate run, compiled: many samples at a time, and each step on the way to a border."""
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
-        views = (self.data.qpos, self.data.qvel, self.data.qacc, self.data.ctrl, self.data.qfrc_applied)
+        views = (
+            self.data.qpos,
+            self.data.qvel,
+            self.data.qacc,
+            self.data.ctrl,
+            self.data.qfrc_applied,
+        )
         at = (x.ctypes.data for x in views)
-        self.arm = runge_kutta.Engine(FORWARD, self.model._address, self.data._address, *at)
+        self.arm = runge_kutta.MarchEngine(MJ_FORWARD, self.model._address, self.data._address, *at)
         self.y, self.work = np.empty(runge_kutta.STATES), np.empty((6, runge_kutta.STATES))
-        self.room = np.empty((CHUNK, runge_kutta.ROW))
+        self.room = np.empty((CHUNK, runge_kutta.MARCH_ROW))
 
     def go(self, progress: Any) -> None:
         Run.go(self, progress)
@@ -277,7 +303,13 @@ class March(RungeKutta):
     def _given(self) -> tuple[Any, ...]:
         y = self.y
         y[:2], y[2:4], y[4:] = self.data.qpos, self.data.qvel, self.data.act
-        return self.c, self.regions.b(self.t), self.scenario.force, self.scenario.clay is not None, self.arm
+        return (
+            self.c,
+            self.regions.b(self.t),
+            self.scenario.force,
+            self.scenario.clay is not None,
+            self.arm,
+        )
 
     def _take(self) -> None:
         self.data.qpos[:], self.data.qvel[:], self.data.act[:] = self.y[:2], self.y[2:4], self.y[4:]
@@ -288,12 +320,18 @@ class March(RungeKutta):
         if n > 0:
             low, high = tuple(self.regions.low), tuple(self.regions.high)
             given, rows = self._given(), self.room[:n]
-            made = _march(*given, dt, self.substeps, low, high, self.scenario.origin, self.y, self.work, rows)
+            made = _march(
+                *given, dt, self.substeps, low, high, self.scenario.origin, self.y, self.work, rows
+            )
             self._take()
             if made:
                 self.rows += rows[:made].tolist()
                 self.b += [self.regions.b(self.t)] * made
-                self.i, self.t, self.steps = i + made, (i + made) * dt, self.steps + made * self.substeps
+                self.i, self.t, self.steps = (
+                    i + made,
+                    (i + made) * dt,
+                    self.steps + made * self.substeps,
+                )
                 return len(self.rows) >= CHUNK
         return super().advance()
 
@@ -302,11 +340,11 @@ class March(RungeKutta):
         self._take()
 
 
-class Suspicious(Exception):
+class NeedsMonitor(Exception):
     """A run to be made again, and watched."""
 
 
-class Pool:
+class BatchPool:
     """What the threads of a batch share, and what each has of its own.
 
     Args:
@@ -316,27 +354,30 @@ class Pool:
     def __init__(self, every: int):
         self.every = every
         self.own = threading.local()
-        self.models = {x.clay is not None: engine.build(x) for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))}
+        self.models = {
+            x.clay is not None: engine.build(x)
+            for x in (Scenario(), Scenario(clay=slab(0.0, 0.0, 1.0)))
+        }
 
-    def _go(self, scenario: Scenario, every: int, quiet: bool) -> tuple[Native, float]:
+    def _go(self, scenario: Scenario, every: int, quiet: bool) -> tuple[NativeLeapfrog, float]:
         """The run, made, and the seconds it took."""
         if not hasattr(self.own, "bench"):
-            self.own.bench = Bench(self.models)
-        run = Native(scenario, every, self.own.bench, quiet)
+            self.own.bench = EngineStore(self.models)
+        run = NativeLeapfrog(scenario, every, self.own.bench, quiet)
         begin = time.perf_counter()
         run.go(None)
         return run, time.perf_counter() - begin
 
-    def run(self, scenario: Scenario) -> tuple[Native, float]:
+    def run(self, scenario: Scenario) -> tuple[NativeLeapfrog, float]:
         """A run that native can make, and the seconds it took."""
         return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
-        """What batch.entry takes, of a run that native can make."""
+        """What batch.summary_entry takes, of a run that native can make."""
         if scenario.stop:
-            with contextlib.suppress(Suspicious):
-                return self._go(scenario, LAST, True)[0].brief()
-        return self._go(scenario, LAST, False)[0].brief()
+            with contextlib.suppress(NeedsMonitor):
+                return self._go(scenario, LAST_ONLY, True)[0].brief()
+        return self._go(scenario, LAST_ONLY, False)[0].brief()
 
 
 def _timestep(model: mujoco.MjModel) -> np.ndarray:
@@ -352,18 +393,24 @@ def _timestep(model: mujoco.MjModel) -> np.ndarray:
     return head[at : at + 1]
 
 
-def _lines(signal: Any) -> np.ndarray:
+def _signal_lines(signal: Any) -> np.ndarray:
     """A signals.Signal, one row a line: omega [rad/s], phase x, y [rad], amplitude x, y; none for None."""
     if signal is None:
         return np.zeros((0, 5))
-    return np.column_stack((signal.omega, signal.phase, np.tile(signal.amplitude, (len(signal.omega), 1))))
+    return np.column_stack(
+        (signal.omega, signal.phase, np.tile(signal.amplitude, (len(signal.omega), 1)))
+    )
 
 
 @functools.cache
 def warm(accurate: bool) -> None:
     """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
-    entry = "march.march" if accurate else "native._whole"
-    told = NOTICE if sys.stderr and sys.stderr.isatty() and not any(folder().rglob(f"{entry}-*.nbi")) else ""
+    entry = "runge_kutta.march" if accurate else "compiled._whole"
+    told = (
+        NOTICE
+        if sys.stderr and sys.stderr.isatty() and not any(cache_folder().rglob(f"{entry}-*.nbi"))
+        else ""
+    )
     print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
@@ -371,7 +418,7 @@ def warm(accurate: bool) -> None:
     try:
         for damping in (None, slab(1.0, 0.0, 1.0)):
             s = Scenario(clay=damping, t_max=1e-2, integrator="accurate" if accurate else "fast")
-            (March if accurate else Native)(s, 1).go(None)
+            (NativeRungeKutta if accurate else NativeLeapfrog)(s, 1).go(None)
     finally:
         print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
         if before is not None:

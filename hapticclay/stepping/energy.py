@@ -11,20 +11,30 @@ from ..model import arm
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Scenario
 
-MEMO = ("friction", "passivity_controller", "coupling")  # entries of an interface; the last two are part of motors
+HARDWARE_WORK = (
+    "friction",
+    "passivity_controller",
+    "coupling",
+)  # entries of an interface; the last two are part of motors
 
 
-def stored(th: Operator, r1: float, r2: float, p: Sequence[float], v: Sequence[float]) -> tuple[float, float]:
+def stored_energy(
+    th: Operator, r1: float, r2: float, p: Sequence[float], v: Sequence[float]
+) -> tuple[float, float]:
     """Energy [J] of the arm at link rates r1, r2 [rad/s], and of mass and spring of the hand at p [m], v [m/s]."""
-    at_hand = 0.5 * (th.mass * (v[0] * v[0] + v[1] * v[1]) + th.spring * (p[0] * p[0] + p[1] * p[1]))
+    at_hand = 0.5 * (
+        th.mass * (v[0] * v[0] + v[1] * v[1]) + th.spring * (p[0] * p[0] + p[1] * p[1])
+    )
     return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), float(at_hand)
 
 
-def balance(work: Sequence[float], first: tuple[float, float], last: tuple[float, float]) -> dict[str, float]:
+def energy_balance(
+    work: Sequence[float], first: tuple[float, float], last: tuple[float, float]
+) -> dict[str, float]:
     """muscle + motors = clay + hand_damper + kinetic + hand_stored + residual [J].
 
     Args:
-        work: of muscle, motors, clay, hand's damper, and throughput [J]. first, last: from `stored`.
+        work: of muscle, motors, clay, hand's damper, and throughput [J]. first, last: from `stored_energy`.
     """
     muscle, motors, clay, hand, through = work
     kinetic, at_hand = last[0] - first[0], last[1] - first[1]
@@ -40,11 +50,11 @@ def balance(work: Sequence[float], first: tuple[float, float], last: tuple[float
     }
 
 
-def spent(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):
+def kick_work(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):
     """Work done in a kick [J]: of muscle, motors, clay, hand's damper, and throughput. Floats, or arrays over kicks.
 
     Args:
-        H: length of the kick [s]. k: from loop.inputs. restx, resty: of the clay, beside its dampers [N].
+        H: length of the kick [s]. k: from loop.step_inputs. restx, resty: of the clay, beside its dampers [N].
         bx, by, ax, ay: handle velocity before and after it [m/s].
         t1, t2: motor torques [N.m]. w1, w2: mean joint rates [rad/s]. damper: of the hand [N.s/m].
     """
@@ -57,7 +67,7 @@ def spent(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):
     return muscle, motors, clay, hand, abs(muscle) + abs(motors)
 
 
-class Ledger:
+class EnergyLedger:
     """Adds up the work done in the kicks of a run; each force times the mean of the velocities around it.
 
     The arm's kinetic energy is read from the engine's own rates, so the balance also tells whether
@@ -67,7 +77,7 @@ class Ledger:
     def __init__(self, scenario: Scenario, extra: list[tuple[float, ...]] | None = None):
         self.scenario = scenario
         self.extra = extra  # of each kick, where there is an interface: see `_memo`
-        self.memo = np.zeros(len(MEMO))
+        self.memo = np.zeros(len(HARDWARE_WORK))
         self.work = np.zeros(5)  # muscle, motors, clay, hand's damper, throughput
         self.first: tuple[float, float] | None = None  # energy of arm and hand at the start
         self.last = (0.0, 0.0)
@@ -76,7 +86,7 @@ class Ledger:
         """Enters kicks.
 
         Args:
-            raw: shape (14, n), as glide.advance keeps them. k: loop.inputs of each, (12, n) or (12, 1).
+            raw: shape (14, n), as glide.advance keeps them. k: loop.step_inputs of each, (12, n) or (12, 1).
             rest: of the clay, beside its dampers [N], (2, n) or (2, 1). H: length of each kick [s], (n,) or (1,).
         """
         if not raw.shape[1]:
@@ -85,17 +95,22 @@ class Ledger:
         q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
         v = 0.5 * (before + after)
         a = q[0] + q[1]
-        columns: Any = arm.columns(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
-        r1, r2 = arm.rates(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
+        columns: Any = arm.jacobian(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
+        r1, r2 = arm.joint_velocity(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
         around = before[0], before[1], after[0], after[1]
-        self.work += [x.sum() for x in spent(H, k, rest[0], rest[1], *around, tau[0], tau[1], r1, r2 - r1, th.damper)]
+        self.work += [
+            x.sum()
+            for x in kick_work(
+                H, k, rest[0], rest[1], *around, tau[0], tau[1], r1, r2 - r1, th.damper
+            )
+        ]
         if self.extra is not None:
             self._memo(H, v, r1, r2)
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
             u1x, u1y, u2x, u2y = (x[j] for x in columns)
-            r = arm.rates(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
-            return stored(th, r[0], r[1], p[:, j].tolist(), v[:, j].tolist())
+            r = arm.joint_velocity(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
+            return stored_energy(th, r[0], r[1], p[:, j].tolist(), v[:, j].tolist())
 
         if self.first is None:
             self.first = held(before, 0)
@@ -117,10 +132,14 @@ class Ledger:
 
     def close(self) -> dict[str, float]:
         """The balance of all kicks entered."""
-        out = balance(self.work.tolist(), self.first or self.last, self.last)
+        out = energy_balance(self.work.tolist(), self.first or self.last, self.last)
         parts = self.scenario.interface
         if parts:
             used = (any(parts.friction), parts.passivity, parts.coupling is not None)
-            out |= {name: float(x) for name, x, on in zip(MEMO, self.memo, used, strict=True) if on}
+            out |= {
+                name: float(x)
+                for name, x, on in zip(HARDWARE_WORK, self.memo, used, strict=True)
+                if on
+            }
             out["residual"] -= out.get("friction", 0.0)
         return out

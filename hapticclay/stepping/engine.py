@@ -45,11 +45,7 @@ class Crossing:
     speed: float
 
 
-# MERGED stepping.scene
-# Composes the engine's model from the parts in mjcf/, adding only what a scenario needs.
-
-
-def folder() -> Path:
+def mjcf_folder() -> Path:
     """The folder of MJCF files: beside the package in a checkout, inside it when installed."""
     package = Path(__file__).resolve().parents[1]
     checkout = package.parent / "mjcf"
@@ -95,7 +91,7 @@ def build(scenario: Scenario) -> mujoco.MjModel:
 
 def _compose(parts: list[str]) -> mujoco.MjSpec:
     text = "".join(f'<include file="{part}"/>' for part in parts)
-    files = {part: (folder() / part).read_bytes() for part in parts}
+    files = {part: (mjcf_folder() / part).read_bytes() for part in parts}
     return mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
 
 
@@ -105,12 +101,10 @@ def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
     return model
 
 
-# MERGED stepping.run
-# What every way of running a scenario shares: the engine's model, the regions, the record.
-
-
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
-CHUNK = 4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
+CHUNK = (
+    4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
+)
 
 
 class Run:
@@ -127,15 +121,19 @@ class Run:
     def __init__(self, scenario: Scenario, every: int):
         if mujoco.get_mjcb_control() is not None:
             raise ParameterError(
-                "mjcb_control", mujoco.get_mjcb_control(), "the engine must be free of control callbacks"
+                "mjcb_control",
+                mujoco.get_mjcb_control(),
+                "the engine must be free of control callbacks",
             )
         self.scenario, self.every = scenario, every
         self.model, self.data = self.engine()
-        q1, q2 = arm.inverse(scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1])
+        q1, q2 = arm.inverse_kinematics(
+            scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1]
+        )
         self.data.qpos[:] = q1, q2
-        r1, r2 = arm.rates(*scenario.velocity, *arm.columns(*_trigonometry(q1, q2)), 1.0)
+        r1, r2 = arm.joint_velocity(*scenario.velocity, *arm.jacobian(*_sines(q1, q2)), 1.0)
         self.data.qvel[:] = r1, r2 - r1
-        self.muscle, self.command = _signal(scenario.muscle), _signal(scenario.command)
+        self.muscle, self.command = _build_signal(scenario.muscle), _build_signal(scenario.command)
         self.angles: Any = memoryview(self.data.qpos)  # floats, in the engine's own memory
         self.rates: Any = memoryview(self.data.qvel)
         self.regions = Regions(scenario.clay, scenario.length, scenario.start)
@@ -143,7 +141,7 @@ class Run:
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
         self.i, self.t, self.steps = 0, 0.0, 0
         self.pause = math.inf
-        self.watch = monitor.Watch(scenario)
+        self.watch = monitor.StabilityMonitor(scenario)
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # index, rows, b
         self.crossings: list[Crossing] = []
@@ -172,16 +170,25 @@ class Run:
         try:
             while self.outcome is None and self.i < self.pause:
                 if self.advance() or self.outcome:
-                    enough = progress and progress(self.t, self.position(self.angles, self.rates, 0.0)[0])
+                    enough = progress and progress(
+                        self.t, self.position(self.angles, self.rates, 0.0)[0]
+                    )
                     if enough and self.outcome is None:
                         self.outcome = monitor.Outcome("interrupted", self.t, self.i)
                     self.flush()
-        except (ArithmeticError, ValueError) as error:  # beyond floating point, or the arm exactly straight
-            if isinstance(error, ValueError) and all(map(math.isfinite, (*self.angles, *self.rates))):
+        except (
+            ArithmeticError,
+            ValueError,
+        ) as error:  # beyond floating point, or the arm exactly straight
+            if isinstance(error, ValueError) and all(
+                map(math.isfinite, (*self.angles, *self.rates))
+            ):
                 raise
             self.flush()
             if self.outcome is None:
-                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause="the arm is stretched or folded")
+                self.outcome = monitor.Outcome(
+                    "out of reach", self.t, self.i, cause="the arm is stretched or folded"
+                )
 
     def uh(self, begin: Any, end: Any) -> Any:
         """Mean muscle force over [begin, end] [s], or many such spans [N], (2,) or (n, 2)."""
@@ -200,12 +207,12 @@ class Run:
 
     def position(self, q, w, h: float) -> tuple[float, float]:
         """Handle position [m] when the joints have turned from q with w for h seconds."""
-        x, y = arm.position(q[0] + h * w[0], q[1] + h * w[1])
+        x, y = arm.handle_position(q[0] + h * w[0], q[1] + h * w[1])
         return x - self.scenario.origin[0], y - self.scenario.origin[1]
 
     def target(self) -> tuple[float, float, bool]:
         """(time of the next sample [s], length of the step to it [s], whether now is a sample); length 0 at the end."""
-        return aim(self.t, self.i, self.last, self.scenario.dt, self.scenario.t_max)
+        return next_sample(self.t, self.i, self.last, self.scenario.dt, self.scenario.t_max)
 
     def inside(self, i: int, p: float) -> bool:
         """Whether coordinate i at p [m] is in the present region (a NaN is: it is judged later)."""
@@ -250,7 +257,9 @@ class Run:
             if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
                 keep = np.append(keep, good - 1)
             everything = len(keep) == rows.shape[1]
-            self.kept.append((self.looked + keep, rows if everything else rows[:, keep], b()[:, keep]))
+            self.kept.append(
+                (self.looked + keep, rows if everything else rows[:, keep], b()[:, keep])
+            )
         self.looked += good
         return good
 
@@ -262,23 +271,28 @@ class Run:
             t[-1] = self.end_time
         q, p, v, fh, tau, delta = (rows[j : j + 2].T.copy() for j in range(0, 12, 2))
         a = q.sum(axis=1)
-        u = arm.columns(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
-        r1, r2 = arm.rates(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
+        u = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+        r1, r2 = arm.joint_velocity(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
         qd = np.column_stack((r1, r2 - r1))
-        return dict(t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta)
+        return dict(
+            t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta
+        )
 
     def brief(self) -> tuple[Any, ...]:
         """What simulation.batch.entry takes: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
         arrays = self.arrays()
-        last = [x[-1] if len(x) else (np.nan, np.nan) for x in map(arrays.__getitem__, ("p", "v", "fh", "fe", "b"))]
+        last = [
+            x[-1] if len(x) else (np.nan, np.nan)
+            for x in map(arrays.__getitem__, ("p", "v", "fh", "fe", "b"))
+        ]
         return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
 
 
-def _trigonometry(q1: float, q2: float) -> tuple[float, float, float, float]:
+def _sines(q1: float, q2: float) -> tuple[float, float, float, float]:
     return math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
 
 
-def _signal(multisine: Multisine | None) -> Any:
+def _build_signal(multisine: Multisine | None) -> Any:
     if multisine is None:
         return None
     from ..model.signals import Signal  # only a run that has one pays for it
@@ -286,7 +300,9 @@ def _signal(multisine: Multisine | None) -> Any:
     return Signal(multisine)
 
 
-def window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
+def shared_view(
+    a: np.ndarray, b: np.ndarray
+) -> tuple[memoryview, Callable[..., tuple[float, ...]]]:
     """A view of the engine's memory from a to b, two floats each, and what reads all four at once."""
     first, second = a.ctypes.data, b.ctypes.data
     gap = second - first - a.nbytes
@@ -294,7 +310,7 @@ def window(a: np.ndarray, b: np.ndarray) -> tuple[memoryview, Callable[..., tupl
     return view, struct.Struct(f"2d{gap}x2d").unpack_from
 
 
-def outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
+def command_view(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[..., None]]:
     """A view of the engine's memory from ctrl on, and what writes a whole command into it.
 
     ctrl holds the motors and, where there is clay, two dampers; its first 32 bytes are its own either
@@ -313,7 +329,7 @@ def outlet(ctrl: np.ndarray, push: np.ndarray) -> tuple[memoryview, Callable[...
     return memoryview(ctrl), write  # type: ignore[arg-type]
 
 
-def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, float, bool]:
+def next_sample(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, float, bool]:
     """Run.target, for the run at time t [s], at or after sample i, that has `last` whole steps."""
     on_grid = t == i * dt
     if i > last:
@@ -323,7 +339,7 @@ def aim(t: float, i: int, last: int, dt: float, t_max: float) -> tuple[float, fl
     return target, after if after > 1e-9 * dt else 0.0, on_grid
 
 
-def root(f: Callable[..., float], b: float, fb: float, *args: Any) -> float:
+def find_root(f: Callable[..., float], b: float, fb: float, *args: Any) -> float:
     """Where f(x, *args), of opposite sign at 0+ and at b, vanishes (false position, Illinois), to rounding.
 
     f may be 0 at 0 itself, as of a handle that enters stiff clay, stops and comes back: then f/x is what must vanish.

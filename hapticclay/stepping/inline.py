@@ -31,7 +31,9 @@ def inline(function: FunctionType, never: frozenset[str] = frozenset()) -> Calla
     except (OSError, TypeError, SyntaxError):
         return function
     work = _Inliner(never)
-    scope: dict[str, ast.expr] = {n: _name(n) for n in _assigned(tree) | {a.arg for a in tree.args.args}}
+    scope: dict[str, ast.expr] = {
+        n: _name(n) for n in _assigned(tree) | {a.arg for a in tree.args.args}
+    }
     tree.body = work.block(tree.body, function, scope)
     tree.decorator_list, tree.returns = [], None
     for arg in tree.args.args:
@@ -55,7 +57,9 @@ def _name(text: str) -> ast.Name:
 
 
 def _assigned(node: ast.AST) -> set[str]:
-    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {
+        n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+    }
 
 
 def _read(node: ast.AST) -> set[str]:
@@ -68,7 +72,9 @@ class _Inliner:
         self.bound: dict[str, Any] = {}
         self.count = itertools.count()
 
-    def block(self, body: list[ast.stmt], function: FunctionType, scope: dict[str, ast.expr]) -> list[ast.stmt]:
+    def block(
+        self, body: list[ast.stmt], function: FunctionType, scope: dict[str, ast.expr]
+    ) -> list[ast.stmt]:
         """The statements of body, names resolved in function's scope, laws expanded."""
         out: list[ast.stmt] = []
         for statement in body:
@@ -87,17 +93,25 @@ class _Inliner:
                     head, inner = _hoist(_prune(inner), _assigned(statement.target))
                 other = self.block(statement.orelse, function, scope)
                 if isinstance(statement, ast.If):
-                    new: ast.stmt = ast.If(self.expression(statement.test, function, scope), inner, other)
+                    new: ast.stmt = ast.If(
+                        self.expression(statement.test, function, scope), inner, other
+                    )
                 else:
                     target = self.expression(statement.target, function, scope)
-                    new = ast.For(target, self.expression(statement.iter, function, scope), inner, other)
+                    new = ast.For(
+                        target, self.expression(statement.iter, function, scope), inner, other
+                    )
                 out += [*head, new]
             elif law and isinstance(call, ast.Call) and isinstance(statement, ast.Assign):
                 target = self.expression(statement.targets[0], function, scope)
-                out += self.expand(law, [self.expression(a, function, scope) for a in call.args], target)
+                out += self.expand(
+                    law, [self.expression(a, function, scope) for a in call.args], target
+                )
             elif law and isinstance(call, ast.Call) and isinstance(statement, ast.AugAssign):
                 temporary = self._fresh("value")
-                out += self.expand(law, [self.expression(a, function, scope) for a in call.args], temporary)
+                out += self.expand(
+                    law, [self.expression(a, function, scope) for a in call.args], temporary
+                )
                 target = self.expression(statement.target, function, scope)
                 out.append(ast.AugAssign(target, statement.op, temporary))  # type: ignore[arg-type]
             else:
@@ -111,7 +125,9 @@ class _Inliner:
         assigned = _assigned(tree)
         scope: dict[str, ast.expr] = {n: self._fresh(n) for n in sorted(assigned)}
         for parameter, arg in zip(tree.args.args, args, strict=True):
-            if parameter.arg not in assigned and isinstance(arg, ast.Name | ast.Constant | ast.Tuple):
+            if parameter.arg not in assigned and isinstance(
+                arg, ast.Name | ast.Constant | ast.Tuple
+            ):
                 scope[parameter.arg] = arg
             else:
                 scope.setdefault(parameter.arg, self._fresh(parameter.arg))
@@ -145,10 +161,14 @@ class _Inliner:
                 if isinstance(node.value, ast.Name) and node.value.id not in scope:
                     owner = function.__globals__.get(node.value.id)
                     if isinstance(owner, ModuleType):
-                        return work._global(f"{node.value.id}_{node.attr}", getattr(owner, node.attr), node)
+                        return work._global(
+                            f"{node.value.id}_{node.attr}", getattr(owner, node.attr), node
+                        )
                 return self.generic_visit(node)
 
-        return Resolve().visit(ast.parse(ast.unparse(node)).body[0] if isinstance(node, ast.stmt) else _copy(node))
+        return Resolve().visit(
+            ast.parse(ast.unparse(node)).body[0] if isinstance(node, ast.stmt) else _copy(node)
+        )
 
     def _global(self, name: str, value: Any, node: ast.expr) -> ast.expr:
         if isinstance(value, float):
@@ -164,7 +184,11 @@ class _Inliner:
             found = function.__globals__.get(func.id)
         elif isinstance(func, ast.Attribute) and isinstance(func.value, ast.Name):
             found = getattr(function.__globals__.get(func.value.id), func.attr, None)
-        return found if isinstance(found, FunctionType) and found.__module__.startswith(PACKAGE) else None
+        return (
+            found
+            if isinstance(found, FunctionType) and found.__module__.startswith(PACKAGE)
+            else None
+        )
 
     def _fresh(self, name: str) -> ast.Name:
         return _name(f"{name}_{next(self.count)}")
@@ -197,7 +221,9 @@ def _flatten(body: list[ast.stmt]) -> list[ast.stmt]:
     for statement in body:
         if isinstance(statement, ast.Assign):
             pairs = list(_match(statement.targets[0], statement.value))
-            if len(pairs) > 1 and not any(_read(a) & _read(b) for i, (a, _) in enumerate(pairs) for _, b in pairs[i:]):
+            if len(pairs) > 1 and not any(
+                _read(a) & _read(b) for i, (a, _) in enumerate(pairs) for _, b in pairs[i:]
+            ):
                 out += [_assign(a, b) for a, b in pairs]
                 continue
         out.append(statement)
@@ -237,12 +263,20 @@ class _Line:
     def target(self) -> str:
         """The name that this plain assignment sets; "" for any other statement."""
         s = self.statement
-        return s.targets[0].id if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name) else ""
+        return (
+            s.targets[0].id
+            if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
+            else ""
+        )
 
     def source(self) -> str:
         """The name that this plain assignment copies; "" for any other statement."""
         s = self.statement
-        return s.value.id if self.target() and isinstance(s, ast.Assign) and isinstance(s.value, ast.Name) else ""
+        return (
+            s.value.id
+            if self.target() and isinstance(s, ast.Assign) and isinstance(s.value, ast.Name)
+            else ""
+        )
 
 
 def _prune(body: list[ast.stmt]) -> list[ast.stmt]:
@@ -254,7 +288,8 @@ def _prune(body: list[ast.stmt]) -> list[ast.stmt]:
         rest = lines[i + 1 :]
         i += 1
         once = name and not any(
-            name in x.read | x.assigned for x in lines[: i - 1] + [x for x in rest if name in x.assigned]
+            name in x.read | x.assigned
+            for x in lines[: i - 1] + [x for x in rest if name in x.assigned]
         )
         if not once:
             continue

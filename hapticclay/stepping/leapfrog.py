@@ -11,16 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import arm
-from ..model.clay import at
+from ..model.clay import damping_at
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from . import energy, loop
-from .engine import CHUNK, TOUCH, Run, mujoco, outlet, root, window
+from .engine import CHUNK, TOUCH, Run, command_view, find_root, mujoco, shared_view
 from .inline import inline
 
 LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
-FIRST, WIDER = 0.02, 1.01  # first step of such a hit, in decay times of the speed; each step over the one before
-INPUTS = 12  # numbers in loop.inputs
+FIRST_OF_HIT, HIT_GROWTH = (
+    0.02,
+    1.01,
+)  # first step of such a hit, in decay times of the speed; each step over the one before
+INPUTS = 12  # numbers in loop.step_inputs
 NONE = (0.0, 0.0)
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
 
@@ -33,7 +36,7 @@ def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
     if law not in _fused:
         if steps < FUSE_FROM:
             return law
-        _fused[law] = inline(law, frozenset({"stiff"} if law is advance else ()))
+        _fused[law] = inline(law, frozenset({"stiff"} if law is glide_constant else ()))
     return _fused[law]
 
 
@@ -43,12 +46,12 @@ class _Stretch(NamedTuple):
     n: int
     is_sample: bool  # False at a border between two samples
     b: Any  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all; of one row a tuple
-    k: Any  # loop.inputs, (INPUTS, n), (INPUTS, 1) or a tuple
+    k: Any  # loop.step_inputs, (INPUTS, n), (INPUTS, 1) or a tuple
     H: float  # length of the kick [s]
     rest: Any = NONE  # clay's force beside its dampers [N], (2, n) or a tuple
 
 
-def _spread(columns: list[Any], counts: list[int]) -> np.ndarray:
+def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
     """Columns side by side, those of one column repeated to its count; a tuple is a column of its own."""
     out: list[np.ndarray] = []
     pairs = zip(columns, counts, strict=True)
@@ -63,14 +66,14 @@ def _spread(columns: list[Any], counts: list[int]) -> np.ndarray:
 def _sampled(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario) -> np.ndarray:
     """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
 
-    k is loop.inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) where they are the same for all; rest the clay's
+    k is loop.step_inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) where they are the same for all; rest the clay's
     force beside its dampers [N], (2, n) or (2, 1).
     """
     out = np.empty((12, raw.shape[1]))
     before, after = raw[4:6], raw[6:8]
     out[0:4] = raw[0:4]
     out[4:6] = before + k[4] * (after - before)
-    if k[10:12].any():  # see loop.at_sample
+    if k[10:12].any():  # see loop.velocity_at_sample
         soft = k[10:12] * (k[0:4:2] * before + k[1:4:2] * after + rest)
         out[4:6] = np.where(k[10:12] > 0.0, soft, out[4:6])
     if scenario.operator:
@@ -86,25 +89,27 @@ class Leapfrog(Run):
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
-        self.motion, self.read = window(self.data.qpos, self.data.qvel)
-        self.drive, self.write = outlet(self.data.ctrl, self.data.qfrc_applied)
+        self.motion, self.read = shared_view(self.data.qpos, self.data.qvel)
+        self.drive, self.write = command_view(self.data.ctrl, self.data.qfrc_applied)
         self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
-        self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
+        self.whole = loop.loop_coefficients(scenario, scenario.dt, scenario.dt)
         self.hand = scenario.operator or NO_HAND
-        if scenario.control == "continuous":  # what `_glide` will need is written out before the run is timed
-            _written_out(vary if self.varies else advance, self.last)
+        if (
+            scenario.control == "continuous"
+        ):  # what `_glide` will need is written out before the run is timed
+            _written_out(glide_varying if self.varies else glide_constant, self.last)
             if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-                _written_out(vary, self.last)
+                _written_out(glide_varying, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
         self.final: Any = None  # velocity of the handle at the end [m/s]
         self.before = 0.0  # length of the step that led here [s]
         self.clay = self.regions.base, self.regions.rate  # before the sample
-        self.rows = bytearray(CHUNK * ROW)
+        self.rows = bytearray(CHUNK * GLIDE_ROW)
         self.filled = 0
         self.stretches: list[_Stretch] = []
-        self.ledger = energy.Ledger(scenario)
+        self.ledger = energy.EnergyLedger(scenario)
 
     def advance(self) -> bool:
         if not self._glide():
@@ -117,24 +122,31 @@ class Leapfrog(Run):
         n = min(self.last - self.i, CHUNK - 1 - self.filled)
         if self.before != dt or self.clay != (self.regions.base, self.regions.rate) or n < 1:
             return False
-        p, ahead = self.position(self.angles, self.rates, 0.0), self.position(self.angles, self.rates, dt)
+        p, ahead = (
+            self.position(self.angles, self.rates, 0.0),
+            self.position(self.angles, self.rates, dt),
+        )
         for i in (0, 1):  # do not run far beyond the border that lies ahead
             d = ahead[i] - p[i]
             if d:
                 way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
                 n = min(n, max(16, int(min(0.95 * way, n))))
         q, w, state = tuple(self.angles), tuple(self.rates), self.state
-        rows = range(self.filled * ROW, (self.filled + n) * ROW, ROW)
+        rows = range(self.filled * GLIDE_ROW, (self.filled + n) * GLIDE_ROW, GLIDE_ROW)
         rest: list[tuple[float, float]] = []
         if self.varies:
             b, inputs, shift = self._ahead(n)
             b, k = np.array(b).T, np.array(inputs).T
         else:
             b = self.regions.b(self.t)
-            inputs = loop.inputs(b, b, self.scenario.force, dt, dt, self.hand)
-            b, k, shift = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1)), ([0.0] * n, [0.0] * n)
+            inputs = loop.step_inputs(b, b, self.scenario.force, dt, dt, self.hand)
+            b, k, shift = (
+                np.reshape(b, (2, 1)),
+                np.reshape(inputs, (INPUTS, 1)),
+                ([0.0] * n, [0.0] * n),
+            )
         simple = not self.varies and not k[7, 0]
-        many = _written_out(advance if simple else vary, self.last)
+        many = _written_out(glide_constant if simple else glide_varying, self.last)
         if simple:
             steps, given = rows, (self.whole, inputs)
         else:
@@ -164,7 +176,7 @@ class Leapfrog(Run):
         return True
 
     def _ahead(self, n: int) -> tuple[list, list, list]:
-        """Clay at each of the next n samples, loop.inputs there, and the change of the command after it, x and y."""
+        """Clay at each of the next n samples, loop.step_inputs there, and the change of the command after it, x and y."""
         dt = self.scenario.dt
         t = (self.i + np.arange(n + 1)) * dt
         now = t[:n].tolist()
@@ -172,9 +184,12 @@ class Leapfrog(Run):
         uh = self.uh(t[:n] - 0.5 * dt, t[:n] + 0.5 * dt).tolist()
         if self.regions.grows:
             halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in now]
-            k = [loop.inputs(b0, b1, u, dt, dt, self.hand) for (b0, b1), u in zip(halves, uh, strict=True)]
+            k = [
+                loop.step_inputs(b0, b1, u, dt, dt, self.hand)
+                for (b0, b1), u in zip(halves, uh, strict=True)
+            ]
         else:
-            same = loop.inputs(b[0], b[0], NONE, dt, dt, self.hand)
+            same = loop.step_inputs(b[0], b[0], NONE, dt, dt, self.hand)
             k = [(*same[:5], *u, *same[7:]) for u in uh]
         return b, k, self.shift(t[:n], t[1:]).T.tolist()
 
@@ -207,8 +222,12 @@ class Leapfrog(Run):
                     after, w = self.fine, self._halve(q, w)
             new, command, sample, out = self._tick(q, w, after)
             here, there = self.position(q, out[2:], 0.0), self.position(q, out[2:], after)
-            ups = {i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])}
-            hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]  # no way back: a border must not hold the run
+            ups = {
+                i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])
+            }
+            hit = [
+                i for i in ups if crossed.get(i, ups[i]) == ups[i]
+            ]  # no way back: a border must not hold the run
             if not hit:
                 landing = None
                 break
@@ -231,7 +250,9 @@ class Leapfrog(Run):
         self._engine(w, command, out, after)
         self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
-        self.fine = self.fine * WIDER if self.fine < math.inf and self._limited(command) else math.inf
+        self.fine = (
+            self.fine * HIT_GROWTH if self.fine < math.inf and self._limited(command) else math.inf
+        )
         self.t += after
         if target - self.t <= 1e-9 * self.scenario.dt:
             self._arrive(target)
@@ -249,11 +270,14 @@ class Leapfrog(Run):
         if not (k[10] or k[11]):
             return out[:2]
         at, end = self._whole_kick(q, w)
-        x, y = (loop.at_sample(k, i, at[2 + i], end[i], at[8 + i]) if k[10 + i] else out[i] for i in (0, 1))
+        x, y = (
+            loop.velocity_at_sample(k, i, at[2 + i], end[i], at[8 + i]) if k[10 + i] else out[i]
+            for i in (0, 1)
+        )
         return x, y
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
-        """Sample and end of a kick here, if the step before it were made once more, as loop.tick returns them."""
+        """Sample and end of a kick here, if the step before it were made once more, as loop.step_loop returns them."""
         return self._tick(q, w, self.before)[2:]
 
     def _halve(self, q: tuple[float, ...], w: tuple[float, ...]) -> tuple[float, ...]:
@@ -268,7 +292,7 @@ class Leapfrog(Run):
     def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
         """Length of the first of the steps that resolve a hit which drives motors into their limits [s]; else inf."""
         b = max(self.regions.b(self.t))
-        first = FIRST / (b * arm.TRACE_W) if b else math.inf
+        first = FIRST_OF_HIT / (b * arm.TRACE_W) if b else math.inf
         if first >= after:
             return math.inf
         state, before = self.state, self.before
@@ -291,18 +315,26 @@ class Leapfrog(Run):
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         s = self.scenario
-        c = self.whole if self.before == after == s.dt else loop.coefficients(s, self.before, after)
-        state, *rest = loop.tick(c, self._inputs(self.before, after), q[0], q[1], w[0], w[1], self.state)
+        c = (
+            self.whole
+            if self.before == after == s.dt
+            else loop.loop_coefficients(s, self.before, after)
+        )
+        state, *rest = loop.step_loop(
+            c, self._inputs(self.before, after), q[0], q[1], w[0], w[1], self.state
+        )
         if self.command and after:
             cx, cy = self.shift(self.t, self.t + after).tolist()
             state = (state[0] + cx, state[1] + cy, *state[2:])
         return state, *rest
 
     def _inputs(self, before: float, after: float) -> tuple[float, ...]:
-        """loop.inputs of the kick at this time, between steps of these lengths."""
+        """loop.step_inputs of the kick at this time, between steps of these lengths."""
         t = self.t
-        b0, b1 = at(*self.clay, t - 0.25 * before), self.regions.b(t + 0.25 * after)
-        return loop.inputs(b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after, self.hand)
+        b0, b1 = damping_at(*self.clay, t - 0.25 * before), self.regions.b(t + 0.25 * after)
+        return loop.step_inputs(
+            b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after, self.hand
+        )
 
     def _landing(self, q, w, i: int, up: bool, after: float, there: float) -> float:
         """Length of the step that ends on the border of coordinate i."""
@@ -311,7 +343,7 @@ class Leapfrog(Run):
         def miss(h: float) -> float:
             return self.position(q, self._tick(q, w, h)[3][2:], h)[i] - border
 
-        return root(miss, after, there - border)
+        return find_root(miss, after, there - border)
 
     def _cross(self, i: int, up: bool) -> bool:
         q, w = tuple(self.angles), tuple(self.rates)
@@ -337,10 +369,12 @@ class Leapfrog(Run):
         k = self._inputs(self.before, after)
         self._put(is_sample, row, k, 0.5 * (self.before + after), after > 0.0)
 
-    def _put(self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool) -> None:
+    def _put(
+        self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool
+    ) -> None:
         """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
-        _row.pack_into(self.rows, self.filled * ROW, *row[:14])
-        b = self.regions.b(self.t) if goes_on else at(*self.clay, self.t)
+        _row.pack_into(self.rows, self.filled * GLIDE_ROW, *row[:14])
+        b = self.regions.b(self.t) if goes_on else damping_at(*self.clay, self.t)
         self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
         self.filled += 1
 
@@ -356,7 +390,11 @@ class Leapfrog(Run):
 
     def _whole(self, w, command, out, after: float) -> None:
         """Steps the engine by after, from joint rates w to those of out, whatever the length of the kick."""
-        self.write(self.drive, 0, *loop.entire(w[0], w[1], out[2], out[3], command[0], command[1], after))
+        self.write(
+            self.drive,
+            0,
+            *loop.whole_kick(w[0], w[1], out[2], out[3], command[0], command[1], after),
+        )
         self.model.opt.timestep = after
         mujoco.mj_step(self.model, self.data)
         self.model.opt.timestep = self.scenario.dt
@@ -371,8 +409,8 @@ class Leapfrog(Run):
             k, rest = np.reshape(pieces[0].k, (INPUTS, -1)), np.reshape(pieces[0].rest, (2, -1))
         elif pieces:
             counts = [x.n for x in pieces]
-            k, H = _spread([x.k for x in pieces], counts), np.repeat(H, counts)
-            rest = _spread([x.rest for x in pieces], counts)
+            k, H = _spread_rows([x.k for x in pieces], counts), np.repeat(H, counts)
+            rest = _spread_rows([x.rest for x in pieces], counts)
             if not all(x.is_sample for x in pieces):
                 which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
         samples = [x for x in pieces if x.is_sample]
@@ -381,7 +419,7 @@ class Leapfrog(Run):
             rows[4:6, -1] = self.final
         good = self.judge(
             rows[:, which],
-            lambda: _spread([x.b for x in samples], [x.n for x in samples]),
+            lambda: _spread_rows([x.b for x in samples], [x.n for x in samples]),
         )
         if self.outcome is not None and self.end_time is None:
             n = good if isinstance(which, slice) or not good else int(which[good - 1]) + 1
@@ -391,20 +429,18 @@ class Leapfrog(Run):
         return self.ledger.close()
 
 
-# MERGED stepping.glide
-# Whole steps within one region of the clay, many at a time; `inline` writes the laws into these loops.
+GLIDE_ROW = (
+    14 * 8
+)  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
 
 
-ROW = 14 * 8  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
-
-
-def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
+def glide_constant(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
     """Whole steps within one region of the clay, which is not stiff.
 
     Args:
         rows: range of offsets into the record, one for each step [bytes].
-        c, k: from `loop.coefficients` and `loop.inputs`, for whole steps before and after.
-        state: see `loop.tick`.
+        c, k: from `loop.loop_coefficients` and `loop.step_inputs`, for whole steps before and after.
+        state: see `loop.step_loop`.
         read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
         write: packs a command into the engine's memory, drive.
         keep: packs one row into the record, buffer. step, model, data: the engine.
@@ -420,18 +456,20 @@ def advance(rows, c, k, state, read, write, keep, motion, drive, buffer, step, m
             (t1, t2, bx, by, p1, p2),
             (px, py, vx, vy, fx, fy, dx, dy, _, _),
             (ux, uy, n1, n2),
-        ) = loop.tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
+        ) = loop.step_loop(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
         write(drive, 0, t1, t2, bx, by, p1, p2)
         keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
         step(model, data)
     return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
 
 
-def vary(steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """As `advance`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
+def glide_varying(
+    steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data
+):
+    """As `glide_constant`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
 
     Args:
-        steps: for each step its offset into the record [bytes], `loop.inputs`, change of the command x, y over it [m].
+        steps: for each step its offset into the record [bytes], `loop.step_inputs`, change of the command x, y over it [m].
         rest: list that gets the clay's force beside its dampers x, y in each kick [N].
     """
     s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
@@ -442,7 +480,7 @@ def vary(steps, rest, c, state, read, write, keep, motion, drive, buffer, step, 
             (t1, t2, bx, by, p1, p2),
             (px, py, vx, vy, fx, fy, dx, dy, rx, ry),
             (ux, uy, n1, n2),
-        ) = loop.tick(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
+        ) = loop.step_loop(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
         s0 += cx
         s1 += cy
         write(drive, 0, t1, t2, bx, by, p1, p2)

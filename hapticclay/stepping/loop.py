@@ -22,7 +22,7 @@ SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
 
 def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float, ...]:
-    """State of a loop whose handle is at p [m] and moves with v [m/s], as if it had done so for long; see `tick`.
+    """State of a loop whose handle is at p [m] and moves with v [m/s], as if it had done so for long; see `step_loop`.
 
     The compensator leads by the lag of G at constant speed.
     """
@@ -30,7 +30,7 @@ def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float
     return (*ahead, *v, *p, *v, 0.0, 0.0, 0.0, 0.0)
 
 
-def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
+def loop_coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
     """What a tick needs of the scenario and of the two steps around its sample.
 
     before, after: lengths of the steps [s]; before = 0 at the start, after = 0 at the end.
@@ -40,8 +40,10 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     keepx, takex, nx, mx, kpx = controller.servo_coefficients(G[0], S[0], H, L, R)
     keepy, takey, ny, my, kpy = controller.servo_coefficients(G[1], S[1], H, L, R)
     keep, take = controller.compensator_coefficients(C_POLE, H, L, R)
-    step = H if before > 0.0 and after > 0.0 else max(before, after)  # at start and end the kick is half of one
-    spring, mass, behind, ahead = operator.kick(scenario.operator, H, L, R, step)
+    step = (
+        H if before > 0.0 and after > 0.0 else max(before, after)
+    )  # at start and end the kick is half of one
+    spring, mass, behind, ahead = operator.operator_coefficients(scenario.operator, H, L, R, step)
     limit1, limit2 = scenario.torque_limit
     held = 1.0 if scenario.operator is not None else 0.0
     shaped = 1.0 if scenario.shaping else 0.0
@@ -53,7 +55,7 @@ def coefficients(scenario: Scenario, before: float, after: float) -> tuple[float
     )  # fmt: skip
 
 
-def inputs(b0, b1, uh, before, after, hand):
+def step_inputs(b0, b1, uh, before, after, hand):
     """What a tick needs of its surroundings.
 
     Args:
@@ -63,24 +65,24 @@ def inputs(b0, b1, uh, before, after, hand):
     span = before + after
     L = before / span
     w = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
-    cx0, cx1, cy0, cy1, stiff, sharex, sharey, softx, softy = clay.kick(
+    cx0, cx1, cy0, cy1, stiff, sharex, sharey, softx, softy = clay.split_damping(
         b0, b1, 0.5 * span, L, after / span, w, hand.damper
     )
     uhx, uhy = uh
     return cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
 
 
-def owe(step, H, spring, sharex, sharey, hx, hy):
+def owed_impulse(step, H, spring, sharex, sharey, hx, hy):
     """What stiff clay leaves to the next kick: (force x, y [N], less so much per velocity after x, y [N.s/m]).
 
     Args:
         step, H: lengths of the step after the sample and of the kick [s]. spring: of the hand [N/m].
-        sharex, sharey: from clay.kick. hx, hy: clay.slow_force at the sample [N].
+        sharex, sharey: from clay.split_damping. hx, hy: clay.slow_force at the sample [N].
     """
     return sharex * hx, sharey * hy, 0.5 * step * spring * sharex, 0.5 * step * spring * sharey
 
 
-def measure(q1, q2, w1, w2, d1, d2, ox, noy):
+def measure_handle(q1, q2, w1, w2, d1, d2, ox, noy):
     """What there is to know of the handle.
 
     Args:
@@ -89,24 +91,24 @@ def measure(q1, q2, w1, w2, d1, d2, ox, noy):
         ox, noy: origin of p, x and -y [m].
 
     Returns:
-        (u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy): arm.columns and position [m], absolute rate of
+        (u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy): arm.jacobian and position [m], absolute rate of
         link 2 [rad/s], velocity [m/s], centripetal acceleration c = -J' q' [m/s^2].
     """
     a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.columns(sin(q1), cos(q1), sin(a), cos(a))
+    u1x, u1y, u2x, u2y = arm.jacobian(sin(q1), cos(q1), sin(a), cos(a))
     px = u1y + u2y - ox
     py = noy - u1x - u2x
     r2 = w1 + w2
-    vx, vy = arm.along(w1, r2, u1x, u1y, u2x, u2y)
+    vx, vy = arm.handle_velocity(w1, r2, u1x, u1y, u2x, u2y)
     cx, cy = arm.centripetal(w1 + d1, r2 + d2, u1x, u1y, u2x, u2y)
     return u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy
 
 
-def tick(c, k, q1, q2, w1, w2, state):
+def step_loop(c, k, q1, q2, w1, w2, state):
     """Carries the loop across one sample.
 
     Args:
-        c: from `coefficients`. k: from `inputs`.
+        c: from `loop_coefficients`. k: from `step_inputs`.
         q1, q2: joint angles at the sample [rad]. w1, w2: joint rates half a step before it [rad/s].
         state: (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2
             [rad/s^2], owedx, owedy [N.s]): compensator output and rate, reference model y = G delta and its rate,
@@ -127,9 +129,13 @@ def tick(c, k, q1, q2, w1, w2, state):
     cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
-    u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure(q1, q2, w1, w2, half * g1, half * g2, ox, noy)
+    u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure_handle(
+        q1, q2, w1, w2, half * g1, half * g2, ox, noy
+    )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
-        cx, cy = arm.turning(L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
+        cx, cy = arm.centripetal_about_sample(
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+        )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
@@ -140,16 +146,16 @@ def tick(c, k, q1, q2, w1, w2, state):
     fy = uhy - cy0 * vy
     dx, dy = cx1, cy1
     if held:
-        fx -= operator.impedance(spring, mass, before, px, cx, vx)
-        fy -= operator.impedance(spring, mass, before, py, cy, vy)
+        fx -= operator.operator_force(spring, mass, before, px, cx, vx)
+        fy -= operator.operator_force(spring, mass, before, py, cy, vy)
         dx += behind
         dy += behind
 
     # servo: one kick of the reference model, then of the handle
     vrx = keepx * ydx + takex * (deltax - yx)
     vry = keepy * ydy + takey * (deltay - yy)
-    ax = controller.acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
-    ay = controller.acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
+    ax = controller.servo_acceleration(nx, mx, kpx, vrx, ydx, vx, yx, px, cx)
+    ay = controller.servo_acceleration(ny, my, kpy, vry, ydy, vy, yy, py, cy)
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
@@ -158,29 +164,35 @@ def tick(c, k, q1, q2, w1, w2, state):
         gx = ax - mx * vx + sxx * hx + sxy * hy
         gy = ay - my * vy + sxy * hx + syy * hy
         gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
-        owedx, owedy, softx, softy = owe(step, H, spring, sharex, sharey, gx, gy)
+        owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
         fx += owedx - restx
         fy += owedy - resty
         dx += softx
         dy += softy
-    ux, uy, g1, g2, ffx, ffy, t1, t2 = controller.resolve(
+    ux, uy, g1, g2, ffx, ffy, t1, t2 = controller.saturated_step(
         H, vx, vy, u1x, u1y, u2x, u2y, nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy,
         limit1, limit2, square1, square2,
     )  # fmt: skip
     if stiff:
-        if t1 * t1 >= square1 or t2 * t2 >= square2:  # what the motors hold against the clay is less
-            gx, gy = arm.handle_acceleration((t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y)
+        if (
+            t1 * t1 >= square1 or t2 * t2 >= square2
+        ):  # what the motors hold against the clay is less
+            gx, gy = arm.handle_acceleration(
+                (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y
+            )
             sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
             gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
             fx -= owedx
             fy -= owedy
-            owedx, owedy, _, _ = owe(step, H, spring, sharex, sharey, gx, gy)
+            owedx, owedy, _, _ = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
             fx += owedx
             fy += owedy
-            ux, uy = controller.pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+            ux, uy = controller.velocity_under_torque(
+                H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy
+            )
             ffx = fx - dx * ux
             ffy = fy - dy * uy
-            g1, g2 = arm.rates(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+            g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
@@ -198,7 +210,7 @@ def tick(c, k, q1, q2, w1, w2, state):
     if held:
         fx -= behind * ux
         fy -= behind * uy
-    p1, p2 = arm.torques(fx, fy, u1x, u1y, u2x, u2y)
+    p1, p2 = arm.joint_torques(fx, fy, u1x, u1y, u2x, u2y)
     return (
         (
             deltax + step * ex, deltay + step * ey, ex, ey,
@@ -210,8 +222,8 @@ def tick(c, k, q1, q2, w1, w2, state):
     )  # fmt: skip
 
 
-def instant(scenario: Scenario) -> tuple[float, ...]:
-    """What `derivative` needs of the scenario."""
+def ode_parameters(scenario: Scenario) -> tuple[float, ...]:
+    """What `vector_field` needs of the scenario."""
     th = scenario.operator or NO_HAND
     return (
         *scenario.gain, scenario.origin[0], -scenario.origin[1],
@@ -220,13 +232,13 @@ def instant(scenario: Scenario) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def derivative(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
+def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
     """The same loop as a differential equation, at one instant.
 
     Args:
-        c: from `instant`. bx, by: clay [N.s/m]. uhx, uhy: muscle force [N].
+        c: from `ode_parameters`. bx, by: clay [N.s/m]. uhx, uhy: muscle force [N].
         q1, q2, w1, w2: joint angles [rad] and rates [rad/s].
-        state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `tick`, all at this instant.
+        state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `step_loop`, all at this instant.
 
     Returns:
         (command, rates, sample):
@@ -238,26 +250,28 @@ def derivative(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
         gainx, gainy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
     ) = c  # fmt: skip
     deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
+    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+        q1, q2, w1, w2, 0.0, 0.0, ox, noy
+    )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
     hx, hy = uhx, uhy
-    hx -= operator.impedance(spring, mass, damper, px, cx, vx)
-    hy -= operator.impedance(spring, mass, damper, py, cy, vy)
+    hx -= operator.operator_force(spring, mass, damper, px, cx, vx)
+    hy -= operator.operator_force(spring, mass, damper, py, cy, vy)
     y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
     y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
     # a kick of one second from rest, in which u is the acceleration
-    ax = controller.acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
-    ay = controller.acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
-    _, _, _, _, ffx, ffy, t1, t2 = controller.resolve(
+    ax = controller.servo_acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
+    ay = controller.servo_acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
+    _, _, _, _, ffx, ffy, t1, t2 = controller.saturated_step(
         1.0, 0.0, 0.0, u1x, u1y, u2x, u2y, 1.0, 1.0, ax, ay, sxx, sxy, syy,
         hx - bx * vx, hy - by * vy, mass, mass, limit1, limit2, square1, square2,
     )  # fmt: skip
     hx = ffx + bx * vx
     hy = ffy + by * vy
-    p1, p2 = arm.torques(hx, hy, u1x, u1y, u2x, u2y)
+    p1, p2 = arm.joint_torques(hx, hy, u1x, u1y, u2x, u2y)
     muscle = uhx * vx + uhy * vy
     motors = t1 * w1 + t2 * w2
     clay_power = bx * vx * vx + by * vy * vy
@@ -272,20 +286,20 @@ def derivative(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
     )  # fmt: skip
 
 
-def plant(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
-    """What `push` needs of the scenario and of the two steps around its kick [s]."""
+def plant_coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
+    """What `step_plant` needs of the scenario and of the two steps around its kick [s]."""
     H, span = 0.5 * (before + after), before + after
     return (
         H, after, scenario.origin[0], -scenario.origin[1],
-        *operator.kick(scenario.operator, H, before / span, after / span, max(before, after)),
+        *operator.operator_coefficients(scenario.operator, H, before / span, after / span, max(before, after)),
     )  # fmt: skip
 
 
-def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
+def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
     """One kick of the arm and the hand alone, under given motor torques.
 
     Args:
-        c: from `plant`. k: from `inputs`. q1, q2, w1, w2: as in `tick`. t1, t2: motor torques [N.m].
+        c: from `plant_coefficients`. k: from `step_inputs`. q1, q2, w1, w2: as in `step_loop`. t1, t2: motor torques [N.m].
         owedx, owedy: what stiff clay owes of its impulse in the step before [N.s].
 
     Returns:
@@ -295,32 +309,45 @@ def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
     """
     H, step, ox, noy, spring, mass, before, behind = c
     cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure(q1, q2, w1, w2, 0.0, 0.0, ox, noy)
+    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+        q1, q2, w1, w2, 0.0, 0.0, ox, noy
+    )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
-        cx, cy = arm.turning(L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y)
-    fx = uhx - cx0 * vx - operator.impedance(spring, mass, before, px, cx, vx)
-    fy = uhy - cy0 * vy - operator.impedance(spring, mass, before, py, cy, vy)
+        cx, cy = arm.centripetal_about_sample(
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+        )
+    fx = uhx - cx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
+    fy = uhy - cy0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
     dx, dy = cx1 + behind, cy1 + behind
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
         hx, hy = arm.handle_acceleration(
-            (t1 - t2) / arm.I1, t2 / arm.I2, uhx - spring * px, uhy - spring * py, u1x, u1y, u2x, u2y
+            (t1 - t2) / arm.I1,
+            t2 / arm.I2,
+            uhx - spring * px,
+            uhy - spring * py,
+            u1x,
+            u1y,
+            u2x,
+            u2y,
         )
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-        hx, hy = clay.slow_force(hx, hy, sxx, sxy, syy, sharex, sharey, (cx0 + cx1) * vx, (cy0 + cy1) * vy)
-        owedx, owedy, softx, softy = owe(step, H, spring, sharex, sharey, hx, hy)
+        hx, hy = clay.slow_force(
+            hx, hy, sxx, sxy, syy, sharex, sharey, (cx0 + cx1) * vx, (cy0 + cy1) * vy
+        )
+        owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, hx, hy)
         fx += owedx - restx
         fy += owedy - resty
         dx += softx
         dy += softy
-    ux, uy = controller.pushed(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+    ux, uy = controller.velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
     if stiff:
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
         resty -= owedy
-    g1, g2 = arm.rates((ux - vx) / H, (uy - vy) / H, u1x, u1y, u2x, u2y, 1.0)
+    g1, g2 = arm.joint_velocity((ux - vx) / H, (uy - vy) / H, u1x, u1y, u2x, u2y, 1.0)
     return (
         (px, py, vx, vy, fx - dx * ux, fy - dy * uy, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
@@ -328,20 +355,22 @@ def push(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
     )
 
 
-def at_sample(k, i, before, after, rest):
+def velocity_at_sample(k, i, before, after, rest):
     """Velocity of coordinate i at a sample [m/s].
 
     Args:
-        k: from `inputs`. before, after: velocities around the sample [m/s]. rest: clay's force beside its dampers [N].
+        k: from `step_inputs`. before, after: velocities around the sample [m/s]. rest: clay's force beside its dampers [N].
     """
-    if k[10 + i]:  # what the clay feels: stiff clay leaves nothing else of the velocities around the sample
+    if k[
+        10 + i
+    ]:  # what the clay feels: stiff clay leaves nothing else of the velocities around the sample
         v = k[10 + i] * (k[2 * i] * before + k[2 * i + 1] * after + rest)
     else:
         v = before + k[4] * (after - before)
     return v
 
 
-def entire(w1, w2, n1, n2, t1, t2, step):
+def whole_kick(w1, w2, n1, n2, t1, t2, step):
     """Command that takes the engine from joint rates w to n [rad/s] in one step [s], however long the kick was.
 
     Args:

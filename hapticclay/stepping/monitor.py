@@ -17,13 +17,15 @@ LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
 SPEED = 20.0  # [m/s] beyond any hand
 FLOOR = 1e-9  # [m/s] swings below this are rounding
-GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
-STEP = 2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
-SWINGS = 6  # consecutive swings that a verdict of growth needs
-SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
-TRANSFER = (
-    3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
+SWING_GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
+STEP_GROWTH = (
+    2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
 )
+SWINGS = 6  # consecutive swings that a verdict of growth needs
+SWING_SPACING = (
+    5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
+)
+TRANSFER = 3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
@@ -31,7 +33,7 @@ WHILE = 1.0  # ... for so long at the time limit is stalled; motors in their lim
 OFTEN = 0.1  # share of its last WHILE that an unstable run which goes on spends in the torque limits, if it cycles
 
 
-class Watch:
+class StabilityMonitor:
     """Looks at the rows of a run, chunk by chunk, for the end of its good part.
 
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
@@ -49,8 +51,13 @@ class Watch:
         self.hits = [0, 0]  # samples since then with a motor in its limit
         self.since = [0, 0]  # samples since then
         self.seen = 0  # samples
-        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]  # where the handle has been [m]
-        self.moved = self.unbound = -1  # last sample with the handle faster than STILL; with no motor in its limit
+        self.least, self.most = (
+            [math.inf, math.inf],
+            [-math.inf, -math.inf],
+        )  # where the handle has been [m]
+        self.moved = (
+            self.unbound
+        ) = -1  # last sample with the handle faster than STILL; with no motor in its limit
         self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
         self.often = 0  # samples with a motor in its limit
         self.onset: Outcome | None = None  # of an instability through which the run went on
@@ -72,7 +79,9 @@ class Watch:
         good = rows.shape[1]
         # first the question that costs little: is anything amiss at all?
         bend = np.abs(np.sin(q2))
-        if good and not (np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD):
+        if good and not (
+            np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD
+        ):
             bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
             good = int(bad.argmax()) if bad.any() else good
         if good:
@@ -95,14 +104,18 @@ class Watch:
         above = [i for i in (0, 1) if count[i] and self._above_limit(i)]
         axis = self._blame(above) if max(count) >= 3 or any(count[i] >= 2 for i in above) else ""
         if axis:
-            return good, Outcome("diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis))
+            return good, Outcome(
+                "diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis)
+            )
         if abs(math.sin(q2[good])) < FOLD:
             stretched = math.cos(q2[good]) > 0.0
             code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
             advice = "choose a force, start or origin that keeps the handle within 0.11 to 0.59 m of the shoulder"
             return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
         axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
-        return good, Outcome("diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis))
+        return good, Outcome(
+            "diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis)
+        )
 
     def end(self, outcome: Outcome) -> Outcome:
         """What there is to say of a run that came to this end, now that all its rows have been seen."""
@@ -113,18 +126,29 @@ class Watch:
         recent = max(1, min(self.seen, round(WHILE / s.dt)))
         if self.onset is not None:
             cycles = self.bound.sum() > OFTEN * len(self.bound)
-            cause = f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
+            cause = (
+                f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
+            )
             return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
         if outcome.code == "time limit":
             if self.seen - 1 - self.unbound >= recent:
                 least = "rms" if s.muscle else "the force"
                 advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower {least}"
-                return replace(outcome, code="saturated", cause="a motor stays in its limit", advice=advice)
+                return replace(
+                    outcome, code="saturated", cause="a motor stays in its limit", advice=advice
+                )
             if self.seen - 1 - self.moved >= recent:
-                return replace(outcome, code="stalled", cause=f"slower than {STILL:g} m/s", advice=self._why_still())
+                return replace(
+                    outcome,
+                    code="stalled",
+                    cause=f"slower than {STILL:g} m/s",
+                    advice=self._why_still(),
+                )
         share = self.often / max(self.seen, 1)
         if share >= 0.01:
-            return replace(outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time")
+            return replace(
+                outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time"
+            )
         return outcome
 
     def _why_still(self) -> str:
@@ -146,7 +170,9 @@ class Watch:
         self.often += int(bound.sum())
         self.seen += last + 1
         if not self.scenario.stop:
-            self.bound = np.concatenate((self.bound, bound))[-max(1, round(WHILE / self.scenario.dt)) :]
+            self.bound = np.concatenate((self.bound, bound))[
+                -max(1, round(WHILE / self.scenario.dt)) :
+            ]
 
     def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
         verdicts = {}
@@ -211,9 +237,12 @@ class Watch:
             if cycle[-1][0] >= self.largest[1 - i] or self._above_limit(i):
                 return LIMITS
         sizes = [x[0] for x in swings]
-        if sum(x[2] for x in swings[-SWINGS:]) < SPACING * SWINGS:
+        if sum(x[2] for x in swings[-SWINGS:]) < SWING_SPACING * SWINGS:
             return ""
-        if math.prod(min(b / a, STEP) for a, b in zip(sizes, sizes[1:], strict=False)) <= GROWTH:
+        if (
+            math.prod(min(b / a, STEP_GROWTH) for a, b in zip(sizes, sizes[1:], strict=False))
+            <= SWING_GROWTH
+        ):
             return ""
         driven = self.scenario.muscle or self.scenario.command
         if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
@@ -226,7 +255,11 @@ class Watch:
     def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
         """Of these values of clay, that with the least gain limit of the linear loop of axis i, and this limit."""
         return min(
-            ((b, linear_loop.gain_limit(AXES[i], b, self.scenario.operator)) for b in values), key=lambda x: x[1]
+            (
+                (b, linear_loop.continuous_gain_limit(AXES[i], b, self.scenario.operator))
+                for b in values
+            ),
+            key=lambda x: x[1],
         )
 
     def _profile(self, i: int) -> Profile:
@@ -255,7 +288,7 @@ class Watch:
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
 
 
-def calm(rows, n, limit1, limit2, swings, seen):
+def is_quiet(rows, n, limit1, limit2, swings, seen):
     """Whether Watch can have nothing to say of the next n rows of a run: an easier question than its own.
 
     It is not calm where a row is no longer a run's, or where as many swings in a row did not shrink as a verdict takes.
@@ -317,4 +350,6 @@ class Outcome:
 
     def __str__(self) -> str:
         where = f": {self.axis} axis" if self.axis else ""
-        return f"{self.code}{where} at {self.time:.4f} s" + (f" ({self.cause})" if self.cause else "")
+        return f"{self.code}{where} at {self.time:.4f} s" + (
+            f" ({self.cause})" if self.cause else ""
+        )

@@ -12,10 +12,10 @@ from ..model import arm
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from . import energy, loop
-from .engine import CHUNK, TOUCH, Run, mujoco, root
-from .stride import call, drive, load, store
+from .engine import CHUNK, TOUCH, Run, find_root, mujoco
+from .stride import call_engine, load_double, store_double, write_command
 
-REACH = 0.5  # fastest rate times step up to which an explicit step is trusted
+STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most of them for one sample
 
 
@@ -31,12 +31,12 @@ class RungeKutta(Run):
         th = scenario.operator or NO_HAND
         b = max((*scenario.clay.x.values, *scenario.clay.y.values)) if scenario.clay else 0.0
         fastest = (b + th.damper) * arm.TRACE_W + math.sqrt(th.spring * arm.TRACE_W)
-        self.substeps = max(1, math.ceil(scenario.dt * fastest / REACH))
+        self.substeps = max(1, math.ceil(scenario.dt * fastest / STABLE_STEP))
         if self.substeps > SUBSTEPS:
             bound = f"explicit: would take {self.substeps} steps a sample in so stiff a scene; choose 'fast'"
             raise ParameterError("integrator", scenario.integrator, bound)
         data = self.data
-        self.c = loop.instant(scenario)
+        self.c = loop.ode_parameters(scenario)
         self.drive: Any = memoryview(data.ctrl)
         self.push: Any = memoryview(data.qfrc_applied)
         self.act: Any = memoryview(data.act)
@@ -54,7 +54,7 @@ class RungeKutta(Run):
             cx, cy = self.shift(0.0, t)
             state = (state[0] + cx, state[1] + cy, *state[2:])
         (bx, by), (uhx, uhy) = self.regions.b(t), self.uh(t, t)
-        return loop.derivative(self.c, bx, by, uhx, uhy, q1, q2, w1, w2, state)
+        return loop.vector_field(self.c, bx, by, uhx, uhy, q1, q2, w1, w2, state)
 
     def _control(self, model, data) -> None:
         command, rates, _ = self._derivative(data.time)
@@ -112,7 +112,10 @@ class RungeKutta(Run):
         for i in hit:
             up = p[i] > self.regions.high[i]
             border = self.regions.high[i] if up else self.regions.low[i]
-            spans[i] = (root(lambda x, i=i, border=border: there(x)[i] - border, h, p[i] - border), up)
+            spans[i] = (
+                find_root(lambda x, i=i, border=border: there(x)[i] - border, h, p[i] - border),
+                up,
+            )
         i = min(spans, key=lambda i: spans[i][0])
         h, up = spans[i]
         there(h)
@@ -146,24 +149,19 @@ class RungeKutta(Run):
         """Energy of the arm, and of mass and spring of the hand [J]."""
         w1, w2 = self.rates
         px, py, vx, vy, *_ = self._derivative(self.t)[2]
-        return energy.stored(self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy))
+        return energy.stored_energy(
+            self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy)
+        )
 
     def balance(self) -> dict[str, float]:
-        return energy.balance(self.act[8:13].tolist(), self.start, self._stored())
+        return energy.energy_balance(self.act[8:13].tolist(), self.start, self._stored())
 
 
-# MERGED stepping.march
-# The fourth-order Runge-Kutta of `rungekutta` in numbers alone, many steps at a time; `native` compiles it.
-#
-# The engine gives the arm's acceleration at each stage; what it would integrate is integrated here, the same way.
-#
+STATES = 17  # q, q', then the states of loop.vector_field and the works
+MARCH_ROW = 12  # floats of a row, as Run.judge takes them
 
 
-STATES = 17  # q, q', then the states of loop.derivative and the works
-ROW = 12  # floats of a row, as Run.judge takes them
-
-
-class Engine(NamedTuple):
+class MarchEngine(NamedTuple):
     """Addresses in the engine: of mj_forward, the model and the data, and of what it reads and gives."""
 
     forward: int
@@ -176,37 +174,39 @@ class Engine(NamedTuple):
     push: int
 
 
-def slope(c, b, uh, dampers, engine, y, dy):
+def stage_derivative(c, b, uh, dampers, engine, y, dy):
     """Writes the derivative of all states y into dy, both (STATES,).
 
     Args:
-        c: from loop.instant. b: clay [N.s/m]. uh: muscle force [N]. dampers: whether the engine has clay.
+        c: from loop.ode_parameters. b: clay [N.s/m]. uh: muscle force [N]. dampers: whether the engine has clay.
 
     Returns:
-        (command, sample) as loop.derivative.
+        (command, sample) as loop.vector_field.
     """
     state = (y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
-    command, rates, sample = loop.derivative(c, b[0], b[1], uh[0], uh[1], y[0], y[1], y[2], y[3], state)
-    store(engine.q, y[0])
-    store(engine.q + 8, y[1])
-    store(engine.w, y[2])
-    store(engine.w + 8, y[3])
-    drive(engine, dampers, (command[0], command[1], b[0], b[1], command[2], command[3]))
-    call(engine.forward, engine.model, engine.data)
+    command, rates, sample = loop.vector_field(
+        c, b[0], b[1], uh[0], uh[1], y[0], y[1], y[2], y[3], state
+    )
+    store_double(engine.q, y[0])
+    store_double(engine.q + 8, y[1])
+    store_double(engine.w, y[2])
+    store_double(engine.w + 8, y[3])
+    write_command(engine, dampers, (command[0], command[1], b[0], b[1], command[2], command[3]))
+    call_engine(engine.forward, engine.model, engine.data)
     dy[0], dy[1] = y[2], y[3]
-    dy[2], dy[3] = load(engine.acceleration), load(engine.acceleration + 8)
+    dy[2], dy[3] = load_double(engine.acceleration), load_double(engine.acceleration + 8)
     for j in range(13):
         dy[4 + j] = rates[j]
     return command, sample
 
 
-def leap(c, b, uh, dampers, engine, h, y, k):
+def one_step(c, b, uh, dampers, engine, h, y, k):
     """Carries y over one step of h [s]. k: (5, STATES), to work in; its first row is the slope at y."""
     for stage in range(1, 4):
         ahead = h if stage == 3 else 0.5 * h
         for j in range(STATES):
             k[4, j] = y[j] + ahead * k[stage - 1, j]
-        slope(c, b, uh, dampers, engine, k[4], k[stage])
+        stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
     for j in range(STATES):
         y[j] += h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
 
@@ -226,17 +226,19 @@ def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows
         for j in range(STATES):
             k[5, j] = y[j]
         for part in range(substeps):
-            command, sample = slope(c, b, uh, dampers, engine, y, k[0])
+            command, sample = stage_derivative(c, b, uh, dampers, engine, y, k[0])
             if part == 0:
                 row = rows[i]
                 row[0], row[1] = y[0], y[1]
                 for j in range(6):
                     row[2 + j] = sample[j]
                 row[8], row[9], row[10], row[11] = command[0], command[1], y[4], y[5]
-            leap(c, b, uh, dampers, engine, h, y, k)
-            px, py = arm.position(y[0], y[1])
+            one_step(c, b, uh, dampers, engine, h, y, k)
+            px, py = arm.handle_position(y[0], y[1])
             px, py = px - origin[0], py - origin[1]
-            inside = low[0] - TOUCH <= px <= high[0] + TOUCH and low[1] - TOUCH <= py <= high[1] + TOUCH
+            inside = (
+                low[0] - TOUCH <= px <= high[0] + TOUCH and low[1] - TOUCH <= py <= high[1] + TOUCH
+            )
             if not (inside and abs(y[2]) + abs(y[3]) < np.inf):
                 for j in range(STATES):
                     y[j] = k[5, j]
@@ -244,7 +246,7 @@ def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows
     return len(rows)
 
 
-def once(c, b, uh, dampers, engine, h, y, k):
+def march_once(c, b, uh, dampers, engine, h, y, k):
     """One step of h [s] from y."""
-    slope(c, b, uh, dampers, engine, y, k[0])
-    leap(c, b, uh, dampers, engine, h, y, k)
+    stage_derivative(c, b, uh, dampers, engine, y, k[0])
+    one_step(c, b, uh, dampers, engine, h, y, k)

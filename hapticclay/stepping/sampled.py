@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import arm, controller, hardware, operator
-from ..model.clay import at
+from ..model.clay import damping_at
 from ..model.constants import AXES, G, S
 from ..model.scenario import Scenario
 from . import energy, loop
@@ -32,11 +32,11 @@ class Sampled(Leapfrog):
         self.n = round((scenario.Ts or scenario.dt) / scenario.dt)
         # rows of (A, B) of each axis, as floats: a product of so small matrices costs more in NumPy
         self.blocks = [
-            np.column_stack(controller.held(axis, K, self.n * scenario.dt)).tolist()
+            np.column_stack(controller.held_compensator(axis, K, self.n * scenario.dt)).tolist()
             for axis, K in zip(AXES, scenario.gain, strict=True)
         ]
         s = self.state
-        # (delta, delta', y, y') of each axis, the torques held, and what stiff clay owes, see loop.push
+        # (delta, delta', y, y') of each axis, the torques held, and what stiff clay owes, see loop.step_plant
         self.state = (s[0:8:2], s[1:8:2], NONE, NONE)
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
@@ -52,7 +52,7 @@ class Sampled(Leapfrog):
         if self.physical:
             return super()._inputs(before, after)
         uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
-        return loop.inputs(NONE, NONE, uh, before, after, self.hand)
+        return loop.step_inputs(NONE, NONE, uh, before, after, self.hand)
 
     def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
         return inf  # torques that are held do not follow a hit
@@ -64,8 +64,8 @@ class Sampled(Leapfrog):
         if after > 0.0 and self._is_sample():
             seen = w
             if before:
-                c, k = loop.plant(s, before, 0.0), self._inputs(before, 0.0)
-                at, out, owed = loop.push(c, k, q[0], q[1], w[0], w[1], *tau, *owed)
+                c, k = loop.plant_coefficients(s, before, 0.0), self._inputs(before, 0.0)
+                at, out, owed = loop.step_plant(c, k, q[0], q[1], w[0], w[1], *tau, *owed)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown, *at[6:])
                 seen, w = self._seen(q, w, out), out[2:]
                 force = self._felt(q, seen, tau)
@@ -75,8 +75,15 @@ class Sampled(Leapfrog):
             shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else NONE
             x, y = map(self._hold, (x, y), self.blocks, f, shift)
             before = 0.0
-        at, out, owed = loop.push(
-            loop.plant(s, before, after), self._inputs(before, after), q[0], q[1], w[0], w[1], *tau, *owed
+        at, out, owed = loop.step_plant(
+            loop.plant_coefficients(s, before, after),
+            self._inputs(before, after),
+            q[0],
+            q[1],
+            w[0],
+            w[1],
+            *tau,
+            *owed,
         )
         return (x, y, tau, owed), (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
 
@@ -85,19 +92,30 @@ class Sampled(Leapfrog):
         v = self._velocity(q, w, out)
         if v == out[:2]:
             return out[2:]
-        r1, r2 = arm.rates(v[0], v[1], *self._measure(q, w)[0], 1.0)
+        r1, r2 = arm.joint_velocity(v[0], v[1], *self._measure(q, w)[0], 1.0)
         return r1, r2 - r1
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
         _, _, tau, owed = self.state
         h = self.before
-        at, out, _ = loop.push(loop.plant(self.scenario, h, h), self._inputs(h, h), q[0], q[1], w[0], w[1], *tau, *owed)
+        at, out, _ = loop.step_plant(
+            loop.plant_coefficients(self.scenario, h, h),
+            self._inputs(h, h),
+            q[0],
+            q[1],
+            w[0],
+            w[1],
+            *tau,
+            *owed,
+        )
         return (*at[:6], *NONE, *at[6:]), out
 
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
-        """arm.columns, position, velocity and centripetal acceleration of the handle."""
+        """arm.jacobian, position, velocity and centripetal acceleration of the handle."""
         ox, oy = self.scenario.origin
-        u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
+        u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure_handle(
+            q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy
+        )
         return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
 
     def _first(self, q, w) -> Pair:
@@ -106,7 +124,9 @@ class Sampled(Leapfrog):
         if th is None:
             return uh
         _, p, v, _ = self._measure(q, w)
-        return uh[0] - th.spring * p[0] - th.damper * v[0], uh[1] - th.spring * p[1] - th.damper * v[1]
+        return uh[0] - th.spring * p[0] - th.damper * v[0], uh[1] - th.spring * p[
+            1
+        ] - th.damper * v[1]
 
     def _felt(self, q, w, tau) -> Pair:
         """The operator's force that the sensor shows at the sample, before the torques change [N]."""
@@ -114,11 +134,16 @@ class Sampled(Leapfrog):
         if th is None:
             return uh
         u, p, v, c = self._measure(q, w)
-        b = at(*self.clay, self.t) if self.physical else NONE
-        rest = [uh[i] - operator.impedance(th.spring, th.mass, th.damper, p[i], c[i], v[i]) for i in (0, 1)]
+        b = damping_at(*self.clay, self.t) if self.physical else NONE
+        rest = [
+            uh[i] - operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
+            for i in (0, 1)
+        ]
         # a kick of one second from rest, in which the velocity after it is the acceleration
         fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
-        a = controller.pushed(1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass)
+        a = controller.velocity_under_torque(
+            1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass
+        )
         return rest[0] - th.mass * a[0], rest[1] - th.mass * a[1]
 
     def _is_sample(self) -> bool:
@@ -130,20 +155,34 @@ class Sampled(Leapfrog):
         bx, by = self.regions.b(self.t)
         return self._torques(u, p, v, c, x, y, force, (bx * v[0], by * v[1]))
 
-    def _torques(self, u: tuple[float, float, float, float], p: Pair, v: Pair, c: Pair, x, y, force: Pair, fe: Pair):
+    def _torques(
+        self,
+        u: tuple[float, float, float, float],
+        p: Pair,
+        v: Pair,
+        c: Pair,
+        x,
+        y,
+        force: Pair,
+        fe: Pair,
+    ):
         """The same from handle position [m], velocity, acceleration, hand force and the clay's force [N]."""
         s = self.scenario
         f = (force[0] - fe[0], force[1] - fe[1])
         a = []
         for i, (g, h, z) in enumerate(zip(G, S, (x, y), strict=True)):
             y2 = g.stiffness * (z[0] - z[2]) - g.damping * z[3]
-            a.append(controller.acceleration(1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]))
+            a.append(
+                controller.servo_acceleration(
+                    1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]
+                )
+            )
         sxx, sxy, syy = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(*u)
-        *_, t1, t2 = controller.resolve(  # the limits come last, after the clay's share
+        *_, t1, t2 = controller.saturated_step(  # the limits come last, after the clay's share
             1.0, 0.0, 0.0, *u, 1.0, 1.0, a[0], a[1], sxx, sxy, syy, *f, 0.0, 0.0, inf, inf, inf, inf
         )  # fmt: skip
         if not self.physical:
-            p1, p2 = arm.torques(*fe, *u)
+            p1, p2 = arm.joint_torques(*fe, *u)
             t1, t2 = t1 - p1, t2 - p2
         (l1, l2) = s.torque_limit
         return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
@@ -151,7 +190,9 @@ class Sampled(Leapfrog):
     @staticmethod
     def _hold(z, block, f: float, shift: float) -> tuple[float, ...]:
         z0, z1, z2, z3 = z
-        delta, *rest = [a0 * z0 + a1 * z1 + a2 * z2 + a3 * z3 + b * f for a0, a1, a2, a3, b in block]
+        delta, *rest = [
+            a0 * z0 + a1 * z1 + a2 * z2 + a3 * z3 + b * f for a0, a1, a2, a3, b in block
+        ]
         return delta + shift, *rest
 
     def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
@@ -184,14 +225,10 @@ class Sampled(Leapfrog):
         self._whole(w, command, out, after)
 
 
-# MERGED stepping.wired
-# The sampled run through real hardware: jitter, encoders, converters, a delay, friction, passivity.
+TIME_SLACK = 1e-9  # of dt: events so close are one
 
 
-NEAR = 1e-9  # of dt: events so close are one
-
-
-class Held(NamedTuple):
+class HeldForce(NamedTuple):
     """What the motors hold, and of what it is made: torques [N.m]; forces on the handle, resisting [N].
 
     clay: as rendered, with what the passivity controller adds, `guard`. coupling, tool: force of the virtual
@@ -205,7 +242,7 @@ class Held(NamedTuple):
     tool: Pair = NONE
 
 
-class Electronics(NamedTuple):
+class HardwareState(NamedTuple):
     """State of the hardware between two samples.
 
     k: index of the next sample. queue: (time [s], Held) still to come. history: of the angles, see
@@ -215,7 +252,7 @@ class Electronics(NamedTuple):
     """
 
     k: int
-    queue: tuple[tuple[float, Held], ...]
+    queue: tuple[tuple[float, HeldForce], ...]
     history: tuple[tuple[int, Pair], ...]
     rates: Pair
     filters: tuple[tuple[float, ...], tuple[float, ...]]
@@ -226,7 +263,7 @@ class Electronics(NamedTuple):
     tool: Pair
 
 
-class Wired(Sampled):
+class HardwareLoop(Sampled):
     """Samples and changes of torque come at their own times; a step ends on each, as it does on borders."""
 
     def __init__(self, scenario: Scenario, every: int):
@@ -234,10 +271,10 @@ class Wired(Sampled):
         assert scenario.interface is not None
         self.parts = scenario.interface
         self.Ts = self.n * scenario.dt
-        self.chance = hardware.Chance(self.parts)
+        self.chance = hardware.SampleNoise(self.parts)
         cutoff, order = self.parts.force_filter, self.parts.filter_order
         self.filter = None if cutoff is None else hardware.butterworth(cutoff, order, self.Ts)
-        self.whole_delay = math.floor(self.parts.delay / self.Ts + NEAR)  # samples
+        self.whole_delay = math.floor(self.parts.delay / self.Ts + TIME_SLACK)  # samples
         self.part_delay = max(self.parts.delay / self.Ts - self.whole_delay, 0.0)
         q, w = tuple(self.angles), tuple(self.rates)
         # before the start the joints have turned so for long
@@ -245,20 +282,30 @@ class Wired(Sampled):
                      for j in range(-self.parts.window, 0))  # fmt: skip
         start: Pair = scenario.start
         rest = (0.0,) * order
-        hw = Electronics(0, (), past, w, (rest, rest), NONE, NONE, start, (NONE,) * (self.whole_delay + 2), start)
-        self.state = (*self.state[:2], Held(), hw, NONE)
+        hw = HardwareState(
+            0, (), past, w, (rest, rest), NONE, NONE, start, (NONE,) * (self.whole_delay + 2), start
+        )
+        self.state = (*self.state[:2], HeldForce(), hw, NONE)
         self.extra: list[tuple[float, ...]] = []
-        self.extras: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())  # of the row at an event, and after it
-        self.acting = Held()
+        self.extras: tuple[tuple[float, ...], tuple[float, ...]] = (
+            (),
+            (),
+        )  # of the row at an event, and after it
+        self.acting = HeldForce()
         self.rendered: list[tuple[float, float, float]] = []  # time [s], clay as rendered [N]
-        self.ledger = energy.Ledger(scenario, self.extra)
+        self.ledger = energy.EnergyLedger(scenario, self.extra)
         self.grid = 0.0
 
     def target(self) -> tuple[float, float, bool]:
         target, after, on_grid = super().target()
-        self.grid, near = target, NEAR * self.scenario.dt
+        self.grid, near = target, TIME_SLACK * self.scenario.dt
         hw = self.state[3]
-        soon = [self._when(hw.k), self._when(hw.k + 1), self._when(hw.k) + self.parts.delay, *(d for d, _ in hw.queue)]
+        soon = [
+            self._when(hw.k),
+            self._when(hw.k + 1),
+            self._when(hw.k) + self.parts.delay,
+            *(d for d, _ in hw.queue),
+        ]
         stop = min((t for t in soon if t > self.t + near), default=target)
         if after and stop < target - near:
             return stop, stop - self.t, on_grid
@@ -277,7 +324,7 @@ class Wired(Sampled):
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         x, y, held, hw, owed = self.state
-        before, now = self.before, self.t + NEAR * self.scenario.dt
+        before, now = self.before, self.t + TIME_SLACK * self.scenario.dt
         self.row, shown = None, (x[0], y[0])
         sample = after > 0.0 and self._when(hw.k) <= now
         if sample or after > 0.0 and hw.queue and hw.queue[0][0] <= now:
@@ -285,7 +332,7 @@ class Wired(Sampled):
             if before:
                 at, out, owed, slip = self._push(before, 0.0, q, w, held, owed)
                 self.row = (*q, *at[:4], *out[:2], *at[4:6], *held.torque, *shown, *at[6:])
-                self.extras = (_memo(slip, held), ())
+                self.extras = (_hardware_work(slip, held), ())
                 tau = held.torque[0] + slip[0], held.torque[1] + slip[1]
                 seen, w = self._seen(q, w, out), out[2:]
                 force = self._felt(q, seen, tau)
@@ -297,32 +344,44 @@ class Wired(Sampled):
                 held, hw = hw.queue[0][1], hw._replace(queue=hw.queue[1:])
             before = 0.0
         at, out, owed, slip = self._push(before, after, q, w, held, owed)
-        self.extras, self.acting = (self.extras[0], _memo(slip, held)), held
-        return (x, y, held, hw, owed), (*held.torque, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
+        self.extras, self.acting = (self.extras[0], _hardware_work(slip, held)), held
+        return (
+            (x, y, held, hw, owed),
+            (*held.torque, 0.0, 0.0, 0.0, 0.0),
+            (*at[:6], *shown, *at[6:]),
+            out,
+        )
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
         _, _, held, _, owed = self.state
         at, out, _, _ = self._push(self.before, self.before, q, w, held, owed)
         return (*at[:6], *NONE, *at[6:]), out
 
-    def _push(self, before: float, after: float, q, w, held: Held, owed: Pair) -> tuple[Any, Any, Any, Pair]:
-        """loop.push under the held torques and the friction, and the torques of the latter [N.m]."""
-        c, k, (t1, t2) = loop.plant(self.scenario, before, after), self._inputs(before, after), held.torque
-        at, out, left = loop.push(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
+    def _push(
+        self, before: float, after: float, q, w, held: HeldForce, owed: Pair
+    ) -> tuple[Any, Any, Any, Pair]:
+        """loop.step_plant under the held torques and the friction, and the torques of the latter [N.m]."""
+        c, k, (t1, t2) = (
+            loop.plant_coefficients(self.scenario, before, after),
+            self._inputs(before, after),
+            held.torque,
+        )
+        at, out, left = loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
         limit: Any = self.parts.friction
         if limit == NONE:
             return at, out, left, NONE
         one, two = (
-            loop.push(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1] for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
+            loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1]
+            for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
         )
         a12 = 0.5 * (one[3] - out[3] + two[2] - out[2])  # equal but for rounding
-        f1, f2 = hardware.stuck(out[2:], one[2] - out[2], a12, two[3] - out[3], limit)
-        return *loop.push(c, k, q[0], q[1], w[0], w[1], t1 + f1, t2 + f2, *owed), (f1, f2)
+        f1, f2 = hardware.coulomb_friction(out[2:], one[2] - out[2], a12, two[3] - out[3], limit)
+        return *loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + f1, t2 + f2, *owed), (f1, f2)
 
     def _encoded(self, q) -> Pair:
-        return hardware.encoded(q[0], self.parts.encoder), hardware.encoded(q[1], self.parts.encoder)
+        return hardware.encode(q[0], self.parts.encoder), hardware.encode(q[1], self.parts.encoder)
 
-    def _sample(self, q, w, x, y, force, hw: Electronics):
+    def _sample(self, q, w, x, y, force, hw: HardwareState):
         """One sample: what is measured, the torques to come, and compensator and reference model up to the next."""
         s, parts, k = self.scenario, self.parts, hw.k
         _, lost, noise = self.chance(k)
@@ -334,42 +393,59 @@ class Wired(Sampled):
             held, hw = self._render(u, p, v, hw)
             tau, f = self._torques(u, p, v, c, x, y, force, held.clay)
             span = parts.dac_range or s.torque_limit
-            t1, t2 = (hardware.converted(t, parts.dac_bits, r) for t, r in zip(tau, span, strict=True))
+            t1, t2 = (
+                hardware.quantize(t, parts.dac_bits, r) for t, r in zip(tau, span, strict=True)
+            )
             due = self._when(k) + parts.delay
             hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
         shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else NONE
         x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
         return x, y, hw
 
-    def _sensed(self, force, noise: Pair, hw: Electronics):
+    def _sensed(self, force, noise: Pair, hw: HardwareState):
         """The hand's force behind noise, filter and converter [N], and the state of the filters after it."""
-        force, filters = (force[0] + noise[0], force[1] + noise[1]) if any(noise) else force, hw.filters
+        force, filters = (
+            (force[0] + noise[0], force[1] + noise[1]) if any(noise) else force,
+            hw.filters,
+        )
         if self.filter:
             shown = filters[0][0], filters[1][0]
-            filters = tuple(hardware.filtered(*self.filter, z, f) for z, f in zip(filters, force, strict=True))
+            filters = tuple(
+                hardware.filter_step(*self.filter, z, f)
+                for z, f in zip(filters, force, strict=True)
+            )
             force = shown
         bits, span = self.parts.adc_bits, self.parts.adc_range
-        return (hardware.converted(force[0], bits, span), hardware.converted(force[1], bits, span)), filters
+        return (
+            hardware.quantize(force[0], bits, span),
+            hardware.quantize(force[1], bits, span),
+        ), filters
 
-    def _turned(self, k: int, q, w, hw: Electronics):
+    def _turned(self, k: int, q, w, hw: HardwareState):
         """Joint angles [rad] and rates [rad/s] as they are measured."""
         parts, old = self.parts, hw.history
         q = self._encoded(q)
         if parts.velocity == "exact":
             return q, w, hw
-        w = hardware.difference(old, k, q, self.Ts)
+        w = hardware.velocity_difference(old, k, q, self.Ts)
         if parts.velocity_filter is not None:
             span = (k - old[-1][0]) * self.Ts
-            w = tuple(hardware.smoothed(a, b, parts.velocity_filter, span) for a, b in zip(hw.rates, w, strict=True))
+            w = tuple(
+                hardware.low_pass(a, b, parts.velocity_filter, span)
+                for a, b in zip(hw.rates, w, strict=True)
+            )
         return q, w, hw._replace(history=(*old, (k, q))[-parts.window :], rates=w)
 
-    def _render(self, u, p: Pair, v: Pair, hw: Electronics) -> tuple[Held, Electronics]:
+    def _render(self, u, p: Pair, v: Pair, hw: HardwareState) -> tuple[HeldForce, HardwareState]:
         """The clay's force on the handle at p [m] and v [m/s], by coupling and passivity controller."""
         parts, b = self.parts, self.regions.b(self.t)
-        fe, held = (b[0] * v[0], b[1] * v[1]), Held()
+        fe, held = (b[0] * v[0], b[1] * v[1]), HeldForce()
         if parts.coupling:
             k, d = parts.coupling.spring, parts.coupling.damper
-            tool = [hardware.coupled(hw.tool[i], p[i], v[i], b[i], k, d, self.Ts) for i in (0, 1)]
+            tool = [
+                hardware.virtual_coupling(hw.tool[i], p[i], v[i], b[i], k, d, self.Ts)
+                for i in (0, 1)
+            ]
             hw = hw._replace(tool=(tool[0][0], tool[1][0]))
             fe = b[0] * tool[0][1], b[1] * tool[1][1]
             held = held._replace(coupling=fe, tool=(tool[0][1], tool[1][1]))
@@ -382,7 +458,9 @@ class Wired(Sampled):
         mean = [(1.0 - self.part_delay) * f0[i] + self.part_delay * f1[i] for i in (0, 1)]
         e: Any = tuple(hw.energy[i] + mean[i] * (p[i] - hw.position[i]) for i in (0, 1))
         W = arm.mobility(*u)[::2]
-        safe: Any = tuple(hardware.guarded(e[i], fe[i], v[i], self.Ts, W[i]) for i in (0, 1))
+        safe: Any = tuple(
+            hardware.passivity_controller(e[i], fe[i], v[i], self.Ts, W[i]) for i in (0, 1)
+        )
         hw = hw._replace(energy=e, position=p, forces=(safe, *hw.forces)[: self.whole_delay + 2])
         return held._replace(clay=safe, guard=(safe[0] - fe[0], safe[1] - fe[1])), hw
 
@@ -397,11 +475,13 @@ class Wired(Sampled):
         arrays = super().arrays()
         if not self.physical and self.rendered:
             held = np.array(self.rendered)
-            near = NEAR * self.scenario.dt
-            arrays["fe"] = held[np.searchsorted(held[:, 0], arrays["t"] + near, side="right") - 1, 1:]
+            near = TIME_SLACK * self.scenario.dt
+            arrays["fe"] = held[
+                np.searchsorted(held[:, 0], arrays["t"] + near, side="right") - 1, 1:
+            ]
         return arrays
 
 
-def _memo(slip: Pair, held: Held) -> tuple[float, ...]:
-    """A row of energy.Ledger.extra."""
+def _hardware_work(slip: Pair, held: HeldForce) -> tuple[float, ...]:
+    """A row of energy.EnergyLedger.extra."""
     return *slip, *held.guard, *held.coupling, *held.tool

@@ -14,20 +14,20 @@ import numpy as np
 from ..model import arm, clay, signals
 from ..model.constants import L1, L2
 from . import energy, loop
-from .engine import TOUCH, aim, root
-from .leapfrog import FIRST, LANDINGS, WIDER
+from .engine import TOUCH, find_root, next_sample
+from .leapfrog import FIRST_OF_HIT, HIT_GROWTH, LANDINGS
 
-MORE, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # why `stride` returned
-ROW = 14  # floats of a row: q, p, v, fh, tau, delta, b, two axes each
+UNFINISHED, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # why `step_many` returned
+STRIDE_ROW = 14  # floats of a row: q, p, v, fh, tau, delta, b, two axes each
 
 STATE = np.dtype(
     [
         ("t", "f8"),  # now [s]
         ("before", "f8"),  # length of the step that led here [s]
         ("fine", "f8"),  # longest step on the way from a hit [s]
-        ("loop", "f8", 12),  # state of loop.tick
-        ("clay", "f8", 4),  # base and rate before the sample, see clay.at
-        ("work", "f8", 5),  # see energy.spent
+        ("loop", "f8", 12),  # state of loop.step_loop
+        ("clay", "f8", 4),  # base and rate before the sample, see clay.damping_at
+        ("work", "f8", 5),  # see energy.kick_work
         ("last", "f8", 6),  # of the last kick: position, velocity and joint rates after it
         ("index", "i8", 2),  # of the region along x and y
         ("i", "i8"),  # of the sample at or before now
@@ -64,7 +64,7 @@ class Given(NamedTuple):
     last: int
 
 
-class Engine(NamedTuple):
+class StrideEngine(NamedTuple):
     """Addresses in the engine: of mj_step, the model and the data, and of what a step reads and writes."""
 
     step: int
@@ -77,115 +77,157 @@ class Engine(NamedTuple):
     timestep: int
 
 
-def load(address):
+def load_double(address):
     """The float at an address; `native` has its own way, here and in the next two."""
     return ctypes.c_double.from_address(address).value
 
 
-def store(address, x):
+def store_double(address, x):
     """Writes a float to an address."""
     ctypes.c_double.from_address(address).value = x
 
 
-def call(address, a, b):
+def call_engine(address, a, b):
     """Calls the function at an address with two others."""
     ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)(a, b)
 
 
-def mean(lines, t, h):
+def mean_signal(lines, t, h):
     """Mean over [t - h, t + h] [s] of a multisine, x and y; lines as `native.lines` gives them."""
     x, y = 0.0, 0.0
     for j in range(len(lines)):
-        x += lines[j, 3] * signals.line(lines[j, 0], lines[j, 1], t, h)
-        y += lines[j, 4] * signals.line(lines[j, 0], lines[j, 2], t, h)
+        x += lines[j, 3] * signals.multisine_line(lines[j, 0], lines[j, 1], t, h)
+        y += lines[j, 4] * signals.multisine_line(lines[j, 0], lines[j, 2], t, h)
     return x, y
 
 
-def around(g, muscle, t, before, after, old, new):
-    """loop.inputs of the kick at time t between steps of these lengths [s], in clay old, then new: (base, rate)."""
-    b0 = clay.at(old[0], old[1], t - 0.25 * before)
-    b1 = clay.at(new[0], new[1], t + 0.25 * after)
-    x, y = mean(muscle, t + 0.25 * (after - before), 0.25 * (before + after))
-    k = loop.inputs(b0, b1, (g.force[0] + x, g.force[1] + y), before, after, g.operator)
+def kick_inputs(g, muscle, t, before, after, old, new):
+    """loop.step_inputs of the kick at time t between steps of these lengths [s], in clay old, then new: (base, rate)."""
+    b0 = clay.damping_at(old[0], old[1], t - 0.25 * before)
+    b1 = clay.damping_at(new[0], new[1], t + 0.25 * after)
+    x, y = mean_signal(muscle, t + 0.25 * (after - before), 0.25 * (before + after))
+    k = loop.step_inputs(b0, b1, (g.force[0] + x, g.force[1] + y), before, after, g.operator)
     return k
 
 
-def kick(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
-    """loop.tick between steps of any length; arguments as `around` and there."""
-    c = loop.coefficients(g, before, after)
-    k = around(g, muscle, t, before, after, old, new)
-    to, command, sample, out = loop.tick(c, k, q1, q2, w1, w2, state)
+def kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
+    """loop.step_loop between steps of any length; arguments as `kick_inputs` and there."""
+    c = loop.loop_coefficients(g, before, after)
+    k = kick_inputs(g, muscle, t, before, after, old, new)
+    to, command, sample, out = loop.step_loop(c, k, q1, q2, w1, w2, state)
     return to, command, sample, out
 
 
-def place(g, q1, q2, w1, w2, h):
+def position_after(g, q1, q2, w1, w2, h):
     """Handle position [m] when the joints have turned from q with w for h seconds."""
-    x, y = arm.position(q1 + h * w1, q2 + h * w2)
+    x, y = arm.handle_position(q1 + h * w1, q2 + h * w2)
     return x - g.origin[0], y - g.origin[1]
 
 
-def side(p, low, high):
+def border_side(p, low, high):
     """1 beyond the upper border, -1 beyond the lower, 0 within (a NaN is)."""
     return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0
 
 
-def heading(g, q1, q2, sample, out, after, low, high):
-    """Beyond which borders a step from angles q would end, see `side`: (x, y). sample, out: from loop.tick."""
+def region_exit(g, q1, q2, sample, out, after, low, high):
+    """Beyond which borders a step from angles q would end, see `border_side`: (x, y). sample, out: from loop.step_loop."""
     r2 = out[2] + out[3]
     # where the velocity points, the handle ends up to within this
     slack = 0.5 * after * after * (L1 * out[2] * out[2] + L2 * r2 * r2) + TOUCH
     x, y = sample[0] + after * out[0], sample[1] + after * out[1]
     if low[0] + slack <= x <= high[0] - slack and low[1] + slack <= y <= high[1] - slack:
         return 0, 0
-    x, y = place(g, q1, q2, out[2], out[3], after)
-    return side(x, low[0], high[0]), side(y, low[1], high[1])
+    x, y = position_after(g, q1, q2, out[2], out[3], after)
+    return border_side(x, low[0], high[0]), border_side(y, low[1], high[1])
 
 
-def miss(h, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, border):
+def distance_beyond(h, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, border):
     """How far beyond this border of coordinate i a step of length h would end [m]."""
-    out = kick(g, muscle, t, before, h, old, new, q1, q2, w1, w2, state)[3]
-    return place(g, q1, q2, out[2], out[3], h)[i] - border
+    out = kick_loop(g, muscle, t, before, h, old, new, q1, q2, w1, w2, state)[3]
+    return position_after(g, q1, q2, out[2], out[3], h)[i] - border
 
 
-def land(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state, out, sx, sy, low, high):
+def locate_event(
+    g, muscle, t, before, after, old, new, q1, q2, w1, w2, state, out, sx, sy, low, high
+):
     """(length, coordinate, side) of the step that ends on the first of the borders that lie in this one's way."""
-    x, y = place(g, q1, q2, out[2], out[3], after)
+    x, y = position_after(g, q1, q2, out[2], out[3], after)
     span, i, up = after, -1, 0
     if sx:
         border = high[0] if sx > 0 else low[0]
-        span = root(miss, after, x - border, g, muscle, t, before, old, new, q1, q2, w1, w2, state, 0, border)
+        span = find_root(
+            distance_beyond,
+            after,
+            x - border,
+            g,
+            muscle,
+            t,
+            before,
+            old,
+            new,
+            q1,
+            q2,
+            w1,
+            w2,
+            state,
+            0,
+            border,
+        )
         i, up = 0, sx
     if sy:
         border = high[1] if sy > 0 else low[1]
-        other = root(miss, after, y - border, g, muscle, t, before, old, new, q1, q2, w1, w2, state, 1, border)
+        other = find_root(
+            distance_beyond,
+            after,
+            y - border,
+            g,
+            muscle,
+            t,
+            before,
+            old,
+            new,
+            q1,
+            q2,
+            w1,
+            w2,
+            state,
+            1,
+            border,
+        )
         if i < 0 or other < span:
             span, i, up = other, 1, sy
     return span, i, up
 
 
-def velocity(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state):
+def velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state):
     """See Leapfrog._velocity: of coordinate i."""
-    k = around(g, muscle, t, before, before, old, new)
+    k = kick_inputs(g, muscle, t, before, before, old, new)
     after = before if k[10 + i] > 0.0 else 0.0
-    _, _, sample, out = kick(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
-    return loop.at_sample(k, i, sample[2 + i], out[i], sample[8 + i]) if after > 0.0 else out[i]
+    _, _, sample, out = kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
+    return (
+        loop.velocity_at_sample(k, i, sample[2 + i], out[i], sample[8 + i])
+        if after > 0.0
+        else out[i]
+    )
 
 
-def note(crossing, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, up, low, high, end):
+def record_crossing(
+    crossing, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, up, low, high, end
+):
     """Notes that the handle steps over this border; True if it is the end of the path."""
     speed = 0.0
     if before > 0.0:
-        speed = velocity(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state)
+        speed = velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state)
     border = high[i] if up > 0 else low[i]
     crossing[0], crossing[1], crossing[2], crossing[3] = i, border, t, speed
     return i == 0 and up > 0 and border == end
 
 
-def write(row, g, q1, q2, sample, command, out, k, b):
+def write_row(row, g, q1, q2, sample, command, out, k, b):
     """Writes what belongs to a sample: see `leapfrog._sampled`."""
     row[0], row[1], row[2], row[3] = q1, q2, sample[0], sample[1]
-    row[4] = loop.at_sample(k, 0, sample[2], out[0], sample[8])
-    row[5] = loop.at_sample(k, 1, sample[3], out[1], sample[9])
+    row[4] = loop.velocity_at_sample(k, 0, sample[2], out[0], sample[8])
+    row[5] = loop.velocity_at_sample(k, 1, sample[3], out[1], sample[9])
     if g.held:
         row[6] = sample[4] + k[0] * sample[2] + k[1] * out[0] + sample[8]
         row[7] = sample[5] + k[2] * sample[3] + k[3] * out[1] + sample[9]
@@ -195,9 +237,9 @@ def write(row, g, q1, q2, sample, command, out, k, b):
     row[12], row[13] = b
 
 
-def enter(work, g, H, k, sample, command, out, w1, w2):
+def add_work(work, g, H, k, sample, command, out, w1, w2):
     """Enters the work of a kick of length H into the ledger."""
-    done = energy.spent(
+    done = energy.kick_work(
         H, k, sample[8], sample[9], sample[2], sample[3], out[0], out[1], command[0], command[1],
         0.5 * (w1 + out[2]), 0.5 * (w2 + out[3]), g.operator.damper,
     )  # fmt: skip
@@ -205,52 +247,52 @@ def enter(work, g, H, k, sample, command, out, w1, w2):
         work[j] += done[j]
 
 
-def drive(engine, dampers, command):
-    """Gives the engine a command as of loop.tick; dampers: whether it has clay."""
-    store(engine.ctrl, command[0])
-    store(engine.ctrl + 8, command[1])
+def write_command(engine, dampers, command):
+    """Gives the engine a command as of loop.step_loop; dampers: whether it has clay."""
+    store_double(engine.ctrl, command[0])
+    store_double(engine.ctrl + 8, command[1])
     if dampers:
-        store(engine.ctrl + 16, command[2])
-        store(engine.ctrl + 24, command[3])
-    store(engine.push, command[4])
-    store(engine.push + 8, command[5])
+        store_double(engine.ctrl + 16, command[2])
+        store_double(engine.ctrl + 24, command[3])
+    store_double(engine.push, command[4])
+    store_double(engine.push + 8, command[5])
 
 
-def move(engine, dampers, whole, dt, after, command, w1, w2, out):
+def step_engine(engine, dampers, whole, dt, after, command, w1, w2, out):
     """Steps the engine by after; where that is not the length of the kick, the kick goes in whole."""
     if not whole:
-        command = loop.entire(w1, w2, out[2], out[3], command[0], command[1], after)
-        store(engine.timestep, after)
-    drive(engine, dampers, command)
-    call(engine.step, engine.model, engine.data)
+        command = loop.whole_kick(w1, w2, out[2], out[3], command[0], command[1], after)
+        store_double(engine.timestep, after)
+    write_command(engine, dampers, command)
+    call_engine(engine.step, engine.model, engine.data)
     if not whole:
-        store(engine.timestep, dt)
+        store_double(engine.timestep, dt)
 
 
-def limited(g, command):
+def motors_limited(g, command):
     """Whether a motor gives all it can in a kick."""
     return abs(command[0]) >= g.torque_limit[0] or abs(command[1]) >= g.torque_limit[1]
 
 
-def first_of_a_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
+def first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
     """See Leapfrog._first_of_a_hit."""
-    x, y = clay.at(new[0], new[1], t)
+    x, y = clay.damping_at(new[0], new[1], t)
     b = max(x, y)
-    first = FIRST / (b * arm.TRACE_W) if b > 0.0 else np.inf
+    first = FIRST_OF_HIT / (b * arm.TRACE_W) if b > 0.0 else np.inf
     if first >= after:
         return np.inf
     if before > 0.0:
-        state, _, _, out = kick(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)
+        state, _, _, out = kick_loop(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)
         w1, w2 = out[2], out[3]
-    command = kick(g, muscle, t, 0.0, first, old, new, q1, q2, w1, w2, state)[1]
-    return first if limited(g, command) else np.inf
+    command = kick_loop(g, muscle, t, 0.0, first, old, new, q1, q2, w1, w2, state)[1]
+    return first if motors_limited(g, command) else np.inf
 
 
-def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
+def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
     """Steps on, until most kicks are made, room rows written, crossings full, or the run is over.
 
     Args:
-        g: Given. muscle, commanded: lines of their multisines, see `mean`. table: see clay.table. engine: Engine.
+        g: Given. muscle, commanded: lines of their multisines, see `mean_signal`. table: see clay.region_table. engine: Engine.
         run: array of one STATE, which is advanced.
         rows: one for each sample, (room, ROW), as Run.judge takes them, and the clay.
         crossings: (n, 4), n >= 4: coordinate, border [m], time [s], speed along it [m/s].
@@ -265,69 +307,107 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
     state = (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11])
     old = ((c[0], c[1]), (c[2], c[3]))
     index = (now["index"][0], now["index"][1])
-    low, high, base, rate = clay.settle(table, index[0], index[1], t)
+    low, high, base, rate = clay.enter_region(table, index[0], index[1], t)
     work, last = now["work"], now["last"]
-    steady = loop.coefficients(g, dt, dt)
-    k = around(g, muscle, t, dt, dt, old, (base, rate))
+    steady = loop.loop_coefficients(g, dt, dt)
+    k = kick_inputs(g, muscle, t, dt, dt, old, (base, rate))
     fresh = False  # k is that of whole steps here and now
-    done, filled, crossed, code = 0, 0, 0, MORE
+    done, filled, crossed, code = 0, 0, 0, UNFINISHED
     while done < most and filled < room and crossed < len(crossings) - 3:
-        target, after, on_grid = aim(t, i, g.last, dt, g.t_max)
-        if closing == MORE and after == 0.0:
+        target, after, on_grid = next_sample(t, i, g.last, dt, g.t_max)
+        if closing == UNFINISHED and after == 0.0:
             closing = TIME_LIMIT
         if on_grid:
             landings = 0
-        q1, q2, w1, w2 = load(engine.q), load(engine.q + 8), load(engine.w), load(engine.w + 8)
+        q1, q2, w1, w2 = (
+            load_double(engine.q),
+            load_double(engine.q + 8),
+            load_double(engine.w),
+            load_double(engine.w + 8),
+        )
         after = min(after, fine)
-        axis, up, overx, overy = -1, 0, 0, 0  # border that the step ends on; borders stepped over without a step
+        axis, up, overx, overy = (
+            -1,
+            0,
+            0,
+            0,
+        )  # border that the step ends on; borders stepped over without a step
         while True:
-            if closing != MORE:
+            if closing != UNFINISHED:
                 after = 0.0
             if struck and after > 0.0:
                 new = (base, rate)
-                struck, fine = 0, first_of_a_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
+                struck, fine = (
+                    0,
+                    first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state),
+                )
                 if fine < after:
                     after = fine
                     if before > 0.0:  # see Leapfrog._halve
-                        k = around(g, muscle, t, before, 0.0, old, new)
-                        to, command, sample, out = kick(g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state)
-                        enter(work, g, 0.5 * before, k, sample, command, out, w1, w2)
+                        k = kick_inputs(g, muscle, t, before, 0.0, old, new)
+                        to, command, sample, out = kick_loop(
+                            g, muscle, t, before, 0.0, old, new, q1, q2, w1, w2, state
+                        )
+                        add_work(work, g, 0.5 * before, k, sample, command, out, w1, w2)
                         state, before, w1, w2 = to, 0.0, out[2], out[3]
-                        store(engine.w, w1)
-                        store(engine.w + 8, w2)
+                        store_double(engine.w, w1)
+                        store_double(engine.w + 8, w2)
             whole = before == dt and after == dt
             if whole:
                 if not fresh:
-                    k = around(g, muscle, t, dt, dt, old, (base, rate))
-                    fresh = len(muscle) == 0 and rate[0] == 0.0 and rate[1] == 0.0 and old == (base, rate)
-                to, command, sample, out = loop.tick(steady, k, q1, q2, w1, w2, state)
+                    k = kick_inputs(g, muscle, t, dt, dt, old, (base, rate))
+                    fresh = (
+                        len(muscle) == 0
+                        and rate[0] == 0.0
+                        and rate[1] == 0.0
+                        and old == (base, rate)
+                    )
+                to, command, sample, out = loop.step_loop(steady, k, q1, q2, w1, w2, state)
             else:
                 fresh = False
-                k = around(g, muscle, t, before, after, old, (base, rate))
-                to, command, sample, out = loop.tick(loop.coefficients(g, before, after), k, q1, q2, w1, w2, state)
+                k = kick_inputs(g, muscle, t, before, after, old, (base, rate))
+                to, command, sample, out = loop.step_loop(
+                    loop.loop_coefficients(g, before, after), k, q1, q2, w1, w2, state
+                )
             if after == 0.0 or axis >= 0:
                 break
-            sx, sy = heading(g, q1, q2, sample, out, after, low, high)
+            sx, sy = region_exit(g, q1, q2, sample, out, after, low, high)
             # no way back over a border: it must not hold the run
             sx, sy = sx if overx in (0, sx) else 0, sy if overy in (0, sy) else 0
             if sx == 0 and sy == 0:
                 break
-            x, y = place(g, q1, q2, out[2], out[3], 0.0)
-            if sx and side(x, low[0], high[0]):
+            x, y = position_after(g, q1, q2, out[2], out[3], 0.0)
+            if sx and border_side(x, low[0], high[0]):
                 here, overx = 0, sx
-            elif sy and side(y, low[1], high[1]):
+            elif sy and border_side(y, low[1], high[1]):
                 here, overy = 1, sy
             else:
                 if landings >= LANDINGS:
                     break
-                after, axis, up = land(
-                    g, muscle, t, before, after, old, (base, rate), q1, q2, w1, w2, state, out, sx, sy, low, high
+                after, axis, up = locate_event(
+                    g,
+                    muscle,
+                    t,
+                    before,
+                    after,
+                    old,
+                    (base, rate),
+                    q1,
+                    q2,
+                    w1,
+                    w2,
+                    state,
+                    out,
+                    sx,
+                    sy,
+                    low,
+                    high,
                 )
                 continue
             up = sx if here == 0 else sy
-            ended = note(
+            ended = record_crossing(
                 crossings[crossed], g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state,
-                here, up, low, high, table[clay.MORE, 2],
+                here, up, low, high, table[clay.AXIS_ROWS, 2],
             )  # fmt: skip
             crossed += 1
             if ended:
@@ -337,37 +417,45 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
             else:
                 fresh, struck = False, 1
                 index = (index[0] + up, index[1]) if here == 0 else (index[0], index[1] + up)
-                low, high, base, rate = clay.settle(table, index[0], index[1], t)
-        if before > 0.0 or closing == MORE:
-            enter(work, g, 0.5 * (before + after), k, sample, command, out, w1, w2)
+                low, high, base, rate = clay.enter_region(table, index[0], index[1], t)
+        if before > 0.0 or closing == UNFINISHED:
+            add_work(work, g, 0.5 * (before + after), k, sample, command, out, w1, w2)
             last[0], last[1], last[2], last[3], last[4], last[5] = sample[0], sample[1], *out
             done += 1
-            if on_grid or closing != MORE:
-                b = clay.at(base, rate, t) if after > 0.0 else clay.at(old[0], old[1], t)
+            if on_grid or closing != UNFINISHED:
+                b = (
+                    clay.damping_at(base, rate, t)
+                    if after > 0.0
+                    else clay.damping_at(old[0], old[1], t)
+                )
                 row = rows[filled]
-                write(row, g, q1, q2, sample, command, out, k, b)
+                write_row(row, g, q1, q2, sample, command, out, k, b)
                 if after == 0.0 and k[7] > 0.0:
-                    row[4] = velocity(0, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state)
-                    row[5] = velocity(1, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state)
+                    row[4] = velocity_at_border(
+                        0, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state
+                    )
+                    row[5] = velocity_at_border(
+                        1, g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state
+                    )
                 filled += 1
-        if closing != MORE:
+        if closing != UNFINISHED:
             code = closing
             break
         if not abs(out[2]) + abs(out[3]) < np.inf:
             code = NOT_FINITE
             break
-        move(engine, g.dampers, whole, dt, after, command, w1, w2, out)
+        step_engine(engine, g.dampers, whole, dt, after, command, w1, w2, out)
         steps += 1
         state = to
         if len(commanded):
-            x1, y1 = mean(commanded, t + after, 0.0)
-            x0, y0 = mean(commanded, t, 0.0)
+            x1, y1 = mean_signal(commanded, t + after, 0.0)
+            x0, y0 = mean_signal(commanded, t, 0.0)
             state = (
                 to[0] + (x1 - x0), to[1] + (y1 - y0),
                 to[2], to[3], to[4], to[5], to[6], to[7], to[8], to[9], to[10], to[11],
             )  # fmt: skip
         old, before = (base, rate), after
-        fine = fine * WIDER if fine < np.inf and limited(g, command) else np.inf
+        fine = fine * HIT_GROWTH if fine < np.inf and motors_limited(g, command) else np.inf
         t += after
         if target - t <= 1e-9 * dt:
             i += 1
@@ -375,17 +463,17 @@ def stride(g, muscle, commanded, table, engine, run, rows, crossings, most, room
         if axis >= 0:
             landings += 1
             fresh = False
-            ended = note(
+            ended = record_crossing(
                 crossings[crossed], g, muscle, t, before, old, (base, rate),
-                load(engine.q), load(engine.q + 8), load(engine.w), load(engine.w + 8), state,
-                axis, up, low, high, table[clay.MORE, 2],
+                load_double(engine.q), load_double(engine.q + 8), load_double(engine.w), load_double(engine.w + 8), state,
+                axis, up, low, high, table[clay.AXIS_ROWS, 2],
             )  # fmt: skip
             crossed += 1
             if ended:
                 closing = FINISHED
             else:
                 index = (index[0] + up, index[1]) if axis == 0 else (index[0], index[1] + up)
-                low, high, base, rate = clay.settle(table, index[0], index[1], t)
+                low, high, base, rate = clay.enter_region(table, index[0], index[1], t)
                 struck = 1
     now["t"], now["before"], now["i"], now["closing"] = t, before, i, closing
     now["landings"], now["steps"], now["fine"], now["struck"] = landings, steps, fine, struck

@@ -20,12 +20,16 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limit
 
-SMALL = 1e-4  # [m/s] a push that leaves the arm linear
-LARGE = 0.05  # [m/s] one that a hand gives
+SMALL_PUSH = 1e-4  # [m/s] a push that leaves the arm linear
+LARGE_PUSH = 0.05  # [m/s] one that a hand gives
 SPAN = 1.2  # [s] a run that is to be judged by its growth ...
-LONG = (2.0, 8.0, 32.0)  # ... and one that is to be told apart, longer while its motors are in their limits
+LONG = (
+    2.0,
+    8.0,
+    32.0,
+)  # ... and one that is to be told apart, longer while its motors are in their limits
 FIT = 0.7  # share of a run, its end, that growth is read from
-STEP = 4e-3  # [s] between the samples that it is read from
+POSE_STEP = 4e-3  # [s] between the samples that it is read from
 RANK = 1e-7  # singular values below this share of the largest are rounding
 FAINT = 1e-4  # so are modes below this share of the strongest
 SLOW = 1.0  # [rad/s, 1/s] the hand's spring drags the handle back slower than this: no oscillation
@@ -52,7 +56,7 @@ class Loop:
     delay: float = 0.0
     shaping: bool = True
     pose: tuple[float, float] = (0.0, 0.0)
-    push: float = SMALL
+    push: float = SMALL_PUSH
     torque_limit: tuple[float, float] = TORQUE_LIMIT
 
     def __post_init__(self):
@@ -87,7 +91,7 @@ class Loop:
         )
 
 
-def growth(record: Record, axis: str) -> float:
+def growth_rate(record: Record, axis: str) -> float:
     """Rate at which the oscillation of a free motion grows [1/s]: that of its least damped mode; negative if it decays.
 
     The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath, IEEE Trans. ASSP 37,
@@ -96,9 +100,14 @@ def growth(record: Record, axis: str) -> float:
     Returns:
         inf for a run that ended before it could be read.
     """
-    v, dt = record.v[:-1, AXES.index(choice("axis", axis, AXES))], record.scenario.dt  # the last step may be short
+    v, dt = (
+        record.v[:-1, AXES.index(choice("axis", axis, AXES))],
+        record.scenario.dt,
+    )  # the last step may be short
     v = v[int((1.0 - FIT) * len(v)) :]
-    skip = 2 * round(0.5 * STEP / dt) + 1  # odd: half the sampling frequency must not fold onto zero; nor both ways
+    skip = (
+        2 * round(0.5 * POSE_STEP / dt) + 1
+    )  # odd: half the sampling frequency must not fold onto zero; nor both ways
     found = [_least_damped(v[::n], n * dt) for n in (skip, skip + 2) if len(v) >= 32 * n]
     if not found:
         return math.inf if record.outcome.code != "time limit" else -math.inf
@@ -107,18 +116,22 @@ def growth(record: Record, axis: str) -> float:
 
 def _least_damped(v: np.ndarray, dt: float) -> float:
     rows = len(v) // 2
-    u, s, _ = np.linalg.svd(np.lib.stride_tricks.sliding_window_view(v, rows).T, full_matrices=False)
+    u, s, _ = np.linalg.svd(
+        np.lib.stride_tricks.sliding_window_view(v, rows).T, full_matrices=False
+    )
     r = max(1, min(int(np.sum(s > RANK * s[0])), rows // 3))
     z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
     z = z[np.abs(z) > 1e-6]
     powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
-    weight = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0]) * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
+    weight = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0]) * np.maximum(
+        np.abs(z) ** (len(v) - 1), 1.0
+    )
     rate, turn = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
     counts = (weight > FAINT * weight.max(initial=0.0)) & ((turn > SLOW) | (rate > SLOW))
     return float(rate[counts].max()) if counts.any() else -math.inf
 
 
-def behaviour(loop: Loop) -> str:
+def classify_run(loop: Loop) -> str:
     """What a run of it does: "stable", "limit cycle" (bounded by the motors' torque) or "diverges".
 
     Growth is that of a linear motion, so a run whose motors were in their limits at its end goes on for longer.
@@ -132,11 +145,11 @@ def behaviour(loop: Loop) -> str:
         if code in ("limit cycle", "saturated"):
             break
         if not np.any(np.abs(record.tau[int((1.0 - FIT) * len(record.tau)) :]) >= limit):
-            return "diverges" if growth(record, loop.axis) > 0.0 else "stable"
+            return "diverges" if growth_rate(record, loop.axis) > 0.0 else "stable"
     return "limit cycle"
 
 
-def crossing(rate: Callable[[float], float], guess: float, most: float) -> float:
+def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> float:
     """Where a growth rate changes from negative to positive, near guess or beyond: bisection on a ratio, sped up.
 
     Args:
@@ -183,21 +196,32 @@ def simulated_gain(loop: Loop, guess: float | None = None, most: float = 200.0) 
     """
     if guess is None:
         guess = gain_limit.gain_limit(
-            loop.axis, loop.b, impedance=loop.operator is not None, operator=loop.operator, Ts=loop.Ts, delay=loop.delay
+            loop.axis,
+            loop.b,
+            impedance=loop.operator is not None,
+            operator=loop.operator,
+            Ts=loop.Ts,
+            delay=loop.delay,
         )
     guess = min(guess, most) if guess > 0.0 else 1.0
-    return crossing(lambda K: growth(simulate(replace(loop, K=K).scenario()), loop.axis), guess, most)
+    return find_crossing(
+        lambda K: growth_rate(simulate(replace(loop, K=K).scenario()), loop.axis), guess, most
+    )
 
 
 def simulated_damping(loop: Loop, guess: float, most: float = 1e5) -> float:
     """The clay b [N.s/m] from which a run oscillates more and more; arguments as `simulated_gain`."""
-    return crossing(lambda b: growth(simulate(replace(loop, b=b).scenario()), loop.axis), guess, most)
+    return find_crossing(
+        lambda b: growth_rate(simulate(replace(loop, b=b).scenario()), loop.axis), guess, most
+    )
 
 
-def _mobility(loop: Loop) -> np.ndarray:
+def _pose_mobility(loop: Loop) -> np.ndarray:
     """W = Lambda^-1 at the handle's pose [1/kg], shape (2, 2)."""
-    q1, q2 = arm.inverse(NOMINAL[0] + loop.pose[0], NOMINAL[1] + loop.pose[1])
-    xx, xy, yy = arm.mobility(*arm.columns(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)))
+    q1, q2 = arm.inverse_kinematics(NOMINAL[0] + loop.pose[0], NOMINAL[1] + loop.pose[1])
+    xx, xy, yy = arm.mobility(
+        *arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
+    )
     return np.array([[xx, xy], [xy, yy]])
 
 
@@ -205,7 +229,14 @@ def _wanted() -> np.ndarray:
     """The servo's acceleration from (p, v, delta, delta', y, y') of each axis, shape (2, 12)."""
     out = np.zeros((2, 12))
     for j, (g, s) in enumerate(zip(G, S, strict=True)):
-        feedback = [-s.stiffness, -s.damping, g.stiffness, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
+        feedback = [
+            -s.stiffness,
+            -s.damping,
+            g.stiffness,
+            0.0,
+            s.stiffness - g.stiffness,
+            s.damping - g.damping,
+        ]
         out[j, 6 * j : 6 * j + 6] = feedback
     return out
 
@@ -217,7 +248,7 @@ def pose_matrix(loop: Loop) -> np.ndarray:
     gains of Sh, and couples the axes (docs/equations.md, section 3).
     """
     th, i, force = loop.operator or NO_HAND, AXES.index(loop.axis), np.zeros((2, 12))
-    W = np.diag([S[0].gain, S[1].gain]) if loop.shaping else _mobility(loop)
+    W = np.diag([S[0].gain, S[1].gain]) if loop.shaping else _pose_mobility(loop)
     for j in (0, 1):  # hand and clay without the hand's mass
         force[j, 6 * j : 6 * j + 2] = -th.spring, -th.damper - loop.b
     acceleration = np.linalg.solve(np.eye(2) + th.mass * W, _wanted() + W @ force)
@@ -242,15 +273,18 @@ def pose_step(loop: Loop) -> np.ndarray:
     th, n = loop.operator or NO_HAND, math.floor(loop.delay / loop.Ts + 1e-9)
     part, m = max(loop.delay - n * loop.Ts, 0.0), 14 + 2 * n
     where, rate = [0, 6, 1, 7], np.zeros((6, 6))
-    inertia = np.linalg.inv(_mobility(loop))
+    inertia = np.linalg.inv(_pose_mobility(loop))
     rate[:2, 2:4] = np.eye(2)
     rate[2:4] = np.linalg.solve(
-        inertia + th.mass * np.eye(2), np.hstack([-x * np.eye(2) for x in (th.spring, th.damper, -1.0)])
+        inertia + th.mass * np.eye(2),
+        np.hstack([-x * np.eye(2) for x in (th.spring, th.damper, -1.0)]),
     )
-    head, rest = (controller.exponential(span * rate) for span in (part, loop.Ts - part))
+    head, rest = (controller.matrix_exponential(span * rate) for span in (part, loop.Ts - part))
     x = np.eye(m)
     old, v = x[-2:], x[[1, 7]]
-    acceleration = rate[2:4] @ np.vstack((x[where], old))  # under the force before the sample, which the sensor feels
+    acceleration = rate[2:4] @ np.vstack(
+        (x[where], old)
+    )  # under the force before the sample, which the sensor feels
     f = -th.spring * x[[0, 6]] - (th.damper + loop.b) * v - th.mass * acceleration
     u = inertia @ np.pad(_wanted(), ((0, 0), (0, m - 12))) - loop.b * v
     if loop.shaping:
@@ -259,7 +293,7 @@ def pose_step(loop: Loop) -> np.ndarray:
     half = head[:4] @ np.vstack((x[where], old))
     M[where] = rest[:4] @ np.vstack((half, x[10 + 2 * n : 12 + 2 * n] if n else u))
     for j, axis in enumerate(AXES):
-        A, B = controller.held(axis, loop.K if axis == loop.axis else 0.0, loop.Ts)
+        A, B = controller.held_compensator(axis, loop.K if axis == loop.axis else 0.0, loop.Ts)
         M[6 * j + 2 : 6 * j + 6] = A @ x[6 * j + 2 : 6 * j + 6] + np.outer(B, f[j])
     M[12:14] = u
     M[14:] = x[12 : m - 2]
@@ -291,12 +325,12 @@ def pose_limit(loop: Loop, most: float = 200.0) -> float:
     return high
 
 
-def linear(loop: Loop) -> bool:
+def linear_rate(loop: Loop) -> bool:
     """Whether the linear loop at the nominal pose is stable in continuous time."""
     return gain_limit.is_stable(loop.axis, loop.K, loop.b, loop.operator)
 
 
-def cause(loop: Loop, stable: bool) -> str:
+def explain_disagreement(loop: Loop, stable: bool) -> str:
     """Why a run does (stable) or does not (not stable) settle, against what continuous time at the nominal pose says.
 
     One thing is changed in the run at a time, and two if none will do alone, until it does what theory says.
@@ -306,11 +340,11 @@ def cause(loop: Loop, stable: bool) -> str:
         ("sampling", dict(Ts=None, delay=0.0)) if loop.Ts else ("", {}),
         ("pose-dependent Lambda", dict(shaping=True)) if not loop.shaping else ("", {}),
         ("saturation", dict(torque_limit=(1e6, 1e6))),
-        ("size of the motion", dict(push=SMALL)),
+        ("size of the motion", dict(push=SMALL_PUSH)),
     ]
     for n in (1, 2):
         for some in combinations([c for c in changes if c[0]], n):
             change = {field: value for _, fields in some for field, value in fields.items()}
-            if (behaviour(replace(loop, **change)) == "stable") != stable:
+            if (classify_run(replace(loop, **change)) == "stable") != stable:
                 return " and ".join(name for name, _ in some)
     return "not found"

@@ -23,13 +23,25 @@ from ..model.signals import Multisine, Signal
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
-SCHEMA = "hapticclay-identify-1"
-NOMINAL = (L2, L1)  # world position of the handle where the elbow is square [m]
-BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz], either side of the corner
+IDENTIFICATION_SCHEMA = "hapticclay-identify-1"
+NOMINAL_POSE = (L2, L1)  # world position of the handle where the elbow is square [m]
+IDENTIFICATION_BAND = {
+    "G": (0.15, 20.0),
+    "S": (0.15, 20.0),
+    "Th": (0.08, 3.0),
+}  # [Hz], either side of the corner
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
-AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small, so that the pose stays; Th is the same at every pose
-LINES = 40
-LEFT = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}  # between loop and fitted form at AMPLITUDE, by runs without noise ...
+AMPLITUDE = {
+    "G": 2e-3,
+    "S": 2e-3,
+    "Th": 1e-2,
+}  # [m]: small, so that the pose stays; Th is the same at every pose
+MULTISINE_LINES = 40
+SETTLING = {
+    "G": 5e-9,
+    "S": 5e-5,
+    "Th": 2e-7,
+}  # between loop and fitted form at AMPLITUDE, by runs without noise ...
 SHAPED = 5e-9  # ... of Sh where it holds at every pose
 
 
@@ -45,7 +57,9 @@ class Noise:
     force: float = 0.02
 
     def __post_init__(self):
-        object.__setattr__(self, "encoder_counts", integer("noise.encoder_counts", self.encoder_counts, 100, 2**40))
+        object.__setattr__(
+            self, "encoder_counts", integer("noise.encoder_counts", self.encoder_counts, 100, 2**40)
+        )
         object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
 
 
@@ -85,7 +99,7 @@ class Identified:
     def summary(self) -> dict[str, Any]:
         """Everything there is, ready for JSON."""
         return {
-            "schema": SCHEMA,
+            "schema": IDENTIFICATION_SCHEMA,
             "what": self.what,
             "axis": self.axis,
             "coefficients": [{**asdict(c), "error": c.error} for c in self.coefficients],
@@ -99,19 +113,26 @@ class Identified:
             "seed": self.seed,
             "periods": self.periods,
             "realisations": self.realisations,
-            "units": {"frequency": "Hz", "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what]},
+            "units": {
+                "frequency": "Hz",
+                "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what],
+            },
             "versions": versions(),
         }
 
 
-def mobility(x: float, y: float) -> tuple[float, float]:
+def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
     """Wxx and Wyy of the arm with its handle at world (x, y) [1/kg]."""
-    q1, q2 = arm.inverse(x, y)
-    wxx, _, wyy = arm.mobility(*arm.columns(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2)))
+    q1, q2 = arm.inverse_kinematics(x, y)
+    wxx, _, wyy = arm.mobility(
+        *arm.jacobian(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2))
+    )
     return float(wxx), float(wyy)
 
 
-def measured(record: Record, noise: Noise | None, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def measured(
+    record: Record, noise: Noise | None, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Handle position [m] and hand force [N] as the sensors show them, each (n, 2).
 
     Args:
@@ -122,7 +143,7 @@ def measured(record: Record, noise: Noise | None, rng: np.random.Generator) -> t
     count = 2.0 * np.pi / noise.encoder_counts
     q = count * np.round(record.q / count)
     a = q[:, 0] + q[:, 1]
-    u1x, u1y, u2x, u2y = arm.columns(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+    u1x, u1y, u2x, u2y = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
     p = np.column_stack((u1y + u2y, -u1x - u2x)) - record.scenario.origin
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
@@ -131,7 +152,7 @@ def identify(
     axis: str = "x",
     what: str = "G",
     *,
-    origin: tuple[float, float] = NOMINAL,
+    origin: tuple[float, float] = NOMINAL_POSE,
     shaping: bool = False,
     noise: Noise | None = None,
     seed: int = 0,
@@ -139,7 +160,7 @@ def identify(
     period: float | None = None,
     periods: int = 2,
     realisations: int = 4,
-    lines: int = LINES,
+    lines: int = MULTISINE_LINES,
     amplitude: float | None = None,
     control: str = "continuous",
     dt: float = TS,
@@ -171,13 +192,20 @@ def identify(
     from scipy.fft import next_fast_len
 
     i = AXES.index(choice("axis", axis, AXES))
-    choice("what", what, KINDS)
+    choice("what", what, BLOCK_KINDS)
     if not isinstance(noise, Noise | None):
         raise ParameterError("noise", noise, "must be a Noise or None")
     seed = integer("seed", seed, 0, 2**32 - 1)
     realisations = integer("realisations", realisations, 1, 1000)
     periods = integer("periods", periods, 1 if realisations > 1 else 2, 1000)
-    size = number("amplitude", AMPLITUDE[what] if amplitude is None else amplitude, 0.0, 1.0, above=True, unit="m")
+    size = number(
+        "amplitude",
+        AMPLITUDE[what] if amplitude is None else amplitude,
+        0.0,
+        1.0,
+        above=True,
+        unit="m",
+    )
     length = number("period", PERIOD[what] if period is None else period, 0.1, 1000.0, unit="s")
     base = Scenario(
         name=f"identify {what} {axis}", gain=(0.0, 0.0), force=(0.0, 0.0), origin=pair("origin", origin, unit="m"),
@@ -185,12 +213,23 @@ def identify(
         length=None,
     )  # fmt: skip
     n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
-    gain = S[i].gain if shaping or what != "S" else mobility(*base.origin)[i]
+    gain = S[i].gain if shaping or what != "S" else endpoint_mobility(*base.origin)[i]
     rms = size * S[i].stiffness / gain if what == "S" else size
-    wave = _multisine((rms, 0.0) if i == 0 else (0.0, rms), band or BAND[what], n * base.dt, lines, 0.1 / base.dt)
+    wave = _multisine(
+        (rms, 0.0) if i == 0 else (0.0, rms),
+        band or IDENTIFICATION_BAND[what],
+        n * base.dt,
+        lines,
+        0.1 / base.dt,
+    )
     base = replace(base, t_max=(1 + periods) * wave.period)
-    phases, noises = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1).tolist()
-    scenarios = [replace(base, **{"muscle" if what == "S" else "command": replace(wave, seed=x)}) for x in phases]
+    phases, noises = (
+        np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1).tolist()
+    )
+    scenarios = [
+        replace(base, **{"muscle" if what == "S" else "command": replace(wave, seed=x)})
+        for x in phases
+    ]
     signals = []
     for made, (scenario, x) in enumerate(zip(scenarios, noises, strict=True), 1):
         record = simulate(scenario)
@@ -203,11 +242,15 @@ def identify(
             progress(made, realisations)
     bins = np.round(Signal(wave).omega / (2.0 * np.pi) * wave.period).astype(int)
     frequency = bins / wave.period
-    found = estimate(np.array(signals), n, bins)
-    step = base.dt if control == "continuous" else None  # no difference equation of second order holds the hold
-    least = (SHAPED if what == "S" and shaping else LEFT[what]) * (size / AMPLITUDE[what]) ** 2
-    fitted = coefficients(what, axis, frequency, found, step, least)
-    return Identified(what, axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods, realisations)
+    found = estimate_response(np.array(signals), n, bins)
+    step = (
+        base.dt if control == "continuous" else None
+    )  # no difference equation of second order holds the hold
+    least = (SHAPED if what == "S" and shaping else SETTLING[what]) * (size / AMPLITUDE[what]) ** 2
+    fitted = fitted_coefficients(what, axis, frequency, found, step, least)
+    return Identified(
+        what, axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods, realisations
+    )
 
 
 def _multisine(rms, band: object, period: float, lines: int, limit: float) -> Multisine:
@@ -216,11 +259,17 @@ def _multisine(rms, band: object, period: float, lines: int, limit: float) -> Mu
     lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
-        raise ParameterError("band", (low, high), f"must hold 3 multiples of 1/period = {1.0 / period:.4g} Hz or more")
+        raise ParameterError(
+            "band",
+            (low, high),
+            f"must hold 3 multiples of 1/period = {1.0 / period:.4g} Hz or more",
+        )
     return Multisine(rms, low, high, period, min(lines, most))
 
 
-def _signals(what: str, i: int, record: Record, p: np.ndarray, fh: np.ndarray, part: slice) -> np.ndarray:
+def _signals(
+    what: str, i: int, record: Record, p: np.ndarray, fh: np.ndarray, part: slice
+) -> np.ndarray:
     """Reference, input and output of axis i over part of a record, (3, samples)."""
     wave = record.scenario.muscle or record.scenario.command
     assert wave is not None
@@ -228,21 +277,17 @@ def _signals(what: str, i: int, record: Record, p: np.ndarray, fh: np.ndarray, p
     return np.array((Signal(wave)(record.t[part])[:, i], given[part, i], out[part, i]))
 
 
-# MERGED studies.estimation
-# From records to coefficients: frequency responses of periodic signals, and the printed forms fitted to them.
-#
-# Pintelon, Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012. How it is used here, and
-# what limits it: docs/identify.md.
-#
-
-
-KINDS = ("G", "S", "Th")
-NAMES = {
+BLOCK_KINDS = ("G", "S", "Th")
+COEFFICIENT_NAMES = {
     "G": ("gain", "damping", "stiffness"),
     "S": ("gain", "damping", "stiffness"),
     "Th": ("mass", "damper", "spring"),
 }
-UNITS = {"G": ("1/s^2", "1/s", "1/s^2"), "S": ("1/kg", "1/s", "1/s^2"), "Th": ("kg", "N.s/m", "N/m")}
+COEFFICIENT_UNITS = {
+    "G": ("1/s^2", "1/s", "1/s^2"),
+    "S": ("1/kg", "1/s", "1/s^2"),
+    "Th": ("kg", "N.s/m", "N/m"),
+}
 TRUST = 1e-6  # no line counts as known to better than this share of itself
 NEIGHBOURS = 5  # lines over which the scatter of the response is averaged
 COVER = 0.95  # of the confidence intervals
@@ -265,21 +310,26 @@ class Coefficient:
         return self.value / self.printed - 1.0
 
 
-def value(c: Coefficient) -> str:
+def transfer_function(c: Coefficient) -> str:
     """Fitted value and half its interval, to two figures of the latter: "41.793 +- 0.012"."""
     half = 0.5 * (c.high - c.low)
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
     return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"
 
 
-def printed(what: str, axis: str) -> tuple[float, ...]:
+def printed_form(what: str, axis: str) -> tuple[float, ...]:
     """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19), in the order of NAMES."""
     i = AXES.index(axis)
     block = {"G": G[i], "S": S[i], "Th": Operator()}[what]
-    return tuple(getattr(block, name) for name in NAMES[what])
+    return tuple(getattr(block, name) for name in COEFFICIENT_NAMES[what])
 
 
-def response(what: str, coefficients: tuple[float, ...] | np.ndarray, frequency: np.ndarray, dt: float | None = None):
+def response(
+    what: str,
+    coefficients: tuple[float, ...] | np.ndarray,
+    frequency: np.ndarray,
+    dt: float | None = None,
+):
     """Complex response of what with these coefficients at frequency [Hz], both (n,).
 
     Args:
@@ -291,7 +341,9 @@ def response(what: str, coefficients: tuple[float, ...] | np.ndarray, frequency:
     return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
 
 
-def _operators(frequency: np.ndarray, dt: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _operators(
+    frequency: np.ndarray, dt: float | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What stands for s^2, s and 1 at frequency [Hz]."""
     omega = 2.0 * np.pi * frequency
     if dt is None:
@@ -300,7 +352,7 @@ def _operators(frequency: np.ndarray, dt: float | None) -> tuple[np.ndarray, np.
     return -((2.0 * np.sin(half) / dt) ** 2), 1j * np.sin(2.0 * half) / dt, np.cos(half) ** 2
 
 
-def estimate(
+def estimate_response(
     signals: np.ndarray, n: int, bins: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
     """Response, its standard deviation and the coherence at the lines of a multisine, each (lines,), and the runs' own.
@@ -342,7 +394,10 @@ def _smooth(x: np.ndarray) -> np.ndarray:
     """Mean of each value and its NEIGHBOURS - 1 nearest, of those that exist."""
     half = NEIGHBOURS // 2
     total = np.cumsum(np.concatenate(([0.0], x)))
-    low, high = np.maximum(np.arange(len(x)) - half, 0), np.minimum(np.arange(len(x)) + half + 1, len(x))
+    low, high = (
+        np.maximum(np.arange(len(x)) - half, 0),
+        np.minimum(np.arange(len(x)) + half + 1, len(x)),
+    )
     return (total[high] - total[low]) / (high - low)
 
 
@@ -363,7 +418,7 @@ def fit(
 
     Args:
         what: which form. frequency: [Hz], (n,), n >= 3. H: response, complex, (n,). deviation: of H, (n,).
-        errors: of each run, (runs, n), as `estimate` gives them; None for a single run. dt: as `response`.
+        errors: of each run, (runs, n), as `estimate_response` gives them; None for a single run. dt: as `response`.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
@@ -384,7 +439,9 @@ def fit(
     else:
         runs = len(errors)
         freedom = runs - 1
-        variance = np.sum((np.linalg.pinv(found.jac) @ parts(errors / sigma).T) ** 2, axis=1) / (runs * freedom)
+        variance = np.sum((np.linalg.pinv(found.jac) @ parts(errors / sigma).T) ** 2, axis=1) / (
+            runs * freedom
+        )
     half = stdtrit(freedom, 0.5 + 0.5 * COVER) * np.sqrt(variance)
     return found.x * start, half * np.abs(start)
 
@@ -395,20 +452,34 @@ def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -
     if what == "Th":
         A, b = np.stack((s2, s, one), axis=1) / H[:, None], np.ones_like(H)
     else:
-        A, b = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / np.abs(s2[:, None]), s2 / np.abs(s2) + 0j
+        A, b = (
+            np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / np.abs(s2[:, None]),
+            s2 / np.abs(s2) + 0j,
+        )
     both = np.concatenate((A.real, A.imag)), np.concatenate((b.real, b.imag))
     return np.linalg.lstsq(*both, rcond=None)[0]
 
 
-def coefficients(what: str, axis: str, frequency: np.ndarray, found: tuple, dt: float | None, least: float):
+def fitted_coefficients(
+    what: str, axis: str, frequency: np.ndarray, found: tuple, dt: float | None, least: float
+):
     """`fit` beside the printed coefficients of what on axis: three of Coefficient.
 
     Args:
-        found: H, deviation, coherence, errors, as `estimate` returns them. dt: as `response`.
+        found: H, deviation, coherence, errors, as `estimate_response` returns them. dt: as `response`.
         least: share of a coefficient that the fitted form is wrong by, part of the interval.
     """
     H, deviation, _, errors = found
     value, half = fit(what, frequency, H, deviation, errors, dt)
     half = np.hypot(half, least * np.abs(value))
-    rows = zip(NAMES[what], UNITS[what], printed(what, axis), value.tolist(), half.tolist(), strict=True)
-    return tuple(Coefficient(name, unit, known, x, x - h, x + h) for name, unit, known, x, h in rows)
+    rows = zip(
+        COEFFICIENT_NAMES[what],
+        COEFFICIENT_UNITS[what],
+        printed_form(what, axis),
+        value.tolist(),
+        half.tolist(),
+        strict=True,
+    )
+    return tuple(
+        Coefficient(name, unit, known, x, x - h, x + h) for name, unit, known, x, h in rows
+    )

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, number
-from ..model.clay import there_is
+from ..model.clay import extent
 from ..model.scenario import Scenario
 from ..simulation.record import Record
 
-CELL = 2e-3  # [m] of a picture's map, at most
+CELL_SIZE = 2e-3  # [m] of a picture's map, at most
 SEEN, COUNTED = 10, 32  # cells, at least, in the tool's width: in a picture, where volume counts
 BEND = 5e-4  # of the width: so far may a piece of the path be from the straight line that stands for it
-MARGIN = 0.02  # of a block without borders, before the start and beyond the end of the path [m]
+MAP_MARGIN = 0.02  # of a block without borders, before the start and beyond the end of the path [m]
 HALF = 0.08  # half the breadth of a block without borders, where the path has none [m]
 
 
@@ -37,14 +37,16 @@ class Tool:
     depth: float = 0.01
 
     def __post_init__(self):
-        object.__setattr__(self, "width", number("tool.width", self.width, 2.0 * CELL, 0.1, unit="m"))
+        object.__setattr__(
+            self, "width", number("tool.width", self.width, 2.0 * CELL_SIZE, 0.1, unit="m")
+        )
         object.__setattr__(self, "depth", number("tool.depth", self.depth, 1e-4, 0.025, unit="m"))
 
 
 TOOL = Tool()
 
 
-def block(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of the block of clay to be seen, shape (2,) each [m]; without clay, of the work area.
 
     Where the clay has borders they are the block's; where it has none, the block reaches a little beyond the path.
@@ -53,12 +55,15 @@ def block(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     low, high = start - HALF, start + HALF
     if length is not None:
         across = scenario.clay is not None and scenario.clay.y.along == "y"
-        low, high[0] = low.copy(), length + MARGIN
-        low[0] = start[0] - MARGIN
+        low, high[0] = low.copy(), length + MAP_MARGIN
+        low[0] = start[0] - MAP_MARGIN
         if across:
-            low[1], high[1] = start[1] - MARGIN, start[1] + 2.1 * (length - start[0]) + MARGIN
+            low[1], high[1] = (
+                start[1] - MAP_MARGIN,
+                start[1] + 2.1 * (length - start[0]) + MAP_MARGIN,
+            )
     for i in (0, 1):
-        spans = there_is(scenario.clay, i)
+        spans = extent(scenario.clay, i)
         if scenario.clay and spans and all(f != math.inf for span in spans for f in map(abs, span)):
             low[i], high[i] = spans[0][0], spans[-1][1]
     return low, high
@@ -77,25 +82,36 @@ class Removal:
     """
 
     def __init__(
-        self, scenario: Scenario, tool: Tool = TOOL, cell: float | None = None, path: np.ndarray | None = None
+        self,
+        scenario: Scenario,
+        tool: Tool = TOOL,
+        cell: float | None = None,
+        path: np.ndarray | None = None,
     ):
         """For the block of the scenario, and as far beyond as the tool goes along path [m], shape (n, 2).
 
         Args:
             cell: largest size of a cell [m]; None for what the tool's width asks for.
         """
-        fit = min(CELL, tool.width / SEEN) if path is None else tool.width / COUNTED
-        self.tool, self.cell = tool, number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m")
-        low, high = block(scenario)
-        spans = [there_is(scenario.clay, i) for i in (0, 1)]
+        fit = min(CELL_SIZE, tool.width / SEEN) if path is None else tool.width / COUNTED
+        self.tool, self.cell = (
+            tool,
+            number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m"),
+        )
+        low, high = block_of_clay(scenario)
+        spans = [extent(scenario.clay, i) for i in (0, 1)]
         borders: list[list[float]] = [[], []]
         if path is not None and len(path):
             reach = 0.5 * tool.width + self.cell
             low, high = path.min(axis=0) - reach, path.max(axis=0) + reach
-            borders = [[e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)]
+            borders = [
+                [e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)
+            ]
         if np.max((high - low) / self.cell) > 20_000:
-            raise ParameterError("record", scenario.name, "the path is too long for a map of the clay")
-        lines = [_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
+            raise ParameterError(
+                "record", scenario.name, "the path is too long for a map of the clay"
+            )
+        lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
         self.wide, self.high = (np.diff(at) for at in lines)
         left = [1.0 - _share(spans[i], lines[i]) for i in (0, 1)]
@@ -120,7 +136,9 @@ class Removal:
             x, y = x - along * dx, y - along * dy
         wide, high = self.wide[i], self.high[j][:, None]
         away = np.maximum(np.sqrt(x * x + y * y), 1e-9)
-        across = np.maximum(np.hypot(x * wide, y * high) / away, 1e-9)  # the cell, as the edge moves
+        across = np.maximum(
+            np.hypot(x * wide, y * high) / away, 1e-9
+        )  # the cell, as the edge moves
         cover = np.clip(0.5 + (r - away) / across, 0.0, 1.0)
         cut = self.cut[j, i]
         np.maximum(cut, cover, out=cover)
@@ -160,7 +178,10 @@ def removed(
     bends = way[moving][_bends(p[moving], BEND * tool.width)]
     knots = np.union1d(np.arange(0.0, way[-1], grid.cell), bends)
     at = np.column_stack([np.interp(knots, way[moving], p[moving, i]) for i in (0, 1)]).tolist()
-    gained = [grid.sweep(at[0], at[0]), *(grid.sweep(a, b) for a, b in zip(at, at[1:], strict=False))]
+    gained = [
+        grid.sweep(at[0], at[0]),
+        *(grid.sweep(a, b) for a, b in zip(at, at[1:], strict=False)),
+    ]
     total = np.cumsum(gained)
     if len(knots) < 2:
         return np.full(len(p), total[0]), rate
@@ -190,18 +211,24 @@ def _bends(p: np.ndarray, tolerance: float) -> np.ndarray:
     return keep
 
 
-def _lines(low: float, high: float, borders: list[float], cell: float) -> np.ndarray:
+def _border_lines(low: float, high: float, borders: list[float], cell: float) -> np.ndarray:
     """Edges of the cells from low to high or a little beyond, one at each of the borders between them [m]."""
     if not borders:
         return low + cell * np.arange(max(math.ceil((high - low) / cell - 1e-9), 2) + 1)
     ends = np.unique([low, *borders, high])
-    pieces = [np.linspace(a, b, math.ceil((b - a) / cell) + 1)[:-1] for a, b in zip(ends, ends[1:], strict=False)]
+    pieces = [
+        np.linspace(a, b, math.ceil((b - a) / cell) + 1)[:-1]
+        for a, b in zip(ends, ends[1:], strict=False)
+    ]
     return np.append(np.concatenate(pieces), high)
 
 
 def _share(spans: list[tuple[float, float]], lines: np.ndarray) -> np.ndarray:
     """Share of each cell between the lines that lies in the spans."""
-    inside = sum(np.clip(lines, low, high) - low if low > -math.inf else np.minimum(lines, high) for low, high in spans)
+    inside = sum(
+        np.clip(lines, low, high) - low if low > -math.inf else np.minimum(lines, high)
+        for low, high in spans
+    )
     return np.diff(inside) / np.diff(lines) if spans else np.zeros(len(lines) - 1)
 
 

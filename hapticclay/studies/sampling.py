@@ -22,10 +22,10 @@ from ..model.experiments import SCENARIOS
 from ..model.operator import Operator
 from ..model.scenario import Scenario
 
-SCHEMA = "hapticclay-sweep-2"
+SWEEP_SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
 LETTERS = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
-MOST = 10_000_000  # runs in one sweep
+MOST_RUNS = 10_000_000  # runs in one sweep
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,25 @@ class Range:
             ParameterError: it is none of these.
         """
         bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5"'
-        items = text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
+        items = (
+            text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
+        )
         try:
             if items is None:
                 found = re.fullmatch(LETTERS, str(text).strip())
                 if found:
-                    low, high, n = float(found["low"]), float(found["high"]), int(found["n"]) if found["n"] else None
+                    low, high, n = (
+                        float(found["low"]),
+                        float(found["high"]),
+                        int(found["n"]) if found["n"] else None,
+                    )
                     finite = math.isfinite(low) and math.isfinite(high)
-                    if not finite or n == 0 or (found["log"] and low <= 0.0) or (n != 1 and low >= high):
+                    if (
+                        not finite
+                        or n == 0
+                        or (found["log"] and low <= 0.0)
+                        or (n != 1 and low >= high)
+                    ):
                         raise ValueError
                     return cls(low, high, n, bool(found["log"]))
                 items = str(text).split(",")
@@ -72,7 +83,11 @@ class Range:
         if self.values:
             return np.array(self.values)
         assert self.n
-        return np.geomspace(self.low, self.high, self.n) if self.log else np.linspace(self.low, self.high, self.n)
+        return (
+            np.geomspace(self.low, self.high, self.n)
+            if self.log
+            else np.linspace(self.low, self.high, self.n)
+        )
 
     def spread(self, u: np.ndarray) -> np.ndarray:
         """u in [0, 1) over the range; a list is drawn from."""
@@ -113,12 +128,22 @@ class Sweep:
         if not self.vary:
             raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
         if (self.runs is None) != (self.design == "grid"):
-            raise ParameterError("runs", self.runs, "must be given for 'lhs' and 'sobol', and for them alone")
+            raise ParameterError(
+                "runs", self.runs, "must be given for 'lhs' and 'sobol', and for them alone"
+            )
         for name, r in self.vary.items():
             if not r.values and (r.n is None) == (self.design == "grid"):
-                told = "must have a count, as in 1:1000:50log" if self.runs is None else "takes no count: runs has it"
-                raise ParameterError(name, f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}", f"{told} ({self.design})")
-        integer("runs", len(self), 1, MOST)
+                told = (
+                    "must have a count, as in 1:1000:50log"
+                    if self.runs is None
+                    else "takes no count: runs has it"
+                )
+                raise ParameterError(
+                    name,
+                    f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}",
+                    f"{told} ({self.design})",
+                )
+        integer("runs", len(self), 1, MOST_RUNS)
         known = tuple(inspect.signature(SCENARIOS[self.experiment]).parameters)
         for name in (*self.vary, *self.fixed):
             head, _, part = name.partition(".")
@@ -132,7 +157,7 @@ class Sweep:
 
     def __len__(self) -> int:
         if self.runs is not None:
-            return integer("runs", self.runs, 1, MOST)
+            return integer("runs", self.runs, 1, MOST_RUNS)
         return math.prod(r.n or 1 for r in self.vary.values())
 
     @property
@@ -150,7 +175,7 @@ class Sweep:
         if self.design == "grid":
             index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
             return np.column_stack([r.grid()[i] for r, i in zip(axes, index, strict=True)])
-        unit = _unit(self.design, len(axes), len(self), self.seed)[first:last]
+        unit = _unit_samples(self.design, len(axes), len(self), self.seed)[first:last]
         return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
 
     def scenario(self, point: np.ndarray) -> Scenario:
@@ -187,7 +212,7 @@ class Sweep:
 
     def described(self) -> dict[str, Any]:
         """The sweep as data, from which `digest` tells two apart."""
-        return {"schema": SCHEMA, **dataclasses.asdict(self)}
+        return {"schema": SWEEP_SCHEMA, **dataclasses.asdict(self)}
 
     def digest(self) -> str:
         """Fingerprint of what is run, and of the release it is run with."""
@@ -196,7 +221,7 @@ class Sweep:
 
 
 @functools.lru_cache(1)  # a worker is asked for it with each chunk
-def _unit(design: str, dimensions: int, runs: int, seed: int) -> np.ndarray:
+def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndarray:
     """A sample of the unit cube, shape (runs, dimensions)."""
     from scipy.stats import qmc
 
@@ -216,7 +241,10 @@ def parse_grid(text: str) -> dict[str, Range]:
     """
     how = "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, each name once"
     together = re.sub(r"\s+log(?!\S)", "log", text)
-    return {name: Range.parse(name, values) for name, values in _words("grid", together, how).items()}
+    return {
+        name: Range.parse(name, values)
+        for name, values in _split_words("grid", together, how).items()
+    }
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
@@ -225,10 +253,13 @@ def parse_fixed(text: str) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    return {name: _value(value) for name, value in _words("fixed", text, "must be name=value, each name once").items()}
+    return {
+        name: _value(value)
+        for name, value in _split_words("fixed", text, "must be name=value, each name once").items()
+    }
 
 
-def _words(field: str, text: str, how: str) -> dict[str, str]:
+def _split_words(field: str, text: str, how: str) -> dict[str, str]:
     """Words name=value, apart; how they must look."""
     out: dict[str, str] = {}
     for word in text.split():
@@ -249,7 +280,7 @@ def _value(text: str) -> Any:
     return parts if len(parts) > 1 else parts[0]
 
 
-def load(path: Path) -> dict[str, Any]:
+def load_sweep(path: Path) -> dict[str, Any]:
     """Reads a sweep from TOML: experiment, design, runs, seed, chunk; tables [vary] and [fixed].
 
     Returns:

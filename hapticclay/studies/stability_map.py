@@ -14,19 +14,19 @@ from ..theory import gain_limit, margins, passivity
 from . import boundary
 from .boundary import Loop
 
-KINDS = ("gain-damping", "delay-damping", "gain-pose")
-POSES = 0.10  # [m] the handle's path, either way from the nominal pose
+MAP_KINDS = ("gain-damping", "delay-damping", "gain-pose")
+MAP_POSES = 0.10  # [m] the handle's path, either way from the nominal pose
 DAMPINGS = (1.0, 3000.0)  # [N.s/m] of the map of gains
 FINE = 61  # points of an analytic line
 UNDAMPED = "held clay is never passive without a damper behind it (Colgate, Schenkel)"
-MOST = 1e5  # [N.s/m] clay is looked for up to here
+MOST_CELLS = 1e5  # [N.s/m] clay is looked for up to here
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """One point of a map: whether the linear continuous loop at the nominal pose is stable there, and what a run does.
 
-    x, y: as the map's axes. simulated: as boundary.behaviour. cause: why the two differ, "" if they do not.
+    x, y: as the map's axes. simulated: as boundary.classify_run. cause: why the two differ, "" if they do not.
     """
 
     x: float
@@ -37,7 +37,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Map:
+class StabilityMap:
     """Boundaries over a plane; stable below them.
 
     Attributes:
@@ -54,17 +54,25 @@ class Map:
     lines: dict[str, tuple[list[float], list[float]]]
     found: dict[str, tuple[list[float], list[float]]]
     exact: dict[str, list[float]]
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
     notes: tuple[str, ...] = ()
 
     def gap(self) -> float:
         """Largest relative difference between the runs and the exact line of the same loop; NaN if there is none."""
-        pairs = [(a, b) for name, (_, y) in self.found.items() for a, b in zip(y, self.exact[name], strict=True)]
-        gaps = [abs(a / b - 1.0) if b else math.inf for a, b in pairs if math.isfinite(a + b) and a != b]
+        pairs = [
+            (a, b)
+            for name, (_, y) in self.found.items()
+            for a, b in zip(y, self.exact[name], strict=True)
+        ]
+        gaps = [
+            abs(a / b - 1.0) if b else math.inf for a, b in pairs if math.isfinite(a + b) and a != b
+        ]
         return max(gaps, default=0.0 if pairs else math.nan)
 
 
-def chart(kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter) -> Map:
+def stability_map(
+    kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter
+) -> StabilityMap:
     """Makes a map.
 
     Args:
@@ -75,19 +83,25 @@ def chart(kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterab
     """
     columns, rows = (4, 3) if quick else (8, 5)
     make = {"gain-damping": _gain_damping, "delay-damping": _delay_damping, "gain-pose": _gain_pose}
-    return make[choice("map", kind, KINDS)](loop, columns, rows, progress)
+    return make[choice("map", kind, MAP_KINDS)](loop, columns, rows, progress)
 
 
-def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
+def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
     fine, x = np.geomspace(*DAMPINGS, FINE).tolist(), np.geomspace(*DAMPINGS, columns).tolist()
     at = lambda b: replace(loop, b=b)  # noqa: E731
     lines = {"continuous time": (fine, [_limit(replace(at(b), Ts=None, delay=0.0)) for b in fine])}
     if loop.Ts:
-        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = (fine, [_limit(at(b)) for b in fine])
+        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = (
+            fine,
+            [_limit(at(b)) for b in fine],
+        )
     notes = []
     for name, law in (
         ("small gain (Eq. 13)", lambda b: _largest(lambda K: bool(_small_gain(at(b), K)))),
-        ("passive: stable with every hand", lambda b: _largest(lambda K: bool(passivity.passivity(loop.axis, K, b)))),
+        (
+            "passive: stable with every hand",
+            lambda b: _largest(lambda K: bool(passivity.passivity(loop.axis, K, b))),
+        ),
     ):
         y = [law(b) for b in fine]
         if any(y):
@@ -98,24 +112,30 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     middle = _limit(replace(loop, Ts=None, delay=0.0))
     ys = np.geomspace(0.25 * middle, 4.0 * middle, rows).tolist()
     if loop.Ts and damper:
-        lines["held clay passive left of it (Colgate, Schenkel)"] = ([damper, damper], [ys[0], ys[-1]])
+        lines["held clay passive left of it (Colgate, Schenkel)"] = (
+            [damper, damper],
+            [ys[0], ys[-1]],
+        )
     elif loop.Ts:
         notes.append(UNDAMPED)
     found = {"runs": (x, [boundary.simulated_gain(at(b)) for b in progress(x)])}
     exact = {"runs": [_limit(at(b)) for b in x]}
-    cells = _cells([at(b) for b in x], x, lambda c, K: replace(c, K=K), ys, progress)
+    cells = _map_cells([at(b) for b in x], x, lambda c, K: replace(c, K=K), ys, progress)
     names = "damping b of the clay [N.s/m]", "gain K [1/kg]"
-    return Map("gain-damping", loop, *names, lines, found, exact, cells, tuple(notes))
+    return StabilityMap("gain-damping", loop, *names, lines, found, exact, cells, tuple(notes))
 
 
-def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
+def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
     loop = loop if loop.Ts else replace(loop, Ts=TS)
     assert loop.Ts
     low, high = 0.5 * loop.Ts, 16.0 * loop.Ts
     fine, x = np.geomspace(low, high, FINE // 2).tolist(), np.geomspace(low, high, columns).tolist()
     at = lambda d: replace(loop, delay=d)  # noqa: E731
     lines = {
-        "continuous time, late": (fine, [_damping(replace(at(d), Ts=None, delay=0.0), d) for d in fine]),
+        "continuous time, late": (
+            fine,
+            [_damping(replace(at(d), Ts=None, delay=0.0), d) for d in fine],
+        ),
         f"sampled every {1e3 * loop.Ts:g} ms and late": (fine, [_damping(at(d), d) for d in fine]),
     }
     notes = []
@@ -126,44 +146,69 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> Map:
     else:
         notes.append(UNDAMPED)
     exact = [_damping(at(d), d) for d in x]
-    runs = [boundary.simulated_damping(at(d), min(b, MOST) or 1.0) for d, b in zip(progress(x), exact, strict=True)]
+    runs = [
+        boundary.simulated_damping(at(d), min(b, MOST_CELLS) or 1.0)
+        for d, b in zip(progress(x), exact, strict=True)
+    ]
     found = {"runs": (x, runs)}
     finite = [b for b in exact if 0.0 < b < math.inf] or [1000.0]
     ys = np.geomspace(0.5 * min(finite), 2.0 * max(finite), rows).tolist()
-    cells = _cells([at(d) for d in x], x, lambda c, b: replace(c, b=b), ys, progress)
+    cells = _map_cells([at(d) for d in x], x, lambda c, b: replace(c, b=b), ys, progress)
     names = "delay of the motors [s]", "damping b of the clay [N.s/m]"
-    return Map("delay-damping", loop, *names, lines, found, {"runs": exact}, cells, tuple(notes))
+    return StabilityMap(
+        "delay-damping", loop, *names, lines, found, {"runs": exact}, cells, tuple(notes)
+    )
 
 
-def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> Map:
-    fine, x = np.linspace(-POSES, POSES, FINE).tolist(), np.linspace(-POSES, POSES, columns).tolist()
+def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
+    fine, x = (
+        np.linspace(-MAP_POSES, MAP_POSES, FINE).tolist(),
+        np.linspace(-MAP_POSES, MAP_POSES, columns).tolist(),
+    )
     at = lambda dx, shaping: replace(loop, pose=(dx, 0.0), shaping=shaping)  # noqa: E731
     nominal = _limit(loop)
     how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
         f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
-        f"linear loop at this pose, {how}": (fine, [boundary.pose_limit(at(dx, False)) for dx in fine]),
+        f"linear loop at this pose, {how}": (
+            fine,
+            [boundary.pose_limit(at(dx, False)) for dx in fine],
+        ),
     }
     here = [boundary.pose_limit(at(dx, False)) for dx in x]
     found = {
-        "runs": (x, [boundary.simulated_gain(at(dx, False), g) for dx, g in zip(progress(x), here, strict=True)]),
+        "runs": (
+            x,
+            [
+                boundary.simulated_gain(at(dx, False), g)
+                for dx, g in zip(progress(x), here, strict=True)
+            ],
+        ),
         "runs, shaped": (x, [boundary.simulated_gain(at(dx, True)) for dx in x]),
     }
     exact = {"runs": here, "runs, shaped": [boundary.pose_limit(at(dx, True)) for dx in x]}
     ys = np.geomspace(0.4 * nominal, 1.2 * nominal, rows).tolist()
-    cells = _cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
+    cells = _map_cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
-    return Map("gain-pose", loop, *names, lines, found, exact, cells)
+    return StabilityMap("gain-pose", loop, *names, lines, found, exact, cells)
 
 
-def _cells(loops, x, put, ys, progress) -> tuple[Cell, ...]:
+def _map_cells(loops, x, put, ys, progress) -> tuple[MapCell, ...]:
     out = []
     for loop, at in zip(progress(loops), x, strict=True):
         for y in ys:
-            tried = replace(put(loop, y), push=boundary.LARGE)
-            theory, run = boundary.linear(tried), boundary.behaviour(tried)
+            tried = replace(put(loop, y), push=boundary.LARGE_PUSH)
+            theory, run = boundary.linear_rate(tried), boundary.classify_run(tried)
             agree = theory == (run == "stable")
-            out.append(Cell(at, y, theory, run, "" if agree else boundary.cause(tried, run == "stable")))
+            out.append(
+                MapCell(
+                    at,
+                    y,
+                    theory,
+                    run,
+                    "" if agree else boundary.explain_disagreement(tried, run == "stable"),
+                )
+            )
     return tuple(out)
 
 
@@ -171,16 +216,18 @@ def _late(loop: Loop) -> str:
     return f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
 
 
-def _hand(loop: Loop) -> dict:
+def _other_hand(loop: Loop) -> dict:
     return dict(impedance=loop.operator is not None, operator=loop.operator)
 
 
 def _limit(loop: Loop) -> float:
-    return gain_limit.gain_limit(loop.axis, loop.b, Ts=loop.Ts, delay=loop.delay, **_hand(loop))
+    return gain_limit.gain_limit(
+        loop.axis, loop.b, Ts=loop.Ts, delay=loop.delay, **_other_hand(loop)
+    )
 
 
 def _small_gain(loop: Loop, K: float) -> margins.Verdict:
-    return margins.small_gain(loop.axis, K, loop.b, **_hand(loop))
+    return margins.small_gain(loop.axis, K, loop.b, **_other_hand(loop))
 
 
 def _largest(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e3) -> float:
@@ -198,7 +245,7 @@ def _largest(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e
 def _damping(loop: Loop, delay: float) -> float:
     """Smallest b at which the late linear loop is unstable [N.s/m]; inf if there is none up to MOST, 0 if from 1 on."""
     stable = lambda b: gain_limit.is_stable(loop.axis, loop.K, b, loop.operator, loop.Ts, delay)  # noqa: E731
-    grid = np.geomspace(1.0, MOST, 60)
+    grid = np.geomspace(1.0, MOST_CELLS, 60)
     bad = next((i for i, b in enumerate(grid) if not stable(float(b))), None)
     if bad is None:
         return math.inf

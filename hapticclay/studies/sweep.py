@@ -24,18 +24,28 @@ from ..files import atomic
 from ..model.constants import AXES
 from ..simulation.batch import cores
 from ..simulation.record import Record
-from ..simulation.simulate import fits, has_numba, simulate
+from ..simulation.simulate import has_numba, native_fits, simulate
 from ..theory import gain_limit
 from .sampling import Sweep
 
-BORDERS = 3  # crossings that have columns of their own
-NATIVE_FROM = 2_000_000  # steps in the whole sweep from which the compiled loop pays in every process
-MARK = b"hapticclay_sweep", b"hapticclay_part"  # keys in a part's metadata: the sweep's digest, the chunk's number
-PROBES, PATIENCE = 20, 5.0  # runs an estimate is made from, and the time after which fewer will do [s]
+CROSSINGS_KEPT = 3  # crossings that have columns of their own
+COMPILE_FROM = (
+    2_000_000  # steps in the whole sweep from which the compiled loop pays in every process
+)
+MARK = (
+    b"hapticclay_sweep",
+    b"hapticclay_part",
+)  # keys in a part's metadata: the sweep's digest, the chunk's number
+PROBES, CLAIM_PATIENCE = (
+    20,
+    5.0,
+)  # runs an estimate is made from, and the time after which fewer will do [s]
 NAMED = 5  # bad parts that are named, not counted
 
 
-def row(index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = "") -> dict[str, Any]:
+def result_row(
+    index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
+) -> dict[str, Any]:
     """One row of the data set: parameters, how the run ended, what was measured. NaN where there is nothing.
 
     Args:
@@ -46,7 +56,7 @@ def row(index: int, names: list[str], point: np.ndarray, r: Record | None, refus
     out |= {"status": r.outcome.code if r else "refused", "axis": r.outcome.axis if r else "",
             "cause": r.outcome.cause if r else refused, "end_time": r.outcome.time if r else nan}  # fmt: skip
     times = [c.time for c in r.crossings] if r else []
-    out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(BORDERS)}
+    out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(CROSSINGS_KEPT)}
     for i, axis in enumerate(AXES):
         deepest = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None) if r else None
         entry = deepest[axis] if deepest else {}
@@ -57,7 +67,10 @@ def row(index: int, names: list[str], point: np.ndarray, r: Record | None, refus
         if r and r.scenario.gain[i] > 0.0:
             b = entry.get("b", 0.0)
             th = r.scenario.operator
-            margin = gain_limit.gain_limit(axis, b, impedance=th is not None, operator=th) / r.scenario.gain[i]
+            margin = (
+                gain_limit.gain_limit(axis, b, impedance=th is not None, operator=th)
+                / r.scenario.gain[i]
+            )
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0
     out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
@@ -65,44 +78,50 @@ def row(index: int, names: list[str], point: np.ndarray, r: Record | None, refus
     return out
 
 
-def measure(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
+def measure_rates(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
     """Makes one run of a sweep; its row."""
     names = list(sweep.vary)
     try:
         scenario = sweep.scenario(point)
-        compiled = len(sweep) * scenario.t_max / scenario.dt >= NATIVE_FROM and fits(scenario) and has_numba()
-        return row(index, names, point, simulate(scenario, engine="native" if compiled else "python"))
+        compiled = (
+            len(sweep) * scenario.t_max / scenario.dt >= COMPILE_FROM
+            and native_fits(scenario)
+            and has_numba()
+        )
+        return result_row(
+            index, names, point, simulate(scenario, engine="native" if compiled else "python")
+        )
     except ParameterError as error:
-        return row(index, names, point, None, str(error))
+        return result_row(index, names, point, None, str(error))
 
 
 def run_chunk(sweep: Sweep, number: int, out: str) -> int:
     """Runs one chunk and writes its file; returns the number of its runs. What a worker does, here or far away."""
     runs = sweep.chunk_runs(number)
     points = sweep.points(runs.start, runs.stop)
-    rows = [measure(sweep, index, point) for index, point in zip(runs, points, strict=True)]
-    with atomic(part(Path(out), number)) as f:
-        _write(rows, schema(sweep, number), f)
+    rows = [measure_rates(sweep, index, point) for index, point in zip(runs, points, strict=True)]
+    with atomic(sweep_part(Path(out), number)) as f:
+        _write_part(rows, parquet_schema(sweep, number), f)
     return len(runs)
 
 
-def schema(sweep: Sweep, number: int) -> Any:
+def parquet_schema(sweep: Sweep, number: int) -> Any:
     """The pyarrow Schema of a chunk's file: its columns, and in its metadata which sweep and which chunk it is of."""
     import pyarrow as pa
 
-    empty = row(0, list(sweep.vary), np.zeros(len(sweep.vary)), None)
+    empty = result_row(0, list(sweep.vary), np.zeros(len(sweep.vary)), None)
     marks = dict(zip(MARK, (sweep.digest().encode(), b"%d" % number), strict=True))
     return pa.Table.from_pylist([empty]).schema.with_metadata(marks)
 
 
-def _write(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
+def _write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     pq.write_table(pa.Table.from_pylist(rows, schema), file, write_page_checksum=True)
 
 
-def _read(file: Path) -> Any:
+def _read_part(file: Path) -> Any:
     """A part as a pyarrow Table, every page proven by its checksum; None if it is damaged.
 
     Raises:
@@ -115,26 +134,28 @@ def _read(file: Path) -> Any:
         source = pa.BufferReader(file.read_bytes())
     except OSError as error:
         raise ParameterError("part", file.name, f"must be readable ({error.strerror})") from None
-    with contextlib.suppress(pa.ArrowException, OSError, ValueError):  # threads of Arrow's abort some exits of Python
+    with contextlib.suppress(
+        pa.ArrowException, OSError, ValueError
+    ):  # threads of Arrow's abort some exits of Python
         return pq.ParquetFile(source, page_checksum_verification=True).read(use_threads=False)
     return None
 
 
-def part(out: Path, number: int) -> Path:
+def sweep_part(out: Path, number: int) -> Path:
     """The file of one chunk."""
     return out / "data" / f"part-{number:06d}.parquet"
 
 
-def _parts(out: Path) -> list[Path]:
+def _part_numbers(out: Path) -> list[Path]:
     return sorted((out / "data").glob("part-*.parquet"))
 
 
-def missing(sweep: Sweep, out: Path) -> list[int]:
+def missing_parts(sweep: Sweep, out: Path) -> list[int]:
     """Chunks that have no file yet."""
-    return [n for n in range(sweep.chunks) if not part(out, n).is_file()]
+    return [n for n in range(sweep.chunks) if not sweep_part(out, n).is_file()]
 
 
-def begin(sweep: Sweep, out: Path) -> list[int]:
+def begin_sweep(sweep: Sweep, out: Path) -> list[int]:
     """Makes the folder, or checks that what lies there is of this same sweep; gives the chunks that are to be done.
 
     Parts that are damaged, or of another sweep or place, are named and removed, as is what a killed writer left.
@@ -149,27 +170,33 @@ def begin(sweep: Sweep, out: Path) -> list[int]:
         except (OSError, ValueError, KeyError, TypeError):
             digest = "unreadable"
         if digest != sweep.digest():
-            raise ParameterError("out", str(out), "holds another sweep, or another release's: choose another folder")
+            raise ParameterError(
+                "out", str(out), "holds another sweep, or another release's: choose another folder"
+            )
     else:
         with atomic(file) as f:
-            f.write((json.dumps({"digest": sweep.digest(), **sweep.described()}, indent=1) + "\n").encode())
-    numbers = {part(out, n): n for n in range(sweep.chunks)}
-    for stray in set(_parts(out)) - set(numbers):
+            f.write(
+                (
+                    json.dumps({"digest": sweep.digest(), **sweep.described()}, indent=1) + "\n"
+                ).encode()
+            )
+    numbers = {sweep_part(out, n): n for n in range(sweep.chunks)}
+    for stray in set(_part_numbers(out)) - set(numbers):
         raise ParameterError("part", stray.name, f"is no part of the sweep in {out}: move it away")
-    wanted = schema(sweep, 0)
-    bad = {f: fault for f in _parts(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
+    wanted = parquet_schema(sweep, 0)
+    bad = {f: fault for f in _part_numbers(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
     if bad:
         named = [f"{f.name} ({fault})" for f, fault in bad.items()]
         more = [f"{len(named) - NAMED} more"] if len(named) > NAMED else []
         print(f"hapticclay: made again: {', '.join(named[:NAMED] + more)}", file=sys.stderr)
     for left in (*bad, *(out / "data").glob(".part-*")):
         left.unlink(missing_ok=True)
-    return missing(sweep, out)
+    return missing_parts(sweep, out)
 
 
 def _fault(sweep: Sweep, number: int, file: Path, wanted: Any) -> str:
     """What is wrong with a chunk's file, "" if nothing is; wanted: the schema of any chunk."""
-    table = _read(file)
+    table = _read_part(file)
     if table is None:
         return "damaged"
     digest, of = _marks(table)
@@ -177,7 +204,9 @@ def _fault(sweep: Sweep, number: int, file: Path, wanted: Any) -> str:
         return "of another sweep"
     if of != b"%d" % number:
         return f"a copy of part {of.decode(errors='replace')}"
-    whole = table.schema.equals(wanted) and table["run"].to_pylist() == list(sweep.chunk_runs(number))
+    whole = table.schema.equals(wanted) and table["run"].to_pylist() == list(
+        sweep.chunk_runs(number)
+    )
     return "" if whole else "incomplete"
 
 
@@ -196,15 +225,19 @@ def claimed(sweep: Sweep, out: Path) -> Iterator[list[int]]:
     try:
         import pyarrow  # noqa: F401
     except ImportError:
-        raise ParameterError("sweep", "pyarrow", "is not installed: pip install 'hapticclay[sweep]'") from None
+        raise ParameterError(
+            "sweep", "pyarrow", "is not installed: pip install 'hapticclay[sweep]'"
+        ) from None
     try:
         out.mkdir(parents=True, exist_ok=True)
         lock = os.open(out / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
-        raise ParameterError("out", str(out), f"must be a writable folder ({error.strerror})") from None
+        raise ParameterError(
+            "out", str(out), f"must be a writable folder ({error.strerror})"
+        ) from None
     try:
         _hold(lock, out)
-        yield begin(sweep, out)
+        yield begin_sweep(sweep, out)
     finally:
         os.close(lock)
 
@@ -217,29 +250,36 @@ def _hold(lock: int, out: Path) -> None:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         who = os.read(lock, 200).decode(errors="replace")
-        raise ParameterError("out", str(out), f"is where another sweep is at work ({who}): let it end first") from None
+        raise ParameterError(
+            "out", str(out), f"is where another sweep is at work ({who}): let it end first"
+        ) from None
     except (ImportError, OSError):
-        print(f"hapticclay: {out} knows no file locks: start no second sweep in it", file=sys.stderr)
+        print(
+            f"hapticclay: {out} knows no file locks: start no second sweep in it", file=sys.stderr
+        )
     with contextlib.suppress(OSError):  # a full disk is met where it matters
         os.truncate(lock, 0)
         os.write(lock, f"process {os.getpid()} on {platform.node()}".encode())
 
 
-def run(
+def run_sweep(
     sweep: Sweep, out: Path, *, workers: int | None = None, scheduler: str | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:  # fmt: skip
     """Does what is missing of a sweep; returns the number of runs made.
 
     Args:
-        sweep: what to run. out: folder of sweep.json and data/. workers, scheduler: as in `work`.
+        sweep: what to run. out: folder of sweep.json and data/. workers, scheduler: as in `sweep_worker`.
         progress: called with the number of runs of each chunk that is done.
 
     Raises:
-        ParameterError: as `claimed` and `work`.
+        ParameterError: as `claimed` and `sweep_worker`.
     """
     done = 0
-    with claimed(sweep, out) as todo, contextlib.closing(work(sweep, out, todo, workers, scheduler)) as results:
+    with (
+        claimed(sweep, out) as todo,
+        contextlib.closing(sweep_worker(sweep, out, todo, workers, scheduler)) as results,
+    ):
         for n in results:
             done += n
             if progress:
@@ -247,20 +287,28 @@ def run(
     return done
 
 
-def work(
-    sweep: Sweep, out: Path, todo: list[int], workers: int | None = None, scheduler: str | None = None
+def sweep_worker(
+    sweep: Sweep,
+    out: Path,
+    todo: list[int],
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> Generator[int, None, None]:
     """Runs chunks of a sweep whose folder is claimed; gives the number of runs of each, as it is done.
 
     Args:
-        sweep, out: as in `run`. todo: the chunks.
+        sweep, out: as in `run_sweep`. todo: the chunks.
         workers: processes here; None for one a core. scheduler: address of a dask scheduler to use instead.
 
     Raises:
         ParameterError: a file cannot be written, or a package is missing.
         ChildProcessError: a worker here was killed.
     """
-    return _far(sweep, out, todo, scheduler) if scheduler else _here(sweep, out, todo, processes(todo, workers))
+    return (
+        _far(sweep, out, todo, scheduler)
+        if scheduler
+        else _here(sweep, out, todo, processes(todo, workers))
+    )
 
 
 def processes(todo: list[int], workers: int | None) -> int:
@@ -277,19 +325,23 @@ def _here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generator[i
         for number in todo:
             yield run_chunk(sweep, number, str(out))
         return
-    context = multiprocessing.get_context("spawn")  # the engine's threads and locks do not survive a fork
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_serve) as pool:
+    context = multiprocessing.get_context(
+        "spawn"
+    )  # the engine's threads and locks do not survive a fork
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_serve_cluster) as pool:
         try:
             jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
             for job in as_completed(jobs):
                 yield job.result()
         except BrokenProcessPool:
-            raise ChildProcessError("a worker was killed (memory?); the same command goes on from there") from None
+            raise ChildProcessError(
+                "a worker was killed (memory?); the same command goes on from there"
+            ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _serve() -> None:
+def _serve_cluster() -> None:
     """Leaves Ctrl-C to the process that waits, so that a worker finishes its chunk; and ends the worker with it."""
     import signal
     import threading
@@ -311,39 +363,45 @@ def _far(sweep: Sweep, out: Path, todo: list[int], address: str) -> Generator[in
     try:
         from distributed import Client, as_completed
     except ImportError:
-        raise ParameterError("scheduler", address, "needs dask: pip install 'hapticclay[cluster]'") from None
+        raise ParameterError(
+            "scheduler", address, "needs dask: pip install 'hapticclay[cluster]'"
+        ) from None
     try:
         client = Client(address, timeout="20s", set_as_default=False)
     except OSError as error:
-        raise ParameterError("scheduler", address, f"must be the address of a dask scheduler ({error})") from None
+        raise ParameterError(
+            "scheduler", address, f"must be the address of a dask scheduler ({error})"
+        ) from None
     with client:
-        jobs = client.map(lambda n: run_chunk(sweep, n, str(out.resolve())), todo, pure=False, retries=10)
+        jobs = client.map(
+            lambda n: run_chunk(sweep, n, str(out.resolve())), todo, pure=False, retries=10
+        )
         for job in as_completed(jobs, loop=client.loop):
             yield job.result()
 
 
-def estimate(sweep: Sweep) -> tuple[float, float]:
+def estimate_time(sweep: Sweep) -> tuple[float, float]:
     """Seconds of one process and bytes on disk that a run of a sweep takes, from some of its runs, drawn at random."""
     import pyarrow as pa
 
     drawn = np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist()
-    probe = lambda i: measure(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
+    probe = lambda i: measure_rates(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
     probe(drawn[0])  # the first run loads and compiles
     rows, spent, begin = [], 0.0, time.perf_counter()
     for i in drawn:
         rows.append(probe(i))
         spent = time.perf_counter() - begin
-        if spent > PATIENCE:
+        if spent > CLAIM_PATIENCE:
             break
     sizes = []
     for some in (rows, rows[:1]):
-        _write(some, schema(sweep, 0), file := pa.BufferOutputStream())
+        _write_part(some, parquet_schema(sweep, 0), file := pa.BufferOutputStream())
         sizes.append(file.tell())
     each = (sizes[0] - sizes[1]) / max(1, len(rows) - 1)
     return spent / len(rows), each + (sizes[1] - each) / min(sweep.chunk, len(sweep))
 
 
-def read(out: str | os.PathLike[str]):
+def read_sweep(out: str | os.PathLike[str]):
     """The data set in the folder out, all its chunks, as a pyarrow Table in the order of the runs.
 
     Raises:
@@ -351,21 +409,29 @@ def read(out: str | os.PathLike[str]):
     """
     import pyarrow as pa
 
-    files = _parts(Path(out))
+    files = _part_numbers(Path(out))
     if not files:
-        raise ParameterError("sweep", str(out), "must be a folder that hapticclay sweep has written")
+        raise ParameterError(
+            "sweep", str(out), "must be a folder that hapticclay sweep has written"
+        )
     tables = []
     for file in files:
-        table = _read(file)
+        table = _read_part(file)
         digest, of = _marks(table) if table is not None else (b"", b"")
         if table is None:
             fault = "damaged"
-        elif tables and (digest != _marks(tables[0])[0] or not table.schema.equals(tables[0].schema)):
+        elif tables and (
+            digest != _marks(tables[0])[0] or not table.schema.equals(tables[0].schema)
+        ):
             fault = "of another sweep"
-        elif of and file.name != f"part-{of.decode(errors='replace'):0>6}.parquet":  # 0.1.0 marked none
+        elif (
+            of and file.name != f"part-{of.decode(errors='replace'):0>6}.parquet"
+        ):  # 0.1.0 marked none
             fault = "a copy of another part"
         else:
             tables.append(table)
             continue
-        raise ParameterError("part", file.name, f"is {fault}: the command of the sweep in {out} makes it again")
+        raise ParameterError(
+            "part", file.name, f"is {fault}: the command of the sweep in {out} makes it again"
+        )
     return pa.concat_tables(tables).replace_schema_metadata(None)

@@ -10,12 +10,22 @@ import numpy as np
 
 from ..errors import integer, number
 from ..model.constants import AXES, L1, L2
-from .identification import NAMES, NOMINAL, identify, mobility, printed
+from .identification import (
+    COEFFICIENT_NAMES,
+    NOMINAL_POSE,
+    endpoint_mobility,
+    identify,
+    printed_form,
+)
 
-BLOCKS = ("G", "S")
-MARGIN = 0.04  # [m] from the stretched and the folded arm: nearer, joint rates grow without bound
-SETTINGS: dict[str, Any] = dict(  # a mm of motion would let the pose change; without noise, a hundredth will do
-    band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
+DRIFT_BLOCKS = ("G", "S")
+REACH_SHARE = (
+    0.04  # [m] from the stretched and the folded arm: nearer, joint rates grow without bound
+)
+DRIFT_SETTINGS: dict[str, Any] = (
+    dict(  # a mm of motion would let the pose change; without noise, a hundredth will do
+        band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
+    )
 )
 
 
@@ -40,14 +50,14 @@ class Drift:
         """Lowest and highest value of each coefficient over the poses, beside the printed one."""
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
-            what, axis, values = BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
+            what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
             out.append(
                 {
                     "what": what,
                     "axis": axis,
-                    "name": NAMES[what][n],
+                    "name": COEFFICIENT_NAMES[what][n],
                     "shaping": bool(k),
-                    "printed": printed(what, axis)[n],
+                    "printed": printed_form(what, axis)[n],
                     "lowest": float(values.min()),
                     "highest": float(values.max()),
                 }
@@ -61,7 +71,13 @@ class Drift:
             "y": self.y.tolist(),
             "spacing": self.spacing,
             "coefficients": self.coefficients.tolist(),
-            "order": ["pose", "shaping (off, on)", "block (G, S)", "axis (x, y)", "gain, damping, stiffness"],
+            "order": [
+                "pose",
+                "shaping (off, on)",
+                "block (G, S)",
+                "axis (x, y)",
+                "gain, damping, stiffness",
+            ],
             "mobility": self.mobility.tolist(),
             "ranges": self.ranges(),
             "units": {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"},
@@ -71,17 +87,21 @@ class Drift:
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     """World x and y [m] of the points of a square grid through the nominal pose that lie within reach, y >= 0."""
     reach = L1 + L2
-    x = NOMINAL[0] + spacing * np.arange(
-        -np.floor((reach + NOMINAL[0]) / spacing), np.ceil((reach - NOMINAL[0]) / spacing)
+    x = NOMINAL_POSE[0] + spacing * np.arange(
+        -np.floor((reach + NOMINAL_POSE[0]) / spacing), np.ceil((reach - NOMINAL_POSE[0]) / spacing)
     )
-    y = NOMINAL[1] + spacing * np.arange(-np.floor(NOMINAL[1] / spacing), np.ceil((reach - NOMINAL[1]) / spacing))
+    y = NOMINAL_POSE[1] + spacing * np.arange(
+        -np.floor(NOMINAL_POSE[1] / spacing), np.ceil((reach - NOMINAL_POSE[1]) / spacing)
+    )
     x, y = (z.ravel() for z in np.meshgrid(x, y))
     r = np.hypot(x, y)
-    inside = (r >= abs(L2 - L1) + MARGIN) & (r <= L1 + L2 - MARGIN)
+    inside = (r >= abs(L2 - L1) + REACH_SHARE) & (r <= L1 + L2 - REACH_SHARE)
     return x[inside], y[inside]
 
 
-def drift_map(spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None) -> Drift:
+def drift_map(
+    spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None
+) -> Drift:
     """Identifies G and Sh on both axes over the workspace, without and with inertia shaping; a few minutes.
 
     Args:
@@ -97,9 +117,11 @@ def drift_map(spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, 
     out = np.empty((len(x), 2, 2, 2, 3))
     for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
         for k, j, i in np.ndindex(2, 2, 2):
-            found = identify(AXES[i], BLOCKS[j], origin=at, shaping=bool(k), seed=seed, **SETTINGS)
+            found = identify(
+                AXES[i], DRIFT_BLOCKS[j], origin=at, shaping=bool(k), seed=seed, **DRIFT_SETTINGS
+            )
             out[m, k, j, i] = found.values
         if progress:
             progress(m + 1, len(x))
-    w = np.array([mobility(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
+    w = np.array([endpoint_mobility(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
     return Drift(x, y, spacing, out, w)

@@ -14,7 +14,7 @@ from ..model.operator import Operator
 from . import gain_limit, linear_loop, margins
 
 K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain
-BAND = (0.3, 30.0)  # [rad/s]: where a hand moves on purpose, up to about 5 Hz
+DESIGN_BAND = (0.3, 30.0)  # [rad/s]: where a hand moves on purpose, up to about 5 Hz
 
 
 def design_gain(
@@ -60,12 +60,20 @@ def design_gain(
             bound = "must stay as they are with sampling or delay, where only gain_margin is known"
             field = "phase_margin, disk_margin, delay_margin, at, compensator"
             raise ParameterError(field, (phase, disk, late, at, compensator), bound)
-        return gain_limit.critical(axis, b, th, Ts, delay, render)[0] / gain
-    top = linear_loop.gain_limit(axis, b, th, compensator)
+        return gain_limit.critical_gain(axis, b, th, Ts, delay, render)[0] / gain
+    top = linear_loop.continuous_gain_limit(axis, b, th, compensator)
 
     def good(K: float) -> bool:
-        m = margins.margins(axis, K, b, impedance=th is not None, operator=th, at=at, compensator=compensator)
-        return m.stable and m.gain[1] >= gain and m.phase >= phase and m.disk >= disk and m.delay >= late
+        m = margins.margins(
+            axis, K, b, impedance=th is not None, operator=th, at=at, compensator=compensator
+        )
+        return (
+            m.stable
+            and m.gain[1] >= gain
+            and m.phase >= phase
+            and m.disk >= disk
+            and m.delay >= late
+        )
 
     if top == math.inf:
         top = K_MAX
@@ -102,7 +110,12 @@ class Design:
 
 
 def transparency_error(
-    axis: str, K: float, b: float, *, band: tuple[float, float] = BAND, compensator: Compensator = PRINTED
+    axis: str,
+    K: float,
+    b: float,
+    *,
+    band: tuple[float, float] = DESIGN_BAND,
+    compensator: Compensator = PRINTED,
 ) -> float:
     """Rms of |1 - fe/fh| (Eq. 7) over a band [rad/s], evenly in log frequency (Simpson's rule, 401 points)."""
     from scipy.integrate import simpson
@@ -120,7 +133,7 @@ def compare(
     b: float,
     compensators: list[Compensator],
     *,
-    band: tuple[float, float] = BAND,
+    band: tuple[float, float] = DESIGN_BAND,
     impedance: bool = True,
     operator: Operator | None = None,
     at: str = "compensator",
@@ -140,7 +153,9 @@ def compare(
         how: Any = dict(impedance=impedance, operator=operator, at=at, compensator=c)
         K = design_gain(axis, b, **how, **margin)
         if not 0.0 < K < math.inf:
-            raise ParameterError("compensators", c, f"must have a largest K at this margin, it is {K:g}")
+            raise ParameterError(
+                "compensators", c, f"must have a largest K at this margin, it is {K:g}"
+            )
         found = margins.margins(axis, K, b, **how)
         out.append(Design(c, K, transparency_error(axis, K, b, band=band, compensator=c), found))
     return sorted(out, key=lambda d: d.error)

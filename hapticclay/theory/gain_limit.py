@@ -24,10 +24,10 @@ from ..model.operator import NO_HAND, Operator
 from ..model.scenario import RENDERS
 from . import linear_loop
 
-STEP = 1.01  # the frequency grid grows by this factor ...
-LEAST = 1e-60  # nothing crosses at a lower gain, and products of such numbers vanish
-SMALL = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
-NEAR = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
+PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
+LEAST_GAIN = 1e-60  # nothing crosses at a lower gain, and products of such numbers vanish
+SMALL_ANGLE = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
+NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
 
 
 def hand(impedance: bool = True, operator: Operator | None = None) -> Operator | None:
@@ -58,7 +58,7 @@ def gain_limit(
     """Largest compensator gain K up to which the loop of one axis is stable at the nominal pose.
 
     Every gain between 0 and the limit is stable. In continuous time without delay that is the first crossing of the
-    closed-loop polynomial (Eq. 8); otherwise see `lifted` (sampled) and `late` (continuous, the motors late).
+    closed-loop polynomial (Eq. 8); otherwise see `sampled_loop` (sampled) and `delayed_loop` (continuous, the motors late).
 
     Args:
         axis: "x" or "y". b: clay [N.s/m].
@@ -75,17 +75,22 @@ def gain_limit(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    return critical(axis, b, hand(impedance, operator), Ts, delay, render)[0]
+    return critical_gain(axis, b, hand(impedance, operator), Ts, delay, render)[0]
 
 
-def critical(
-    axis: str, b: float, operator: Operator | None, Ts: float | None = None, delay: float = 0.0, render: str = "held"
+def critical_gain(
+    axis: str,
+    b: float,
+    operator: Operator | None,
+    Ts: float | None = None,
+    delay: float = 0.0,
+    render: str = "held",
 ) -> tuple[float, float]:
     """The gain limit and the frequency at which the loop then rings [rad/s]; arguments as `gain_limit`."""
-    loop = family(axis, b, operator, Ts, delay, render)
+    loop = loop_family(axis, b, operator, Ts, delay, render)
     if loop:
-        return first(loop)
-    blank, passive, driven = linear_loop.terms(axis, b, operator)
+        return first_instability(loop)
+    blank, passive, driven = linear_loop.loop_polynomials(axis, b, operator)
     return linear_loop.first_crossing(np.polyadd(blank, passive), driven)
 
 
@@ -99,13 +104,13 @@ def is_stable(
     render: str = "held",
 ) -> bool:
     """Whether the loop is stable at this very K, whatever it is below; other arguments as `gain_limit`."""
-    K, loop = number("K", K, 0.0, above=True), family(axis, b, operator, Ts, delay, render)
+    K, loop = number("K", K, 0.0, above=True), loop_family(axis, b, operator, Ts, delay, render)
     return loop.stable(K) if loop else linear_loop.stable(axis, K, b, operator)
 
 
-def family(
+def loop_family(
     axis: str, b: float, operator: Operator | None, Ts: float | None, delay: float, render: str
-) -> Family | None:
+) -> LoopFamily | None:
     """The loop for every K; None for the one that is a polynomial. Arguments as `gain_limit`.
 
     Raises:
@@ -118,12 +123,12 @@ def family(
     if Ts is not None:
         Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
         number("delay", delay, 0.0, 100.0 * Ts, unit="s")
-        return lifted(axis, b, operator, Ts, delay, render)
-    return late(axis, b, operator, delay, render) if delay else None
+        return sampled_loop(axis, b, operator, Ts, delay, render)
+    return delayed_loop(axis, b, operator, delay, render) if delay else None
 
 
 @dataclass(frozen=True)
-class Family:
+class LoopFamily:
     """A loop for every gain.
 
     Attributes:
@@ -139,9 +144,9 @@ class Family:
     last: float | None = None
 
 
-def first(loop: Family) -> tuple[float, float]:
+def first_instability(loop: LoopFamily) -> tuple[float, float]:
     """Smallest K > 0 at which the loop stops being stable, and where [rad/s]; (inf, nan) if it never does."""
-    found = sorted(crossings(loop))
+    found = sorted(gain_crossings(loop))
     if not loop.stable(0.5 * found[0][0] if found else 1.0):
         return 0.0, math.nan
     for i, (K, omega) in enumerate(found):
@@ -151,7 +156,7 @@ def first(loop: Family) -> tuple[float, float]:
     return math.inf, math.nan
 
 
-def crossings(loop: Family) -> list[tuple[float, float]]:
+def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     """Every (K, omega) with 1 = K h(omega), K > 0.
 
     A pair of them closer than the grid shows as a dip of Im h that keeps its sign; every dip is followed to its bottom.
@@ -167,11 +172,15 @@ def crossings(loop: Family) -> list[tuple[float, float]]:
         return []
     y, ahead = z.imag / np.abs(z), z.real > 0.0
     y[y == 0.0] = 1e-300  # a grid point on a crossing: found from one side
-    spans = [(x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (ahead[:-1] | ahead[1:]))]
+    spans = [
+        (x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (ahead[:-1] | ahead[1:]))
+    ]
     dip = (np.abs(y[1:-1]) <= np.minimum(np.abs(y[:-2]), np.abs(y[2:]))) & (y[:-2] * y[1:-1] > 0.0)
     for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & ahead[1:-1]) + 1:
         sign = math.copysign(1.0, y[i])
-        bottom = minimize_scalar(lambda x, s=sign: s * lean(x), bounds=(x[i - 1], x[i + 1]), method="bounded")
+        bottom = minimize_scalar(
+            lambda x, s=sign: s * lean(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
+        )
         if bottom.fun < 0.0:  # type: ignore[union-attr]
             spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
     omega = [math.exp(brentq(lean, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
@@ -181,14 +190,18 @@ def crossings(loop: Family) -> list[tuple[float, float]]:
     return [(float(k), float(w)) for k, w in zip(K, omega, strict=True) if 0.0 < k < math.inf]
 
 
-def grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
+def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
     """Frequencies from low to high [rad/s], dense in ratio, and denser around |resonances|."""
-    base = np.geomspace(low, high, 2 + int(math.log(high / low) / math.log(STEP)))
-    near = np.multiply.outer(np.abs(resonances), np.concatenate((1.0 - NEAR, [1.0], 1.0 + NEAR))).ravel()
+    base = np.geomspace(low, high, 2 + int(math.log(high / low) / math.log(PHASE_STEP)))
+    near = np.multiply.outer(
+        np.abs(resonances), np.concatenate((1.0 - NEAR_AXIS, [1.0], 1.0 + NEAR_AXIS))
+    ).ravel()
     return np.unique(np.concatenate((base, near[(near > low) & (near < high)])))
 
 
-def late(axis: str, b: float, operator: Operator | None, delay: float, render: str = "held") -> Family:
+def delayed_loop(
+    axis: str, b: float, operator: Operator | None, delay: float, render: str = "held"
+) -> LoopFamily:
     """The continuous loop in which all that the motors do comes late by `delay` [s].
 
     With W = 1/mass of the handle (the gain of Sh), T = Te + Th, and the clay among the motors (held) or not (implicit),
@@ -201,7 +214,7 @@ def late(axis: str, b: float, operator: Operator | None, delay: float, render: s
     cg = np.convolve([1.0, C_POLE, 0.0], [1.0, G[i].damping, G[i].stiffness])
     now = np.convolve(cg, [1.0 + W * th.mass, W * (th.damper + physical * b), W * th.spring])
     then = np.convolve(cg, [S[i].damping + W * (not physical) * b, S[i].stiffness])
-    driven = linear_loop.terms(axis, b, operator)[2]
+    driven = linear_loop.loop_polynomials(axis, b, operator)[2]
     if not th.spring:  # the integrator that moves the handle
         now, driven = now[:-1], driven[:-1]
         then = then[:-1]
@@ -228,15 +241,17 @@ def late(axis: str, b: float, operator: Operator | None, delay: float, render: s
             return (np.polyval(now, s) + np.polyval(rest, s) * np.exp(-s * delay)) / (s + a) ** n
 
         # each zero right of the axis turns F by -pi between 0 and infinity; beyond 1e3 high hardly anything is left
-        turned = turning(F, np.union1d(turns, grid(1e-3 * size.min(), 1e3 * high, roots)))
+        turned = phase_change(
+            F, np.union1d(turns, frequency_grid(1e-3 * size.min(), 1e3 * high, roots))
+        )
         return abs(turned) < 0.5 * np.pi
 
     low, top = 1e-3 * size.min(), max(40.0 / delay, 2.0 * np.abs(roots.imag).max())
     turns = np.linspace(low, top, min(int(4.0 * delay * top), 100_000))
-    return Family(h, np.union1d(turns, grid(low, top, roots)), stable)
+    return LoopFamily(h, np.union1d(turns, frequency_grid(low, top, roots)), stable)
 
 
-def turning(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
+def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
     """How far arg f turns along x [rad]; points are put in between until no step turns by more than 0.5 rad.
 
     NaN if that takes over a million points: a delay of so many turns that no loop survives it.
@@ -252,17 +267,22 @@ def turning(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
     return math.nan
 
 
-def lifted(
-    axis: str, b: float, operator: Operator | None, Ts: float, delay: float = 0.0, render: str = "held"
-) -> Family:
+def sampled_loop(
+    axis: str,
+    b: float,
+    operator: Operator | None,
+    Ts: float,
+    delay: float = 0.0,
+    render: str = "held",
+) -> LoopFamily:
     """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma') x(k), exact at the samples.
 
-    See `matrices`. A loop is stable if every eigenvalue lies within the unit circle, but for the one at z = 1 that
+    See `sampled_matrices`. A loop is stable if every eigenvalue lies within the unit circle, but for the one at z = 1 that
     moves the handle where Th has no spring. Clay of 1e9 N.s/m, or K = 1e-12, put others within rounding of z = 1, so
     the map is of differences, M - 1, and counted from where handle and motors would rest under this delta: the column
     of delta is then exactly zero, and gamma's share of it that of the hand's spring.
     """
-    less, beta, gamma = differences(axis, b, operator, Ts, delay, render)
+    less, beta, gamma = sampled_differences(axis, b, operator, Ts, delay, render)
     i, spring = AXES.index(axis), (operator or NO_HAND).spring
     rest = np.zeros(len(less))
     rest[0] = S[i].stiffness / (S[i].stiffness + S[i].gain * spring)
@@ -276,38 +296,50 @@ def lifted(
 
     def h(omega: np.ndarray) -> np.ndarray:
         out = np.empty(len(omega), dtype=complex)
-        for i in range(0, len(omega), 256):  # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
+        for i in range(
+            0, len(omega), 256
+        ):  # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
             z1 = np.expm1(1j * omega[i : i + 256] * Ts)
-            out[i : i + 256] = np.linalg.solve(z1[:, None, None] * np.eye(n) - less, beta[:, None])[:, :, 0] @ gamma
+            out[i : i + 256] = (
+                np.linalg.solve(z1[:, None, None] * np.eye(n) - less, beta[:, None])[:, :, 0]
+                @ gamma
+            )
         return out
 
     def stable(K: float) -> bool:
-        z1 = eigenvalues(less + max(K, LEAST) * np.outer(beta, gamma))
+        z1 = eigenvalues(less + max(K, LEAST_GAIN) * np.outer(beta, gamma))
         return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
 
     z1 = eigenvalues(free)
     poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    zeros = np.roots(np.trim_zeros(linear_loop.impedance(b, operator)))
+    zeros = np.roots(np.trim_zeros(linear_loop.environment_polynomial(b, operator)))
     resonances = np.concatenate((poles, zeros))
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     turns = np.linspace(low, top, 20 * n)[:-1]
-    return Family(h, np.union1d(turns, grid(low, top * (1.0 - 1e-9), resonances.imag)), stable, top)
+    return LoopFamily(
+        h, np.union1d(turns, frequency_grid(low, top * (1.0 - 1e-9), resonances.imag)), stable, top
+    )
 
 
 def eigenvalues(a: np.ndarray) -> np.ndarray:
     """Eigenvalues of a, shape (n, n), the small ones as exact as the large: from its inverse, where they are large."""
     z = np.linalg.eigvals(a)
     z = z[np.argsort(np.abs(z))]
-    small = int(np.sum(np.abs(z) < SMALL * np.abs(z[-1])))
+    small = int(np.sum(np.abs(z) < SMALL_ANGLE * np.abs(z[-1])))
     if small:
         large = np.linalg.eigvals(np.linalg.inv(a))
         z[:small] = 1.0 / large[np.argsort(-np.abs(large))][:small]
     return z
 
 
-def matrices(
-    axis: str, b: float, operator: Operator | None, Ts: float, delay: float = 0.0, render: str = "held"
+def sampled_matrices(
+    axis: str,
+    b: float,
+    operator: Operator | None,
+    Ts: float,
+    delay: float = 0.0,
+    render: str = "held",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, beta, gamma of the sampled loop x(k+1) = (M + K beta gamma') x(k), x at the sample before it acts.
 
@@ -324,14 +356,19 @@ def matrices(
     Returns:
         M, shape (m, m), beta and gamma, shape (m,); m = 7 + n.
     """
-    less, beta, gamma = differences(axis, b, operator, Ts, delay, render)
+    less, beta, gamma = sampled_differences(axis, b, operator, Ts, delay, render)
     return less + np.eye(len(less)), beta, gamma
 
 
-def differences(
-    axis: str, b: float, operator: Operator | None, Ts: float, delay: float = 0.0, render: str = "held"
+def sampled_differences(
+    axis: str,
+    b: float,
+    operator: Operator | None,
+    Ts: float,
+    delay: float = 0.0,
+    render: str = "held",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M - 1, beta, gamma of `matrices`, M - 1 without the loss of digits of the difference."""
+    """M - 1, beta, gamma of `sampled_matrices`, M - 1 without the loss of digits of the difference."""
     i = AXES.index(choice("axis", axis, AXES))
     physical = choice("render", render, RENDERS) == "implicit"
     th, g, s = operator or NO_HAND, G[i], S[i]
@@ -339,11 +376,22 @@ def differences(
     part = max(delay / Ts - n, 0.0) if delay / Ts - n > 1e-9 else 0.0
     m = 7 + n
     w = 1.0 / (1.0 / s.gain + th.mass)
-    own = np.array([-w * th.spring, -w * (th.damper + physical * b)])  # of the handle's acceleration
-    (rest, new), (head, old) = (_moved(own, w, x * Ts) for x in (1.0 - part, part))  # under u(k-n), after u(k-n-1)
+    own = np.array(
+        [-w * th.spring, -w * (th.damper + physical * b)]
+    )  # of the handle's acceleration
+    (rest, new), (head, old) = (
+        _moved(own, w, x * Ts) for x in (1.0 - part, part)
+    )  # under u(k-n), after u(k-n-1)
 
     u = np.zeros(m)  # u(k) from x(k)
-    u[:6] = [-s.stiffness, -s.damping, g.stiffness, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
+    u[:6] = [
+        -s.stiffness,
+        -s.damping,
+        g.stiffness,
+        0.0,
+        s.stiffness - g.stiffness,
+        s.damping - g.damping,
+    ]
     u /= s.gain
     u[1] -= (not physical) * b
     gamma = np.zeros(m)
@@ -351,7 +399,7 @@ def differences(
     gamma[:2] -= th.mass * own
     gamma[-1] -= th.mass * w
 
-    A, B = controller.held(axis, 1.0, Ts)
+    A, B = controller.held_compensator(axis, 1.0, Ts)
     less = np.zeros((m, m))
     less[:2, :2] = rest + head + rest @ head
     less[:2, -1] = old + rest @ old
@@ -384,7 +432,9 @@ def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]
     if abs(fast) * t > 1.0:
         sums = (pulse - mean(slow * t) * t) / fast
     else:
-        sums = controller.exponential(t * np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]]))[0, 2]
+        sums = controller.matrix_exponential(
+            t * np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]])
+        )[0, 2]
     pulse, sums = pulse.real, sums.real
     change = [[own[0] * sums, pulse], [own[0] * pulse, own[1] * pulse + own[0] * sums]]
     return np.array(change), w * np.array([sums, pulse])

@@ -26,7 +26,11 @@ def steady_speed(K: float, f: float, b: Any) -> Any:
 
 
 def characteristic(
-    axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
+    axis: str,
+    K: float,
+    b: float,
+    operator: Operator | None = None,
+    compensator: Compensator = PRINTED,
 ) -> np.ndarray:
     """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
 
@@ -40,11 +44,11 @@ def characteristic(
     Raises:
         ParameterError: unknown axis, or K or b not finite and >= 0.
     """
-    blank, passive, driven = terms(axis, b, operator, compensator)
+    blank, passive, driven = loop_polynomials(axis, b, operator, compensator)
     return np.polyadd(np.polyadd(blank, passive), number("K", K, 0.0) * driven)
 
 
-def terms(
+def loop_polynomials(
     axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The closed-loop polynomial falls into blank + passive + K driven.
@@ -60,24 +64,34 @@ def terms(
     i = AXES.index(choice("axis", axis, AXES))
     n, c = compensator.fraction
     s = np.array([1.0, S[i].damping, S[i].stiffness])
-    t = impedance(b, operator)
+    t = environment_polynomial(b, operator)
     cg = np.convolve(c, [1.0, G[i].damping, G[i].stiffness])
-    return np.convolve(cg, s), S[i].gain * np.convolve(cg, t), G[i].gain * np.convolve(np.convolve(n, s), t)
+    return (
+        np.convolve(cg, s),
+        S[i].gain * np.convolve(cg, t),
+        G[i].gain * np.convolve(np.convolve(n, s), t),
+    )
 
 
-def device(axis: str, K: float, compensator: Compensator = PRINTED) -> tuple[np.ndarray, np.ndarray]:
+def device_admittance(
+    axis: str, K: float, compensator: Compensator = PRINTED
+) -> tuple[np.ndarray, np.ndarray]:
     """What the handle shows to any impedance: G C + Sh as (numerator, denominator); arguments as `characteristic`."""
-    blank, passive, driven = terms(axis, 0.0, Operator(0.0, 0.0, 1.0), compensator)  # against a unit spring
+    blank, passive, driven = loop_polynomials(
+        axis, 0.0, Operator(0.0, 0.0, 1.0), compensator
+    )  # against a unit spring
     return np.polyadd(passive, number("K", K, 0.0) * driven), blank
 
 
-def impedance(b: float, operator: Operator | None = None) -> np.ndarray:
+def environment_polynomial(b: float, operator: Operator | None = None) -> np.ndarray:
     """Te + Th as coefficients, shape (3,): clay b [N.s/m] and the operator's arm (Eqs. 4, 19)."""
     b, th = number("b", b, 0.0, unit="N.s/m"), operator or NO_HAND
     return np.array([th.mass, th.damper + b, th.spring])
 
 
-def state_space(axis: str, K: float, b: float, operator: Operator | None = None) -> tuple[np.ndarray, np.ndarray]:
+def state_space(
+    axis: str, K: float, b: float, operator: Operator | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """The loop at the nominal pose as z' = A z + B uh, z = (p, p', delta, delta', y, y'), y = G delta.
 
     The servo's law is that of docs/equations.md, section 3; arguments as `characteristic`.
@@ -88,8 +102,12 @@ def state_space(axis: str, K: float, b: float, operator: Operator | None = None)
     i = AXES.index(choice("axis", axis, AXES))
     th, g, s = operator or NO_HAND, G[i], S[i]
     own = 1.0 + s.gain * th.mass  # p'' appears in the hand's force too
-    rest = np.array([-th.spring, -th.damper - b, 0.0, 0.0, 0.0, 0.0])  # force without the hand's mass
-    servo = np.array([-s.stiffness, -s.damping, g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping])
+    rest = np.array(
+        [-th.spring, -th.damper - b, 0.0, 0.0, 0.0, 0.0]
+    )  # force without the hand's mass
+    servo = np.array(
+        [-s.stiffness, -s.damping, g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
+    )
     A, B = np.zeros((6, 6)), np.zeros(6)
     A[0, 1] = A[2, 3] = A[4, 5] = 1.0
     A[1], B[1] = (servo + s.gain * rest) / own, s.gain / own
@@ -124,13 +142,17 @@ def crossing_times(
             z, t = ahead, t + step
         if t >= t_max:
             break
-        h: Any = brentq(lambda h, A=A, z=z, edge=edge: float((expm(A * h) @ z)[0]) - edge, 0.0, step, xtol=1e-15)
+        h: Any = brentq(
+            lambda h, A=A, z=z, edge=edge: float((expm(A * h) @ z)[0]) - edge, 0.0, step, xtol=1e-15
+        )
         z, t = expm(A * h) @ z, t + h
         out.append(t)
     return out
 
 
-def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None = None) -> np.ndarray:
+def closed_loop_poles(
+    axis: str, K: float, b: float, operator: Operator | None = None
+) -> np.ndarray:
     """Poles of the loop at the nominal pose [rad/s], shape (6,); arguments as `characteristic`.
 
     Without a spring in Th one of them is the integrator that moves the handle (s = 0).
@@ -138,7 +160,13 @@ def closed_loop_poles(axis: str, K: float, b: float, operator: Operator | None =
     return np.roots(characteristic(axis, K, b, operator))
 
 
-def stable(axis: str, K: float, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED) -> bool:
+def stable(
+    axis: str,
+    K: float,
+    b: float,
+    operator: Operator | None = None,
+    compensator: Compensator = PRINTED,
+) -> bool:
     """True if no closed-loop pole lies right of the imaginary axis; arguments as `characteristic`."""
     return hurwitz(characteristic(axis, K, b, operator, compensator))
 
@@ -148,13 +176,15 @@ def hurwitz(poly: np.ndarray) -> bool:
     return bool(np.all(np.roots(np.trim_zeros(poly)).real < 0.0))
 
 
-def gain_limit(axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED) -> float:
+def continuous_gain_limit(
+    axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
+) -> float:
     """Largest K up to which the loop is stable at the nominal pose; inf if there is none.
 
     Args:
         axis: "x" or "y". b: clay [N.s/m]. operator: Th; None for Th = 0. compensator: shape of C.
     """
-    blank, passive, driven = terms(axis, b, operator, compensator)
+    blank, passive, driven = loop_polynomials(axis, b, operator, compensator)
     return first_crossing(np.polyadd(blank, passive), driven)[0]
 
 
@@ -170,7 +200,9 @@ def first_crossing(A: np.ndarray, B: np.ndarray) -> tuple[float, float]:
     A_, B_ = on_axis(A), on_axis(B)
     AB = np.convolve(A_, B_.conj())
     omega = positive_roots(AB.imag)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a zero of B on the axis: no K puts a pole there
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # a zero of B on the axis: no K puts a pole there
         K = -np.polyval(AB, omega).real / np.abs(np.polyval(B_, omega)) ** 2
     for i in np.argsort(K):
         if 0.0 < K[i] < math.inf and not hurwitz(np.polyadd(A, (1.0 + 1e-6) * K[i] * B)):

@@ -92,7 +92,7 @@ class Nyquist:
         return self.N + self.P
 
 
-def loop(
+def open_loop(
     axis: str,
     K: float,
     b: float,
@@ -114,7 +114,9 @@ def loop(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    blank, passive, driven = linear_loop.terms(axis, b, gain_limit.hand(impedance, operator), compensator)
+    blank, passive, driven = linear_loop.loop_polynomials(
+        axis, b, gain_limit.hand(impedance, operator), compensator
+    )
     driven = number("K", K, 0.0) * driven
     if choice("at", at, BREAKS) == "force":
         n, d = np.polyadd(passive, driven), blank
@@ -124,11 +126,13 @@ def loop(
 
 
 def nyquist(axis: str, K: float, b: float, *, at: str = "force", **kw) -> Nyquist:
-    """The Nyquist curve and its count; arguments as `loop`."""
-    n, d = loop(axis, K, b, at=at, **kw)
+    """The Nyquist curve and its count; arguments as `open_loop`."""
+    n, d = open_loop(axis, K, b, at=at, **kw)
     size = np.abs(np.concatenate((np.roots(np.trim_zeros(n)), np.roots(np.trim_zeros(d)))))
-    omega = gain_limit.grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
-    return Nyquist(omega, np.polyval(n, 1j * omega) / np.polyval(d, 1j * omega), *encirclements(n, d))
+    omega = gain_limit.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
+    return Nyquist(
+        omega, np.polyval(n, 1j * omega) / np.polyval(d, 1j * omega), *encirclements(n, d)
+    )
 
 
 def encirclements(n: np.ndarray, d: np.ndarray) -> tuple[int, int]:
@@ -160,20 +164,24 @@ def encirclements(n: np.ndarray, d: np.ndarray) -> tuple[int, int]:
         low *= 0.1
     while len(n) < len(d) and near(1j * high) > 1e-3:
         high *= 10.0
-    omega = gain_limit.grid(low, high, np.concatenate((poles, zeros)))
+    omega = gain_limit.frequency_grid(low, high, np.concatenate((poles, zeros)))
     if order <= 0:
         omega = np.concatenate(([1e-9 * low], omega))
-    turned = 2.0 * gain_limit.turning(lambda w: 1.0 + np.polyval(n, 1j * w) / np.polyval(d, 1j * w), omega)
-    return round((max(order, 0) * math.pi - turned) / (2.0 * math.pi)), int(np.sum(poles.real > 0.0))
+    turned = 2.0 * gain_limit.phase_change(
+        lambda w: 1.0 + np.polyval(n, 1j * w) / np.polyval(d, 1j * w), omega
+    )
+    return round((max(order, 0) * math.pi - turned) / (2.0 * math.pi)), int(
+        np.sum(poles.real > 0.0)
+    )
 
 
 def margins(axis: str, K: float, b: float, *, at: str = "compensator", **kw) -> Margins:
-    """Gain, phase, delay and disk margins of the continuous loop; arguments as `loop`.
+    """Gain, phase, delay and disk margins of the continuous loop; arguments as `open_loop`.
 
     All from roots of polynomials. at="compensator": a factor on K, a delay of the compensator alone;
     at="force": a factor on, or a delay of, everything the net force does.
     """
-    n, d = loop(axis, K, b, at=at, **kw)
+    n, d = open_loop(axis, K, b, at=at, **kw)
     if not linear_loop.hurwitz(np.polyadd(n, d)):
         nan = math.nan
         return Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, (nan, nan), nan, nan, nan)
@@ -186,13 +194,19 @@ def margins(axis: str, K: float, b: float, *, at: str = "compensator", **kw) -> 
     less, less_at = _nearest(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
     omega = np.sqrt(linear_loop.positive_roots(np.polysub(square(n), square(d))))
     lag = np.angle(np.polyval(nd, omega)) + np.pi  # how far L is ahead of -1, 0 to 2 pi
-    phase, phase_at = _nearest(np.minimum(lag, 2.0 * np.pi - lag), omega, lag > -1.0, np.argmin, math.inf)
+    phase, phase_at = _nearest(
+        np.minimum(lag, 2.0 * np.pi - lag), omega, lag > -1.0, np.argmin, math.inf
+    )
     delay, delay_at = _nearest(lag / omega, omega, lag > -1.0, np.argmin, math.inf)
-    if len(n) == len(d) and abs(n[0]) >= abs(d[0]):  # L does not fall off: any delay turns it round -1
+    if len(n) == len(d) and abs(n[0]) >= abs(
+        d[0]
+    ):  # L does not fall off: any delay turns it round -1
         delay, delay_at = 0.0, math.inf
-    worst, disk_at = least(-square(np.polysub(d, n)), square(np.polyadd(d, n)))
+    worst, disk_at = least_value(-square(np.polysub(d, n)), square(np.polyadd(d, n)))
     disk = 2.0 / math.sqrt(-worst)
-    return Margins(True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at)
+    return Margins(
+        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
+    )
 
 
 def _nearest(
@@ -214,7 +228,7 @@ def real(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.convolve(linear_loop.on_axis(p), linear_loop.on_axis(q).conj()).real[::-1][::2][::-1]
 
 
-def least(R: np.ndarray, Q: np.ndarray) -> tuple[float, float]:
+def least_value(R: np.ndarray, Q: np.ndarray) -> tuple[float, float]:
     """Smallest value of R/Q over all frequencies, 0 and infinity included, and where [rad/s].
 
     Args:
@@ -225,8 +239,16 @@ def least(R: np.ndarray, Q: np.ndarray) -> tuple[float, float]:
     x = np.concatenate(([0.0], linear_loop.positive_roots(slope)))
     R, Q = np.trim_zeros(R, "f"), np.trim_zeros(Q, "f")
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.nan_to_num(np.polyval(R, x) / np.polyval(Q, x), nan=math.inf, posinf=math.inf, neginf=-math.inf)
-    end = 0.0 if len(R) < len(Q) else R[0] / Q[0] if len(R) == len(Q) else math.copysign(math.inf, R[0])
+        value = np.nan_to_num(
+            np.polyval(R, x) / np.polyval(Q, x), nan=math.inf, posinf=math.inf, neginf=-math.inf
+        )
+    end = (
+        0.0
+        if len(R) < len(Q)
+        else R[0] / Q[0]
+        if len(R) == len(Q)
+        else math.copysign(math.inf, R[0])
+    )
     i = int(np.argmin(value))
     return (float(value[i]), math.sqrt(x[i])) if value[i] <= end else (float(end), math.inf)
 
@@ -258,7 +280,7 @@ def coupled_stability(
     of True beside a margin below 1.
     """
     th = gain_limit.hand(impedance, operator)
-    limit, omega = gain_limit.critical(axis, b, th, Ts, delay, render)
+    limit, omega = gain_limit.critical_gain(axis, b, th, Ts, delay, render)
     good = gain_limit.is_stable(axis, K, b, th, Ts, delay, render)
     how = (
         "eigenvalues of the exact sampled model"
@@ -267,12 +289,16 @@ def coupled_stability(
         if delay
         else "roots of the closed-loop polynomial"
     )
-    hand = f"the hand is {th.mass:g} s^2 + {th.damper:g} s + {th.spring:g} N/m" if th else "no hand at the handle"
+    hand = (
+        f"the hand is {th.mass:g} s^2 + {th.damper:g} s + {th.spring:g} N/m"
+        if th
+        else "no hand at the handle"
+    )
     return Verdict(good, limit / K, omega, (LINEAR, hand), f"{how}: exact", "gain limit over K")
 
 
 def small_gain(axis: str, K: float, b: float, *, equation: int = 13, **kw) -> Verdict:
-    """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail; hand as in `loop`.
+    """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail; hand as in `open_loop`.
 
     (11), the same as (10), asks for |L| < 1 and (13), the same as (12), for |G C| < |1/(Te + Th) + Sh|: each
     sufficient, none necessary. (9) asks only that |1 + L| has no zero on the axis, which unstable loops fulfil too.
@@ -286,19 +312,25 @@ def small_gain(axis: str, K: float, b: float, *, equation: int = 13, **kw) -> Ve
     if equation not in (9, 10, 11, 12, 13):
         raise ParameterError("equation", equation, "must be 9, 10, 11, 12 or 13")
     if equation == 9:
-        n, d = loop(axis, K, b, **kw)
-        worst, omega = least(square(np.polyadd(n, d)), square(d))
+        n, d = open_loop(axis, K, b, **kw)
+        worst, omega = least_value(square(np.polyadd(n, d)), square(d))
         how = "extreme of a ratio of polynomials: exact. Necessary for stability, not sufficient"
-        return Verdict(worst > 0.0, math.sqrt(max(worst, 0.0)), omega, (LINEAR,), how, "least |1 + L|")
-    n, d = loop(axis, K, b, at="force" if equation < 12 else "compensator", **kw)
-    worst, omega = least(-square(n), square(d))
+        return Verdict(
+            worst > 0.0, math.sqrt(max(worst, 0.0)), omega, (LINEAR,), how, "least |1 + L|"
+        )
+    n, d = open_loop(axis, K, b, at="force" if equation < 12 else "compensator", **kw)
+    worst, omega = least_value(-square(n), square(d))
     margin = 1.0 / math.sqrt(-worst) if worst else math.inf
     how = "extreme of a ratio of polynomials: exact. Sufficient for stability, not necessary"
     fails = bands(np.polysub(square(n), square(d)))
-    return Verdict(margin > 1.0, margin, omega, (LINEAR,), how, "least right side over left side", fails)
+    return Verdict(
+        margin > 1.0, margin, omega, (LINEAR,), how, "least right side over left side", fails
+    )
 
 
-def transparency(axis: str, K: float, b: float, omega: np.ndarray, *, compensator: Compensator = PRINTED) -> np.ndarray:
+def transparency(
+    axis: str, K: float, b: float, omega: np.ndarray, *, compensator: Compensator = PRINTED
+) -> np.ndarray:
     """fe/fh, the share of the hand's force that is the clay's (Eq. 7); the hand does not matter.
 
     Args:
@@ -307,14 +339,10 @@ def transparency(axis: str, K: float, b: float, omega: np.ndarray, *, compensato
     Returns:
         Complex, shape (n,). At omega = 0 it is K b/(10 + K b) with the printed compensator.
     """
-    e, d = linear_loop.device(axis, K, compensator)
+    e, d = linear_loop.device_admittance(axis, K, compensator)
     s = 1j * np.asarray(omega, dtype=float)
     felt = number("b", b, 0.0, unit="N.s/m") * np.polyval(e, s)
     return felt / (felt + np.polyval(d[:-1], s))
-
-
-# MERGED theory.robustness
-# Stability with every hand in a box: mass, damper and spring of Th each in a range, and the rigid arm.
 
 
 FIELDS = ("mass", "damper", "spring")
@@ -340,13 +368,18 @@ class Box:
 
     def corners(self) -> list[Operator]:
         """The eight corners, each once."""
-        return [Operator(*x) for x in sorted(set(itertools.product(self.mass, self.damper, self.spring)))]
+        return [
+            Operator(*x)
+            for x in sorted(set(itertools.product(self.mass, self.damper, self.spring)))
+        ]
 
     def sample(self, n: int, seed: int = 0) -> list[Operator]:
         """n members, uniform within the box."""
         x = np.random.default_rng(seed).uniform(size=(n, 3))
         ranges = np.array([self.mass, self.damper, self.spring])
-        return [Operator(*row) for row in (ranges[:, 0] + x * (ranges[:, 1] - ranges[:, 0])).tolist()]
+        return [
+            Operator(*row) for row in (ranges[:, 0] + x * (ranges[:, 1] - ranges[:, 0])).tolist()
+        ]
 
 
 @dataclass(frozen=True)
@@ -373,9 +406,9 @@ def critical_hand(
     A + E Th, so the pole s = j omega asks for one value Th = -A/E. The values of the box at omega are a rectangle,
     spring - mass omega^2 by omega damper: -A/E lies in it where four polynomials in omega^2 have the right sign.
     """
-    blank, passive, driven = linear_loop.terms(axis, b, None, compensator)
+    blank, passive, driven = linear_loop.loop_polynomials(axis, b, None, compensator)
     A = np.polyadd(np.polyadd(blank, passive), K * driven)
-    E = linear_loop.device(axis, K, compensator)[0]
+    E = linear_loop.device_admittance(axis, K, compensator)[0]
     R, Q = real(-A, E), square(E)  # -A/E = R/Q + j omega X/Q
     X = np.convolve(linear_loop.on_axis(-A), linear_loop.on_axis(E).conj()).imag[::-1][1::2][::-1]
     (m0, m1), (d0, d1), (k0, k1) = box.mass, box.damper, box.spring
@@ -396,7 +429,10 @@ def critical_hand(
 
 def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, float]:
     """The hand of the box whose value at omega^2 = x is real + j omega damper."""
-    low, high = max(box.mass[0], (box.spring[0] - real) / x), min(box.mass[1], (box.spring[1] - real) / x)
+    low, high = (
+        max(box.mass[0], (box.spring[0] - real) / x),
+        min(box.mass[1], (box.spring[1] - real) / x),
+    )
     mass = min(max(0.5 * (low + high), box.mass[0]), box.mass[1])
     spring = min(max(real + mass * x, box.spring[0]), box.spring[1])
     return Operator(mass, min(max(damper, box.damper[0]), box.damper[1]), spring), math.sqrt(x)
@@ -409,8 +445,8 @@ def rigid_limit(axis: str, compensator: Compensator = PRINTED) -> tuple[float, f
     paper says below Eq. 13 that no compensator serves a rigid arm; that is what its sufficient condition says, not
     what the loop does.
     """
-    driven = linear_loop.device(axis, 1.0, compensator)[0]
-    passive = linear_loop.device(axis, 0.0, compensator)[0]
+    driven = linear_loop.device_admittance(axis, 1.0, compensator)[0]
+    passive = linear_loop.device_admittance(axis, 0.0, compensator)[0]
     return linear_loop.first_crossing(passive, np.polysub(driven, passive))
 
 
@@ -440,37 +476,50 @@ def worst_case(
     if not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
     if Ts is None and not delay:
-        limit, omega, hand = _exact(axis, b, box, compensator)
+        limit, omega, hand = _exact_worst_case(axis, b, box, compensator)
         how = "zero exclusion, its value set a rectangle at every frequency: exact"
     else:
         if compensator != PRINTED:
-            raise ParameterError("compensator", compensator, "must be the printed one with sampling or delay")
+            raise ParameterError(
+                "compensator", compensator, "must be the printed one with sampling or delay"
+            )
         members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))
-        found = [(*gain_limit.critical(axis, b, th, Ts, delay, render), th) for th in members]
+        found = [(*gain_limit.critical_gain(axis, b, th, Ts, delay, render), th) for th in members]
         limit, omega, hand = min(found, key=lambda x: x[0])
         how = f"sampled: the corners and {samples} random members, no proof for those between"
     if box.rigid:
         stiff, at = rigid_limit(axis, compensator)
         if stiff < limit:
             limit, omega, hand = stiff, at, None
-        how += "; the rigid arm by the zeros of G C + Sh" + (", in continuous time" if Ts or delay else ", exact")
-    verdict = Verdict(K < limit, limit / K, omega, (LINEAR, f"hand in {box}"), how, "worst gain limit over K")
+        how += "; the rigid arm by the zeros of G C + Sh" + (
+            ", in continuous time" if Ts or delay else ", exact"
+        )
+    verdict = Verdict(
+        K < limit, limit / K, omega, (LINEAR, f"hand in {box}"), how, "worst gain limit over K"
+    )
     return WorstCase(verdict, limit, hand)
 
 
-def _exact(axis: str, b: float, box: Box, compensator: Compensator) -> tuple[float, float, Operator | None]:
+def _exact_worst_case(
+    axis: str, b: float, box: Box, compensator: Compensator
+) -> tuple[float, float, Operator | None]:
     def unstable(K: float) -> bool:
         return not linear_loop.stable(axis, K, b, corners[0], compensator) or bool(
             critical_hand(axis, K, b, box, compensator)
         )
 
     corners = box.corners()
-    limit, worst = min(((linear_loop.gain_limit(axis, b, th, compensator), th) for th in corners), key=lambda x: x[0])
+    limit, worst = min(
+        ((linear_loop.continuous_gain_limit(axis, b, th, compensator), th) for th in corners),
+        key=lambda x: x[0],
+    )
     top = min(limit, 1e6)
     low, high = 0.0, (1.0 + 1e-6) * top
     if limit == math.inf and not unstable(top):
         return limit, math.nan, worst
-    for K in np.geomspace(1e-4 * top, top, 49)[:-1].tolist():  # a window narrower than 20 % in K may be jumped ...
+    for K in np.geomspace(1e-4 * top, top, 49)[
+        :-1
+    ].tolist():  # a window narrower than 20 % in K may be jumped ...
         if unstable(K):
             high = K
             break
@@ -483,5 +532,5 @@ def _exact(axis: str, b: float, box: Box, compensator: Compensator) -> tuple[flo
     if high < (1.0 - 1e-7) * limit:  # ... but no limit of a corner; `critical_hand` is that sharp
         found = critical_hand(axis, high, b, box, compensator)
         return high, found[1] if found else math.nan, found[0] if found else worst
-    blank, passive, driven = linear_loop.terms(axis, b, worst, compensator)
+    blank, passive, driven = linear_loop.loop_polynomials(axis, b, worst, compensator)
     return limit, linear_loop.first_crossing(np.polyadd(blank, passive), driven)[1], worst

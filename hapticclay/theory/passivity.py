@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import number
 from ..model.controller import PRINTED, Compensator
 from . import linear_loop
-from .margins import LINEAR, Verdict, bands, least, real, square
+from .margins import LINEAR, Verdict, bands, least_value, real, square
 
 
 def passivity(axis: str, K: float, b: float, *, compensator: Compensator = PRINTED) -> Verdict:
@@ -27,17 +27,21 @@ def passivity(axis: str, K: float, b: float, *, compensator: Compensator = PRINT
     Returns:
         Verdict with the least Re Z [N.s/m]: as much damping the clay has to spare, or lacks.
     """
-    e, d = linear_loop.device(axis, K, compensator)
+    e, d = linear_loop.device_admittance(axis, K, compensator)
     b = number("b", b, 0.0, unit="N.s/m")
     R, Q = np.polyadd(real(d[:-1], e), b * square(e)), square(e)
-    worst, omega = least(R, Q)
+    worst, omega = least_value(R, Q)
     alone = linear_loop.stable(axis, K, b, None, compensator)
     how = "stable without a hand and Re Z >= 0 at the least of a ratio of polynomials: exact"
     what = "least Re Z [N.s/m]" + ("" if alone else "; not stable without a hand")
-    return Verdict(alone and worst >= 0.0, worst, omega, (LINEAR, "continuous time"), how, what, bands(-R))
+    return Verdict(
+        alone and worst >= 0.0, worst, omega, (LINEAR, "continuous time"), how, what, bands(-R)
+    )
 
 
-def colgate_schenkel(H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = 20_001) -> Verdict:
+def colgate_schenkel(
+    H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = 20_001
+) -> Verdict:
     """Passivity of a sampled virtual object behind a physical damper.
 
     Necessary and sufficient (Colgate, Schenkel, J. Robotic Systems 14, 1997):
@@ -48,13 +52,21 @@ def colgate_schenkel(H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: 
         H: pulse transfer function from sampled position to held force [N/m] at complex z, shape (n,) to (n,).
         Ts: sample [s]. damping: of the device itself, physical [N.s/m]. n: frequencies looked at.
     """
-    Ts, damping = number("Ts", Ts, 0.0, above=True, unit="s"), number("damping", damping, 0.0, unit="N.s/m")
+    Ts, damping = (
+        number("Ts", Ts, 0.0, above=True, unit="s"),
+        number("damping", damping, 0.0, unit="N.s/m"),
+    )
     theta = np.linspace(0.0, np.pi, n)[1:]
-    need = 0.25 * Ts / np.sin(0.5 * theta) ** 2 * (-np.expm1(-1j * theta) * H(np.exp(1j * theta))).real
+    need = (
+        0.25 * Ts / np.sin(0.5 * theta) ** 2 * (-np.expm1(-1j * theta) * H(np.exp(1j * theta))).real
+    )
     i = int(np.argmax(need))
     fails = _runs(theta / Ts, need >= damping)
     how = f"Colgate and Schenkel's test at {n - 1} frequencies up to pi/Ts: sampled"
-    assumptions = ("a mass and a physical damper, nothing else, behind the handle", "position sampled, force held")
+    assumptions = (
+        "a mass and a physical damper, nothing else, behind the handle",
+        "position sampled, force held",
+    )
     return Verdict(
         bool(damping > need[i]),
         damping - float(need[i]),

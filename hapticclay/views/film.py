@@ -33,8 +33,14 @@ FPS = {".mp4": 30, ".webp": 20, ".gif": 20}  # frames a second, by kind of file
 ASPECT = 1.2  # width over height that the cameras are made for, at least
 PLOTS = 0.375  # share of the width that the plots take
 TITLE = 240  # width of a picture from which its title is one line [pixels]
-SAMPLES, SHADOW = 4, 2048  # a pixel, and the width of the shadow's map [pixels], where edges are softened
-ON, OFF = ("enable", "enabled", "on", "true", "1"), ("disable", "disabled", "off", "false", "0")  # MUJOCO_GL
+SAMPLES, SHADOW = (
+    4,
+    2048,
+)  # a pixel, and the width of the shadow's map [pixels], where edges are softened
+ON, OFF = (
+    ("enable", "enabled", "on", "true", "1"),
+    ("disable", "disabled", "off", "false", "0"),
+)  # MUJOCO_GL
 GL = "apt-get install libegl1 libgl1 (or libosmesa6 and MUJOCO_GL=osmesa)"
 
 
@@ -81,7 +87,10 @@ class Lens:
         )  # fmt: skip
         mujoco.mjr_render(self._rect, self._scene, self._context)
         if title:
-            font, corner = mujoco.mjtFont.mjFONT_NORMAL.value, mujoco.mjtGridPos.mjGRID_TOPLEFT.value
+            font, corner = (
+                mujoco.mjtFont.mjFONT_NORMAL.value,
+                mujoco.mjtGridPos.mjGRID_TOPLEFT.value,
+            )
             mujoco.mjr_overlay(font, corner, self._rect, title, "", self._context)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._context)
         return self._pixels[::-1]
@@ -114,13 +123,25 @@ def _opened(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco
         return gl, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     except Exception as error:  # each backend fails in its own ways: ImportError, AttributeError, GLError, FatalError
         if wanted not in ("", "egl", "osmesa"):
-            raise ParameterError("MUJOCO_GL", wanted, "needs a display: unset it, or set egl or osmesa") from None
-        lacks = isinstance(error, AttributeError | ImportError)  # PyOpenGL's way to say that it found no library
-        why = "no library or driver" if lacks else " ".join(str(error).split()) or type(error).__name__
-        raise ParameterError("OpenGL", wanted or "egl", f"cannot be started ({why}): {GL}") from None
+            raise ParameterError(
+                "MUJOCO_GL", wanted, "needs a display: unset it, or set egl or osmesa"
+            ) from None
+        lacks = isinstance(
+            error, AttributeError | ImportError
+        )  # PyOpenGL's way to say that it found no library
+        why = (
+            "no library or driver"
+            if lacks
+            else " ".join(str(error).split()) or type(error).__name__
+        )
+        raise ParameterError(
+            "OpenGL", wanted or "egl", f"cannot be started ({why}): {GL}"
+        ) from None
 
 
-def ready(out: Path, speed: float = 1.0, size: tuple[int, int] = (960, 480)) -> tuple[str, float, tuple[int, int]]:
+def ready(
+    out: Path, speed: float = 1.0, size: tuple[int, int] = (960, 480)
+) -> tuple[str, float, tuple[int, int]]:
     """Whether a film can be made here, to be asked before a long run.
 
     Args:
@@ -134,7 +155,9 @@ def ready(out: Path, speed: float = 1.0, size: tuple[int, int] = (960, 480)) -> 
     """
     kind = choice("out", out.suffix.lower(), tuple(FPS))
     speed = number("speed", speed, 1e-3, 1e3, above=True)
-    width, height = (integer(f"size[{name}]", n, 160, 4096) for name, n in zip(("w", "h"), size, strict=True))
+    width, height = (
+        integer(f"size[{name}]", n, 160, 4096) for name, n in zip(("w", "h"), size, strict=True)
+    )
     _codec(kind)
     gl, context = _opened(mujoco.MjSpec().compile(), 64, 64)
     context.free()
@@ -151,7 +174,9 @@ def _codec(kind: str) -> None:
             imageio_ffmpeg.get_ffmpeg_exe()
         except (ImportError, RuntimeError):
             raise ParameterError(
-                "out", kind, "needs a codec: pip install 'imageio[ffmpeg]'; or take .webp, which needs none"
+                "out",
+                kind,
+                "needs a codec: pip install 'imageio[ffmpeg]'; or take .webp, which needs none",
             ) from None
         return
     try:
@@ -160,7 +185,9 @@ def _codec(kind: str) -> None:
         if kind == ".webp" and not features.check("webp"):
             raise ImportError
     except ImportError:
-        raise ParameterError("out", kind, f"needs a codec: pip install --upgrade pillow, with {kind[1:]}") from None
+        raise ParameterError(
+            "out", kind, f"needs a codec: pip install --upgrade pillow, with {kind[1:]}"
+        ) from None
 
 
 def frames(
@@ -252,14 +279,12 @@ def _write(path: Path, images: Iterator[np.ndarray], kind: str, fps: int) -> Non
     if kind != ".mp4":
         imageio.mimwrite(path, [x.copy() for x in images], duration=1000 // fps, loop=0)
         return
-    writer = imageio.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7)  # type: ignore[arg-type]
+    writer = imageio.get_writer(
+        path, format="FFMPEG", fps=fps, codec="libx264", macro_block_size=2, quality=7
+    )  # type: ignore[arg-type]
     with writer:
         for image in images:
             writer.append_data(image)
-
-
-# MERGED views.running
-# Plots that run along with a film: the axes drawn once, the curves inked onto them as time goes on.
 
 
 DPI = 100
@@ -298,7 +323,9 @@ class Running:
         return self.image
 
 
-def draw(record: Record, width: int, height: int) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
+def draw(
+    record: Record, width: int, height: int
+) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
     """The plots before anything runs on them, and the curves that will: axes, x, y, colour."""
     r, count = record, max(1, min(3, height // LEAST[1]))
     roomy = width >= ROOMY[0] and height >= ROOMY[1] * count
@@ -307,7 +334,9 @@ def draw(record: Record, width: int, height: int) -> tuple[Figure, list[tuple[Ax
     x, v, force = 100.0 * r.p[:, i], r.v[:, i], r.fh[:, i]
     ratio, top = r.ratio(r.fe)[:, i], max(float(r.b[:, i].max(initial=0.0)), 1.0)
     ratio = np.clip(ratio, -top, 2.0 * top)  # 0/0 as a run begins or turns
-    usual = np.percentile(np.concatenate((force, r.fe[:, i])), (1.0, 99.0))  # not the spike at a border
+    usual = np.percentile(
+        np.concatenate((force, r.fe[:, i])), (1.0, 99.0)
+    )  # not the spike at a border
     where, when = (f"position {axis} [cm]", "time [s]") if roomy else (f"{axis} [cm]", "t [s]")
     speed, ratio_name = f"v$_{axis}$ [m/s]", "f$_e$/v [N$\\cdot$s/m]"
     plans: Any = (  # x, y to be seen, names of x and y, title where there is room, title where there is not; curves
@@ -332,7 +361,11 @@ def draw(record: Record, width: int, height: int) -> tuple[Figure, list[tuple[Ax
         canvas = FigureCanvasAgg(figure)
         figure.draw_without_rendering()  # which settles the ticks, and so what room they take
         canvas.draw()
-    curves = [(ax, plan[0], y, color) for ax, plan in zip(panels, plans, strict=True) for y, color in plan[-1]]
+    curves = [
+        (ax, plan[0], y, color)
+        for ax, plan in zip(panels, plans, strict=True)
+        for y, color in plan[-1]
+    ]
     return figure, curves
 
 
@@ -351,7 +384,9 @@ class _Pen:
         self.at -= 0.5  # centres of pixels
         x0, y0, x1, y1 = np.rint(ax.bbox.extents).astype(int)
         self.low, self.high = (x0, image.shape[0] - y1), (x1, image.shape[0] - y0)
-        self.at = np.clip(self.at, np.array(self.low) - 9, np.array(self.high) + 9)  # a spike leaves the panel soon
+        self.at = np.clip(
+            self.at, np.array(self.low) - 9, np.array(self.high) + 9
+        )  # a spike leaves the panel soon
 
     def draw(self, n: int) -> None:
         end = int(np.searchsorted(self.index, n))
@@ -372,7 +407,9 @@ class _Pen:
                 np.maximum.at(self.ink, (py[inside], px[inside]), dab)
         window = np.s_[low[1] : high[1], low[0] : high[0]]
         ink, paper = self.ink[window][..., None], self.image[window].astype(np.float32)
-        paper = np.where(ink > 0.0, self.paper[window] + ink * (self.color - self.paper[window]), paper)
+        paper = np.where(
+            ink > 0.0, self.paper[window] + ink * (self.color - self.paper[window]), paper
+        )
         self.image[window] = paper.astype(np.uint8)
 
 
@@ -400,4 +437,6 @@ def _clay(ax: Axes, record: Record, i: int) -> None:
     if profile and profile.along == AXES[i] and max(profile.values):
         edges = (-10.0, *profile.edges, 10.0)
         for low, high, b in zip(edges, edges[1:], profile.values, strict=False):
-            ax.axvspan(100.0 * low, 100.0 * high, color=CLAY, alpha=0.6 * b / max(profile.values), lw=0)
+            ax.axvspan(
+                100.0 * low, 100.0 * high, color=CLAY, alpha=0.6 * b / max(profile.values), lw=0
+            )

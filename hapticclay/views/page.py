@@ -33,7 +33,12 @@ POINTS = 400  # of a plot
 TITLE = "hapticclay"
 SKY, GROUND = (236, 240, 245), (214, 220, 228)  # behind the scene, above and below
 RED, GREEN, AMBER = "#c92a2a", "#0d6b52", "#b86b00"  # behind the verdict
-INK = {("hand", 0): "#009E73", ("clay", 0): "#0072B2", ("hand", 1): "#E69F00", ("clay", 1): "#D55E00"}
+INK = {
+    ("hand", 0): "#009E73",
+    ("clay", 0): "#0072B2",
+    ("hand", 1): "#E69F00",
+    ("clay", 1): "#D55E00",
+}
 DARK, STEEL, BLUE, ORANGE = (56, 64, 74), (178, 186, 196), (15, 110, 173), (230, 107, 13)
 
 
@@ -58,11 +63,16 @@ class Page:
             import rich
             import viser
         except ImportError:
-            raise ParameterError("web", "viser", "is not installed: pip install 'hapticclay[web]'") from None
+            raise ParameterError(
+                "web", "viser", "is not installed: pip install 'hapticclay[web]'"
+            ) from None
         self.session = session
         port, local = integer("port", port, 0, 65535), host in LOCAL
         self.console = rich.get_console()
-        self.quiet, self.console.quiet = self.console.quiet, True  # viser's boxes name the port behind the gate
+        self.quiet, self.console.quiet = (
+            self.console.quiet,
+            True,
+        )  # viser's boxes name the port behind the gate
         with socket.create_server((LOCAL[0], 0)) as free:
             behind = free.getsockname()[1]
         self.server = viser.ViserServer(host=LOCAL[0], port=behind, verbose=False, label=TITLE)
@@ -116,33 +126,51 @@ class Page:
         add, ground = self.server.scene, stage.GROUND
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.fov = (0.21, -0.66, 0.64), (0.18, 0.15, -0.04), 0.60
-        add.set_background_image(np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png")
+        add.set_background_image(
+            np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png"
+        )
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)
         add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.5)
         add.add_light_directional(
-            "/lamp", color=(255, 250, 240), intensity=1.2, position=(-0.4, 0.6, 1.1), cast_shadow=True
+            "/lamp",
+            color=(255, 250, 240),
+            intensity=1.2,
+            position=(-0.4, 0.6, 1.1),
+            cast_shadow=True,
         )
         add.world_axes.visible = False
-        add.add_box("/table", (205, 211, 216), (0.92, 0.88, 0.02), position=(0.22, 0.12, ground - 0.012))
+        add.add_box(
+            "/table", (205, 211, 216), (0.92, 0.88, 0.02), position=(0.22, 0.12, ground - 0.012)
+        )
         add.add_grid("/grid", 0.92, 0.88, plane="xy", cell_size=0.1, section_size=0.1, cell_color=(180, 188, 196),
                      section_color=(180, 188, 196), position=(0.22, 0.12, ground - 0.001))  # fmt: skip
         add.add_cylinder("/foot", 0.06, 0.03, DARK, position=(0.0, 0.0, ground + 0.015))
         add.add_cylinder("/shoulder", 0.042, 0.052, STEEL, position=(0.0, 0.0, -0.004))
-        along = (math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0)  # a cylinder that lies along x
+        along = (
+            math.cos(math.pi / 4),
+            0.0,
+            math.sin(math.pi / 4),
+            0.0,
+        )  # a cylinder that lies along x
         self.link1 = add.add_frame("/link1", show_axes=False)
         add.add_cylinder("/link1/bar", 0.017, L1, DARK, wxyz=along, position=(0.5 * L1, 0.0, 0.0))
         self.link2 = add.add_frame("/link2", show_axes=False)
         add.add_cylinder("/link2/bar", 0.012, L2, BLUE, wxyz=along, position=(0.5 * L2, 0.0, 0.0))
         add.add_cylinder("/link2/elbow", 0.026, 0.048, STEEL)
         tip = ground + stage.THICKNESS - self.session.tool.depth
-        add.add_cylinder("/link2/tool", 0.5 * self.session.tool.width, -tip, STEEL, position=(L2, 0.0, 0.5 * tip))
+        add.add_cylinder(
+            "/link2/tool", 0.5 * self.session.tool.width, -tip, STEEL, position=(L2, 0.0, 0.5 * tip)
+        )
         add.add_cylinder("/link2/handle", 0.008, 0.045, DARK, position=(L2, 0.0, 0.022))
         add.add_icosphere("/link2/knob", 0.016, ORANGE, position=(L2, 0.0, 0.052))
         self.clay: Any = None
         if self.stage.field >= 0:
             grid = self.stage.removal
-            x, y = grid.x + self.session.scenario.origin[0], grid.y + self.session.scenario.origin[1]
+            x, y = (
+                grid.x + self.session.scenario.origin[0],
+                grid.y + self.session.scenario.origin[1],
+            )
             self.plan, faces = _sheet(x, y)
             self.clay = add.add_mesh_simple(
                 "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="front",
@@ -160,18 +188,29 @@ class Page:
 
     def _controls(self, uplot: Any) -> None:
         gui, s = self.server.gui, self.session.scenario
-        gui.configure_theme(control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False)
+        gui.configure_theme(
+            control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
+        )
         self.verdict, self.status = gui.add_html(""), gui.add_markdown("")
         self.run = gui.add_button("Pause")
         reset = gui.add_button("Reset")
         self.keep = gui.add_checkbox("Record", True)
-        self.hold = gui.add_checkbox("Hand holds", False, hint="The hand pulls to the arrows' centre; drag it.")
+        self.hold = gui.add_checkbox(
+            "Hand holds", False, hint="The hand pulls to the arrows' centre; drag it."
+        )
         top = hardest(self.session.given)
-        self.b = gui.add_slider("Clay b [N.s/m]", 0.0, max(3.0 * top, 1.0), 1.0, top, disabled=not top)
+        self.b = gui.add_slider(
+            "Clay b [N.s/m]", 0.0, max(3.0 * top, 1.0), 1.0, top, disabled=not top
+        )
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
         nothing = (np.array([0.0, 1.0]), np.zeros(2))
-        form: Any = {"mode": 1, "scales": {"x": uplot.Scale(time=False)}, "aspect": 2.0, "padding": (12, 4, 0, 0)}
+        form: Any = {
+            "mode": 1,
+            "scales": {"x": uplot.Scale(time=False)},
+            "aspect": 2.0,
+            "padding": (12, 4, 0, 0),
+        }
         self.velocities = {
             i: gui.add_uplot(
                 nothing,
@@ -209,7 +248,9 @@ class Page:
         if slider.min <= slider.value <= slider.max:
             self._locked(act)
         else:
-            slider.value = slider.max if slider.value > slider.max else slider.min  # a change that comes here again
+            slider.value = (
+                slider.max if slider.value > slider.max else slider.min
+            )  # a change that comes here again
 
     def _gain(self) -> None:
         first = self.session.given.gain
@@ -219,13 +260,17 @@ class Page:
         fx, fy = self.session.given.force
         size = math.hypot(fx, fy)
         self.session.push(
-            (self.force.value * fx / size, self.force.value * fy / size) if size else (self.force.value, 0.0)
+            (self.force.value * fx / size, self.force.value * fy / size)
+            if size
+            else (self.force.value, 0.0)
         )
 
     def _hold(self) -> None:
         if self.hold.value:
             x, y, _ = self.target.position
-            self.session.pull((x - self.session.scenario.origin[0], y - self.session.scenario.origin[1]))
+            self.session.pull(
+                (x - self.session.scenario.origin[0], y - self.session.scenario.origin[1])
+            )
         else:
             self.session.pull(None)
 
@@ -253,7 +298,12 @@ class Page:
             new = [f[1] for f in frames[first:]]
             self.shown = len(frames)
             frame, point, q = frames[-1], session.point, list(session.run.angles)
-            clock, ended, paused, verdict = session.clock, session.ended, session.paused, session.verdict()
+            clock, ended, paused, verdict = (
+                session.clock,
+                session.ended,
+                session.paused,
+                session.verdict(),
+            )
             every = max(1, len(frames) // POINTS)
             some = frames[::every] if now - self.plotted > PLOT_EVERY else []
             self.stage.carve(new)
@@ -266,7 +316,11 @@ class Page:
             if point is None:
                 x, y = (a + b for a, b in zip(frame[1], session.scenario.origin, strict=True))
                 self.target.position = (x, y, 0.052)
-            if self.clay and now - self.cut > CUT_EVERY and (self.stage.stale or self.cut == -math.inf):
+            if (
+                self.clay
+                and now - self.cut > CUT_EVERY
+                and (self.stage.stale or self.cut == -math.inf)
+            ):
                 self.stage.stale, self.cut = False, now
                 self.clay.vertices = self._vertices()
         if some:
@@ -301,7 +355,10 @@ def _sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     plan = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     a = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
     faces = np.concatenate(
-        (np.column_stack((a, a + 1, a + len(x))), np.column_stack((a + 1, a + len(x) + 1, a + len(x))))
+        (
+            np.column_stack((a, a + 1, a + len(x))),
+            np.column_stack((a + 1, a + len(x) + 1, a + len(x))),
+        )
     )
     return plan, faces.astype(np.uint32)
 
@@ -334,10 +391,6 @@ def _name(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-# MERGED views.gate
-# A gate before a server that listens on this machine alone: who comes must mean this page, and may need a token.
-
-
 LOCAL = ("127.0.0.1", "localhost", "::1")
 COOKIE = "hapticclay"
 PASS = "X-Hapticclay-Pass"  # header by which the server behind knows whom the gate has let in
@@ -359,7 +412,14 @@ class Gate:
         ParameterError: the address cannot be listened on.
     """
 
-    def __init__(self, host: str, port: int, inner: int, token: str = "", edit: Callable[[bytes], bytes] = bytes):
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        inner: int,
+        token: str = "",
+        edit: Callable[[bytes], bytes] = bytes,
+    ):
         """Listens.
 
         Args:
@@ -371,11 +431,15 @@ class Gate:
         self._loop = asyncio.new_event_loop()
         self._tasks: set[asyncio.Task] = set()
         try:
-            self._server = self._loop.run_until_complete(asyncio.start_server(self._meet, host, port, limit=HEAD))
+            self._server = self._loop.run_until_complete(
+                asyncio.start_server(self._meet, host, port, limit=HEAD)
+            )
         except OSError as error:
             self._loop.close()
             why = error.strerror.lower() if error.strerror else str(error)
-            raise ParameterError("port", port, f"{host} cannot be listened on ({why}): try --port 0, for any") from None
+            raise ParameterError(
+                "port", port, f"{host} cannot be listened on ({why}): try --port 0, for any"
+            ) from None
         self.port = self._server.sockets[0].getsockname()[1]
         self._thread = threading.Thread(target=self._loop.run_forever, name="gate", daemon=True)
         self._thread.start()
@@ -403,11 +467,19 @@ class Gate:
             if refusal:
                 writer.write(refusal)
             elif fields.get("Upgrade", "").lower() == "websocket":
-                await self._pass(head[:-2] + f"{PASS}: {self.secret}\r\n\r\n".encode(), reader, writer)
+                await self._pass(
+                    head[:-2] + f"{PASS}: {self.secret}\r\n\r\n".encode(), reader, writer
+                )
             else:
                 writer.write(await asyncio.wait_for(self._fetch(target), PATIENCE))
             await writer.drain()
-        except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError, TimeoutError):
+        except (
+            OSError,
+            asyncio.IncompleteReadError,
+            asyncio.LimitOverrunError,
+            asyncio.CancelledError,
+            TimeoutError,
+        ):
             pass  # whoever it was has gone, or never was a browser
         finally:
             self._tasks.discard(task)
@@ -428,16 +500,26 @@ class Gate:
         except (ValueError, http.client.HTTPException):
             understood, own, query = False, False, {}
         if not understood:
-            return target, fields, _answer("400 Bad Request", b"hapticclay: not a request for a page\n")
+            return (
+                target,
+                fields,
+                _answer("400 Bad Request", b"hapticclay: not a request for a page\n"),
+            )
         if not own:
             text = b"hapticclay: asked for under another name, or by another page: open the address printed at start\n"
             return target, fields, _answer("403 Forbidden", text)
         cookies = [c.strip().partition("=") for c in fields.get("Cookie", "").split(";")]
-        if not self.token or any(name == COOKIE and self._right(value) for name, _, value in cookies):
+        if not self.token or any(
+            name == COOKIE and self._right(value) for name, _, value in cookies
+        ):
             return target, fields, b""
         if self._right(query.get("token", [""])[0]):
             cookie = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-            return target, fields, _answer("303 See Other", b"", f"Location: /\r\nSet-Cookie: {cookie}\r\n")
+            return (
+                target,
+                fields,
+                _answer("303 See Other", b"", f"Location: /\r\nSet-Cookie: {cookie}\r\n"),
+            )
         text = b"hapticclay: the address lacks the token that was printed at start\n"
         return target, fields, _answer("403 Forbidden", text)
 
@@ -456,19 +538,30 @@ class Gate:
         """The page behind, as an answer of our own."""
         reader, writer = await asyncio.open_connection("127.0.0.1", self.inner)
         try:
-            writer.write(f"GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{self.inner}\r\n\r\n".encode("latin-1"))
+            writer.write(
+                f"GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{self.inner}\r\n\r\n".encode("latin-1")
+            )
             head, _, body = (await reader.read(-1)).partition(b"\r\n\r\n")
         finally:
             writer.close()
         line, _, rest = head.partition(b"\r\n")
         kind = http.client.parse_headers(io.BytesIO(rest)).get("Content-Type", "text/plain")
-        return _answer(line.decode("latin-1").partition(" ")[2] or "502 Bad Gateway", self.edit(body), kind=kind)
+        return _answer(
+            line.decode("latin-1").partition(" ")[2] or "502 Bad Gateway",
+            self.edit(body),
+            kind=kind,
+        )
 
-    async def _pass(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _pass(
+        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
         inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self.inner)
         try:
             inner_writer.write(head)
-            ways = [asyncio.create_task(_copy(*x)) for x in ((reader, inner_writer), (inner_reader, writer))]
+            ways = [
+                asyncio.create_task(_copy(*x))
+                for x in ((reader, inner_writer), (inner_reader, writer))
+            ]
             try:
                 await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
             finally:

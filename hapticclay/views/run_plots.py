@@ -79,13 +79,20 @@ def path(record: Record) -> Figure:
         margin = 0.08 * max(float((high - low).max()), 0.1)
         low, high = low - margin, high + margin
         room = (high - low)[1] * (figure.get_figwidth() - MARGIN) / (figure.get_figheight() - 1.3)
-        wider = max(0.0, 0.5 * (room - (high - low)[0]))  # the axes are as wide as the figure, and so is their title
+        wider = max(
+            0.0, 0.5 * (room - (high - low)[0])
+        )  # the axes are as wide as the figure, and so is their title
         low[0], high[0] = low[0] - wider, high[0] + wider
         _clay_map(figure, ax, record, low, high)
         ax.plot(p[:, 0], p[:, 1], color=BLUE, label="handle")
         ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
         ax.plot(*p[-1], "s", color=BLUE, ms=5, label="end")
-        ax.set(xlabel="position x [cm]", ylabel="position y [cm]", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        ax.set(
+            xlabel="position x [cm]",
+            ylabel="position y [cm]",
+            xlim=(low[0], high[0]),
+            ylim=(low[1], high[1]),
+        )
         ax.set_aspect("equal")
         ax.grid(False)
         figure.legend(loc="outside upper center", ncols=4)
@@ -100,7 +107,10 @@ def _clay_map(figure: Figure, ax: Axes, record: Record, low: Any, high: Any) -> 
         return
     wide = [[-1e4], [1e4]]
     edges = [
-        sorted({100.0 * e for f in (clay.x, clay.y) if f.along == a for e in f.edges} | {wide[0][0], wide[1][0]})
+        sorted(
+            {100.0 * e for f in (clay.x, clay.y) if f.along == a for e in f.edges}
+            | {wide[0][0], wide[1][0]}
+        )
         for a in AXES
     ]
     top = max(max(f.values) for f in (clay.x, clay.y)) or 1.0
@@ -108,10 +118,21 @@ def _clay_map(figure: Figure, ax: Axes, record: Record, low: Any, high: Any) -> 
         for y0, y1 in zip(edges[1], edges[1][1:], strict=False):
             at = {"x": 0.5 * (x0 + x1) / 100.0, "y": 0.5 * (y0 + y1) / 100.0}
             b = [f.values[int(np.searchsorted(f.edges, at[f.along]))] for f in (clay.x, clay.y)]
-            ax.fill_between([x0, x1], y0, y1, color=CLAY, alpha=0.15 + 0.85 * max(b) / top if max(b) else 0.0, lw=0)
+            ax.fill_between(
+                [x0, x1],
+                y0,
+                y1,
+                color=CLAY,
+                alpha=0.15 + 0.85 * max(b) / top if max(b) else 0.0,
+                lw=0,
+            )
             left, right = max(x0, low[0]), min(x1, high[0])
             bottom, up = max(y0, low[1]), min(y1, high[1])
-            if right - left > 0.12 * (high[0] - low[0]) and up - bottom > 0.08 * (high[1] - low[1]) and max(b):
+            if (
+                right - left > 0.12 * (high[0] - low[0])
+                and up - bottom > 0.08 * (high[1] - low[1])
+                and max(b)
+            ):
                 ax.text(
                     right - 0.01 * (high[0] - low[0]), bottom + 0.01 * (high[1] - low[1]),
                     f"b = ({b[0]:g}, {b[1]:g})", ha="right", va="bottom", fontsize=8, color=GREY,
@@ -132,9 +153,20 @@ def force_maneuver(records: Sequence[Record], axis: str = "x", against: str = "t
             where = r.t if against == "time" else 100.0 * r.p[:, i]
             ax.plot(where, r.fh[:, i], color=BLUE, lw=0.9, label="operator, f$_h$")
             if r.scenario.muscle is not None:
-                muscle = Signal(r.scenario.muscle)  # in pieces: of n samples it would hold n times its lines at once
-                uh = np.concatenate([muscle(t)[:, i] for t in np.array_split(r.t, len(r.t) // 4096 + 1)])
-                ax.plot(where, r.scenario.force[i] + uh, color=ORANGE, lw=1.1, ls="--", label="muscle, u$_h$")
+                muscle = Signal(
+                    r.scenario.muscle
+                )  # in pieces: of n samples it would hold n times its lines at once
+                uh = np.concatenate(
+                    [muscle(t)[:, i] for t in np.array_split(r.t, len(r.t) // 4096 + 1)]
+                )
+                ax.plot(
+                    where,
+                    r.scenario.force[i] + uh,
+                    color=ORANGE,
+                    lw=1.1,
+                    ls="--",
+                    label="muscle, u$_h$",
+                )
             ax.set_ylabel(f"force along {axis} [N]")
             _title(figure, ax, [*_parts(r.scenario), r.outcome.code])
             if against != "time":
@@ -189,12 +221,21 @@ def _axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
             for low, high, b in zip(edges, edges[1:], profile.values, strict=False):
                 if b > 0.0:
                     low, high = max(low, -1.0), min(high, 1.0)
-                    ax.axvspan(100.0 * low, 100.0 * high, color=CLAY, alpha=0.6 * b / top, lw=0, label=label)
+                    ax.axvspan(
+                        100.0 * low,
+                        100.0 * high,
+                        color=CLAY,
+                        alpha=0.6 * b / top,
+                        lw=0,
+                        label=label,
+                    )
                     label = "_"
     return figure, panels
 
 
-def _steps(ax: Axes, record: Record, i: int, law: Any, color: str, label: str, style: str = "--") -> None:
+def _steps(
+    ax: Axes, record: Record, i: int, law: Any, color: str, label: str, style: str = "--"
+) -> None:
     """The value of law(b) over the stretch of path that had each b."""
     pieces = record.stretches(AXES[i])
     if len(pieces) > 20:  # an unstable run that chatters over a border
@@ -203,7 +244,9 @@ def _steps(ax: Axes, record: Record, i: int, law: Any, color: str, label: str, s
         x, b = 100.0 * record.p[piece, i], record.b[piece, i]
         if b[0] == b[-1]:
             y = law(float(b[0]))
-            ax.plot([x.min(), x.max()], [y, y], color=color, ls=style, lw=1.4, label=label, zorder=3)
+            ax.plot(
+                [x.min(), x.max()], [y, y], color=color, ls=style, lw=1.4, label=label, zorder=3
+            )
         else:
             ax.plot(x, law(b), color=color, ls=style, lw=1.4, label=label, zorder=3)
         label = "_"

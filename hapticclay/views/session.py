@@ -34,10 +34,25 @@ from ..studies.removal import TOOL, Tool, removed
 from ..theory import linear_loop
 
 FRAME = 1.0 / 60.0  # [s] between two looks at the person
-MOST = 0.05  # longest slice of simulated time; a machine that needs longer for it slows the clock [s]
+MOST_FORCE = (
+    0.05  # longest slice of simulated time; a machine that needs longer for it slows the clock [s]
+)
 HOUR = 3600.0  # longest session [s]
-REACH = (abs(L2 - L1) + 0.05, L1 + L2 - 0.02)  # from the shoulder, of the point that the hand pulls to [m]
-JITTER = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # edges of the histogram of lateness [ms]
+REACH_SHORT = (
+    abs(L2 - L1) + 0.05,
+    L1 + L2 - 0.02,
+)  # from the shoulder, of the point that the hand pulls to [m]
+JITTER = (
+    0.0,
+    1.0,
+    2.0,
+    5.0,
+    10.0,
+    20.0,
+    50.0,
+    100.0,
+    1000.0,
+)  # edges of the histogram of lateness [ms]
 RECENT = 60  # frames over which the real-time factor is shown
 CALM = 1.0  # without growing swings until an unstable arm is called calm again [s]
 
@@ -73,7 +88,9 @@ class Pull:
 
     def mean(self, begin: Any, end: Any) -> np.ndarray:
         """Mean force over [begin, end] [s], as signals.Signal.mean [N]."""
-        return np.array(self.force) + self.spring * self.at(0.5 * (np.asarray(begin) + np.asarray(end)))
+        return np.array(self.force) + self.spring * self.at(
+            0.5 * (np.asarray(begin) + np.asarray(end))
+        )
 
 
 class _Live(Leapfrog):
@@ -84,10 +101,10 @@ class _Live(Leapfrog):
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        _written_out(leapfrog.vary, self.last)  # now, not while the hand waits
+        _written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
-        self.watch = monitor.Watch(replace(scenario, muscle=Multisine()))
+        self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
         self.keeping = True
         self.gains = [(0, scenario.gain)]  # index of the first sample with it
 
@@ -103,7 +120,7 @@ class _Live(Leapfrog):
         if scenario.gain != self.scenario.gain:
             self.gains.append((self.i, scenario.gain))
         self.scenario = scenario
-        self.whole = loop.coefficients(scenario, scenario.dt, scenario.dt)
+        self.whole = loop.loop_coefficients(scenario, scenario.dt, scenario.dt)
         self.watch.scenario = replace(scenario, muscle=Multisine())
         if scenario.clay is not None:
             self.regions.change(scenario.clay, self.t)
@@ -140,11 +157,11 @@ class Clock:
         passed = FRAME if self._then is None else now - self._then
         self._then = now
         self._owed += passed
-        due = min(self._owed, MOST)
+        due = min(self._owed, MOST_FORCE)
         self._owed -= due
-        self.slow = self._owed > 0.5 * MOST
-        if self._owed > MOST:  # the rest will never be made good
-            self._owed = MOST
+        self.slow = self._owed > 0.5 * MOST_FORCE
+        if self._owed > MOST_FORCE:  # the rest will never be made good
+            self._owed = MOST_FORCE
         self.frames += 1
         self.real += passed
         self.simulated += due
@@ -160,7 +177,9 @@ class Clock:
     @property
     def factor(self) -> float:
         """Simulated over real time, of late."""
-        real, simulated = (sum(x) for x in zip(*self._recent, strict=True)) if self._recent else (1.0, 1.0)
+        real, simulated = (
+            (sum(x) for x in zip(*self._recent, strict=True)) if self._recent else (1.0, 1.0)
+        )
         return simulated / real
 
 
@@ -173,7 +192,9 @@ class Session:
             each slice, for plots that run along: t [s], the others (2,).
     """
 
-    def __init__(self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1):
+    def __init__(
+        self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
+    ):
         """A session begins at the start of the scenario; its own force, length and t_max do not count.
 
         Args:
@@ -191,7 +212,9 @@ class Session:
         """Begins anew with a scenario: clay whole, record empty."""
         for field, value in (("control", "continuous"), ("integrator", "fast")):
             if getattr(scenario, field) != value:
-                raise ParameterError(field, getattr(scenario, field), f"must be {value!r} where a person takes part")
+                raise ParameterError(
+                    field, getattr(scenario, field), f"must be {value!r} where a person takes part"
+                )
         self.given = scenario
         self.scenario = played(scenario, self.stiffness)
         self.run = _Live(self.scenario, self.every)
@@ -236,10 +259,12 @@ class Session:
         """K now."""
         return self.scenario.gain
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> LiveVerdict:
         """What the monitor of the run, and its gain limit, say now."""
         s, onset = self.scenario, self.run.watch.onset
-        return verdict(self.gain, limits(self.b, s.operator), onset, self.t - self._swung < CALM)
+        return live_verdict(
+            self.gain, live_gain_limits(self.b, s.operator), onset, self.t - self._swung < CALM
+        )
 
     def pull(self, point: tuple[float, float] | None) -> None:
         """The hand pulls to this point [m] from now on, as far as the arm reaches; None lets go."""
@@ -299,7 +324,9 @@ class Session:
         extra = {
             "removed": volume,
             "removal_rate": rate,
-            "target": np.column_stack([np.interp(out.t, knots[:, 0], knots[:, 1 + i]) for i in (0, 1)]),
+            "target": np.column_stack(
+                [np.interp(out.t, knots[:, 0], knots[:, 1 + i]) for i in (0, 1)]
+            ),
             "gain": np.array([gain for _, gain in run.gains])[which],
         }
         clock = self.clock
@@ -317,9 +344,15 @@ class Session:
         after = np.searchsorted(out.t, t)
         begin = out.t[np.maximum(after - 1, 0)]
         end = np.append(out.t, math.inf)[after]
-        off = (t < out.t[-1]) & ((after == 0) | (end - begin > 1.5 * self.every * self.scenario.dt)) & (t != end)
+        off = (
+            (t < out.t[-1])
+            & ((after == 0) | (end - begin > 1.5 * self.every * self.scenario.dt))
+            & (t != end)
+        )
         order = np.argsort(np.concatenate((out.t, t[off])), kind="stable")
-        way = replace(out, p=np.concatenate((out.p, p[off]))[order], v=np.concatenate((out.v, v[off]))[order])
+        way = replace(
+            out, p=np.concatenate((out.p, p[off]))[order], v=np.concatenate((out.v, v[off]))[order]
+        )
         kept = np.argsort(order)[: len(out.t)]
         volume, rate = removed(way, self.tool.width, self.tool.depth)
         return volume[kept], rate[kept]
@@ -347,7 +380,7 @@ class Session:
         x, y = (a + o for a, o in zip(point, self.scenario.origin, strict=True))
         x = x or 1e-9  # the shoulder itself lies in no direction
         r = math.hypot(x, y)
-        scale = min(max(r, REACH[0]), REACH[1]) / r
+        scale = min(max(r, REACH_SHORT[0]), REACH_SHORT[1]) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
 
 
@@ -357,7 +390,14 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
     th = scenario.operator or Operator()
     hand = Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)
     return replace(
-        scenario, operator=hand, force=(0.0, 0.0), muscle=None, command=None, length=None, t_max=HOUR, stop=False
+        scenario,
+        operator=hand,
+        force=(0.0, 0.0),
+        muscle=None,
+        command=None,
+        length=None,
+        t_max=HOUR,
+        stop=False,
     )
 
 
@@ -371,10 +411,6 @@ def scaled(clay: Clay | None, factor: float) -> Clay | None:
         return replace(f, values=times(f.values), growth=times(f.growth))
 
     return None if clay is None else Clay(x=law(clay.x), y=law(clay.y))
-
-
-# MERGED views.player
-# Plays in real time, beside whatever is shown: a session that a person takes part in, or a record.
 
 
 class Replay:
@@ -401,14 +437,20 @@ class Replay:
             return np.empty((0, 2))
         self.t += seconds
         before = self.n
-        self.n = int(np.searchsorted(self.source.t, self.t, "right").clip(1, len(self.source.t))) - 1
+        self.n = (
+            int(np.searchsorted(self.source.t, self.t, "right").clip(1, len(self.source.t))) - 1
+        )
         self.frames.append(self._frame(self.n))
         return self.source.p[before : self.n + 1]
 
     @property
     def gain(self) -> tuple[float, float]:
         """K now."""
-        x, y = self.source.extra["gain"][self.n].tolist() if "gain" in self.source.extra else self.scenario.gain
+        x, y = (
+            self.source.extra["gain"][self.n].tolist()
+            if "gain" in self.source.extra
+            else self.scenario.gain
+        )
         return x, y
 
     @property
@@ -417,12 +459,12 @@ class Replay:
         x, y = self.source.b[self.n].tolist()
         return x, y
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> LiveVerdict:
         """As of a session; what the monitor found is the outcome of the record."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
-        limit = limits(self.b, s.operator) if s.control == "continuous" else None
-        return verdict(self.gain, limit, r.outcome if found else None, True)
+        limit = live_gain_limits(self.b, s.operator) if s.control == "continuous" else None
+        return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
     def _frame(self, n: int) -> tuple:
         r = self.source
@@ -454,7 +496,10 @@ class Player(threading.Thread):
 
     def __init__(self, play: Session | Replay):
         super().__init__(name="player", daemon=True)
-        self.play, self.lock = play, threading.RLock()  # what changes a page is told of the change at once
+        self.play, self.lock = (
+            play,
+            threading.RLock(),
+        )  # what changes a page is told of the change at once
         self.error: Exception | None = None
         self._stop_now = threading.Event()
 
@@ -481,12 +526,8 @@ class Player(threading.Thread):
             raise self.error
 
 
-# MERGED views.verdict
-# What to say of the stability of the loop while it runs.
-
-
 @dataclass(frozen=True)
-class Verdict:
+class LiveVerdict:
     """What to say of the loop now.
 
     Attributes:
@@ -497,9 +538,12 @@ class Verdict:
     unstable: bool
 
 
-def verdict(
-    gain: tuple[float, float], limit: tuple[float, float] | None, onset: Outcome | None, swings: bool
-) -> Verdict:
+def live_verdict(
+    gain: tuple[float, float],
+    limit: tuple[float, float] | None,
+    onset: Outcome | None,
+    swings: bool,
+) -> LiveVerdict:
     """Says what the stability monitor has found, or else how far the gain is from its limit.
 
     Args:
@@ -507,10 +551,14 @@ def verdict(
             found. swings: whether the arm still swings.
     """
     far = limit or (math.inf, math.inf)
-    above = [f"K{a} {k:.3g} > {most:.3g}" for a, k, most in zip(AXES, gain, far, strict=True) if k > most]
+    above = [
+        f"K{a} {k:.3g} > {most:.3g}" for a, k, most in zip(AXES, gain, far, strict=True) if k > most
+    ]
     text = "stable"
     if onset is not None and swings:
-        text = f"UNSTABLE since {onset.time:.1f} s: {onset.cause}" + (f" of {onset.axis}" if onset.axis else "")
+        text = f"UNSTABLE since {onset.time:.1f} s: {onset.cause}" + (
+            f" of {onset.axis}" if onset.axis else ""
+        )
     elif above:
         text = "beyond the limit of K"
     elif onset is not None:
@@ -520,10 +568,13 @@ def verdict(
     elif limit:
         each = ("none" if most == math.inf else f"{most:.3g}" for most in limit)
         text += f"; limit of K here: {'none' if limit == (math.inf, math.inf) else ', '.join(each)}"
-    return Verdict(text, bool(onset and swings))
+    return LiveVerdict(text, bool(onset and swings))
 
 
-def limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
+def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
     """The gain limit of the linear loop on each axis, with this clay at the handle [N.s/m]; inf for none."""
-    x, y = (linear_loop.gain_limit(axis, damping, operator) for axis, damping in zip(AXES, b, strict=True))
+    x, y = (
+        linear_loop.continuous_gain_limit(axis, damping, operator)
+        for axis, damping in zip(AXES, b, strict=True)
+    )
     return x, y

@@ -13,14 +13,19 @@ from ..stepping.engine import _compose, _sound, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
 
 CAMERAS = ("room", "top", "close")
-PALE, DEEP = np.array([222, 168, 132]), np.array([186, 100, 62])  # clay of the least and of the most damping
+PALE, DEEP = (
+    np.array([222, 168, 132]),
+    np.array([186, 100, 62]),
+)  # clay of the least and of the most damping
 HIDDEN = (0.0, 0.0, -5.0)  # where the target is when nobody pulls [m]
 
 
 def cut_axes(scenario: Scenario) -> tuple[int, ...]:
     """The axes that plots beside a picture show: those along which the clay is laid out, x where there is none."""
     clay = scenario.clay
-    return tuple(sorted({AXES.index(f.along) for f in (clay.x, clay.y)})) if clay is not None else (0,)
+    return (
+        tuple(sorted({AXES.index(f.along) for f in (clay.x, clay.y)})) if clay is not None else (0,)
+    )
 
 
 def hardest(scenario: Scenario) -> float:
@@ -45,7 +50,9 @@ class Stage:
         if scenario.clay is not None:
             low, high = [np.array([grid.x[j], grid.y[j]]) + origin for j in (0, -1)]
             rows, columns = len(grid.y), len(grid.x)
-            clay = Block((low[0], low[1]), (high[0], high[1]), rows, columns, THICKNESS, self._colors())
+            clay = Block(
+                (low[0], low[1]), (high[0], high[1]), rows, columns, THICKNESS, self._colors()
+            )
         self.model = picture(clay, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if clay else -1
@@ -93,7 +100,9 @@ class Stage:
         top = hardest(self.scenario) or 1.0
         b = np.zeros(self.removal.cut.shape)
         for f in (clay.x, clay.y):
-            along = np.array(f.values)[np.searchsorted(f.edges, self.removal.x if f.along == "x" else self.removal.y)]
+            along = np.array(f.values)[
+                np.searchsorted(f.edges, self.removal.x if f.along == "x" else self.removal.y)
+            ]
             b = np.maximum(b, along[None, :] if f.along == "x" else along[:, None])
         rng = np.random.default_rng(0)  # a little grain, as clay has
         grain = 1.0 + 0.03 * rng.standard_normal(b.shape)[..., None]
@@ -134,11 +143,21 @@ def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
             _skin(spec.body(body) if body else spec.worldbody, *skin)
         surface = GROUND + (clay.thickness if clay else THICKNESS)
         body = spec.body("link2").add_body(name="tool", pos=(L2, 0.0, 0.0))
-        _skin(body, "cylinder", (0.0, 0.0, surface - tool[1]), (0.0, 0.0, 0.0), 0.5 * tool[0], "steel")
+        _skin(
+            body, "cylinder", (0.0, 0.0, surface - tool[1]), (0.0, 0.0, 0.0), 0.5 * tool[0], "steel"
+        )
         _skin(body, "cylinder", (0.0, 0.0, 0.0), (0.0, 0.0, 0.045), 0.008, "dark")
         _skin(body, "sphere", (0.0, 0.0, 0.052), (0.0, 0.0, 0.052), 0.016, "orange")
         target = spec.worldbody.add_body(name="target", mocap=True)
-        _skin(target, "sphere", (0.0, 0.0, 0.052), (0.0, 0.0, 0.052), 0.012, "", (0.9, 0.42, 0.05, 0.45))
+        _skin(
+            target,
+            "sphere",
+            (0.0, 0.0, 0.052),
+            (0.0, 0.0, 0.052),
+            0.012,
+            "",
+            (0.9, 0.42, 0.05, 0.45),
+        )
         if clay:
             _block(spec, clay)
         model = spec.compile()
@@ -158,10 +177,14 @@ SKIN: Any = (  # body ("" for the world), shape, from, to [m], radius [m], mater
 )
 
 
-def _skin(body, shape: str, begin, end, radius: float, material: str, rgba=(0.5, 0.5, 0.5, 1.0)) -> None:
+def _skin(
+    body, shape: str, begin, end, radius: float, material: str, rgba=(0.5, 0.5, 0.5, 1.0)
+) -> None:
     """Adds a geom that is only seen: it weighs nothing and touches nothing."""
     kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.upper()}")
-    place = {"pos": begin, "size": (radius, 0.0, 0.0)} if begin == end else {"fromto": (*begin, *end)}
+    place = (
+        {"pos": begin, "size": (radius, 0.0, 0.0)} if begin == end else {"fromto": (*begin, *end)}
+    )
     geom = body.add_geom(type=kind, material=material, mass=0.0, contype=0, conaffinity=0, **place)
     geom.size[0] = radius
     if not material:

@@ -20,17 +20,26 @@ from matplotlib.ticker import MultipleLocator, NullFormatter
 from ..errors import ParameterError, choice
 from ..model.constants import AXES, L1, L2, ORIGIN, PATH_LENGTH
 from ..model.operator import Operator
-from ..studies.identification import NOMINAL, Identified, mobility, printed, response, value
-from ..studies.stability_map import Map
-from ..studies.workspace import BLOCKS, Drift
+from ..studies.identification import (
+    NOMINAL_POSE,
+    Identified,
+    endpoint_mobility,
+    printed_form,
+    response,
+    transfer_function,
+)
+from ..studies.stability_map import StabilityMap
+from ..studies.workspace import DRIFT_BLOCKS, Drift
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, STYLE
 
-# MERGED views.plot_boundary
-# The picture of a map of stability.
-
-
 PINK, YELLOW = "#CC79A7", "#E69F00"  # Okabe and Ito
-LINES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PINK, (0, (1, 1))), (YELLOW, (0, (5, 1, 1, 1, 1, 1))))
+LINES = (
+    (BLUE, "-"),
+    (ORANGE, "--"),
+    (GREEN, "-."),
+    (PINK, (0, (1, 1))),
+    (YELLOW, (0, (5, 1, 1, 1, 1, 1))),
+)
 DOTS: Any = (dict(marker="o", mfc=BLACK), dict(marker="D", mfc="white"))
 RUNS: Any = {  # what a run did: marker
     "stable": dict(marker="o", mfc="none"),
@@ -41,7 +50,7 @@ CELL = "#666666"
 SCALE = {"delay-damping": (1e3, "[s]", "[ms]"), "gain-pose": (1e2, "[m]", "[cm]")}  # of the x axis
 
 
-def boundaries(chart: Map) -> Figure:
+def boundaries(chart: StabilityMap) -> Figure:
     """Analytic boundaries as lines, those from runs as dots; what each cell's run did, ringed where theory errs."""
     factor, unit, shown = SCALE.get(chart.kind, (1.0, "", ""))
     with matplotlib.rc_context(STYLE):
@@ -65,13 +74,37 @@ def boundaries(chart: Map) -> Figure:
         if wrong:
             x, y = [factor * c.x for c in wrong], [c.y for c in wrong]
             label = "unlike continuous time, no delay, nominal pose"
-            ax.plot(x, y, ls="none", marker="o", mfc="none", color=ORANGE, ms=13, mew=1.5, label=label)
+            ax.plot(
+                x, y, ls="none", marker="o", mfc="none", color=ORANGE, ms=13, mew=1.5, label=label
+            )
         for (name, (x, y)), dot in zip(chart.found.items(), DOTS, strict=False):
-            ax.plot(factor * np.array(x), _finite(y), color=BLACK, ls="none", ms=7, zorder=5, label=_run(name), **dot)
-        beyond = [factor * a for x, y in chart.found.values() for a, b in zip(x, y, strict=True) if b > high]
+            ax.plot(
+                factor * np.array(x),
+                _finite(y),
+                color=BLACK,
+                ls="none",
+                ms=7,
+                zorder=5,
+                label=_run(name),
+                **dot,
+            )
+        beyond = [
+            factor * a
+            for x, y in chart.found.values()
+            for a, b in zip(x, y, strict=True)
+            if b > high
+        ]
         if beyond:
             at: Any = dict(transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
-            ax.plot(beyond, [1.0] * len(beyond), "^", color=BLACK, ms=8, label="runs: stable up to here", **at)
+            ax.plot(
+                beyond,
+                [1.0] * len(beyond),
+                "^",
+                color=BLACK,
+                ms=8,
+                label="runs: stable up to here",
+                **at,
+            )
         ax.set_ylim(low, high)
         _ticks(ax, chart)
         ax.set_xlabel(_units(chart.x_name.replace(unit, shown) if unit else chart.x_name))
@@ -81,7 +114,7 @@ def boundaries(chart: Map) -> Figure:
     return figure
 
 
-def _span(chart: Map) -> tuple[float, float]:
+def _span(chart: StabilityMap) -> tuple[float, float]:
     """What the y axis shows: every cell, the lines about them, and boundaries found not far beyond."""
     cells = [c.y for c in chart.cells]
     top = 3.0 * max(cells)
@@ -91,12 +124,18 @@ def _span(chart: Map) -> tuple[float, float]:
     return 0.7 * min(cells + found + lines), high
 
 
-def _ticks(ax: Axes, chart: Map) -> None:
+def _ticks(ax: Axes, chart: StabilityMap) -> None:
     """Labels a reader can interpolate between: 1, 2, 5 on a short log axis, powers of ten on a long one."""
     for side in (ax.yaxis,) if chart.kind == "gain-pose" else (ax.xaxis, ax.yaxis):
         low, high = ax.get_xlim() if side is ax.xaxis else ax.get_ylim()
         decades = math.log10(high / low)
-        subs = (1.0, 2.0, 3.0, 5.0, 7.0) if decades < 1.2 else (1.0, 2.0, 5.0) if decades < 3.0 else (1.0,)
+        subs = (
+            (1.0, 2.0, 3.0, 5.0, 7.0)
+            if decades < 1.2
+            else (1.0, 2.0, 5.0)
+            if decades < 3.0
+            else (1.0,)
+        )
         side.set_major_locator(ticker.LogLocator(subs=subs))
         side.set_major_formatter(ticker.FormatStrFormatter("%g"))
         side.set_minor_formatter(ticker.NullFormatter())
@@ -115,12 +154,20 @@ def _run(name: str) -> str:
     return name.replace("runs", "boundary found by runs")
 
 
-def _title(chart: Map) -> str:
+def _title(chart: StabilityMap) -> str:
     s = chart.loop
     kept = [f"{s.axis} axis"]
     if chart.kind != "gain-damping":
-        kept.append(f"K = {s.K:g} 1/kg" if chart.kind == "delay-damping" else f"b = {s.b:g} N$\\cdot$s/m")
-    kept.append("no hand" if s.operator is None else "nominal hand" if s.operator == Operator() else "given hand")
+        kept.append(
+            f"K = {s.K:g} 1/kg" if chart.kind == "delay-damping" else f"b = {s.b:g} N$\\cdot$s/m"
+        )
+    kept.append(
+        "no hand"
+        if s.operator is None
+        else "nominal hand"
+        if s.operator == Operator()
+        else "given hand"
+    )
     kept.append(f"Ts = {1e3 * s.Ts:g} ms" if s.Ts else "continuous time")
     if s.delay and chart.kind != "delay-damping":
         kept.append(f"{1e3 * s.delay:g} ms late")
@@ -129,12 +176,15 @@ def _title(chart: Map) -> str:
     return ", ".join(kept) + "; stable below the lines"
 
 
-# MERGED views.plot_identify
-# Figures of an identification: Bode diagrams like Figs. 4 to 6, and maps over the workspace.
-
-
 FIGURES = {"G": "fig4", "S": "fig5", "Th": "fig6"}  # of the paper
-EQUATIONS = {"Gx": "Eq. 15", "Gy": "Eq. 16", "Sx": "Eq. 17", "Sy": "Eq. 18", "Thx": "Eq. 19", "Thy": "Eq. 19"}
+EQUATIONS = {
+    "Gx": "Eq. 15",
+    "Gy": "Eq. 16",
+    "Sx": "Eq. 17",
+    "Sy": "Eq. 18",
+    "Thx": "Eq. 19",
+    "Thy": "Eq. 19",
+}
 SYMBOLS = {"G": "G", "S": "S", "Th": "T$_h$"}
 SCALES = {"G": "dB re 1 m/m", "S": "dB re 1 m/N", "Th": "dB re 1 N/m"}
 ARM = "#888888"
@@ -155,7 +205,9 @@ def bode(results: Sequence[Identified]) -> Figure:
         for column, result in zip(axes.T, results, strict=True):
             _column(column, result)
         what = results[0].what
-        for ax, label in zip(axes[:, 0], (f"magnitude [{SCALES[what]}]", "phase [deg]", "coherence"), strict=True):
+        for ax, label in zip(
+            axes[:, 0], (f"magnitude [{SCALES[what]}]", "phase [deg]", "coherence"), strict=True
+        ):
             ax.set_ylabel(label)
         figure.align_ylabels(axes[:, 0])
         handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -168,13 +220,17 @@ def _column(axes: Sequence[Axes], result: Identified) -> None:
     what, f = result.what, result.frequency
     fine = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
     block = f"{what}{result.axis}"
-    known, fitted = (response(what, x, fine) for x in (printed(what, result.axis), result.values))
+    known, fitted = (
+        response(what, x, fine) for x in (printed_form(what, result.axis), result.values)
+    )
     share = result.deviation / np.abs(result.response)
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
         ax.plot(fine, part(known), color=ORANGE, lw=2.2, label="printed")
         ax.plot(fine, part(fitted), color=BLACK, ls=":", lw=1.2, label="fitted to the points")
-        marks: Any = dict(fmt="o", ms=4.0, mfc="white", mew=1.2, color=BLUE, elinewidth=1.0, zorder=3)
+        marks: Any = dict(
+            fmt="o", ms=4.0, mfc="white", mew=1.2, color=BLUE, elinewidth=1.0, zorder=3
+        )
         ax.errorbar(f, part(result.response), e, label="simulated arm, with 95 % bars", **marks)
     coherence.plot(f, result.coherence, "o", ms=3.0, color=BLUE)
     low = min(0.9, float(result.coherence.min()))
@@ -184,10 +240,16 @@ def _column(axes: Sequence[Axes], result: Identified) -> None:
     coherence.xaxis.set_major_formatter("{x:g}")
     coherence.xaxis.set_minor_formatter(NullFormatter())
     phase.yaxis.set_major_locator(MultipleLocator(45.0))
-    magnitude.set_title(f"{SYMBOLS[what]}, {result.axis} axis ({EQUATIONS[block]})", fontsize=10, loc="left")
-    text = "\n".join(f"{c.name} {value(c)} {_unit(c.unit)}" for c in result.coefficients)
+    magnitude.set_title(
+        f"{SYMBOLS[what]}, {result.axis} axis ({EQUATIONS[block]})", fontsize=10, loc="left"
+    )
+    text = "\n".join(
+        f"{c.name} {transfer_function(c)} {_unit(c.unit)}" for c in result.coefficients
+    )
     where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
-    magnitude.text(0.04, s=text, transform=magnitude.transAxes, fontsize=8, color="#444444", **where)
+    magnitude.text(
+        0.04, s=text, transform=magnitude.transAxes, fontsize=8, color="#444444", **where
+    )
 
 
 def _unit(unit: str) -> str:
@@ -212,10 +274,14 @@ def workspace(drift: Drift) -> Figure:
         figure = Figure(figsize=(9.4, 5.6))
         axes: Any = figure.subplots(2, 2, sharex=True, sharey=True)
         for i, row in enumerate(axes):
-            top = max(float(drift.mobility[:, i].max()), float(drift.coefficients[:, :, 1, i, 0].max()))
+            top = max(
+                float(drift.mobility[:, i].max()), float(drift.coefficients[:, :, 1, i, 0].max())
+            )
             mesh: Any = None
             for k, ax in enumerate(row):
-                mesh = _cells(ax, drift, drift.coefficients[:, k, BLOCKS.index("S"), i, 0], 1.02 * top)
+                mesh = _cells(
+                    ax, drift, drift.coefficients[:, k, DRIFT_BLOCKS.index("S"), i, 0], 1.02 * top
+                )
                 if k == 0:
                     _contours(ax, i, top)
                 _surroundings(ax)
@@ -223,7 +289,7 @@ def workspace(drift: Drift) -> Figure:
                 ax.set_title(f"gain of S$_{AXES[i]}$, {title}", fontsize=10, loc="left")
             bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
             bar.set_label("gain [1/kg] (line: printed)")
-            bar.ax.axhline(printed("S", AXES[i])[0], color=ORANGE, lw=2.0)
+            bar.ax.axhline(printed_form("S", AXES[i])[0], color=ORANGE, lw=2.0)
             row[0].set_ylabel("world y [m]")
         for ax in axes[1]:
             ax.set_xlabel("world x [m]")
@@ -238,7 +304,8 @@ def _cells(ax: Axes, drift: Drift, values: np.ndarray, top: float) -> Any:
     x, y = (np.arange(z.min(), z.max() + half, drift.spacing) for z in (drift.x, drift.y))
     grid = np.full((len(y), len(x)), np.nan)
     grid[
-        np.rint((drift.y - y[0]) / drift.spacing).astype(int), np.rint((drift.x - x[0]) / drift.spacing).astype(int)
+        np.rint((drift.y - y[0]) / drift.spacing).astype(int),
+        np.rint((drift.x - x[0]) / drift.spacing).astype(int),
     ] = values
     edges = (np.append(z - half, z[-1] + half) for z in (x, y))
     return ax.pcolormesh(*edges, grid, cmap="cividis", vmin=0.0, vmax=top, rasterized=True)
@@ -249,7 +316,7 @@ def _contours(ax: Axes, i: int, top: float) -> None:
     w = np.full((len(y), len(x)), np.nan)
     for n, m in np.ndindex(w.shape):
         if abs(L2 - L1) < np.hypot(x[m], y[n]) < L1 + L2:
-            w[n, m] = mobility(float(x[m]), float(y[n]))[i]
+            w[n, m] = endpoint_mobility(float(x[m]), float(y[n]))[i]
     lines = ax.contour(x, y, w, np.arange(0.1, top, 0.2), colors=BLACK, linewidths=0.8)
     lines.set_path_effects([withStroke(linewidth=2.4, foreground="white")])
     for text in ax.clabel(lines, fmt="%.1f", fontsize=7):
@@ -262,15 +329,16 @@ def _surroundings(ax: Axes) -> None:
         ax.add_patch(Arc((0.0, 0.0), 2.0 * r, 2.0 * r, theta1=0.0, theta2=180.0, color=ARM, lw=2.0))
         ax.plot([], [], color=ARM, lw=2.0, label="_" if n else "limits of the reach")
     ax.plot(0.0, 0.0, "^", color=ARM, ms=7, clip_on=False, label="shoulder")
-    ax.plot((ORIGIN[0], ORIGIN[0] + PATH_LENGTH), (ORIGIN[1], ORIGIN[1]), color=ORANGE, label="default path")
-    ax.plot(*NOMINAL, "o", mfc="none", mec=ORANGE, mew=2.0, ms=9, label="nominal pose")
+    ax.plot(
+        (ORIGIN[0], ORIGIN[0] + PATH_LENGTH),
+        (ORIGIN[1], ORIGIN[1]),
+        color=ORANGE,
+        label="default path",
+    )
+    ax.plot(*NOMINAL_POSE, "o", mfc="none", mec=ORANGE, mew=2.0, ms=9, label="nominal pose")
     ax.set_aspect("equal")
     ax.set_xlim(-0.62, 0.62)
     ax.set_ylim(-0.02, 0.62)
-
-
-# MERGED views.plot_sweep
-# Maps of a sweep: what came of each run, over two of its parameters.
 
 
 OUTCOMES = {  # Okabe and Ito, light to dark by how bad it is
@@ -315,8 +383,16 @@ def absent(table: Any, value: str) -> list[str]:
         return [""] * len(status)
     stem, _, axis = value.rpartition("_")
     b = table[f"b_{axis}"].to_pylist() if stem in ("fe_over_v", "speed") else []
-    free = [x == 0.0 and (stem == "fe_over_v" or any(y > 0.0 for y in b)) for x in b] or [False] * len(status)
-    rest = "border not reached" if value.startswith("crossing") else "no steady speed" if b else "no figure"
+    free = [x == 0.0 and (stem == "fe_over_v" or any(y > 0.0 for y in b)) for x in b] or [
+        False
+    ] * len(status)
+    rest = (
+        "border not reached"
+        if value.startswith("crossing")
+        else "no steady speed"
+        if b
+        else "no figure"
+    )
     return [
         s if s == "refused" else "no clay reached" if f else "" if math.isfinite(x) else rest
         for s, f, x in zip(status, free, figures, strict=True)
@@ -327,7 +403,7 @@ def heat(table: Any, value: str = "status", x: str | None = None, y: str | None 
     """A map of one column over two parameters, the mean (of status the worst) over any others.
 
     Args:
-        table: from sweep.read. value: column to show, of numbers or "status". x, y: parameters; None for the first two
+        table: from sweep.read_sweep. value: column to show, of numbers or "status". x, y: parameters; None for the first two
             that vary.
 
     Raises:
@@ -339,7 +415,11 @@ def heat(table: Any, value: str = "status", x: str | None = None, y: str | None 
     x, y = x or names[0], y or next(n for n in names if n != (x or names[0]))
     for name in (x, y):
         choice("parameter", name, names)
-    choice("column", value, [n for n in table.column_names if n == "status" or str(table[n].type) != "string"])
+    choice(
+        "column",
+        value,
+        [n for n in table.column_names if n == "status" or str(table[n].type) != "string"],
+    )
     px, py = (np.array(table[n]) for n in (x, y))
     kinds = list(OUTCOMES)
     raw = table[value].to_pylist()
@@ -367,7 +447,9 @@ def heat(table: Any, value: str = "status", x: str | None = None, y: str | None 
                 scale("log")
         ax.set(xlabel=_label(x), ylabel=_label(y))
         ax.grid(False)
-        ax.set_title(f"{value.replace('_', ' ')}, {len(z)} runs", fontsize=9, loc="left", color=GREY)
+        ax.set_title(
+            f"{value.replace('_', ' ')}, {len(z)} runs", fontsize=9, loc="left", color=GREY
+        )
     return figure
 
 
@@ -382,9 +464,15 @@ def _mesh(ax: Axes, px, py, z, why, worst: bool, how: dict[str, Any]) -> tuple[A
     for k, (name, look) in enumerate(ABSENT.items()):
         j, i = np.nonzero(kind == k)
         if len(i):
-            corners = np.stack([(ex[i + u], ey[j + v]) for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))])
-            style: Any = dict(facecolor=look["color"], hatch=look["hatch"], edgecolor=HATCH, linewidth=0.0)
-            ax.add_patch(PathPatch(Path.make_compound_path_from_polys(corners.transpose(2, 0, 1)), **style))
+            corners = np.stack(
+                [(ex[i + u], ey[j + v]) for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+            )
+            style: Any = dict(
+                facecolor=look["color"], hatch=look["hatch"], edgecolor=HATCH, linewidth=0.0
+            )
+            ax.add_patch(
+                PathPatch(Path.make_compound_path_from_polys(corners.transpose(2, 0, 1)), **style)
+            )
             handles.append(Patch(label=name, **style))
     return image, handles
 
@@ -397,7 +485,11 @@ def _points(ax: Axes, px, py, z, why, worst: bool, how: dict[str, Any]) -> tuple
         at = why == k
         if at.any():
             marks: Any = dict(
-                marker=look["marker"], color=OUTCOMES.get(name, HATCH), s=size, linewidths=0.8, label=name
+                marker=look["marker"],
+                color=OUTCOMES.get(name, HATCH),
+                s=size,
+                linewidths=0.8,
+                label=name,
             )
             handles.append(ax.scatter(px[at], py[at], **marks))
     return ax.scatter(px[good], py[good], c=z[good], s=size, **how), handles
@@ -413,7 +505,10 @@ def _logarithmic(values: np.ndarray) -> bool:
     """Whether values are spaced more evenly by factors than by differences."""
     if len(values) < 3 or values[0] <= 0.0:
         return False
-    return bool(np.std(np.diff(np.log(values))) * np.ptp(values) < np.std(np.diff(values)) * np.ptp(np.log(values)))
+    return bool(
+        np.std(np.diff(np.log(values))) * np.ptp(values)
+        < np.std(np.diff(values)) * np.ptp(np.log(values))
+    )
 
 
 def _edges(values: np.ndarray) -> np.ndarray:

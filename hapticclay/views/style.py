@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-BLUE, ORANGE, GREEN, BLACK = "#0072B2", "#D55E00", "#009E73", "#222222"  # Okabe and Ito, safe for all eyes
+BLUE, ORANGE, GREEN, BLACK = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#222222",
+)  # Okabe and Ito, safe for all eyes
 CLAY, GREY = "#E8C9A8", "#555555"
 STYLE: Any = {
     "font.size": 10.0,

@@ -15,7 +15,7 @@ from ..model import controller
 from ..model.constants import AXES
 from ..model.operator import Operator
 from ..theory import linear_loop, margins
-from ..theory.design import BAND
+from ..theory.design import DESIGN_BAND
 from .style import BLACK, BLUE, GREEN, ORANGE, STYLE
 
 PINK, SKY = "#CC79A7", "#56B4E9"  # Okabe and Ito
@@ -41,7 +41,7 @@ def bode(
         axis, K, b, impedance, operator, at, compensator: as in `stability.loop`. omega: range shown [rad/s].
     """
     kw: Any = dict(impedance=impedance, operator=operator, at=at, compensator=compensator)
-    n, d = margins.loop(axis, K, b, **kw)
+    n, d = margins.open_loop(axis, K, b, **kw)
     m = margins.margins(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
     L = _response(n, d, w)
@@ -56,7 +56,9 @@ def bode(
         low.axhline(-180.0, color=BLACK, lw=0.8)
         if m.stable and math.isfinite(m.gain[1]):
             at_ = m.gain_omega[1]
-            top.plot([at_, at_], [1.0 / m.gain[1], 1.0], color=ORANGE, lw=3.0, solid_capstyle="butt")
+            top.plot(
+                [at_, at_], [1.0 / m.gain[1], 1.0], color=ORANGE, lw=3.0, solid_capstyle="butt"
+            )
             _note(top, at_, 1.0 / math.sqrt(m.gain[1]), f"gain margin {m.gain[1]:.3g}", ORANGE)
             low.plot(at_, np.interp(at_, w, phase), "o", color=ORANGE, ms=5)
         if m.stable and math.isfinite(m.phase):
@@ -64,7 +66,14 @@ def bode(
             here = float(np.interp(at_, w, phase))
             far = -180.0 + 360.0 * round((here + 180.0) / 360.0)
             low.plot([at_, at_], [far, here], color=GREEN, lw=3.0, solid_capstyle="butt")
-            _note(low, at_, 0.5 * (far + here), f"phase margin {math.degrees(m.phase):.3g}\u00b0", GREEN, "right")
+            _note(
+                low,
+                at_,
+                0.5 * (far + here),
+                f"phase margin {math.degrees(m.phase):.3g}\u00b0",
+                GREEN,
+                "right",
+            )
             top.plot(at_, 1.0, "o", color=GREEN, ms=5)
         top.set_ylabel("magnitude of L")
         low.set_ylabel("phase of L [degrees]")
@@ -109,7 +118,7 @@ def nyquist(
             if m.stable and math.isfinite(m.gain[1]):
                 ax.plot(-1.0 / m.gain[1], 0.0, "o", color=color, ms=4.5, zorder=4)
             if m.stable and math.isfinite(m.phase):
-                z = _response(*margins.loop(axis, K, b, **kw), np.array([m.phase_omega]))[0]
+                z = _response(*margins.open_loop(axis, K, b, **kw), np.array([m.phase_omega]))[0]
                 ax.plot(z.real, z.imag, "s", color=color, ms=4.5, zorder=4)
         ax.plot(-1.0, 0.0, "+", color=BLACK, ms=12, mew=2.0, zorder=5)
         ax.annotate("-1", (-1.0, 0.0), (5.0, -13.0), textcoords="offset points", fontsize=9)
@@ -141,11 +150,13 @@ def small_gain(
     kw: Any = dict(impedance=impedance, operator=operator)
     verdict = margins.small_gain(axis, K, b, **kw)
     good = margins.coupled_stability(axis, K, b, **kw)
-    n, d = margins.loop(axis, K, b, at="compensator", **kw)
+    n, d = margins.open_loop(axis, K, b, at="compensator", **kw)
     w = np.geomspace(*omega, 2000)
     e, blank = (
-        np.polysub(linear_loop.device(axis, K)[0], linear_loop.device(axis, 0.0)[0]),
-        linear_loop.device(axis, 0.0)[1],
+        np.polysub(
+            linear_loop.device_admittance(axis, K)[0], linear_loop.device_admittance(axis, 0.0)[0]
+        ),
+        linear_loop.device_admittance(axis, 0.0)[1],
     )
     left = np.abs(_response(e, blank, w))
     with matplotlib.rc_context(STYLE):
@@ -153,7 +164,9 @@ def small_gain(
         ax = figure.add_subplot()
         label = "fails"
         for low, high in verdict.fails:
-            ax.axvspan(max(low, omega[0]), min(high, omega[1]), color=FAILS, lw=0, label=label, zorder=0)
+            ax.axvspan(
+                max(low, omega[0]), min(high, omega[1]), color=FAILS, lw=0, label=label, zorder=0
+            )
             label = "_"
         ax.loglog(w, left, color=BLUE, label="|G C|")
         right = left / np.abs(_response(n, d, w))
@@ -176,7 +189,7 @@ def transparency(
     designs: list[tuple[str, float, controller.Compensator]],
     *,
     omega: tuple[float, float] = (0.1, 300.0),
-    band: tuple[float, float] = BAND,
+    band: tuple[float, float] = DESIGN_BAND,
 ) -> Figure:
     """How much of the hand's force is the clay's, |fe/fh| (Eq. 7), for some compensators.
 
@@ -194,7 +207,14 @@ def transparency(
         for (label, K, c), (color, style) in zip(designs, CURVES, strict=False):
             share = np.abs(margins.transparency(axis, K, b, w, compensator=c))
             ax.semilogx(w, share, color=color, ls=style, label=label)
-        ax.annotate("ideal", (omega[1], 1.0), (-4.0, 3.0), textcoords="offset points", ha="right", fontsize=9)
+        ax.annotate(
+            "ideal",
+            (omega[1], 1.0),
+            (-4.0, 3.0),
+            textcoords="offset points",
+            ha="right",
+            fontsize=9,
+        )
         ax.set_xlim(*omega)
         ax.set_ylim(bottom=0.0)
         ax.set_xlabel("angular frequency [rad/s], band of the error in grey")
@@ -219,7 +239,9 @@ def _title(ax: Axes, text: str) -> None:
 
 def _note(ax: Axes, x: float, y: float, text: str, color: str, side: str = "left") -> None:
     at = (8.0 if side == "left" else -8.0, 0.0)
-    ax.annotate(text, (x, y), at, textcoords="offset points", ha=side, va="center", color=color, fontsize=9)
+    ax.annotate(
+        text, (x, y), at, textcoords="offset points", ha=side, va="center", color=color, fontsize=9
+    )
 
 
 def _arrow(ax: Axes, L: np.ndarray, color: str) -> None:

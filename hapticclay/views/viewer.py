@@ -30,10 +30,18 @@ from .stage import Stage, cut_axes
 Rows = tuple[tuple[str, str], ...]
 SHARE = 0.32  # of the width, for the plots
 BANNER = 0.05, 36  # of the height, and pixels, at least, for the verdict
-ROWS = 0.24, 290  # of the width, and pixels, at least, that what is written beside the picture takes
+ROWS = (
+    0.24,
+    290,
+)  # of the width, and pixels, at least, that what is written beside the picture takes
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
 RED, GREEN, AMBER = (0.80, 0.13, 0.13), (0.05, 0.42, 0.32), (0.72, 0.42, 0.0)  # behind the verdict
-COLORS = {"blue": (0.0, 0.45, 0.70), "green": (0.0, 0.62, 0.45), "red": (0.84, 0.37, 0.0), "yellow": (0.90, 0.62, 0.0)}
+COLORS = {
+    "blue": (0.0, 0.45, 0.70),
+    "green": (0.0, 0.62, 0.45),
+    "red": (0.84, 0.37, 0.0),
+    "yellow": (0.90, 0.62, 0.0),
+}
 INK = {"hand": ("green", "yellow"), "clay": ("blue", "red")}  # of x, y
 
 
@@ -87,7 +95,9 @@ class Pane:
             self.rows = (*words.rows, ("removed", f"{1e6 * self.stage.removal.volume:.2f} cm3"))
             self.keys = words.keys
             self.banner.title = words.verdict
-            color = RED if words.unstable else GREEN if words.verdict.startswith("stable") else AMBER
+            color = (
+                RED if words.unstable else GREEN if words.verdict.startswith("stable") else AMBER
+            )
             self.banner.figurergba[:] = (*color, 1.0)
             for plot in self.plots:
                 plot.extend(self.frames)
@@ -96,10 +106,17 @@ class Pane:
         """Shows what is answered when asked what the keys and the hand have done, until the process ends."""
         body = self.stage.model.body("tool").id
         with viewer.lock():
-            viewer.cam.lookat[:], viewer.cam.distance = (0.33, 0.19, -0.03), 0.80  # the plots cover the right
+            viewer.cam.lookat[:], viewer.cam.distance = (
+                (0.33, 0.19, -0.03),
+                0.80,
+            )  # the plots cover the right
             viewer.cam.azimuth, viewer.cam.elevation = 90.0, -55.0
             viewer.opt.sitegroup[:] = 0
-            for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # the target is shown as a ball of our own
+            for flag in (
+                "PERTOBJ",
+                "PERTFORCE",
+                "SELECT",
+            ):  # the target is shown as a ball of our own
                 viewer.opt.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 0
             groups = viewer.opt.geomgroup.copy()
         grip: np.ndarray | None = None
@@ -129,16 +146,23 @@ class Pane:
         viewer.set_texts(texts)
         if room is None or room.width <= 400:
             return
-        banner, right = max(int(BANNER[0] * room.height), BANNER[1]), max(int(ROWS[0] * room.width), ROWS[1])
+        banner, right = (
+            max(int(BANNER[0] * room.height), BANNER[1]),
+            max(int(ROWS[0] * room.width), ROWS[1]),
+        )
         width, height = int(SHARE * room.width), (room.height - banner) // len(self.plots)
-        figures = [(mujoco.MjrRect(right, room.height - banner, room.width - right, banner), self.banner)]
+        figures = [
+            (mujoco.MjrRect(right, room.height - banner, room.width - right, banner), self.banner)
+        ]
         for i, plot in enumerate(self.plots):
             bottom = room.height - banner - (i + 1) * height
             figures.append((mujoco.MjrRect(room.width - width, bottom, width, height), plot.figure))
         viewer.set_figures(figures)
 
 
-def _hand(viewer: Any, grip: np.ndarray | None) -> tuple[tuple[float, float] | None, np.ndarray | None]:
+def _hand(
+    viewer: Any, grip: np.ndarray | None
+) -> tuple[tuple[float, float] | None, np.ndarray | None]:
     """Where the mouse has dragged to from where it took hold, (x, y) [m], None while it does not; and that place.
 
     The viewer moves its point in a plane through the grip, upright unless shift is held; what it gains in height
@@ -191,7 +215,11 @@ def main() -> None:
             return taken
 
         viewer = mujoco.viewer.launch_passive(
-            pane.stage.model, pane.stage.data, key_callback=pressed.append, show_left_ui=False, show_right_ui=False
+            pane.stage.model,
+            pane.stage.data,
+            key_callback=pressed.append,
+            show_left_ui=False,
+            show_right_ui=False,
         )
         pane.show(keys, viewer, ask)
     except Exception as error:
@@ -288,7 +316,9 @@ class _Plot:
     def extend(self, frames: list) -> None:
         """Takes the frames that are new."""
         new = range(self.seen, len(frames))
-        self.points += [[line.point(frames[k]) for line in self.lines] for k in new if k % self.stride == 0]
+        self.points += [
+            [line.point(frames[k]) for line in self.lines] for k in new if k % self.stride == 0
+        ]
         self.seen = len(frames)
         while len(self.points) >= mujoco.mjMAXLINEPNT - 1:
             self.points, self.stride = self.points[::2], 2 * self.stride
@@ -297,13 +327,19 @@ class _Plot:
         data = np.array(self.points)
         for axis, limits, least in ((0, _wide, 5.0), (1, _snapped, self.least)):
             known = data[..., axis][np.isfinite(data[..., axis])]
-            low, high, lines = limits(float(known.min(initial=0.0)), float(known.max(initial=0.0)), least)
+            low, high, lines = limits(
+                float(known.min(initial=0.0)), float(known.max(initial=0.0)), least
+            )
             self.figure.range[axis], self.figure.gridsize[axis] = (low, high), lines
         span = np.diff(self.figure.range[:2])[:, 0]
         for j in range(len(self.lines)):
             line = data[np.isfinite(data[:, j, 1]), j]
             way = np.cumsum(np.hypot(*(np.diff(line, axis=0, prepend=line[:1]) / span).T)) // STEP
-            line = line[np.flatnonzero(np.diff(way, prepend=-1.0, append=math.inf)[:-1])] if len(line) else line
+            line = (
+                line[np.flatnonzero(np.diff(way, prepend=-1.0, append=math.inf)[:-1])]
+                if len(line)
+                else line
+            )
             self.figure.linepnt[j] = len(line)
             self.figure.linedata[j, : 2 * len(line)] = line.ravel()
 

@@ -39,7 +39,9 @@ LIVE = (
     ("drag, scroll", "camera"),
     ("Ctrl + Q", "close"),
 )
-REPLAY = tuple(row for row in LIVE if row[0] in ("space", "backspace", "H", "drag, scroll", "Ctrl + Q"))
+REPLAY = tuple(
+    row for row in LIVE if row[0] in ("space", "backspace", "H", "drag, scroll", "Ctrl + Q")
+)
 
 
 class Window:
@@ -50,12 +52,21 @@ class Window:
     """
 
     def __init__(self, play: Session | Replay):
-        self.play, self.help, self.other = play, True, False  # other: another scenario is to be shown
-        self.held: tuple[float, float] | None = None  # where the handle was when the mouse took hold [m]
+        self.play, self.help, self.other = (
+            play,
+            True,
+            False,
+        )  # other: another scenario is to be shown
+        self.held: tuple[float, float] | None = (
+            None  # where the handle was when the mouse took hold [m]
+        )
         self._anew()
 
     def _anew(self) -> None:
-        self.shown, self.written = 0, -math.inf  # frames that have been sent; when words last were [s]
+        self.shown, self.written = (
+            0,
+            -math.inf,
+        )  # frames that have been sent; when words last were [s]
 
     def show(self, until: Callable[[], bool] = lambda: False) -> None:
         """Shows it; returns when the window is closed, or this says so. Raises what the player died of, if it did.
@@ -63,7 +74,9 @@ class Window:
         Raises:
             ParameterError: there is no display, or no OpenGL.
         """
-        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        if sys.platform.startswith("linux") and not (
+            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        ):
             raise ParameterError("display", "", f"there is none: {INSTEAD}")
         self.other = True
         while self.other:
@@ -85,12 +98,16 @@ class Window:
                         return  # closed, or lost
                     if not isinstance(words, tuple):
                         if player.ident:  # what was recorded is not to be lost by it
-                            warnings.warn(f"the window failed: {words}", RuntimeWarning, stacklevel=3)
+                            warnings.warn(
+                                f"the window failed: {words}", RuntimeWarning, stacklevel=3
+                            )
                             return
                         why = "the window cannot be opened"
                         if isinstance(words, str):
                             why = words.strip().rpartition("\n")[2].partition(": ")[2]
-                        raise ParameterError("display", os.environ.get("DISPLAY", ""), f"{why}: {INSTEAD}")
+                        raise ParameterError(
+                            "display", os.environ.get("DISPLAY", ""), f"{why}: {INSTEAD}"
+                        )
                     if not player.ident:
                         player.start()
                     with player.lock:
@@ -110,7 +127,9 @@ class Window:
             target = play.point
         frames, anew = play.frames[max(self.shown - 1, 0) :], self.shown == 0
         self.shown = len(play.frames)
-        angles = list(play.run.angles) if isinstance(play, Session) else play.source.q[play.n].tolist()
+        angles = (
+            list(play.run.angles) if isinstance(play, Session) else play.source.q[play.n].tolist()
+        )
         writing, now = None, time.perf_counter()
         if now - self.written >= WRITE_EVERY:
             self.written, writing = now, self._writing()
@@ -153,7 +172,10 @@ class Window:
         if isinstance(play, Session) and not (play.paused or play.ended):
             state = "recording" if play.recording else "not recording"
         rows: Rows = (
-            ("time", f"{t:.1f} s, {play.clock.factor:.2f} x real{', machine too slow' if play.clock.slow else ''}"),
+            (
+                "time",
+                f"{t:.1f} s, {play.clock.factor:.2f} x real{', machine too slow' if play.clock.slow else ''}",
+            ),
             ("state", state),
             ("K", "{:.3g}, {:.3g}".format(*play.gain)),
             ("b", "{:.4g}, {:.4g} N.s/m here; clay {:.4g}".format(*play.b, hardest(play.scenario))),
@@ -167,7 +189,9 @@ class Window:
 @contextlib.contextmanager
 def _viewer(first: Any) -> Iterator[tuple[queue.SimpleQueue, Callable[[Any], None]]]:
     """The viewer's process, and what it says: (keys, hand); what went wrong; at last its exit status."""
-    program = "mjpython" if sys.platform == "darwin" else sys.executable  # there the viewer needs its launcher
+    program = (
+        "mjpython" if sys.platform == "darwin" else sys.executable
+    )  # there the viewer needs its launcher
     process = subprocess.Popen(
         [program, "-P", "-c", f"from {__package__}.viewer import main; main()"],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -178,7 +202,9 @@ def _viewer(first: Any) -> Iterator[tuple[queue.SimpleQueue, Callable[[Any], Non
     heard: queue.SimpleQueue = queue.SimpleQueue()
 
     def listen() -> None:
-        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # cut short in the midst of a word
+        with contextlib.suppress(
+            EOFError, OSError, pickle.UnpicklingError
+        ):  # cut short in the midst of a word
             while True:
                 heard.put(pickle.load(source))
         heard.put(process.wait())

@@ -26,9 +26,16 @@ def run(capsys, *args):
 
 
 def test_run_constant_writes_record_summary_and_plots(capsys, tmp_path):
-    code, out, err = run(capsys, "run", "constant", "--b", "50", "--gain", "1", "0.4", "--out", str(tmp_path / "o"))
+    code, out, err = run(
+        capsys, "run", "constant", "--b", "50", "--gain", "1", "0.4", "--out", str(tmp_path / "o")
+    )
     assert (code, err) == (0, "")
-    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+    assert sorted(os.listdir(tmp_path / "o")) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
     assert "fe/v" in out and "status: finished at" in out
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert summary["scenario"]["gain"] == [1.0, 0.4]
@@ -36,7 +43,9 @@ def test_run_constant_writes_record_summary_and_plots(capsys, tmp_path):
 
 
 def test_run_free_and_no_plots(capsys, tmp_path):
-    code, out, _ = run(capsys, "run", "free", "--shaping", "--no-plots", "--every", "10", "--out", str(tmp_path))
+    code, out, _ = run(
+        capsys, "run", "free", "--shaping", "--no-plots", "--every", "10", "--out", str(tmp_path)
+    )
     assert code == 0 and "border x = 20 cm" in out
     assert sorted(os.listdir(tmp_path)) == ["record.npz", "summary.json"]
 
@@ -108,7 +117,8 @@ def test_out_that_is_a_file_is_refused(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "args", [["--help"], ["run", "--help"], ["run", "constant", "--help"], ["version"], ["--version"]]
+    "args",
+    [["--help"], ["run", "--help"], ["run", "constant", "--help"], ["version"], ["--version"]],
 )
 def test_help_and_version(capsys, args):
     code, out, err = run(capsys, *args)
@@ -143,7 +153,9 @@ def stopped_at_a_terminal(folder, *args, program=("-m", "hapticclay")):
     ) as p:  # fmt: skip
         os.close(end)
         said = b""
-        while said.count(b"constant") < 2:  # after its first showing tqdm has yet to note that it was shown
+        while (
+            said.count(b"constant") < 2
+        ):  # after its first showing tqdm has yet to note that it was shown
             said += screen.read(1000)
         p.send_signal(signal.SIGINT)
         said += rest_of(screen)
@@ -158,7 +170,12 @@ def test_ctrl_c_keeps_what_was_run(tmp_path):
     args = ("run", "constant", "--dt", "1e-6", "--every", "100", "--out", "o")
     code, out, said = stopped_at_a_terminal(tmp_path, *args)
     assert code == 130 and "Traceback" not in said and "status: interrupted at" in out
-    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+    assert sorted(os.listdir(tmp_path / "o")) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
     r = hc.Record.load(tmp_path / "o")
     assert r.outcome.code == "interrupted" and 0.0 < r.t[-1] == r.outcome.time < 11.0
 
@@ -179,7 +196,12 @@ def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
         cwd=tmp_path, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert "Traceback" not in out.stderr
-    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+    assert sorted(os.listdir(tmp_path / "o")) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
 
 
 def test_a_full_device_for_output_is_one_line(tmp_path):
@@ -193,7 +215,9 @@ def test_a_full_device_for_output_is_one_line(tmp_path):
 
 def test_a_closed_output_is_no_traceback(tmp_path):
     words = f"{sys.executable} -m hapticclay run constant --t-max 0.5 --no-plots --out o >&-"
-    out = subprocess.run(["bash", "-c", words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, timeout=120)
+    out = subprocess.run(
+        ["bash", "-c", words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, timeout=120
+    )
     assert (out.returncode, out.stderr) == (0, "")
     assert sorted(os.listdir(tmp_path / "o")) == ["record.npz", "summary.json"]
 
@@ -215,7 +239,9 @@ def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeyp
 
 def test_help_on_a_terminal_without_unicode(tmp_path):
     env = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii"}
-    out = subprocess.run([sys.executable, "-m", "hapticclay", "--help"], env=env, capture_output=True, timeout=60)
+    out = subprocess.run(
+        [sys.executable, "-m", "hapticclay", "--help"], env=env, capture_output=True, timeout=60
+    )
     assert out.returncode == 0 and b"run" in out.stdout and out.stderr == b""
 
 
@@ -231,7 +257,9 @@ def test_names_of_figures_are_known(scenario):
     assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
 
 
-def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(capsys, tmp_path, monkeypatch):
+def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
+    capsys, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     for name in ("constant", "variable"):
         code, out, _ = run(capsys, "run", name, "--t-max", "0.1")
@@ -243,7 +271,13 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(capsys, t
     assert (tmp_path / "o" / "path.png").read_text() == "mine"  # no record lay beside it
     (tmp_path / "o" / "notes.png").write_text("mine")
     run(capsys, "run", "variable", "--t-max", "0.1", "--out", "o")
-    assert sorted(os.listdir("o")) == ["notes.png", "path.png", "record.npz", "summary.json", "velocity.png"]
+    assert sorted(os.listdir("o")) == [
+        "notes.png",
+        "path.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
     run(capsys, "run", "stability", "--t-max", "0.1", "--no-plots", "--out", "o")
     assert sorted(os.listdir("o")) == ["notes.png", "record.npz", "summary.json"]
 
@@ -278,7 +312,10 @@ def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, 
 def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(capsys, "run", "free", "--t-max", "0.1", "--no-plots", "--out", "o")
-    for words in (["view", "--tool-width", "0.01", "o"], ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"]):
+    for words in (
+        ["view", "--tool-width", "0.01", "o"],
+        ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"],
+    ):
         command = app._parsed(words)
         assert isinstance(command.scenario, hc.Record) and command.scenario.scenario.name == "free"
 
@@ -287,7 +324,9 @@ def widths(text):
     return [len(line) for line in text.splitlines()]
 
 
-@pytest.mark.parametrize("args", [("variable",), ("constant", "--gain", "1", "1"), ("stability", "--t-max", "1")])
+@pytest.mark.parametrize(
+    "args", [("variable",), ("constant", "--gain", "1", "1"), ("stability", "--t-max", "1")]
+)
 def test_the_table_fits_a_terminal_and_knows_no_negative_zero(capsys, tmp_path, args):
     code, out, _ = run(capsys, "run", *args, "--no-plots", "--out", str(tmp_path))
     assert code == 0 and max(widths(out.split("\n\n")[0])) <= 80
@@ -310,11 +349,15 @@ def test_a_maneuver_with_few_samples_has_a_table(capsys, tmp_path, args):
 def test_advice_names_what_the_experiment_has(capsys, tmp_path):
     _, out, _ = run(capsys, "run", "stability", "--rms", "0", "--no-plots", "--out", str(tmp_path))
     assert "advice: raise rms\n" in out
-    _, out, _ = run(capsys, "run", "free", "--force", "0", "0", "--no-plots", "--out", str(tmp_path))
+    _, out, _ = run(
+        capsys, "run", "free", "--force", "0", "0", "--no-plots", "--out", str(tmp_path)
+    )
     assert "advice: give a force\n" in out
 
 
-@pytest.mark.parametrize("env,coloured", [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True)])
+@pytest.mark.parametrize(
+    "env,coloured", [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True)]
+)
 def test_no_color_is_heeded(tmp_path, env, coloured):
     env = {**os.environ, "TERM": "xterm", "FORCE_COLOR": ""} | env
     env = {k: v for k, v in env.items() if k != "FORCE_COLOR" and (v or k != "NO_COLOR")}
@@ -322,7 +365,10 @@ def test_no_color_is_heeded(tmp_path, env, coloured):
     with (
         open(terminal, "rb", buffering=0) as screen,
         subprocess.Popen(
-            [sys.executable, "-m", "hapticclay", "version", "--help"], cwd=tmp_path, env=env, stdout=end
+            [sys.executable, "-m", "hapticclay", "version", "--help"],
+            cwd=tmp_path,
+            env=env,
+            stdout=end,
         ) as p,
     ):
         os.close(end)
@@ -331,7 +377,9 @@ def test_no_color_is_heeded(tmp_path, env, coloured):
 
 
 def test_a_home_that_cannot_be_written_is_no_matter(tmp_path):
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("XDG_", "MPLCONFIG"))} | {"HOME": "/dev/null"}
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("XDG_", "MPLCONFIG"))} | {
+        "HOME": "/dev/null"
+    }
     out = subprocess.run(
         [sys.executable, "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--out", "o"],
         cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300,

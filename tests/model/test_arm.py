@@ -16,7 +16,7 @@ elbow = st.floats(-3.1, -0.02)
 
 
 def at(q1, q2):
-    return arm.columns(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
+    return arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
 
 
 def columns(q1, q2):
@@ -32,7 +32,7 @@ def test_columns_are_the_jacobian_in_absolute_angles(q1, q2):
 
 @given(angle, elbow)
 def test_handle_position_from_columns(q1, q2):
-    np.testing.assert_allclose(arm.position(q1, q2), Arm.forward((q1, q2)), atol=4 * EPS)
+    np.testing.assert_allclose(arm.handle_position(q1, q2), Arm.forward((q1, q2)), atol=4 * EPS)
 
 
 @given(angle, elbow)
@@ -58,7 +58,7 @@ def test_trace_of_mobility_is_the_sum_of_the_printed_gains():
 @given(angle, elbow, st.floats(-5, 5), st.floats(-5, 5))
 def test_rates_invert_the_jacobian(q1, q2, vx, vy):
     u = at(q1, q2)
-    r = arm.rates(vx, vy, *u, 2.0)
+    r = arm.joint_velocity(vx, vy, *u, 2.0)
     scale = EPS * 40 * (abs(vx) + abs(vy)) / abs(math.sin(q2))
     np.testing.assert_allclose(2.0 * columns(q1, q2) @ r, (vx, vy), atol=scale)
 
@@ -66,7 +66,7 @@ def test_rates_invert_the_jacobian(q1, q2, vx, vy):
 @given(st.floats(0.12, 0.58), st.floats(-3.1, 3.1))
 def test_inverse_reaches_the_point_with_the_elbow_bent_right(r, phi):
     x, y = r * math.cos(phi), r * math.sin(phi)
-    q1, q2 = arm.inverse(x, y)
+    q1, q2 = arm.inverse_kinematics(x, y)
     # acos loses half the digits near the stretched arm; 0.58 m keeps sin(q2) above 0.15
     np.testing.assert_allclose(Arm.forward((q1, q2)), (x, y), atol=100 * EPS)
     assert q2 < 0.0

@@ -11,7 +11,7 @@ from hapticclay.model.clay import Clay, Profile
 @given(st.floats(0, 1e9), st.floats(1e-6, 1e-1))
 def test_interior_kick_conserves_the_damping_and_never_overshoots(b, H):
     w = 0.92
-    before, after, *_ = clay.kick((b, b), (b, b), H, 0.5, 0.5, w, 0.0)
+    before, after, *_ = clay.split_damping((b, b), (b, b), H, 0.5, 0.5, w, 0.0)
     assert before + after == pytest.approx(b, rel=1e-15)
     z = b * H * w
     amplification = (1 - H * w * before) / (1 + H * w * after)
@@ -22,7 +22,9 @@ def test_interior_kick_conserves_the_damping_and_never_overshoots(b, H):
 
 @given(st.floats(0, 1e3), st.floats(0, 1e3), st.floats(0.01, 0.99))
 def test_soft_border_kick_gives_each_side_its_share(b0, b1, L):
-    before, after, *_, stiff, sharex, sharey, softx, softy = clay.kick((b0, b0), (b1, b1), 1e-4, L, 1 - L, 0.92, 0.0)
+    before, after, *_, stiff, sharex, sharey, softx, softy = clay.split_damping(
+        (b0, b0), (b1, b1), 1e-4, L, 1 - L, 0.92, 0.0
+    )
     assert (before, after) == (L * b0, (1 - L) * b1)
     assert stiff == sharex == sharey == softx == softy == 0.0
 
@@ -32,8 +34,8 @@ def test_impulse_of_a_step_is_b_times_its_distance_in_any_clay(bx, by, h0, h, h1
     """The shares that two kicks give to the velocity of the step between them add up to b h, whatever their lengths."""
     b, free = (bx, by), (0.0, 0.0)
     H0, H1 = 0.5 * (h0 + h), 0.5 * (h + h1)
-    first = clay.kick(free, b, H0, h0 / (2 * H0), h / (2 * H0), 0.92, 0.0)
-    then = clay.kick(b, free, H1, h / (2 * H1), h1 / (2 * H1), 0.92, 0.0)
+    first = clay.split_damping(free, b, H0, h0 / (2 * H0), h / (2 * H0), 0.92, 0.0)
+    then = clay.split_damping(b, free, H1, h / (2 * H1), h1 / (2 * H1), 0.92, 0.0)
     for i in (0, 1):
         assert H0 * first[2 * i + 1] + H1 * then[2 * i] == pytest.approx(b[i] * h, rel=1e-12)
         assert H1 * then[2 * i] * 0.92 <= 1.0 + 1e-12  # the part before never overshoots
@@ -53,13 +55,19 @@ def test_regions_of_the_slab():
     r = clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.20, (0.0, 0.0))
     assert r.b(0.0) == (0.0, 0.0) and r.high[0] == 0.05
     assert not r.at_end(0, True)
-    assert r.cross(0, True, 0.0) == 0.05 and r.b(0.0) == (90.0, 90.0) and (r.low[0], r.high[0]) == (0.05, 0.15)
+    assert (
+        r.cross(0, True, 0.0) == 0.05
+        and r.b(0.0) == (90.0, 90.0)
+        and (r.low[0], r.high[0]) == (0.05, 0.15)
+    )
     assert r.cross(0, True, 0.0) == 0.15 and r.b(0.0) == (0.0, 0.0)
     assert r.at_end(0, True) and r.high[0] == 0.20
     assert r.cross(0, False, 0.0) == 0.15 and r.b(0.0) == (90.0, 90.0)
 
 
-@pytest.mark.parametrize("p,b", [((0.05, 0.0), 90.0), ((0.049, 0.0), 0.0), ((0.1, 0.3), 90.0), ((0.15, 0.0), 0.0)])
+@pytest.mark.parametrize(
+    "p,b", [((0.05, 0.0), 90.0), ((0.049, 0.0), 0.0), ((0.1, 0.3), 90.0), ((0.15, 0.0), 0.0)]
+)
 def test_regions_from_any_start(p, b):
     assert clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.2, p).b(0.0) == (b, b)
 

@@ -45,7 +45,9 @@ def test_each_axis_changes_by_its_own_coordinate():
         assert np.all(r.b[r.p[:, i] < 0.05 - 1e-9, i] == 50.0)
 
 
-@pytest.mark.parametrize("reading,rate", [("30/s", 30.0), ("0.15/s", 0.15), ("0.15/sample", 0.15 / 0.36e-3)])
+@pytest.mark.parametrize(
+    "reading,rate", [("30/s", 30.0), ("0.15/s", 0.15), ("0.15/sample", 0.15 / 0.36e-3)]
+)
 def test_growth_readings(reading, rate):
     r = hc.simulate(hc.variable_cut(reading, t_max=12.0))
     c = crossings(r, "x")[0]
@@ -56,7 +58,9 @@ def test_growth_readings(reading, rate):
 def test_with_growth_the_speed_falls_monotonically_and_follows_the_clay():
     r = hc.simulate(hc.variable_cut(shaping=True))
     c = crossings(r, "x")[0]
-    late = np.flatnonzero(r.t > c.time + 2.0)  # the step at the border has rung down: slowest poles, -3.7 1/s
+    late = np.flatnonzero(
+        r.t > c.time + 2.0
+    )  # the step at the border has rung down: slowest poles, -3.7 1/s
     v, b = r.v[late, 0], r.b[late, 0]
     assert np.all(np.diff(v) < 0.0)
     quasi = F / (10.0 + b)
@@ -100,7 +104,9 @@ def test_irregularity_of_made_up_forces():
 
     assert of(np.sin(2 * np.pi * 1.0 * r.t)) < 1e-2
     assert of(np.sin(2 * np.pi * 20.0 * r.t)) > 0.99
-    assert of(np.sin(2 * np.pi * r.t) + np.sin(2 * np.pi * 20.0 * r.t)) == pytest.approx(np.sqrt(0.5), rel=0.02)
+    assert of(np.sin(2 * np.pi * r.t) + np.sin(2 * np.pi * 20.0 * r.t)) == pytest.approx(
+        np.sqrt(0.5), rel=0.02
+    )
     assert of(rng.normal(size=len(r.t))) > 0.9
     with pytest.raises(ParameterError):
         hc.irregularity(hc.simulate(hc.free(t_max=0.1)))

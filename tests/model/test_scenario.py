@@ -60,7 +60,9 @@ def test_operator_is_checked(kw):
 
 
 def test_numpy_numbers_and_arrays_are_welcome():
-    s = hc.constant_cut(b=np.float64(50), gain=np.array([1.0, 0.5]), force=[1, 0], dt=np.float32(0.001))  # type: ignore[arg-type]
+    s = hc.constant_cut(
+        b=np.float64(50), gain=np.array([1.0, 0.5]), force=[1, 0], dt=np.float32(0.001)
+    )  # type: ignore[arg-type]
     assert s == dataclasses.replace(s)
     assert all(type(x) is float for x in (*s.gain, *s.force, s.dt))
     hash(s)
@@ -81,7 +83,9 @@ def test_scenarios_are_frozen_and_listed():
         hc.free().dt = 1.0  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))]
+)
 @pytest.mark.parametrize("value", [-1.0, "x" * 100, (1.0, [2.0]), None])
 def test_a_parameter_error_survives_copies_and_the_way_between_processes(again, value):
     error = ParameterError("b", value, "must be >= 0")

@@ -14,7 +14,8 @@ from hapticclay.model.signals import Multisine, Signal
 
 def spelt_out(signal, t, axis):
     return sum(
-        signal.amplitude[axis] * np.cos(w * t + p[axis]) for w, p in zip(signal.omega, signal.phase, strict=True)
+        signal.amplitude[axis] * np.cos(w * t + p[axis])
+        for w, p in zip(signal.omega, signal.phase, strict=True)
     )
 
 
@@ -25,7 +26,9 @@ def test_rms_period_and_value(seed, rms, t):
     assert len(s.omega) == 14 and s.omega[0] == pytest.approx(0.4 * np.pi)
     for i in (0, 1):
         assert s(t)[i] == pytest.approx(spelt_out(s, t, i), abs=1e-12)
-    grid = np.arange(0.0, 10.0, 0.1)  # more than two samples of the highest line: the sums are exact
+    grid = np.arange(
+        0.0, 10.0, 0.1
+    )  # more than two samples of the highest line: the sums are exact
     assert np.sqrt(np.mean(s(grid) ** 2, axis=0)) == pytest.approx(m.rms, rel=1e-9)
     np.testing.assert_allclose(s(grid + 10.0), s(grid), atol=1e-11)
 
@@ -34,7 +37,12 @@ def test_rms_period_and_value(seed, rms, t):
 def test_mean_is_the_integral(begin, span):
     s = Signal(Multisine(rms=(1.0, 2.0), low=0.5, high=2.0, period=4.0, seed=7))
     for i in (0, 1):
-        exact = quad(lambda t, i=i: spelt_out(s, t, i), begin, begin + span, epsabs=1e-12, epsrel=1e-12)[0] / span
+        exact = (
+            quad(
+                lambda t, i=i: spelt_out(s, t, i), begin, begin + span, epsabs=1e-12, epsrel=1e-12
+            )[0]
+            / span
+        )
         # the terms are of size 1; quadrature over spans of some periods keeps 1e-9
         assert s.mean(begin, begin + span)[i] == pytest.approx(exact, abs=1e-8)
 

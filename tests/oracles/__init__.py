@@ -111,7 +111,10 @@ class Arm:
         s1, c1, s12, c12 = np.sin(q[0]), np.cos(q[0]), np.sin(q[0] + q[1]), np.cos(q[0] + q[1])
         w12 = w[0] + w[1]
         return np.array(
-            [[-L1 * c1 * w[0] - L2 * c12 * w12, -L2 * c12 * w12], [-L1 * s1 * w[0] - L2 * s12 * w12, -L2 * s12 * w12]]
+            [
+                [-L1 * c1 * w[0] - L2 * c12 * w12, -L2 * c12 * w12],
+                [-L1 * s1 * w[0] - L2 * s12 * w12, -L2 * s12 * w12],
+            ]
         )
 
     @staticmethod
@@ -140,20 +143,43 @@ class Pieces:
 
 
 def nonlinear(
-    b_of_region, edges, K, uh, th=None, shaping=False, t_max=60.0, t_eval=None, rtol=1e-11, atol=1e-13, p0=(0.0, 0.0)
+    b_of_region,
+    edges,
+    K,
+    uh,
+    th=None,
+    shaping=False,
+    t_max=60.0,
+    t_eval=None,
+    rtol=1e-11,
+    atol=1e-13,
+    p0=(0.0, 0.0),
 ):
     """The whole arm, both axes, a slab across x: b_of_region[i] on both axes between edges i-1 and i.
 
     Forward crossings of x only; ends at the last edge. Returns (crossing times, t, p (n, 2), v (n, 2)) at
     the times t_eval before the end.
     """
-    pieces = nonlinear_pieces(b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0, t_eval is not None)
+    pieces = nonlinear_pieces(
+        b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0, t_eval is not None
+    )
     t = np.empty(0) if t_eval is None else t_eval[t_eval < pieces.spans[-1][1]]
     return pieces.crossings, t, *(pieces(t) if len(t) else (np.empty((0, 2)), np.empty((0, 2))))
 
 
 def nonlinear_pieces(
-    b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0=(0.0, 0.0), dense=True, method="DOP853"
+    b_of_region,
+    edges,
+    K,
+    uh,
+    th,
+    shaping,
+    t_max,
+    rtol,
+    atol,
+    p0=(0.0, 0.0),
+    dense=True,
+    method="DOP853",
 ):
     """As `nonlinear`, the solution as Pieces."""
     K, uh = np.array(K), np.array(uh)
@@ -185,7 +211,17 @@ def nonlinear_pieces(
             return Arm.forward(z[:2])[0] - ORIGIN[0] - edge
 
         hit.terminal, hit.direction = True, 1
-        s = solve_ivp(rhs, (t, t_max), z, method, rtol=rtol, atol=atol, args=(b,), events=hit, dense_output=dense)
+        s = solve_ivp(
+            rhs,
+            (t, t_max),
+            z,
+            method,
+            rtol=rtol,
+            atol=atol,
+            args=(b,),
+            events=hit,
+            dense_output=dense,
+        )
         out.spans.append((t, s.t[-1]))
         out.solutions.append(s.sol)
         z, t = s.y[:, -1], s.t[-1]
@@ -278,7 +314,9 @@ def hybrid(
     return np.array(P), np.array(V), np.array(T)
 
 
-def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_max=1.0, times=(), scan=2e-4):
+def bounces(
+    edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_max=1.0, times=(), scan=2e-4
+):
     """Exact motion along one axis at one constant inertia, through the borders `edges` in both directions.
 
     b is values[i] between edges i - 1 and i. At the start the loop has moved with v0 for long. A return to a border
@@ -289,7 +327,14 @@ def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_
     """
     place = np.array([1.0, 0, 1, 0, 1, 0, 0])  # what a shift of the origin shifts
     z = np.array([0.0, v0, G1[axis] / G0[axis] * v0, v0, 0.0, v0, 1.0])
-    region, t, c, crossings, states, times = int(np.searchsorted(edges, p0, side="right")), 0.0, p0, [], [], list(times)
+    region, t, c, crossings, states, times = (
+        int(np.searchsorted(edges, p0, side="right")),
+        0.0,
+        p0,
+        [],
+        [],
+        list(times),
+    )
     while True:
         scale = np.array([1.0, max(values[region], 1.0), 1.0, 1.0, 1.0, 1.0, 1.0])
         A = Linear(axis, values[region], K, uh - th[2] * c, th).A * scale[:, None] / scale
@@ -304,7 +349,13 @@ def bounces(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, p0=0.0, v0=0.0, t_
             border = high if ahead[0] > high else low
             # next to a border that it has just left, the handle is on the near side of it already
             begin = 1e-3 * scan if a is z and border == 0.0 else 0.0
-            h = brentq(lambda h, A=A, a=a, d=border: (expm(A * h) @ a)[0] - d, begin, scan, xtol=1e-17, rtol=1e-15)
+            h = brentq(
+                lambda h, A=A, a=a, d=border: (expm(A * h) @ a)[0] - d,
+                begin,
+                scan,
+                xtol=1e-17,
+                rtol=1e-15,
+            )
             end = ta + h
         while times and times[0] <= min(end, t_max):
             states.append((expm(A * (times.pop(0) - t)) @ z) / scale + c * place)

@@ -21,14 +21,20 @@ PRINTED = {  # as printed, Eqs. 14-28 and Secs. 4, 4.1
 @pytest.mark.parametrize("name", PRINTED)
 def test_transfer_functions(name):
     block, (gain, damping, stiffness) = PRINTED[name]
-    assert (block.gain, block.damping, block.stiffness) == pytest.approx((gain, damping, stiffness), rel=1e-15)
+    assert (block.gain, block.damping, block.stiffness) == pytest.approx(
+        (gain, damping, stiffness), rel=1e-15
+    )
 
 
 def test_operator_clay_arm_and_sampling():
     th = operator.Operator()
     assert (th.mass, th.damper, th.spring) == (0.25, 2.0, 6.0)
     assert (constants.L1, constants.L2, constants.TS) == (0.24, 0.35, 0.36e-3)
-    assert (constants.B_VARIABLE, constants.BORDER, constants.COUNTERWEIGHT) == ((50.0, 100.0), 0.05, (1.0, 45.0))
+    assert (constants.B_VARIABLE, constants.BORDER, constants.COUNTERWEIGHT) == (
+        (50.0, 100.0),
+        0.05,
+        (1.0, 45.0),
+    )
     assert (constants.GROWTH, constants.GROWTH_EQ25, constants.B_STABILITY) == (30.0, 0.15, 100.0)
     assert (constants.GAINS_FIG11, constants.GAIN_LIMIT_PRINTED) == ((2.0, 3.0, 25.0), 5.0)
     assert (constants.C_POLE, constants.B_CONSTANT, constants.CLAY_X, constants.PATH_LENGTH) == (
@@ -40,7 +46,9 @@ def test_operator_clay_arm_and_sampling():
 
 
 def test_path_is_centred_on_the_nominal_pose():
-    assert constants.ORIGIN == pytest.approx((constants.L2 - constants.PATH_LENGTH / 2, constants.L1), abs=1e-16)
+    assert constants.ORIGIN == pytest.approx(
+        (constants.L2 - constants.PATH_LENGTH / 2, constants.L1), abs=1e-16
+    )
 
 
 def test_docs_paper_is_what_the_ledger_gives(ledger_rows):
@@ -66,7 +74,9 @@ def test_each_contradiction_has_its_row(words, ledger_rows):
     assert mine and all(len(r.reason) > 15 for r in mine)
 
 
-@pytest.mark.parametrize("number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"])
+@pytest.mark.parametrize(
+    "number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"]
+)
 def test_a_printed_number_is_typed_once(number):
     typed = 0
     for file in SOURCE.parents[1].rglob("*.py"):

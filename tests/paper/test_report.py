@@ -20,7 +20,7 @@ ROW = Row("a", "Eq. 1", "1", "m", 1.0, 1.001, 1e-2, "given", "why")
 def test_agreement(expected, ours, tolerance, agrees):
     row = dataclasses.replace(ROW, expected=expected, ours=ours, tolerance=tolerance)
     assert row.agrees is agrees
-    assert report.verdict(row) == {True: "yes", False: "NO", None: ""}[agrees]
+    assert report.format_verdict(row) == {True: "yes", False: "NO", None: ""}[agrees]
 
 
 @pytest.mark.parametrize("x,unit,text", [
@@ -28,7 +28,7 @@ def test_agreement(expected, ours, tolerance, agrees):
     (float("nan"), "m", "none"),
 ])  # fmt: skip
 def test_numbers_for_tables(x, unit, text):
-    assert report.number(x, unit) == text
+    assert report.format_number(x, unit) == text
 
 
 def test_runs_are_made_once_and_when_asked(monkeypatch):
@@ -57,10 +57,21 @@ def test_report_is_one_file_with_every_figure(written):
         assert f'id="{name}"' in text and (out / "figures" / f"{name}.png").stat().st_size > 8000
     assert text.count("data:image/png;base64,") == len(names)
     assert not re.search(r'(src|href)="(?!data:)', text), "must not load anything"
-    for figure in ("Fig. 4", "Fig. 5", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 9", "Fig. 10", "Fig. 11", "Nyquist", "Bode"):
+    for figure in (
+        "Fig. 4",
+        "Fig. 5",
+        "Fig. 6",
+        "Fig. 7",
+        "Fig. 8",
+        "Fig. 9",
+        "Fig. 10",
+        "Fig. 11",
+        "Nyquist",
+        "Bode",
+    ):
         assert figure in text
     for row in rows:
-        assert report.number(row.ours, row.unit) in text
+        assert report.format_number(row.ours, row.unit) in text
 
 
 def test_markdown_says_the_same(written):
@@ -68,7 +79,11 @@ def test_markdown_says_the_same(written):
     text = (out / "report.md").read_text()
     for name in re.findall(r"\]\((figures/[^)]+)\)", text):
         assert (out / name).is_file()
-    lines = [line for line in text.splitlines() if line.startswith("| ") and not line.startswith("| quantity")]
+    lines = [
+        line
+        for line in text.splitlines()
+        if line.startswith("| ") and not line.startswith("| quantity")
+    ]
     assert len(lines) == len(rows)
     assert all(line.count(" | ") == 7 for line in lines)
 
@@ -76,19 +91,19 @@ def test_markdown_says_the_same(written):
 def test_ledger_is_data(written):
     out, rows = written
     data = json.loads((out / "ledger.json").read_text(), parse_constant=lambda x: pytest.fail(x))
-    assert data["schema"] == report.SCHEMA and "mujoco" in data["versions"]
+    assert data["schema"] == report.LEDGER_SCHEMA and "mujoco" in data["versions"]
     assert [r["what"] for r in data["rows"]] == [r.what for r in rows]
 
 
 def test_command_says_what_does_not_agree_and_fails(tmp_path, monkeypatch, capsys):
     wrong = dataclasses.replace(ROW, ours=2.0)
-    monkeypatch.setattr(claims, "rows", lambda runs: [ROW, wrong])
+    monkeypatch.setattr(claims, "ledger_rows", lambda runs: [ROW, wrong])
     monkeypatch.setattr(report, "PICTURES", ())
     assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 1
     out = capsys.readouterr().out
     assert "does not agree: a (Eq. 1): 2 m, +100.000 %" in out and "1 of 2 numbers agree" in out
     assert str(tmp_path / "report.html") in out
-    monkeypatch.setattr(claims, "rows", lambda runs: [ROW])
+    monkeypatch.setattr(claims, "ledger_rows", lambda runs: [ROW])
     assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 0
 
 

@@ -44,9 +44,13 @@ def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
     assert 1000 < step < len(whole.t) - 1 and r.outcome.time == r.t[-1] == whole.t[step]
     index = sorted({*range(0, step, every), step})  # each every-th, and the last
     for array in record.ARRAYS:
-        np.testing.assert_array_equal(getattr(r, array), getattr(whole, array)[index], err_msg=array)
+        np.testing.assert_array_equal(
+            getattr(r, array), getattr(whole, array)[index], err_msg=array
+        )
     assert r.crossings == tuple(c for c in whole.crossings if c.time <= r.t[-1])
-    assert abs(r.energy["residual"]) < 1e-5 * r.energy["throughput"]  # whole runs with a hand have 3e-6
+    assert (
+        abs(r.energy["residual"]) < 1e-5 * r.energy["throughput"]
+    )  # whole runs with a hand have 3e-6
 
 
 def test_an_instability_met_before_is_not_forgotten():

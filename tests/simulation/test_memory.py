@@ -11,7 +11,9 @@ import hapticclay as hc
 from hapticclay.simulation import simulate
 
 GB = 10**9
-WIRED = dataclasses.replace(hc.constant_cut(control="sampled", dt=1e-4, t_max=1.5), interface=hc.Interface())
+WIRED = dataclasses.replace(
+    hc.constant_cut(control="sampled", dt=1e-4, t_max=1.5), interface=hc.Interface()
+)
 
 
 def machine(root, files):
@@ -32,11 +34,11 @@ def machine(root, files):
       "sys/fs/cgroup/memory/memory.usage_in_bytes": "1200000\n", "sys/fs/cgroup/memory/memory.stat": ""}, -200_000),
 ])  # fmt: skip
 def test_the_least_of_machine_and_container_counts(files, left, tmp_path):
-    assert simulate.left(machine(tmp_path, files)) == left
+    assert simulate.memory_left(machine(tmp_path, files)) == left
 
 
 def test_there_is_less_left_than_installed():
-    assert 0 < simulate.left() < 1e14
+    assert 0 < simulate.memory_left() < 1e14
 
 
 @pytest.mark.parametrize("scenario,engine,every", [
@@ -56,9 +58,9 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
     peak = tracemalloc.get_traced_memory()[1] - 3e6  # buffers of a chunk, however long the run
     tracemalloc.stop()
     assert record.outcome.code == "time limit"  # so it took what the longest run would
-    monkeypatch.setattr(simulate, "SMALL", 0.0)
+    monkeypatch.setattr(simulate, "SMALL_MEMORY", 0.0)
     for left, fits in ((0.9 * peak, False), (1.5 * peak, True)):
-        monkeypatch.setattr(simulate, "left", lambda left=left: left)
+        monkeypatch.setattr(simulate, "memory_left", lambda left=left: left)
         if fits:
             simulate._check_memory(scenario, every)
         else:
@@ -67,8 +69,8 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
 
 
 def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
-    monkeypatch.setattr(simulate, "left", lambda: 4.0 * GB)
-    monkeypatch.setattr(simulate, "_kind", lambda *a: pytest.fail("ran"))
+    monkeypatch.setattr(simulate, "memory_left", lambda: 4.0 * GB)
+    monkeypatch.setattr(simulate, "_stepper", lambda *a: pytest.fail("ran"))
     scenario = hc.constant_cut(dt=1e-6)
     with pytest.raises(hc.ParameterError) as error:
         hc.simulate(scenario)
@@ -82,7 +84,7 @@ def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
 
 
 def test_no_every_helps_where_each_step_is_remembered(monkeypatch):
-    monkeypatch.setattr(simulate, "left", lambda: 4.0 * GB)
+    monkeypatch.setattr(simulate, "memory_left", lambda: 4.0 * GB)
     with pytest.raises(hc.ParameterError, match="t_max = 10000.0: up to 100000000 steps take"):
         hc.simulate(dataclasses.replace(WIRED, t_max=1e4), every=1000)
 
@@ -92,10 +94,10 @@ def test_a_process_may_have_less_than_the_machine():
     code = (
         "import resource, hapticclay as hc\n"
         "from hapticclay.cli import app\n"
-        "from hapticclay.simulation import memory\n"
+        "from hapticclay.simulation import simulate\n"
         "taken = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (taken + 10**9,) * 2)\n"
-        "assert 0.5e9 < memory.left() <= 1e9\n"
+        "assert 0.5e9 < simulate.memory_left() <= 1e9\n"
         "raise SystemExit(app.main(['run', 'free', '--force', '0', '0', '--dt', '1e-5', '--t-max', '100']))"
     )
     p = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

@@ -39,8 +39,10 @@ def test_every_array_is_named_shaped_and_has_a_unit(run):
 
 
 def test_summary_holds_what_a_reader_needs(run, tmp_path):
-    s = json.loads((run.save(tmp_path) / "summary.json").read_text(), parse_constant=lambda x: pytest.fail(x))
-    assert s["schema"] == record.SCHEMA and s["status"].startswith("time limit")
+    s = json.loads(
+        (run.save(tmp_path) / "summary.json").read_text(), parse_constant=lambda x: pytest.fail(x)
+    )
+    assert s["schema"] == record.RECORD_SCHEMA and s["status"].startswith("time limit")
     assert s["crossings"][0]["border"] == 0.05 and s["crossings"][0]["speed"] > 0.1
     assert s["steps"] == run.steps and s["real_time_factor"] > 0
     assert set(s["versions"]) >= {"python", "hapticclay", "mujoco", "numpy"}
@@ -85,7 +87,9 @@ def test_load_refuses_a_damaged_record(run, tmp_path):
             hc.Record.load(file)
     for change in ({"steps": None}, {"scenario": {"nonsense": 1}}, {"outcome": []}):
         arrays = {name: getattr(run, name) for name in record.ARRAYS}
-        np.savez(file, summary=np.array(json.dumps({"schema": record.SCHEMA, **change})), **arrays)
+        np.savez(
+            file, summary=np.array(json.dumps({"schema": record.RECORD_SCHEMA, **change})), **arrays
+        )
         with pytest.raises(ParameterError, match="record"):
             hc.Record.load(file)
     np.save(tmp_path / "a.npy", np.zeros(3))
@@ -101,9 +105,16 @@ def test_load_refuses_a_damaged_record(run, tmp_path):
     ("v", lambda x: x + np.inf), ("removed", lambda x: x[:, None]), ("removal_rate", lambda x: x[1:]),
     ("target", lambda x: x[:, 0]), ("gain", lambda x: x.astype(int)), ("target", lambda x: np.nan * x),
 ])  # fmt: skip
-def test_load_refuses_an_array_that_is_not_what_it_must_be_and_names_it(run, tmp_path, name, change):
+def test_load_refuses_an_array_that_is_not_what_it_must_be_and_names_it(
+    run, tmp_path, name, change
+):
     n = len(run.t)
-    extra = {"removed": np.zeros(n), "removal_rate": np.zeros(n), "target": np.zeros((n, 2)), "gain": np.ones((n, 2))}
+    extra = {
+        "removed": np.zeros(n),
+        "removal_rate": np.zeros(n),
+        "target": np.zeros((n, 2)),
+        "gain": np.ones((n, 2)),
+    }
     file = dataclasses.replace(run, extra=extra).save(tmp_path) / "record.npz"
     hc.Record.load(file)
     with np.load(file) as z:
@@ -114,7 +125,7 @@ def test_load_refuses_an_array_that_is_not_what_it_must_be_and_names_it(run, tmp
 
 
 def test_load_refuses_another_schema(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(record, "SCHEMA", "hapticclay-record-0")
+    monkeypatch.setattr(record, "RECORD_SCHEMA", "hapticclay-record-0")
     run.save(tmp_path)
     monkeypatch.undo()
     with pytest.raises(ParameterError, match="schema"):

@@ -27,12 +27,16 @@ def test_exact_solution_has_the_published_borders():
     np.testing.assert_allclose(t, [0.43825, 7.71517, 8.43288], atol=5e-6)
 
 
-@pytest.mark.parametrize("impedance,force", [(False, 1.0), (True, 2.0)], ids=["hand off", "hand on"])
+@pytest.mark.parametrize(
+    "impedance,force", [(False, 1.0), (True, 2.0)], ids=["hand off", "hand on"]
+)
 def test_shaped_cut_against_the_exact_solution(impedance, force):
     th = TH if impedance else (0, 0, 0)
     exact, position = piecewise_linear(EDGES, (0, 90, 0), 1.0, force, th)
     for dt, border, place in ((3.6e-4, 1e-6, 1e-7), (2e-3, 1e-5, 3e-6)):
-        r = hc.simulate(hc.constant_cut(force=(force, 0.0), impedance=impedance, shaping=True, dt=dt))
+        r = hc.simulate(
+            hc.constant_cut(force=(force, 0.0), impedance=impedance, shaping=True, dt=dt)
+        )
         assert r.outcome.code == "finished"
         np.testing.assert_allclose(times(r), exact, atol=border)
         np.testing.assert_allclose(r.p[:-1, 0], position(r.t[:-1]), atol=place)
@@ -83,18 +87,28 @@ stable_cut = {
 def test_any_stable_shaped_cut(b, K, f, hand):
     th = TH if hand else (0, 0, 0)
     # keep a margin: beside the stability limit any error grows with the number of swings
-    assume(all(Linear(i, c, K if i == 0 else 0.2, f, th).poles().real.max() < 1e-9 for i in (0, 1) for c in (0, b)))
+    assume(
+        all(
+            Linear(i, c, K if i == 0 else 0.2, f, th).poles().real.max() < 1e-9
+            for i in (0, 1)
+            for c in (0, b)
+        )
+    )
     assume(np.sort(Linear(0, b, K, f, th).poles().real)[-2] < -0.02)
     s = hc.constant_cut(b=b, gain=(K, 0.2), force=(f, 0.0), impedance=hand, shaping=True, t_max=8.0)
     exact, position = piecewise_linear(EDGES, (0, b, 0), K, f, th, t_max=8.0)
     exact = [t for t in exact if t < 8.0]
     r = hc.simulate(s)
     found = times(r)
-    if len(found) > len(exact):  # it swung back over a border, which the exact solution does not follow
+    if len(found) > len(
+        exact
+    ):  # it swung back over a border, which the exact solution does not follow
         assume(False)
     np.testing.assert_allclose(found, exact, rtol=2e-3)
     n = np.searchsorted(r.t, (*exact, 8.0)[-1 if len(exact) < 3 else 2])
-    scale = max(1.0, f * b / 50.0)  # the error of a kick grows with the jump of acceleration at the border
+    scale = max(
+        1.0, f * b / 50.0
+    )  # the error of a kick grows with the jump of acceleration at the border
     np.testing.assert_allclose(r.p[: n - 1, 0], position(r.t[: n - 1]), atol=3e-6 * scale)
 
 
@@ -125,7 +139,11 @@ def test_clay_force_and_speeds_of_the_default_cut():
 @settings(max_examples=15)
 def test_steady_speed_law(b, K, f):
     assume(K < 0.5 * hc.gain_limit("x", b, impedance=False))
-    r = hc.simulate(hc.constant_cut(b=b, gain=(K, 0.1), force=(f, 0.0), start=(0.06, 0.0), shaping=True, t_max=4.0))
+    r = hc.simulate(
+        hc.constant_cut(
+            b=b, gain=(K, 0.1), force=(f, 0.0), start=(0.06, 0.0), shaping=True, t_max=4.0
+        )
+    )
     inside = r.b[:, 0] > 0.0
     last = np.flatnonzero(inside & r.steady()[:, 0])
     assume(len(last))
@@ -228,7 +246,9 @@ def test_a_border_that_lies_at_a_sample_is_crossed_once(ulps):
 def test_a_handle_that_slides_along_a_border_goes_on():
     """Chatter over the border of the clay: no verdict of instability, and the motion converges."""
     y = [
-        hc.simulate(hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6, dt=dt)).p[-1, 1]
+        hc.simulate(hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6, dt=dt)).p[
+            -1, 1
+        ]
         for dt in (1e-3, 3.6e-4)
     ]
     assert y[0] == pytest.approx(y[1], rel=0.03)

@@ -20,23 +20,38 @@ from hapticclay.simulation.record import Record
 from hapticclay.stepping import leapfrog
 from tests.stepping.test_loop import CASES
 
-fast = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]")
+fast = pytest.mark.skipif(
+    importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
+)
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
-GROWING = Clay(Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)), Profile((0.01,), (50.0, 100.0), growth=(9.0, 0.0)))
+GROWING = Clay(
+    Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)),
+    Profile((0.01,), (50.0, 100.0), growth=(9.0, 0.0)),
+)
 WAVE = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
-LAYERS = Clay(Profile((0.01, 0.02, 0.03), (0.0, 50.0, 500.0, 5.0)), Profile((0.001,), (10.0, 90.0), along="y"))
+LAYERS = Clay(
+    Profile((0.01, 0.02, 0.03), (0.0, 50.0, 500.0, 5.0)), Profile((0.001,), (10.0, 90.0), along="y")
+)
 MORE = {
     "whole cut": hc.constant_cut(),
-    "muscle": dataclasses.replace(hc.free(impedance=True, t_max=1.0), clay=GROWING, length=None, muscle=WAVE),
-    "command": dataclasses.replace(hc.free(t_max=1.0), command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3))),
+    "muscle": dataclasses.replace(
+        hc.free(impedance=True, t_max=1.0), clay=GROWING, length=None, muscle=WAVE
+    ),
+    "command": dataclasses.replace(
+        hc.free(t_max=1.0), command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3))
+    ),
     "growth": dataclasses.replace(hc.free(t_max=2.0), clay=GROWING),
     "layers": dataclasses.replace(hc.free(t_max=1.0, force=(1.0, 0.3)), clay=LAYERS),
-    "at speed": dataclasses.replace(hc.constant_cut(b=1e4, t_max=0.3, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)),
+    "at speed": dataclasses.replace(
+        hc.constant_cut(b=1e4, t_max=0.3, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
+    ),
     "backwards": hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), t_max=1.0),
     "along a border": hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.3),
     "diverged": hc.constant_cut(gain=(1.0, 1.0)),
     "thrown out of reach": hc.constant_cut(gain=(1e4, 1e4), torque_limit=(1e6, 1e6)),
-    "unstable, goes on": dataclasses.replace(hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop=False),
+    "unstable, goes on": dataclasses.replace(
+        hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop=False
+    ),
     "stretched": hc.constant_cut(force=(1.0, 50.0)),
     "stalled": hc.constant_cut(force=(0.0, 0.0), t_max=2.0),
     "one short step": hc.constant_cut(t_max=1e-5),
@@ -49,7 +64,12 @@ ALL = {**CASES, **MORE}
 def same(a, b):
     for field in FIELDS:
         np.testing.assert_array_equal(getattr(a, field), getattr(b, field), err_msg=field)
-    assert a.outcome == b.outcome and a.crossings == b.crossings and a.steps == b.steps and a.energy == b.energy
+    assert (
+        a.outcome == b.outcome
+        and a.crossings == b.crossings
+        and a.steps == b.steps
+        and a.energy == b.energy
+    )
 
 
 def close(native, python, times, samples, energy):
@@ -58,9 +78,13 @@ def close(native, python, times, samples, energy):
         assert (a.time, a.speed) == pytest.approx((b.time, b.speed), rel=0.0, abs=times)
     for field in FIELDS:
         x, y = getattr(native, field), getattr(python, field)
-        np.testing.assert_allclose(x, y, rtol=0.0, atol=samples * max(1.0, np.abs(y).max()), err_msg=field)
+        np.testing.assert_allclose(
+            x, y, rtol=0.0, atol=samples * max(1.0, np.abs(y).max()), err_msg=field
+        )
     for key, value in python.energy.items():
-        assert native.energy[key] == pytest.approx(value, rel=0.0, abs=energy * python.energy["throughput"])
+        assert native.energy[key] == pytest.approx(
+            value, rel=0.0, abs=energy * python.energy["throughput"]
+        )
 
 
 @fast
@@ -78,7 +102,10 @@ STILL = {
     "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
     "stiff: substeps": hc.constant_cut(b=2e4, t_max=0.8),
     "free, not on the grid": hc.free(t_max=0.9007),
-    **{name: MORE[name] for name in ("layers", "at speed", "backwards", "diverged", "stretched", "one short step")},
+    **{
+        name: MORE[name]
+        for name in ("layers", "at speed", "backwards", "diverged", "stretched", "one short step")
+    },
 }
 
 
@@ -108,15 +135,17 @@ def test_accurate_native_leaves_the_engine_without_callback_and_needs_none():
 def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     from hapticclay.stepping import compiled
 
-    s = hc.constant_cut(gain=(4.2, 0.2), shaping=True, impedance=True, start=(0.05, 0.0), force=(0.5, 0.0))
-    late, watched = compiled.Native(s, 1), compiled.Native(s, 1)
+    s = hc.constant_cut(
+        gain=(4.2, 0.2), shaping=True, impedance=True, start=(0.05, 0.0), force=(0.5, 0.0)
+    )
+    late, watched = compiled.NativeLeapfrog(s, 1), compiled.NativeLeapfrog(s, 1)
     watched.calm = False
     for run in (late, watched):
         run.go(None)
     assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
     same(Record.of(late, 0.0), Record.of(watched, 0.0))
     assert late.watch.seen == watched.watch.seen >= late.looked
-    calm = compiled.Native(hc.constant_cut(), 1)
+    calm = compiled.NativeLeapfrog(hc.constant_cut(), 1)
     calm.watch.look = None  # is not called
     calm.go(None)
     same(Record.of(calm, 0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
@@ -148,7 +177,10 @@ def test_summaries_are_those_of_the_records():
     short = hc.simulate_batch(ALL.values(), keep="summaries")
     assert short.dtype == batch.SUMMARY
     for i, r in enumerate(records):
-        assert short[i].tobytes() == np.array([batch.entry(*record.brief(r))], batch.SUMMARY)[0].tobytes(), list(ALL)[i]
+        assert (
+            short[i].tobytes()
+            == np.array([batch.summary_entry(*record.brief(r))], batch.SUMMARY)[0].tobytes()
+        ), list(ALL)[i]
         assert short["code"][i] == r.outcome.code and short["residual"][i] == r.energy["residual"]
         np.testing.assert_array_equal(short["p"][i], r.p[-1])
 
@@ -157,7 +189,9 @@ def test_summaries_are_those_of_the_records():
 def test_a_run_that_diverges_changes_no_other():
     good = [hc.constant_cut(b=b, t_max=0.5) for b in (10.0, 50.0, 90.0)]
     alone = hc.simulate_batch(good)
-    mixed = hc.simulate_batch([good[0], MORE["diverged"], good[1], MORE["thrown out of reach"], good[2]])
+    mixed = hc.simulate_batch(
+        [good[0], MORE["diverged"], good[1], MORE["thrown out of reach"], good[2]]
+    )
     assert [mixed[i].outcome.code for i in (1, 3)] == ["diverged", "diverged"]
     for a, b in zip(alone, mixed[::2], strict=True):
         same(a, b)
@@ -165,7 +199,10 @@ def test_a_run_that_diverges_changes_no_other():
 
 @fast
 def test_what_native_cannot_run_python_does(capsys):
-    scenes = [hc.constant_cut(t_max=0.05, **kw) for kw in (dict(control="sampled"), dict(integrator="accurate"))]
+    scenes = [
+        hc.constant_cut(t_max=0.05, **kw)
+        for kw in (dict(control="sampled"), dict(integrator="accurate"))
+    ]
     scenes[1] = dataclasses.replace(scenes[1], muscle=WAVE)
     mixed = hc.simulate_batch([*scenes, CASES["plain"]])
     assert capsys.readouterr().err == ""
@@ -182,7 +219,7 @@ def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
     with pytest.raises(hc.ParameterError, match=r"hapticclay\[fast\]"):
         hc.simulate(hc.free(t_max=0.1), engine="native")
     long = hc.free(force=(0.0, 0.0), dt=1e-6, t_max=1.0)
-    assert simulate._kind(long, "auto") is leapfrog.Leapfrog
+    assert simulate._stepper(long, "auto") is leapfrog.Leapfrog
     scenes = [hc.free(t_max=0.1), hc.constant_cut(t_max=0.1)]
     records = hc.simulate_batch(scenes)
     said = capsys.readouterr().err
@@ -204,10 +241,10 @@ def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
 
 
 def test_auto_takes_native_for_long_runs_only():
-    assert simulate._kind(hc.constant_cut(), "auto") is leapfrog.Leapfrog
+    assert simulate._stepper(hc.constant_cut(), "auto") is leapfrog.Leapfrog
     long = hc.constant_cut(dt=1e-4)
-    assert (simulate._kind(long, "auto") is leapfrog.Leapfrog) == (not simulate.has_numba())
-    assert simulate._kind(long, "python") is leapfrog.Leapfrog
+    assert (simulate._stepper(long, "auto") is leapfrog.Leapfrog) == (not simulate.has_numba())
+    assert simulate._stepper(long, "python") is leapfrog.Leapfrog
 
 
 @pytest.mark.parametrize("kw", [dict(threads=0), dict(every=0), dict(keep="all")])
@@ -235,7 +272,7 @@ def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):
     def broken(self):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(compiled.Native, "advance", broken)
+    monkeypatch.setattr(compiled.NativeLeapfrog, "advance", broken)
     with pytest.raises(RuntimeError, match="broken"):
         hc.simulate_batch([hc.free(t_max=0.1)] * 5, threads=2)
 
@@ -267,7 +304,9 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
     took, said = [], []
     for hits in (0, 1):
         terminal, end = os.openpty()
-        out = subprocess.run([sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=end, check=True)
+        out = subprocess.run(
+            [sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=end, check=True
+        )
         os.write(end, b".")  # a terminal without a word holds its reader up
         said.append(b"")
         while not said[-1].endswith(b"."):
@@ -276,7 +315,11 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
         os.close(end)
         took.append(float(out.stdout.split()[0]))
         assert out.stdout.split()[1] == str(hits).encode()
-    assert said[0].startswith(b"hapticclay: compiling, this once\r") and said[0].endswith(b"\r.") and said[1] == b"."
+    assert (
+        said[0].startswith(b"hapticclay: compiling, this once\r")
+        and said[0].endswith(b"\r.")
+        and said[1] == b"."
+    )
     assert took[1] < 0.5 * took[0]
 
 

@@ -71,8 +71,12 @@ def test_varying_muscle_force_and_command(kw, tolerance):
 
 def test_varying_scenes_converge_at_second_order():
     muscle = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
-    clay = Clay(Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)), Profile((0.01,), (50.0, 100.0)))
-    s = dataclasses.replace(hc.free(impedance=True, t_max=3.0), clay=clay, length=None, muscle=muscle)
+    clay = Clay(
+        Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)), Profile((0.01,), (50.0, 100.0))
+    )
+    s = dataclasses.replace(
+        hc.free(impedance=True, t_max=3.0), clay=clay, length=None, muscle=muscle
+    )
     exact = hc.simulate(dataclasses.replace(s, integrator="accurate", dt=5e-4))
     errors = []
     for n in (1, 2, 4):
@@ -82,7 +86,9 @@ def test_varying_scenes_converge_at_second_order():
     assert order > 1.8, errors
 
 
-@pytest.mark.parametrize("kw,tolerance", [(dict(), 1e-6), (dict(integrator="accurate", dt=2e-3), 1e-8)])
+@pytest.mark.parametrize(
+    "kw,tolerance", [(dict(), 1e-6), (dict(integrator="accurate", dt=2e-3), 1e-8)]
+)
 def test_growing_clay_counts_from_entry(kw, tolerance):
     clay = Clay(Profile((0.02,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
     s = dataclasses.replace(hc.free(shaping=True, t_max=6.0), clay=clay, **kw)
@@ -91,10 +97,14 @@ def test_growing_clay_counts_from_entry(kw, tolerance):
     entry = first.t[-1]
     assert r.crossings[0].time == pytest.approx(entry, abs=tolerance)
     z = first.y[:, -1]
-    later = axis_solution(0, lambda t: 100.0 + 30.0 * t, 1.0, lambda t: 1.0, (0, 0, 0), 6.0 - entry, z0=z)
+    later = axis_solution(
+        0, lambda t: 100.0 + 30.0 * t, 1.0, lambda t: 1.0, (0, 0, 0), 6.0 - entry, z0=z
+    )
     after = r.t > entry
     assert np.max(np.abs(r.p[after, 0] - later.sol(r.t[after] - entry)[0])) < tolerance
-    np.testing.assert_allclose(r.b[after, 0], 100.0 + 30.0 * (r.t[after] - r.crossings[0].time), rtol=1e-12)
+    np.testing.assert_allclose(
+        r.b[after, 0], 100.0 + 30.0 * (r.t[after] - r.crossings[0].time), rtol=1e-12
+    )
     assert np.all(r.b[:, 1] == 50.0)
     assert len(r.regions()) == 2
 
@@ -104,7 +114,11 @@ def test_growth_counts_from_the_first_entry():
     clay = Clay(Profile((0.0,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
     muscle = Multisine(rms=(3.0, 0.0), low=0.5, high=0.5, period=2.0, seed=1)
     s = dataclasses.replace(
-        hc.free(shaping=True, t_max=4.0, force=(0.0, 0.0)), clay=clay, length=None, muscle=muscle, start=(-1e-3, 0.0)
+        hc.free(shaping=True, t_max=4.0, force=(0.0, 0.0)),
+        clay=clay,
+        length=None,
+        muscle=muscle,
+        start=(-1e-3, 0.0),
     )
     r = hc.simulate(s)
     ups = [c.time for c in r.crossings if c.speed > 0.0]
@@ -118,18 +132,29 @@ def test_growth_counts_from_the_first_entry():
 def test_clay_hit_at_speed(b, speed, control):
     """The loop as if it had moved so for long, delta ahead by G's lag: exact solution by matrix exponential."""
     s = dataclasses.replace(
-        hc.constant_cut(b=b, shaping=True, t_max=0.7, control=control, render="implicit", torque_limit=(1e5, 1e5)),
+        hc.constant_cut(
+            b=b,
+            shaping=True,
+            t_max=0.7,
+            control=control,
+            render="implicit",
+            torque_limit=(1e5, 1e5),
+        ),
         velocity=(speed, 0.0),
     )
     r = hc.simulate(s)
     z0 = (0.0, speed, 41.8 / 910.19 * speed, speed, 0.0, speed, 1.0)
-    crossings, position = piecewise_linear((0.05, 0.15, 0.2), (0.0, b, 0.0), 1.0, 1.0, t_max=0.7, z0=z0)
+    crossings, position = piecewise_linear(
+        (0.05, 0.15, 0.2), (0.0, b, 0.0), 1.0, 1.0, t_max=0.7, z0=z0
+    )
     # sampled: held for one sample, as a delay of half of it, 0.18 ms
     tolerance = 1e-6 if control == "continuous" else 4e-4
     mine = [c.time for c in r.crossings]
     assert len(mine) == len(crossings) and mine == pytest.approx(crossings, abs=tolerance)
     t = r.t[r.t < (crossings[-1] if len(crossings) == 3 else 0.7)]
-    assert np.max(np.abs(r.p[: len(t), 0] - position(t))) < (2e-5 if control == "continuous" else 2e-3)
+    assert np.max(np.abs(r.p[: len(t), 0] - position(t))) < (
+        2e-5 if control == "continuous" else 2e-3
+    )
     kinetic = 0.5 / 0.7919 * r.v[:, 0] ** 2
     assert np.max(kinetic) <= 1.1 * np.max(0.5 / 0.7919 * np.gradient(position(t), t) ** 2)
 
@@ -149,7 +174,10 @@ def test_command_is_counted_from_the_start(engine, kw):
     every = round((s.Ts or s.dt) / s.dt)
     np.testing.assert_allclose(r.delta[::every], (sig(r.t) - sig(0.0))[::every], atol=1e-12)
     G = G0[0] / (G0[0] - sig.omega**2 + 1j * G1[0] * sig.omega)
-    moved = np.real(np.exp(1j * (np.outer(r.t, sig.omega) + sig.phase[:, 0])) @ G) * sig.amplitude[0] - sig(0.0)[0]
+    moved = (
+        np.real(np.exp(1j * (np.outer(r.t, sig.omega) + sig.phase[:, 0])) @ G) * sig.amplitude[0]
+        - sig(0.0)[0]
+    )
     later = r.t > 1.0  # what the start has left decays at 21/s
     # (omega dt)^2/6 of 1.4 mm is 5e-9 m; held torques come half a sample late, which the servo's poles double
     tolerance = np.abs(r.v).max() * 3.6e-4 if s.control == "sampled" else 1e-7

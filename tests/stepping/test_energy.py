@@ -28,15 +28,21 @@ def exact_clay_and_hand(b, K, uh, th):
     return z[7], z[8], 0.5 * z[1] ** 2 / 0.7919, 0.5 * m * z[1] ** 2 + 0.5 * k * z[0] ** 2
 
 
-@pytest.mark.parametrize("uh,th", [(1.0, (0, 0, 0)), (2.0, (0.25, 2.0, 6.0))], ids=["hand off", "hand on"])
+@pytest.mark.parametrize(
+    "uh,th", [(1.0, (0, 0, 0)), (2.0, (0.25, 2.0, 6.0))], ids=["hand off", "hand on"]
+)
 def test_every_entry_converges_to_the_exact_integral_at_second_order(uh, th):
     clay, hand, _, stored = exact_clay_and_hand(90.0, 1.0, uh, th)
     steps = np.array([4e-3, 2e-3, 1e-3, 5e-4])
     errors = []
     for dt in steps:
-        e = hc.simulate(hc.constant_cut(force=(uh, 0.0), impedance=any(th), shaping=True, dt=float(dt))).energy
+        e = hc.simulate(
+            hc.constant_cut(force=(uh, 0.0), impedance=any(th), shaping=True, dt=float(dt))
+        ).energy
         assert e["muscle"] == pytest.approx(uh * 0.20, rel=1e-3)
-        errors.append(abs(e["clay"] - clay) + abs(e["hand_damper"] - hand) + abs(e["hand_stored"] - stored))
+        errors.append(
+            abs(e["clay"] - clay) + abs(e["hand_damper"] - hand) + abs(e["hand_stored"] - stored)
+        )
     assert errors[-1] < 3e-6
     assert 1.7 < np.polyfit(np.log(steps), np.log(errors), 1)[0] < 2.6, errors
 
@@ -61,14 +67,14 @@ def test_residual_with_a_hand_is_small_and_converges():
 
 def test_an_engine_that_disobeys_shows_in_the_balance(monkeypatch):
     """The dampers left out of the engine, as a wrong model would: the residual tells."""
-    plain = engine.scene.build
+    plain = engine.build
 
     def build(scenario):
         model = plain(scenario)
         model.actuator_gainprm[2:] = 0.0
         return model
 
-    monkeypatch.setattr(engine.scene, "build", build)
+    monkeypatch.setattr(engine, "build", build)
     e = hc.simulate(hc.constant_cut(t_max=2.0)).energy
     assert abs(e["residual"]) > 1e-3 * e["throughput"]
 

@@ -42,7 +42,9 @@ def test_inertia_matrix_is_the_same_at_every_pose_and_velocity_adds_no_torque():
     np.testing.assert_allclose(seen[0], [[I1 + I2, I2], [I2, I2]], rtol=1e-14)
 
 
-@pytest.mark.parametrize("scenario", [hc.free(), hc.constant_cut(impedance=True)], ids=["free", "constant"])
+@pytest.mark.parametrize(
+    "scenario", [hc.free(), hc.constant_cut(impedance=True)], ids=["free", "constant"]
+)
 def test_headless_scene_holds_nothing_that_it_does_not_need(scenario):
     m = hc.build(scenario)
     for count in ("ngeom", "nsensor", "npair", "nmesh", "ntex", "nmat", "nlight", "ncam", "nhfield", "ntendon",
@@ -64,7 +66,10 @@ def binary(model):
         {"shaping": True},
         {"muscle": Multisine(rms=(1.0, 1.0), low=0.2, high=3.0, period=5.0, seed=1)},
         {"control": "sampled"},
-        {"control": "sampled", "interface": hc.Interface(encoder=4096, friction=(0.1, 0.1), passivity=True)},
+        {
+            "control": "sampled",
+            "interface": hc.Interface(encoder=4096, friction=(0.1, 0.1), passivity=True),
+        },
     ],
     ids=lambda part: "-".join(part),
 )
@@ -111,7 +116,7 @@ def test_scenario_sets_step_and_torque_limits():
 
 def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
     with engine.warnings_caught() as caught:
-        model = mujoco.MjModel.from_xml_path(str(engine.folder() / "scene.xml"))
+        model = mujoco.MjModel.from_xml_path(str(engine.mjcf_folder() / "scene.xml"))
         data = mujoco.MjData(model)
         rng = np.random.default_rng(1)
         for _ in range(1000):

@@ -21,19 +21,27 @@ LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "star
 def tolerance(case):
     """[m] At 0.36 ms all but a few um of stiff borders; more where motors go into their limits between two samples."""
     s = case.scenario
-    if case.group == "reach" or s.gain[0] > 1e3:  # thrown into the singularity, where any torque is too little
+    if (
+        case.group == "reach" or s.gain[0] > 1e3
+    ):  # thrown into the singularity, where any torque is too little
         return 2e-4
     return 5e-5 if s.dt > 1e-3 or min(s.torque_limit) < 1.0 else 1e-5
 
 
-@pytest.mark.parametrize("case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}")
+@pytest.mark.parametrize(
+    "case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}"
+)
 def test_verdict_is_the_reference_s_and_energy_is_bounded(case, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     row = extremes.run(case)
     assert row["agree"], row
     assert row["nan"] == 0 and row["warnings"] == 0 and not list(tmp_path.iterdir())
     if row["reference"] not in ("unstable", "limit cycle"):
-        assert row["energy"] is None and "force: none" in f"{case.group}: {case.name}" or row["energy"] < 1.01, row
+        assert (
+            row["energy"] is None
+            and "force: none" in f"{case.group}: {case.name}"
+            or row["energy"] < 1.01
+        ), row
         assert row["position"] < tolerance(case), row
     if case.scenario.operator is None and case.scenario.integrator == "fast":
         assert row["residual"] < 1e-10, row
@@ -78,7 +86,9 @@ def test_reference_is_the_matrix_exponential_where_the_loop_is_linear():
     s = hc.constant_cut(shaping=True, impedance=True, force=(2.0, 0.0), t_max=3.0)
     t = np.linspace(0.0, 2.9, 50)
     x = reference.solve(s, t)
-    crossings, position = piecewise_linear((0.05, 0.15), (0.0, 90.0), 1.0, 2.0, (0.25, 2.0, 6.0), t_max=3.0)
+    crossings, position = piecewise_linear(
+        (0.05, 0.15), (0.0, 90.0), 1.0, 2.0, (0.25, 2.0, 6.0), t_max=3.0
+    )
     assert x.crossings[0][2] == pytest.approx(crossings[0], abs=1e-9)
     np.testing.assert_allclose(x.p[:, 0], position(t), atol=1e-9)
 
@@ -94,10 +104,15 @@ def test_reference_finds_the_poles_of_the_linear_loop():
 def test_reference_crosses_borders_both_ways():
     clay = Clay(Profile((0.0,), (0.0, 500.0)), Profile((), (0.0,)))
     muscle = Multisine(rms=(2.0, 0.0), low=1.0, high=3.0, period=4.0, seed=3)
-    s = dataclasses.replace(hc.free(force=(0.0, 0.0), t_max=2.0), clay=clay, muscle=muscle, length=None)
+    s = dataclasses.replace(
+        hc.free(force=(0.0, 0.0), t_max=2.0), clay=clay, muscle=muscle, length=None
+    )
     t = np.linspace(0.0, 1.99, 2000)
     x = reference.solve(s, t)
-    ways = [float(np.interp(u + 1e-3, t, x.p[:, 0]) - np.interp(u - 1e-3, t, x.p[:, 0])) for *_, u in x.crossings[1:-1]]
+    ways = [
+        float(np.interp(u + 1e-3, t, x.p[:, 0]) - np.interp(u - 1e-3, t, x.p[:, 0]))
+        for *_, u in x.crossings[1:-1]
+    ]
     assert min(ways) < 0.0 < max(ways)
     r = hc.simulate(s)
     assert np.max(np.abs(np.interp(t, r.t, r.p[:, 0]) - x.p[:, 0])) < 1e-5

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm, hardware
+from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
@@ -30,7 +30,7 @@ def ring(axis, K, b, parts=None, **kw):
     clay = Profile((), (b,))
     unit = lambda x: (x, 0.0) if i == 0 else (0.0, x)  # noqa: E731
     return hc.Scenario(
-        clay=Clay(clay, clay), gain=unit(K), force=(0.0, 0.0), velocity=unit(1e-4), origin=hc.params.NOMINAL,
+        clay=Clay(clay, clay), gain=unit(K), force=(0.0, 0.0), velocity=unit(1e-4), origin=constants.NOMINAL,
         operator=Operator(), length=None, control="sampled", interface=parts, stop=False, **kw,
     )  # fmt: skip
 
@@ -42,7 +42,9 @@ def cut(parts, **kw):
 # ---- nothing, and seeds ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kw", [dict(), dict(render="implicit", impedance=True, force=(2.0, 0.3)), dict(Ts=3 * TS)])
+@pytest.mark.parametrize(
+    "kw", [dict(), dict(render="implicit", impedance=True, force=(2.0, 0.3)), dict(Ts=3 * TS)]
+)
 def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
     kw = dict(clay=(0.02, 0.15), t_max=0.4) | kw
     a, b = hc.simulate(cut(None, **kw)), hc.simulate(cut(hc.Interface(), **kw))
@@ -51,7 +53,9 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
     if kw.get("render") == "implicit":
         np.testing.assert_array_equal(a.fe, b.fe)
-    elif "Ts" not in kw:  # what the motors hold, a hold later than b v only where the last step was cut short
+    elif (
+        "Ts" not in kw
+    ):  # what the motors hold, a hold later than b v only where the last step was cut short
         np.testing.assert_allclose(a.fe[:-1], b.fe[:-1], atol=8 * EPS)
 
 
@@ -111,17 +115,17 @@ def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
 @given(st.floats(-20.0, 20.0), st.integers(2, 24), st.floats(0.1, 100.0))
 def test_a_converter_is_off_by_half_a_level_and_ends_at_its_range(x, bits, span):
     level = 2.0 * span / 2**bits
-    y = hardware.converted(x, bits, span)
+    y = hardware.quantize(x, bits, span)
     assert -span <= y <= span - level * (1.0 - 1e-12)
     if -span <= x <= span - level:
         assert abs(y - x) <= 0.5 * level * (1.0 + 1e-9)
-    assert hardware.converted(y, bits, span) == y  # idempotent
+    assert hardware.quantize(y, bits, span) == y  # idempotent
     assert abs(y / level - round(y / level)) < 1e-6
 
 
 @given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=20), st.integers(2, 16))
 def test_converters_are_monotone(xs, bits):
-    ys = [hardware.converted(x, bits, 5.0) for x in sorted(xs)]
+    ys = [hardware.quantize(x, bits, 5.0) for x in sorted(xs)]
     assert ys == sorted(ys)
 
 
@@ -129,16 +133,18 @@ def test_converters_are_monotone(xs, bits):
 def test_quantisation_error_has_the_variance_of_a_uniform_one(bits):
     rng = np.random.default_rng(0)
     x, level = rng.uniform(-4.0, 4.0, 200_000), 10.0 / 2**bits
-    error = np.array([hardware.converted(v, bits, 5.0) for v in x]) - x
+    error = np.array([hardware.quantize(v, bits, 5.0) for v in x]) - x
     # mean of n uniform errors: level/sqrt(12 n); variance of the squares: level^4/180; five sigma
     assert abs(error.mean()) < 5.0 * level / math.sqrt(12 * len(x))
     assert abs((error**2).mean() - level**2 / 12) < 5.0 * level**2 / math.sqrt(180 * len(x))
 
 
 def test_halves_go_to_the_even_level():
-    assert [hardware.rounded(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
-    assert hardware.encoded(math.tau * 3 / 1000, 1000) == pytest.approx(math.tau * 3 / 1000, rel=1e-15)
-    assert hardware.encoded(0.123, None) == 0.123
+    assert [hardware.round_to_even(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
+    assert hardware.encode(math.tau * 3 / 1000, 1000) == pytest.approx(
+        math.tau * 3 / 1000, rel=1e-15
+    )
+    assert hardware.encode(0.123, None) == 0.123
 
 
 def test_in_a_run_torques_lie_on_levels_within_the_range():
@@ -156,7 +162,7 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
 def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
     at = lambda k: (1.0 + k * Ts * w1, -0.5 + k * Ts * w2)  # noqa: E731
-    found = hardware.difference(tuple((j, at(j)) for j in range(-window, 0)), 0, at(0), Ts)
+    found = hardware.velocity_difference(tuple((j, at(j)) for j in range(-window, 0)), 0, at(0), Ts)
     assert found == pytest.approx((w1, w2), abs=16 * EPS / (window * Ts))
 
 
@@ -164,14 +170,21 @@ def test_window_divides_the_noise_of_an_encoder():
     """m samples hold n or n + 1 counts, the latter as often as the fraction f says: rms sqrt(f (1 - f)) of a count."""
     counts, Ts, w = 4096, 1e-3, 0.7391
     for m in (1, 4, 16):
-        q = [hardware.encoded(w * k * Ts, counts) for k in range(4000)]
-        v = np.array([hardware.difference(((k - m, (q[k - m], 0.0)),), k, (q[k], 0.0), Ts)[0] for k in range(m, 4000)])
+        q = [hardware.encode(w * k * Ts, counts) for k in range(4000)]
+        v = np.array(
+            [
+                hardware.velocity_difference(((k - m, (q[k - m], 0.0)),), k, (q[k], 0.0), Ts)[0]
+                for k in range(m, 4000)
+            ]
+        )
         step = math.tau / counts / (m * Ts)
         np.testing.assert_allclose(v / step, np.round(v / step), atol=1e-6)
         assert np.abs(v - w).max() < step  # two roundings of half a count
         f = w / step % 1.0
         # equidistribution of n samples: discrepancy about log(n)/n
-        assert np.sqrt(np.mean((v - w) ** 2)) == pytest.approx(step * math.sqrt(f * (1.0 - f)), rel=1e-2)
+        assert np.sqrt(np.mean((v - w) ** 2)) == pytest.approx(
+            step * math.sqrt(f * (1.0 - f)), rel=1e-2
+        )
 
 
 def test_velocity_filter_is_an_exact_first_order_lag_of_held_means():
@@ -182,7 +195,7 @@ def test_velocity_filter_is_an_exact_first_order_lag_of_held_means():
     a = cont2discrete((np.array([[-w]]), np.array([[w]]), np.eye(1), np.zeros((1, 1))), Ts)
     rng, y, z = np.random.default_rng(1), 0.0, 0.0
     for u in rng.standard_normal(50):
-        y, z = hardware.smoothed(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
+        y, z = hardware.low_pass(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
         assert y == pytest.approx(z, abs=1e-12)
 
 
@@ -204,7 +217,9 @@ def test_difference_lags_half_its_window_in_a_run():
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate
-        np.testing.assert_allclose(seen[m:], late[m:], atol=0.5 * np.abs(np.diff(true, axis=0)).max())
+        np.testing.assert_allclose(
+            seen[m:], late[m:], atol=0.5 * np.abs(np.diff(true, axis=0)).max()
+        )
 
 
 # ---- force -------------------------------------------------------------------------------------------------------
@@ -222,17 +237,19 @@ def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
     x, y = (0.0,) * order, []
     for v in u:
         y.append(x[0])
-        x = hardware.filtered(A, B, x, v)
-    np.testing.assert_allclose(y, signal.lfilter(n[0], d, u), atol=1e-9)  # polynomials of order 2 near z = 1
+        x = hardware.filter_step(A, B, x, v)
+    np.testing.assert_allclose(
+        y, signal.lfilter(n[0], d, u), atol=1e-9
+    )  # polynomials of order 2 near z = 1
     still = (0.0,) * order
     for _ in range(20_000):
-        still = hardware.filtered(A, B, still, 1.0)
+        still = hardware.filter_step(A, B, still, 1.0)
     assert still[0] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_noise_has_its_rms_and_each_part_its_own_stream():
     n = 20_000
-    a, b = (hardware.Chance(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
+    a, b = (hardware.SampleNoise(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
     noise = np.array([a(k)[2] for k in range(n)])
     assert np.all(np.abs(noise.std(axis=0) - 0.3) < 5 * 0.3 / math.sqrt(2 * n))
     assert np.abs(np.corrcoef(noise.T)[0, 1]) < 5 / math.sqrt(n)
@@ -244,10 +261,12 @@ def test_noise_has_its_rms_and_each_part_its_own_stream():
 
 def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
     n, rms = 20_000, 0.28 * TS
-    c = hardware.Chance(hc.Interface(jitter=rms))
+    c = hardware.SampleNoise(hc.Interface(jitter=rms))
     late = np.array([c(k)[0] for k in range(n)])
     assert late[0] == 0.0 and np.all(np.diff(np.arange(n) * TS + late) > 0.0)
-    assert abs(late.std() - rms) < 5 * rms / math.sqrt(5 * n)  # kurtosis 9/5: variance of the variance 4/5 rms^4/n
+    assert abs(late.std() - rms) < 5 * rms / math.sqrt(
+        5 * n
+    )  # kurtosis 9/5: variance of the variance 4/5 rms^4/n
     assert abs(late.mean()) < 5 * rms / math.sqrt(n)
 
 
@@ -277,7 +296,7 @@ def test_torques_come_late_by_the_delay_to_the_step(delay):
 def test_delayed_run_follows_the_lifted_map(axis, b, Ts, delay):
     """At the nominal pose the small motion of the arm is x(k+1) = M x(k), exact between samples."""
     K, i = 0.5, "xy".index(axis)
-    M, beta, gamma = gain_limit.matrices(axis, b, Operator(), Ts, delay)
+    M, beta, gamma = gain_limit.sampled_matrices(axis, b, Operator(), Ts, delay)
     A = M + K * np.outer(beta, gamma)
     r = hc.simulate(ring(axis, K, b, hc.Interface(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
     x = np.zeros(len(A))
@@ -323,7 +342,7 @@ def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(a
 )  # fmt: skip
 def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
     a12 = share * math.sqrt(a11 * a22)
-    f = hardware.stuck(w, a11, a12, a22, limit)
+    f = hardware.coulomb_friction(w, a11, a12, a22, limit)
     after = (w[0] + a11 * f[0] + a12 * f[1], w[1] + a12 * f[0] + a22 * f[1])
     for j in (0, 1):
         assert abs(f[j]) <= limit[j]
@@ -338,9 +357,9 @@ def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
 def test_a_push_below_the_friction_does_not_move_the_arm_and_one_above_does():
     """At rest, without compensator, the motors give nothing: the hand's torques J'f against the limit."""
     s = replace(hc.free(control="sampled", t_max=0.3), gain=(0.0, 0.0), force=(0.1, 0.0))
-    q = arm.inverse(*s.origin)
-    u = arm.columns(math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q)))
-    tau = arm.torques(0.1, 0.0, *u)
+    q = arm.inverse_kinematics(*s.origin)
+    u = arm.jacobian(math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q)))
+    tau = arm.joint_torques(0.1, 0.0, *u)
     for factor, moves in ((1.01, False), (0.99, True)):
         parts = hc.Interface(friction=(factor * abs(tau[0]), factor * abs(tau[1])))
         r = hc.simulate(replace(s, interface=parts))
@@ -362,15 +381,23 @@ def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
                 interface=hc.Interface(friction=(2.0, 2.0)))  # fmt: skip
     r = hc.simulate(s)
     assert abs(r.qd[0, 1]) > 0.1
-    assert np.abs(r.qd[50:, 1]).max() < 1e-14 and np.ptp(r.q[50:, 1]) < 1e-14 < 1e-3 < np.ptp(r.q[50:, 0])
+    assert np.abs(r.qd[50:, 1]).max() < 1e-14 and np.ptp(r.q[50:, 1]) < 1e-14 < 1e-3 < np.ptp(
+        r.q[50:, 0]
+    )
 
 
 # ---- passivity observer and controller, coupling -----------------------------------------------------------------
 
 
-@given(st.floats(-1e-3, 1.0), st.floats(0.0, 1e6), st.floats(-2.0, 2.0), st.floats(1e-5, 1e-2), st.floats(0.05, 5.0))
+@given(
+    st.floats(-1e-3, 1.0),
+    st.floats(0.0, 1e6),
+    st.floats(-2.0, 2.0),
+    st.floats(1e-5, 1e-2),
+    st.floats(0.05, 5.0),
+)
 def test_the_controllers_force_is_never_active_in_the_hold(energy, b, v, Ts, W):
-    f = hardware.guarded(energy, b * v, v, Ts, W)
+    f = hardware.passivity_controller(energy, b * v, v, Ts, W)
     gain = Ts * f * (v - 0.5 * Ts * W * f)
     assert f * v >= 0.0
     best = 0.5 * v * v / W
@@ -387,14 +414,16 @@ def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, b):
     assume(2.0 * W * -energy < 1e-3 * v * v)
     need = -energy / (Ts * v)
     assume(need > b * v)
-    assert hardware.guarded(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
+    assert hardware.passivity_controller(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
 
 
 @pytest.mark.parametrize("b", [8e3, 1e6])
 def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     kw = dict(b=b, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.5)
     wild, tame = (hc.simulate(cut(hc.Interface(passivity=x), **kw)) for x in (False, True))
-    assert wild.outcome.code == "limit cycle" and wild.energy.keys().isdisjoint(("passivity_controller",))
+    assert wild.outcome.code == "limit cycle" and wild.energy.keys().isdisjoint(
+        ("passivity_controller",)
+    )
     taken = np.cumsum(tame.fe[:-1] * np.diff(tame.p, axis=0), axis=0)
     assert tame.outcome.code == "time limit" and np.abs(tame.v).max() < 2e-3
     assert taken.min() >= -1e-12 * taken.max()
@@ -422,17 +451,25 @@ def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exac
     assert 0.0 < b.energy["passivity_controller"] < 1e-6
 
 
-@given(st.floats(0.0, 1e9), st.floats(1.0, 1e5), st.floats(0.1, 1e3), st.floats(-1.0, 1.0), st.floats(1e-5, 1e-2))
+@given(
+    st.floats(0.0, 1e9),
+    st.floats(1.0, 1e5),
+    st.floats(0.1, 1e3),
+    st.floats(-1.0, 1.0),
+    st.floats(1e-5, 1e-2),
+)
 def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k, d, v, Ts):
-    tool, u = hardware.coupled(0.0, 0.0, v, b, k, d, Ts)
+    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, k, d, Ts)
     assert abs(b * u) <= min(b, d + k * Ts) * abs(v) * (1.0 + 1e-12)
-    assert b * u == pytest.approx(k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v)))
+    assert b * u == pytest.approx(
+        k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v))
+    )
 
 
 def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     tool, b, v, Ts = 0.0, 90.0, 0.1, 1e-3
     for i in range(3000):
-        tool, u = hardware.coupled(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
+        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 
@@ -448,7 +485,9 @@ def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
 
 
 def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():
-    parts = hc.Interface(encoder=65536, velocity="difference", window=16, adc_bits=12, dac_bits=12, delay=TS)
+    parts = hc.Interface(
+        encoder=65536, velocity="difference", window=16, adc_bits=12, dac_bits=12, delay=TS
+    )
     r = hc.simulate(cut(parts, shaping=True, force=(4.0, 0.0)))
     assert r.outcome.code == "finished"
     inside = (r.p[:, 0] > 0.08) & (r.p[:, 0] < 0.14)
@@ -465,7 +504,9 @@ def test_published_resolution_page_was_made_from_the_published_data():
     assert resolution.page(rows).split("## Machine")[0] == page.split("## Machine")[0]
     assert all(r["status"] == "finished" for r in rows)
     fine = [r for r in rows if r["counts"] and r["counts"] >= 65536]
-    assert all(r["rms"] < 0.5 * r["least"] for r in fine)  # n or n + 1 counts in a window: half a count at most
+    assert all(
+        r["rms"] < 0.5 * r["least"] for r in fine
+    )  # n or n + 1 counts in a window: half a count at most
     assert all(abs(r["mean"]) < 1e-3 for r in fine)
 
 

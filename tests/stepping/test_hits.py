@@ -60,7 +60,13 @@ def test_order_is_two_at_any_stiffness(kind, b):
 
 
 @settings(max_examples=25)
-@given(st.floats(0.0, 9.0), st.floats(0.05, 0.5), st.booleans(), st.booleans(), st.sampled_from([TS, 1e-3]))
+@given(
+    st.floats(0.0, 9.0),
+    st.floats(0.05, 0.5),
+    st.booleans(),
+    st.booleans(),
+    st.sampled_from([TS, 1e-3]),
+)
 def test_any_hit_is_within_second_order_of_the_exact_solution(power, v, hand, y, dt):
     """Errors of the times of borders passed faster than 1 mm/s: below 150 dt^2, 2e-5 s at 0.36 ms, whatever b.
 
@@ -76,10 +82,14 @@ def test_any_hit_is_within_second_order_of_the_exact_solution(power, v, hand, y,
         start=put(0.05 - 0.05 * v), gain=(1.0, 0.3), shaping=True, torque_limit=hits.STRONG, length=None, t_max=0.4,
         dt=dt, stop=False, origin=(0.35, 0.19) if y else hits.NOMINAL_BORDER,
     )  # fmt: skip
-    exact, _ = bounces((0.05, 0.15), (0.0, b, 0.0), s.gain[axis], -v, th, axis, 0.05 - 0.05 * v, v, s.t_max)
+    exact, _ = bounces(
+        (0.05, 0.15), (0.0, b, 0.0), s.gain[axis], -v, th, axis, 0.05 - 0.05 * v, v, s.t_max
+    )
     r = hc.simulate(s)
     theirs = [e[0] for e in exact if abs(e[2]) > hits.SLOW]
-    assume(theirs and all(abs(abs(e[2]) / hits.SLOW - 1.0) > 0.1 for e in exact))  # reached, and each clear or not
+    assume(
+        theirs and all(abs(abs(e[2]) / hits.SLOW - 1.0) > 0.1 for e in exact)
+    )  # reached, and each clear or not
     mine = [c.time for c in r.crossings if abs(c.speed) > hits.SLOW]
     assert len(mine) == len(theirs)
     assert max(abs(a - b) for a, b in zip(mine, theirs, strict=True)) < 150.0 * dt * dt
@@ -100,10 +110,14 @@ def test_clay_takes_what_the_hit_brought_and_nothing_is_lost():
 @pytest.mark.parametrize("b", [3e3, 1e5, 1e8])
 def test_recorded_force_in_stiff_clay_balances_what_pushes(b):
     """Pushed for long, the handle creeps at (uh + servo)/b: fe is what the exact solution says, sample by sample."""
-    s = dataclasses.replace(REBOUND, clay=slab(b, 0.05, 0.15), start=(0.06, 0.0), velocity=(0.0, 0.0), t_max=0.3)
+    s = dataclasses.replace(
+        REBOUND, clay=slab(b, 0.05, 0.15), start=(0.06, 0.0), velocity=(0.0, 0.0), t_max=0.3
+    )
     r = hc.simulate(s)
     _, z = bounces((0.05, 0.15), (0.0, b, 0.0), 1.0, -0.5, p0=0.06, t_max=0.31, times=r.t[3:])
-    np.testing.assert_allclose(r.fe[3:, 0], b * z[:, 1], atol=1e-3)  # of 0.5 N; the mean over a kick at the beginning
+    np.testing.assert_allclose(
+        r.fe[3:, 0], b * z[:, 1], atol=1e-3
+    )  # of 0.5 N; the mean over a kick at the beginning
 
 
 @pytest.mark.parametrize("b", [1e4, 1e6])
@@ -116,4 +130,6 @@ def test_sampled_control_measures_the_speed_in_stiff_clay(b):
     r = hc.simulate(s)
     x = reference.solve(s, r.t)
     n = min(len(x.p), len(r.p))
-    np.testing.assert_allclose(b * r.p[:n, 0], b * x.p[:n, 0], atol=1e-3)  # b times distance: an impulse [N.s]
+    np.testing.assert_allclose(
+        b * r.p[:n, 0], b * x.p[:n, 0], atol=1e-3
+    )  # b times distance: an impulse [N.s]

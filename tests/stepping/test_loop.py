@@ -16,7 +16,9 @@ CASES = {
     "shaped": hc.constant_cut(t_max=1.0, shaping=True, force=(1.0, 0.3)),
     "hand": hc.constant_cut(t_max=1.0, impedance=True, force=(2.0, 0.0)),
     "stiff": hc.constant_cut(t_max=1.0, b=1e6),
-    "heavy hand": dataclasses.replace(hc.constant_cut(t_max=1.0), operator=Operator(100.0, 10.0, 1e5)),
+    "heavy hand": dataclasses.replace(
+        hc.constant_cut(t_max=1.0), operator=Operator(100.0, 10.0, 1e5)
+    ),
     "weak motors": hc.constant_cut(t_max=1.0, torque_limit=(0.2, 0.1)),
     "free": hc.free(t_max=1.0),
 }
@@ -29,7 +31,10 @@ def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
     monkeypatch.setattr(leapfrog, "_fused", {})
     monkeypatch.setattr(leapfrog, "FUSE_FROM", 10**9)
     plain = hc.simulate(CASES[name])
-    assert not leapfrog._fused and inline.inline(leapfrog.advance) is not leapfrog.advance
+    assert (
+        not leapfrog._fused
+        and inline.inline(leapfrog.glide_constant) is not leapfrog.glide_constant
+    )
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(fused, field), getattr(plain, field), err_msg=field)
 

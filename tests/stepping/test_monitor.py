@@ -13,7 +13,16 @@ from hapticclay.model.operator import Operator
 from hapticclay.simulation.record import Record
 from hapticclay.stepping import leapfrog, monitor
 
-CODES = {"finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"}
+CODES = {
+    "finished",
+    "time limit",
+    "stalled",
+    "saturated",
+    "diverged",
+    "limit cycle",
+    "out of reach",
+    "singular",
+}
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
 
 
@@ -26,7 +35,9 @@ def check_finite(r):
 @pytest.mark.parametrize("shaping", [False, True])
 @pytest.mark.parametrize("impedance", [False, True])
 def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
-    r = hc.simulate(hc.constant_cut(gain=(1.0, 1.0), shaping=shaping, impedance=impedance, force=(2.0, 0.1)))
+    r = hc.simulate(
+        hc.constant_cut(gain=(1.0, 1.0), shaping=shaping, impedance=impedance, force=(2.0, 0.1))
+    )
     assert r.outcome.code == "diverged" and r.outcome.axis == "y"
     assert r.status.startswith("diverged: y axis at ")
     assert f"{r.outcome.time:.4f}" in r.status
@@ -45,7 +56,9 @@ def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
 
 def test_growth_rate_is_that_of_the_unstable_poles():
     """Small swings of y under shaping grow as exp(sigma t), sigma from the closed-loop poles."""
-    r = hc.simulate(hc.constant_cut(gain=(1.0, 1.0), shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0)))
+    r = hc.simulate(
+        hc.constant_cut(gain=(1.0, 1.0), shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0))
+    )
     sigma = hc.closed_loop_poles("y", 1.0, 90.0).real.max()
     v = r.v[:, 1]
     k = np.flatnonzero((v[1:-1] - v[:-2]) * (v[2:] - v[1:-1]) < 0) + 1
@@ -119,11 +132,13 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
     s = hc.free()
     n, half = 12_000, 100
     t = np.arange(n)
-    v = np.where(t < 500, 0.1, 1e-3 * ratio ** ((t - 500) / half) * np.sin(np.pi * (t - 500) / half))
+    v = np.where(
+        t < 500, 0.1, 1e-3 * ratio ** ((t - 500) / half) * np.sin(np.pi * (t - 500) / half)
+    )
     v = np.clip(v, -5, 5)
     rows = np.zeros((12, n))
     rows[1], rows[5] = -1.5, v
-    watch, found = monitor.Watch(s), None
+    watch, found = monitor.StabilityMonitor(s), None
     for i in range(0, n, chunk):
         good, found = watch.look(rows[:, i : i + chunk], i)
         if found:
@@ -155,13 +170,19 @@ def at_nominal(**kw):
     return dataclasses.replace(s, clay=clay, muscle=muscle, length=None, origin=(0.35, 0.24), **kw)
 
 
-@pytest.mark.parametrize("K,code", [(2.0, "time limit"), (3.0, "time limit"), (25.0, "limit cycle")])
+@pytest.mark.parametrize(
+    "K,code", [(2.0, "time limit"), (3.0, "time limit"), (25.0, "limit cycle")]
+)
 def test_an_unstable_run_may_go_on_against_the_torque_limits(K, code):
     r = hc.simulate(at_nominal(gain=(K, 0.3), stop=False))
     assert r.outcome.code == code, r.status
     assert r.t[-1] == pytest.approx(6.0) and np.max(np.abs(r.tau)) <= 40.0
     if code == "limit cycle":
-        assert r.outcome.axis == "x" and r.outcome.time < 2.0 and np.mean(np.abs(r.tau[:, 0]) == 40.0) > 0.1
+        assert (
+            r.outcome.axis == "x"
+            and r.outcome.time < 2.0
+            and np.mean(np.abs(r.tau[:, 0]) == 40.0) > 0.1
+        )
         cut = hc.simulate(at_nominal(gain=(K, 0.3)))
         assert cut.outcome.code == "diverged" and cut.outcome.time == r.outcome.time
     check_finite(r)
@@ -179,7 +200,12 @@ def test_numbers_beyond_floating_point_end_the_run(monkeypatch):
     check_finite(r)
 
 
-@given(st.floats(0.2, 30.0), st.floats(0.05, 5.0), st.floats(1.0, 1e4), st.sampled_from([3.6e-4, 2e-3, 2e-2]))
+@given(
+    st.floats(0.2, 30.0),
+    st.floats(0.05, 5.0),
+    st.floats(1.0, 1e4),
+    st.sampled_from([3.6e-4, 2e-3, 2e-2]),
+)
 def test_no_parameters_make_it_raise_or_record_nan(K, Ky, b, dt):
     r = hc.simulate(hc.constant_cut(b=b, gain=(K, Ky), force=(3.0, 1.0), t_max=0.5, dt=dt))
     check_finite(r)
@@ -190,6 +216,10 @@ def test_a_command_may_beat_as_it_likes():
     """Two close lines grow from next to nothing, swing by swing, and shrink again: no instability at K = 0."""
     command = hc.Multisine(rms=(1e-3, 0.0), low=4.9, high=5.1, period=10.0, lines=2, seed=0)
     s = dataclasses.replace(
-        hc.free(force=(0.0, 0.0), t_max=3.0), gain=(0.0, 0.0), length=None, command=command, origin=(0.35, 0.24)
+        hc.free(force=(0.0, 0.0), t_max=3.0),
+        gain=(0.0, 0.0),
+        length=None,
+        command=command,
+        origin=(0.35, 0.24),
     )
     assert hc.simulate(s).outcome.code == "time limit"

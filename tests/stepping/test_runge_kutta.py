@@ -37,12 +37,19 @@ def test_fourth_order_and_1e_9_s_at_2_ms(name):
 
 def test_agrees_with_the_fast_integrator_in_everything_recorded():
     kw = dict(impedance=True, force=(2.0, 0.2), t_max=1.0)
-    a, b = hc.simulate(hc.constant_cut(**kw)), hc.simulate(hc.constant_cut(integrator="accurate", **kw))
+    a, b = (
+        hc.simulate(hc.constant_cut(**kw)),
+        hc.simulate(hc.constant_cut(integrator="accurate", **kw)),
+    )
     away = np.min(np.abs(a.t[:, None] - [c.time for c in a.crossings]), axis=1) > 1e-3
     np.testing.assert_array_equal(a.t, b.t)
     np.testing.assert_array_equal(a.b, b.b)
-    for name, scale in dict(p=1e-7, v=1e-4, fh=1e-2, fe=1e-2, q=1e-6, qd=1e-3, tau=1e-2, delta=1e-7).items():
-        np.testing.assert_allclose(getattr(a, name)[away], getattr(b, name)[away], atol=scale, err_msg=name)
+    for name, scale in dict(
+        p=1e-7, v=1e-4, fh=1e-2, fe=1e-2, q=1e-6, qd=1e-3, tau=1e-2, delta=1e-7
+    ).items():
+        np.testing.assert_allclose(
+            getattr(a, name)[away], getattr(b, name)[away], atol=scale, err_msg=name
+        )
     for name in a.energy:
         assert a.energy[name] == pytest.approx(b.energy[name], abs=1e-5), name
     assert a.crossings[0].speed == pytest.approx(b.crossings[0].speed, rel=1e-5)
@@ -51,7 +58,9 @@ def test_agrees_with_the_fast_integrator_in_everything_recorded():
 def test_residual_of_the_energy_converges_at_fourth_order():
     steps, rest = np.array([2e-3, 1e-3, 5e-4]), []
     for dt in steps:
-        e = hc.simulate(hc.constant_cut(integrator="accurate", dt=float(dt), impedance=True, force=(2.0, 0.0))).energy
+        e = hc.simulate(
+            hc.constant_cut(integrator="accurate", dt=float(dt), impedance=True, force=(2.0, 0.0))
+        ).energy
         rest.append(abs(e["residual"]) / e["throughput"])
     assert rest[-1] < 1e-8 and 3.5 < np.polyfit(np.log(steps), np.log(rest), 1)[0] < 4.5, rest
 
@@ -69,7 +78,10 @@ def test_stiffness_takes_more_steps_and_then_is_refused():
     r, f = hc.simulate(s), hc.simulate(dataclasses.replace(s, integrator="fast", dt=1e-4))
     assert r.steps > 15_000
     assert r.p[-1, 0] == pytest.approx(f.p[-1, 0], abs=1e-7)
-    for stiff in (dict(clay=hc.constant_cut(b=1e9).clay), dict(operator=Operator(0.0, 0.0, 1e9), dt=0.02)):
+    for stiff in (
+        dict(clay=hc.constant_cut(b=1e9).clay),
+        dict(operator=Operator(0.0, 0.0, 1e9), dt=0.02),
+    ):
         with pytest.raises(ParameterError, match="explicit.*choose 'fast'"):
             hc.simulate(dataclasses.replace(s, **stiff))
 
@@ -107,7 +119,11 @@ def test_instability_is_a_result_here_too():
 def test_states_are_in_the_accurate_scene_alone():
     assert hc.build(hc.constant_cut()).na == 0
     model = hc.build(hc.constant_cut(integrator="accurate"))
-    assert model.na == 13 and model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 and model.ngeom == 0
+    assert (
+        model.na == 13
+        and model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+        and model.ngeom == 0
+    )
     assert hc.build(hc.free(integrator="accurate")).nu == 2 + 13
 
 

@@ -41,16 +41,29 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
 
 @pytest.mark.parametrize("render", ["held", "implicit"])
 @pytest.mark.parametrize(
-    "kw", [dict(), dict(start=(0.06, 0.0), velocity=(0.05, -0.02)), dict(shaping=True), dict(interface=hc.Interface())]
+    "kw",
+    [
+        dict(),
+        dict(start=(0.06, 0.0), velocity=(0.05, -0.02)),
+        dict(shaping=True),
+        dict(interface=hc.Interface()),
+    ],
 )
 def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
     """Spring and damper of the hand act from the start; its mass does not: nothing accelerated before it."""
     cut = hc.constant_cut(
-        control="sampled", force=(0.5, 0.2), impedance=True, t_max=0.2, render=render, start=(0.06, 0.02)
+        control="sampled",
+        force=(0.5, 0.2),
+        impedance=True,
+        t_max=0.2,
+        render=render,
+        start=(0.06, 0.02),
     )
     s = dataclasses.replace(cut, **kw)
     at = dict(p0=s.start, v0=s.velocity)
-    P, V, T = hybrid(lambda x: 90.0, s.dt, s.gain, s.force, (0.25, 2.0, 6.0), s.shaping, render, 0.15, (), **at)
+    P, V, T = hybrid(
+        lambda x: 90.0, s.dt, s.gain, s.force, (0.25, 2.0, 6.0), s.shaping, render, 0.15, (), **at
+    )
     r = hc.simulate(s)
     n = len(P)
     np.testing.assert_allclose(r.tau[0], T[0], atol=1e-12)
@@ -80,8 +93,12 @@ def test_the_recorded_force_belongs_to_its_sample(operator, late):
 
 def test_substeps_converge_to_the_hybrid_system_at_second_order():
     Ts = 4e-3
-    kw = dict(force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="implicit", Ts=Ts, t_max=0.45)
-    P, *_ = hybrid(slab, Ts, (1.0, 0.5), (2.0, 0.0), render="implicit", t_end=0.4, edges=(0.03, 0.15))
+    kw = dict(
+        force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="implicit", Ts=Ts, t_max=0.45
+    )
+    P, *_ = hybrid(
+        slab, Ts, (1.0, 0.5), (2.0, 0.0), render="implicit", t_end=0.4, edges=(0.03, 0.15)
+    )
     error = []
     for n in (1, 2, 4):
         r = hc.simulate(hc.constant_cut(dt=Ts / n, **kw))
@@ -105,7 +122,9 @@ def test_sampled_tends_to_continuous_as_the_sample_shrinks():
         n = round(dt / 3.6e-4)
         m = min(len(s.p), len(c.p[::n])) - 1
         gap.append(np.max(np.abs(s.p[:m] - c.p[::n][:m])))
-    assert 0.8 < np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] < 1.2, gap  # a hold is half a sample late
+    assert 0.8 < np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] < 1.2, (
+        gap
+    )  # a hold is half a sample late
 
 
 def test_rendering_a_held_force_goes_unstable_where_physical_clay_does_not():
@@ -128,15 +147,19 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     s = control.tf("s")
     G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
     C = K / (s**2 + 10 * s)
-    A, B = controller.held(axis, K, 0.01)
+    A, B = controller.held_compensator(axis, K, 0.01)
     z = np.zeros(4)
     found = []
     for _ in range(50):
         found.append(z[[0, 2]])
         z = A @ z + B
     t = np.arange(50) * 0.01
-    np.testing.assert_allclose([x[0] for x in found], control.step_response(C, t).outputs, atol=1e-9)
-    np.testing.assert_allclose([x[1] for x in found], control.step_response(G * C, t).outputs, atol=1e-9)
+    np.testing.assert_allclose(
+        [x[0] for x in found], control.step_response(C, t).outputs, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        [x[1] for x in found], control.step_response(G * C, t).outputs, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("kw,field", [

@@ -21,20 +21,32 @@ from tests.oracles import Linear
 
 
 @settings(max_examples=10)
-@given(st.floats(-2.0, 2.0), st.floats(20.0, 2000.0), st.floats(-30.0, -8.0), st.floats(0.0, math.tau))
+@given(
+    st.floats(-2.0, 2.0), st.floats(20.0, 2000.0), st.floats(-30.0, -8.0), st.floats(0.0, math.tau)
+)
 def test_growth_is_that_of_the_least_damped_mode(sigma, omega, fast, phase):
     t = np.arange(1250) * 1e-3
     omega = min(omega, 0.9 * math.pi / 1e-3)
-    v = np.exp(sigma * t) * np.cos(omega * t + phase) + 3.0 * np.exp(fast * t) + 0.2 * np.exp(-0.06 * t)
-    rec = SimpleNamespace(t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None)
-    assert boundary.growth(rec, "x") == pytest.approx(sigma, abs=1e-3)  # the mode above it starts 30 times as large
+    v = (
+        np.exp(sigma * t) * np.cos(omega * t + phase)
+        + 3.0 * np.exp(fast * t)
+        + 0.2 * np.exp(-0.06 * t)
+    )
+    rec = SimpleNamespace(
+        t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
+    )
+    assert boundary.growth_rate(rec, "x") == pytest.approx(
+        sigma, abs=1e-3
+    )  # the mode above it starts 30 times as large
 
 
 def test_growth_sees_half_the_sampling_frequency():
     t = np.arange(1250) * 1e-3
     v = 1.0005 ** np.arange(1250) * (-1.0) ** np.arange(1250)
-    rec = SimpleNamespace(t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None)
-    assert boundary.growth(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
+    rec = SimpleNamespace(
+        t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
+    )
+    assert boundary.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
 
 
 @pytest.mark.parametrize("K", [2.0, 4.5])
@@ -42,13 +54,19 @@ def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
     r = hc.simulate(Loop(K=K).scenario())
     poles = Linear(0, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles()
     pole = poles[np.abs(poles.imag) > 1.0].real.max()
-    assert boundary.growth(r, "x") == pytest.approx(pole, abs=2e-3)  # second order: (omega dt)^2/12 of omega
+    assert boundary.growth_rate(r, "x") == pytest.approx(
+        pole, abs=2e-3
+    )  # second order: (omega dt)^2/12 of omega
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
-    found = boundary.simulated_gain(Loop(axis=axis), guess=3.0 if axis == "x" else 1.0)  # not told where
-    assert found == pytest.approx(linear_loop.gain_limit(axis, 90.0, Operator()), rel=3e-3)  # CLOSE, and the step
+    found = boundary.simulated_gain(
+        Loop(axis=axis), guess=3.0 if axis == "x" else 1.0
+    )  # not told where
+    assert found == pytest.approx(
+        linear_loop.continuous_gain_limit(axis, 90.0, Operator()), rel=3e-3
+    )  # CLOSE, and the step
 
 
 def test_boundary_of_the_sampled_arm():
@@ -67,7 +85,7 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
     loop = Loop(shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
-    nominal = linear_loop.gain_limit("x", 90.0, Operator())
+    nominal = linear_loop.continuous_gain_limit("x", 90.0, Operator())
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
     assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
@@ -80,7 +98,9 @@ def test_sampled_loop_at_a_pose(delay):
         exact = gain_limit.gain_limit("x", 90.0, impedance=bool(operator), Ts=2e-3, delay=delay)
         for shaping in (True, False):
             nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
-            assert boundary.pose_limit(nominal) == pytest.approx(exact, rel=1e-9)  # both are found to 1e-10
+            assert boundary.pose_limit(nominal) == pytest.approx(
+                exact, rel=1e-9
+            )  # both are found to 1e-10
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
     loop = replace(loop, shaping=False)
     exact = boundary.pose_limit(loop)
@@ -91,23 +111,27 @@ def test_sampled_loop_at_a_pose(delay):
 def test_pose_matrix_has_the_poles_of_both_axes_where_they_are_decoupled():
     A = boundary.pose_matrix(Loop(K=2.0, shaping=False))
     parts = [Linear(i, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles() for i, K in ((0, 2.0), (1, 0.0))]
-    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.concatenate(parts)), atol=1e-6)
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.concatenate(parts)), atol=1e-6
+    )
 
 
 def test_crossing_by_bisection_alone_and_where_there_is_none():
-    assert boundary.crossing(lambda x: -1.0 if x < 7.3 else math.inf, 1.0, 100.0) == pytest.approx(7.3, rel=2e-3)
-    assert boundary.crossing(lambda x: x - 0.2, 5.0, 100.0) == pytest.approx(0.2, rel=2e-3)
-    assert boundary.crossing(lambda x: -1.0, 1.0, 100.0) == math.inf
-    assert boundary.crossing(lambda x: 1.0, 1.0, 100.0) == 0.0
+    assert boundary.find_crossing(
+        lambda x: -1.0 if x < 7.3 else math.inf, 1.0, 100.0
+    ) == pytest.approx(7.3, rel=2e-3)
+    assert boundary.find_crossing(lambda x: x - 0.2, 5.0, 100.0) == pytest.approx(0.2, rel=2e-3)
+    assert boundary.find_crossing(lambda x: -1.0, 1.0, 100.0) == math.inf
+    assert boundary.find_crossing(lambda x: 1.0, 1.0, 100.0) == 0.0
 
 
 @pytest.mark.parametrize("K,said", [(2.0, "stable"), (12.0, "limit cycle")])
 def test_divergence_and_limit_cycles_are_told_apart(K, said):
-    assert boundary.behaviour(Loop(K=K, push=boundary.LARGE)) == said
+    assert boundary.classify_run(Loop(K=K, push=boundary.LARGE_PUSH)) == said
 
 
 def test_a_slow_growth_is_still_a_divergence():
-    assert boundary.behaviour(Loop(K=4.2, push=1e-5)) == "diverges"
+    assert boundary.classify_run(Loop(K=4.2, push=1e-5)) == "diverges"
 
 
 def saturating(K, share):
@@ -126,28 +150,31 @@ def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
     """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it: a large push stays."""
     loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
     assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
-    assert boundary.linear(loop) and boundary.behaviour(loop) == "limit cycle"
-    assert boundary.cause(loop, False) == "saturation"
-    assert boundary.behaviour(replace(loop, torque_limit=(40.0, 40.0))) == "stable"
-    assert boundary.behaviour(replace(loop, push=1e-4)) == "stable"
+    assert boundary.linear_rate(loop) and boundary.classify_run(loop) == "limit cycle"
+    assert boundary.explain_disagreement(loop, False) == "saturation"
+    assert boundary.classify_run(replace(loop, torque_limit=(40.0, 40.0))) == "stable"
+    assert boundary.classify_run(replace(loop, push=1e-4)) == "stable"
 
 
 def test_motors_that_leave_their_limits_late_are_no_divergence():
     """K = 0.8 is stable whatever share of it the motors give."""
     assert max(saturating(0.8, n) for n in SHARES) < 0.0
-    assert boundary.behaviour(Loop("y", 0.8, push=0.05, torque_limit=(1.0, 1.0))) == "stable"
+    assert boundary.classify_run(Loop("y", 0.8, push=0.05, torque_limit=(1.0, 1.0))) == "stable"
 
 
 def test_causes():
-    push = dict(push=boundary.LARGE)
-    assert boundary.cause(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False) == "pose-dependent Lambda"
+    push = dict(push=boundary.LARGE_PUSH)
+    assert (
+        boundary.explain_disagreement(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False)
+        == "pose-dependent Lambda"
+    )
     Ts = 4e-3
     K = 0.5 * (hc.gain_limit("x", 90.0) + hc.gain_limit("x", 90.0, Ts=Ts))
-    assert boundary.cause(Loop(K=K, Ts=Ts, **push), False) == "sampling"
+    assert boundary.explain_disagreement(Loop(K=K, Ts=Ts, **push), False) == "sampling"
     both = Loop(K=K, Ts=Ts, shaping=False, pose=(0.1, 0.0), **push)
-    assert boundary.cause(both, False) == "sampling and pose-dependent Lambda"
+    assert boundary.explain_disagreement(both, False) == "sampling and pose-dependent Lambda"
     K = 0.5 * (hc.gain_limit("x", 90.0, Ts=1e-3) + hc.gain_limit("x", 90.0, Ts=1e-3, delay=4e-3))
-    assert boundary.cause(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
+    assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 
 
 @pytest.mark.parametrize("kw,field", [(dict(axis="z"), "axis"), (dict(K=0.0), "K"), (dict(delay=1e-3), "delay"),
@@ -193,7 +220,9 @@ def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     b = stability_map._damping(Loop(K=1.0, Ts=Ts), delay)
     assert gain_limit.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
     assert not gain_limit.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
-    assert stability_map._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0  # the servo itself does not bear it
+    assert (
+        stability_map._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0
+    )  # the servo itself does not bear it
 
 
 def test_colgate_schenkel_with_a_whole_delay_is_its_formula():
@@ -211,15 +240,22 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     def small(kind, loop, quick, progress):
         return stability_map._gain_pose(replace(loop, Ts=None, delay=0.0), 2, 3, progress)
 
-    monkeypatch.setattr(stability_map, "chart", small)
-    monkeypatch.setattr(boundary, "simulated_gain", lambda loop, guess=None: boundary.pose_limit(loop))
+    monkeypatch.setattr(stability_map, "stability_map", small)
     monkeypatch.setattr(
-        boundary, "behaviour", lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges"
+        boundary, "simulated_gain", lambda loop, guess=None: boundary.pose_limit(loop)
+    )
+    monkeypatch.setattr(
+        boundary,
+        "behaviour",
+        lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges",
     )
     args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
     assert app.main(args) == 0
     out = capsys.readouterr().out
-    assert "sampled every 0.36 ms" in out and f" {hc.gain_limit('x', 90.0):.4g}    largest stable K" in out
+    assert (
+        "sampled every 0.36 ms" in out
+        and f" {hc.gain_limit('x', 90.0):.4g}    largest stable K" in out
+    )
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80
     data = json.loads((tmp_path / "o" / "stability.json").read_text())
@@ -230,12 +266,18 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     }  # fmt: skip
     limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
     kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
-    assert limits == pytest.approx([hc.gain_limit("x", 90.0, **kw) for kw in kinds], rel=1e-12)  # whatever K
+    assert limits == pytest.approx(
+        [hc.gain_limit("x", 90.0, **kw) for kw in kinds], rel=1e-12
+    )  # whatever K
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
 
-@pytest.mark.parametrize("gain,stable", [("0.8604", True), ("0.8606", False)])  # its limit is 0.8605
-def test_command_gives_margins_and_transparency_of_stable_loops_only(gain, stable, tmp_path, capsys):
+@pytest.mark.parametrize(
+    "gain,stable", [("0.8604", True), ("0.8606", False)]
+)  # its limit is 0.8605
+def test_command_gives_margins_and_transparency_of_stable_loops_only(
+    gain, stable, tmp_path, capsys
+):
     import json
 
     args = ["stability", "--axis", "y", "--gain", gain, "--out", str(tmp_path)]
@@ -247,13 +289,22 @@ def test_command_gives_margins_and_transparency_of_stable_loops_only(gain, stabl
     assert len(mine) == 5
     for r in mine:
         assert (r["value"] is None and r["omega"] is None) != stable, r
-        shown = next(x for x in lines if x.startswith(r["question"])).removeprefix(r["question"]).split()
+        shown = (
+            next(x for x in lines if x.startswith(r["question"]))
+            .removeprefix(r["question"])
+            .split()
+        )
         assert (shown[0] == shown[-1] == "-") != stable, shown
 
 
 @pytest.mark.parametrize(
     "args,word",
-    [(["--map", "gain"], "--map"), (["--b", "-1"], "b = -1"), (["--gain", "0"], "K = 0"), (["--axis", "z"], "--axis")],
+    [
+        (["--map", "gain"], "--map"),
+        (["--b", "-1"], "b = -1"),
+        (["--gain", "0"], "K = 0"),
+        (["--axis", "z"], "--axis"),
+    ],
 )
 def test_command_refuses_bad_input_in_one_line(args, word, tmp_path, capsys):
     assert app.main(["stability", *args, "--out", str(tmp_path / "o")]) == 2

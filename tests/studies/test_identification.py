@@ -31,7 +31,9 @@ BLOCKS = [("G", "x"), ("G", "y"), ("S", "x"), ("S", "y"), ("Th", "x"), ("Th", "y
 
 
 def quick(what, axis, **kw):
-    short = dict(period=2.5, band=(0.35, 3.0)) if what == "Th" else dict(period=1.5, band=(0.6, 15.0))
+    short = (
+        dict(period=2.5, band=(0.35, 3.0)) if what == "Th" else dict(period=1.5, band=(0.6, 15.0))
+    )
     return hc.identify(axis, what, **{"realisations": 2, "periods": 1, "lines": 20, **short, **kw})
 
 
@@ -39,7 +41,9 @@ def kick_response(what, axis, f, dt=DT):
     """What the leapfrog makes of the printed forms: central differences, the spring of Th on (1, 2, 1)/4."""
     a, b, c = PRINTED[what + axis]
     s, s2 = 1j * np.sin(2 * np.pi * f * dt) / dt, -((2.0 * np.sin(np.pi * f * dt) / dt) ** 2)
-    return a * s2 + b * s + c * np.cos(np.pi * f * dt) ** 2 if what == "Th" else a / (s2 + b * s + c)
+    return (
+        a * s2 + b * s + c * np.cos(np.pi * f * dt) ** 2 if what == "Th" else a / (s2 + b * s + c)
+    )
 
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
@@ -47,17 +51,21 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
     """The fitted form is the loop's own difference equation; what is left is 1e-6, and for Sh the pose: (p/l1)^2."""
     r = quick(what, axis)
     left = 1e-4 if what == "S" else 1e-6
-    assert [c.name for c in r.coefficients] == list(identification.NAMES[what])
+    assert [c.name for c in r.coefficients] == list(identification.COEFFICIENT_NAMES[what])
     np.testing.assert_allclose(r.values, PRINTED[what + axis], rtol=left)
     assert [c.printed for c in r.coefficients] == list(PRINTED[what + axis])
     assert np.all(r.coherence > 1.0 - 1e-6)
     exact = response(what, PRINTED[what + axis], r.frequency)
-    share = np.abs(r.response / exact - 1.0)  # of continuous time: (omega dt)^2/12 of s^2, /6 of s, times up to 2
+    share = np.abs(
+        r.response / exact - 1.0
+    )  # of continuous time: (omega dt)^2/12 of s^2, /6 of s, times up to 2
     assert np.all(share < (2.0 * np.pi * r.frequency * DT) ** 2 / 3.0 + 3e-5)
     # beside the loop's own difference equation there remain the transient, and for Sh the pose: (p/l1)^2 = 4e-4 peak
     own = kick_response(what, axis, r.frequency)
     np.testing.assert_allclose(r.response, own, rtol=left)
-    np.testing.assert_allclose(response(what, PRINTED[what + axis], r.frequency, DT), own, rtol=1e-9)
+    np.testing.assert_allclose(
+        response(what, PRINTED[what + axis], r.frequency, DT), own, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
@@ -125,7 +133,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
         r = np.cos(2 * np.pi * np.outer(t, bins) + rng.uniform(0, 2 * np.pi, len(bins))).sum(axis=1)
         # as much noise in each bin as signal: variance n/4 per line, over n/2 bins
         signals.append((r, r + rng.normal(0.0, np.sqrt(n / 4), n), 2.0 * r))
-    H, deviation, coherence, _ = identification.estimate(np.array(signals), n, bins)
+    H, deviation, coherence, _ = identification.estimate_response(np.array(signals), n, bins)
     assert np.abs(H.mean() - 2.0) < 4.0 * np.sqrt(np.mean(deviation**2) / len(bins))
     assert 0.35 < coherence.mean() < 0.65
 
@@ -146,7 +154,16 @@ def test_sampled_control_shows_the_hold():
 
     Tolerance: the next term, of the stiffness, kp Ts^2/8 of (omega^2 at 3 Hz), is 1 % of that.
     """
-    r = quick("S", "x", control="sampled", realisations=1, periods=2, period=0.5, band=(2.0, 10.0), lines=5)
+    r = quick(
+        "S",
+        "x",
+        control="sampled",
+        realisations=1,
+        periods=2,
+        period=0.5,
+        band=(2.0, 10.0),
+        lines=5,
+    )
     assert all(abs(c.error) < 0.02 for c in r.coefficients)
     assert r.coefficients[0].error == pytest.approx(41.1 * DT / 2, rel=0.02)
 
@@ -158,7 +175,9 @@ def mobility(x, y):
     q1 = np.arctan2(y, x) - np.arctan2(l2 * np.sin(q2), l1 + l2 * np.cos(q2))
 
     def at(q):
-        return np.array([l1 * np.cos(q[0]) + l2 * np.cos(q.sum()), l1 * np.sin(q[0]) + l2 * np.sin(q.sum())])
+        return np.array(
+            [l1 * np.cos(q[0]) + l2 * np.cos(q.sum()), l1 * np.sin(q[0]) + l2 * np.sin(q.sum())]
+        )
 
     q = np.array([q1, q2])
     np.testing.assert_allclose(at(q), (x, y), atol=1e-12)
@@ -181,8 +200,12 @@ def test_drift_over_the_workspace(drift):
     np.testing.assert_allclose(g, np.broadcast_to(printed_g, g.shape), rtol=2e-4)
     np.testing.assert_allclose(s[:, 1], np.broadcast_to(printed_s, s[:, 1].shape), rtol=2e-4)
     assert np.max(np.ptp(s[:, 1], axis=0) / printed_s) < 1e-6  # constant over the poses
-    np.testing.assert_allclose(s[:, 0, :, 0], w, rtol=4e-4)  # the pose moves with the handle, 2e-5 m of it
-    np.testing.assert_allclose(s[:, 0, :, 1:], np.broadcast_to(printed_s, s[:, 0].shape)[..., 1:], rtol=1e-3)
+    np.testing.assert_allclose(
+        s[:, 0, :, 0], w, rtol=4e-4
+    )  # the pose moves with the handle, 2e-5 m of it
+    np.testing.assert_allclose(
+        s[:, 0, :, 1:], np.broadcast_to(printed_s, s[:, 0].shape)[..., 1:], rtol=1e-3
+    )
     assert np.ptp(w[:, 0]) > 0.2  # what shaping takes away
     assert len(drift.ranges()) == 24 and json.dumps(drift.summary())
 
@@ -221,7 +244,10 @@ def test_measured_is_within_a_count_and_repeats():
 def test_same_seed_same_result():
     a, b = (quick("G", "x", noise=hc.Noise(), seed=5) for _ in range(2))
     assert a.values == b.values and json.dumps(a.summary()) == json.dumps(b.summary())
-    assert hc.Scenario(**dataclasses.asdict(a.scenario) | {"command": a.scenario.command}) == a.scenario
+    assert (
+        hc.Scenario(**dataclasses.asdict(a.scenario) | {"command": a.scenario.command})
+        == a.scenario
+    )
 
 
 @pytest.mark.parametrize("kw,field", [
@@ -243,9 +269,18 @@ def test_command_line(capsys, tmp_path):
     assert app.main(args) == 0
     out, err = capsys.readouterr()
     assert err == "" and "damping [1/s]" in out and "95 % interval" in out
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["fig4.png", "fig5.png", "fig6.png", "identify.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "fig4.png",
+        "fig5.png",
+        "fig6.png",
+        "identify.json",
+    ]
     found = json.loads((tmp_path / "identify.json").read_text())
-    assert found["schema"] == "hapticclay-identify-1" and [r["what"] for r in found["results"]] == ["G", "S", "Th"]
+    assert found["schema"] == "hapticclay-identify-1" and [r["what"] for r in found["results"]] == [
+        "G",
+        "S",
+        "Th",
+    ]
     for r in found["results"]:
         for c in r["coefficients"]:
             assert abs(c["error"]) < 0.02 and c["low"] < c["high"]

@@ -50,9 +50,13 @@ def test_variable_cut_has_the_volume_of_its_path():
     r = hc.simulate(hc.variable_cut())
     length = np.hypot(*np.diff(r.p, axis=0).T).sum()
     volume, rate = removed(r)
-    assert volume[-1] == pytest.approx(0.01 * (0.02 * length + np.pi * 0.01**2), rel=1e-3)  # its bends are gentle
+    assert volume[-1] == pytest.approx(
+        0.01 * (0.02 * length + np.pi * 0.01**2), rel=1e-3
+    )  # its bends are gentle
     middle = slice(len(r.t) // 3, len(r.t) // 2)
-    np.testing.assert_allclose(rate[middle].mean(), 2e-4 * np.hypot(*r.v[middle].T).mean(), rtol=5e-3)
+    np.testing.assert_allclose(
+        rate[middle].mean(), 2e-4 * np.hypot(*r.v[middle].T).mean(), rtol=5e-3
+    )
 
 
 def raster(clay, path, width, depth):
@@ -68,7 +72,10 @@ def raster(clay, path, width, depth):
     x, y = (np.arange(low[i], high[i], step) for i in (0, 1))
     corners = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
     here = corners + step * np.random.default_rng(1).uniform(size=corners.shape)
-    at = [np.array(f.values)[np.searchsorted(f.edges, here[:, "xy".index(f.along)])] for f in (clay.x, clay.y)]
+    at = [
+        np.array(f.values)[np.searchsorted(f.edges, here[:, "xy".index(f.along)])]
+        for f in (clay.x, clay.y)
+    ]
     here = here[(at[0] > 0.0) | (at[1] > 0.0)]
     near = cKDTree(points).query(here, distance_upper_bound=0.5 * width)[0] <= 0.5 * width
     return near.sum() * step**2 * depth
@@ -92,7 +99,9 @@ def diagonal(n=2000):
 
 def curl(n=20_000):
     a = np.linspace(0.0, 6 * np.pi, n)
-    return np.column_stack((0.03 + 0.007 * a, np.zeros(n))) + 0.012 * np.column_stack((np.cos(a), np.sin(a)))
+    return np.column_stack((0.03 + 0.007 * a, np.zeros(n))) + 0.012 * np.column_stack(
+        (np.cos(a), np.sin(a))
+    )
 
 
 EVERYWHERE = Clay(Profile((), (90.0,)), Profile((), (90.0,)))
@@ -125,21 +134,29 @@ def test_free_space_has_nothing_to_remove():
     assert not volume.any() and not rate.any()
 
 
-@pytest.mark.parametrize("scenario", [hc.constant_cut(), hc.variable_cut()], ids=["constant", "variable"])
+@pytest.mark.parametrize(
+    "scenario", [hc.constant_cut(), hc.variable_cut()], ids=["constant", "variable"]
+)
 def test_the_picture_shows_the_map_that_headless_runs_compute(scenario):
     """Cut frame by frame as a window does (60 a second), against the whole record at once."""
     r = hc.simulate(scenario)
     stage = Stage(scenario)
     n = np.searchsorted(r.t, np.arange(0.0, r.t[-1], 1 / 60.0))
     stage.carve(r.p[np.append(n, len(r.t) - 1)])
-    assert stage.removal.volume == pytest.approx(removed(r)[0][-1], rel=2e-3)  # chords of 1/60 s for arcs
+    assert stage.removal.volume == pytest.approx(
+        removed(r)[0][-1], rel=2e-3
+    )  # chords of 1/60 s for arcs
     assert stage.relief() and not stage.relief()
     shown = stage.model.hfield_data.reshape(stage.removal.cut.shape) * 0.03
     cell, full = stage.removal.cell, stage.removal.clay
-    np.testing.assert_allclose(((0.03 - shown) * full).sum() * cell**2, stage.removal.volume, rtol=1e-4)  # float32
+    np.testing.assert_allclose(
+        ((0.03 - shown) * full).sum() * cell**2, stage.removal.volume, rtol=1e-4
+    )  # float32
 
 
-@pytest.mark.parametrize("kw,word", [({"width": 0.0}, "width"), ({"depth": -1.0}, "depth"), ({"cell": 1.0}, "cell")])
+@pytest.mark.parametrize(
+    "kw,word", [({"width": 0.0}, "width"), ({"depth": -1.0}, "depth"), ({"cell": 1.0}, "cell")]
+)
 def test_bad_tool_is_refused(constant, kw, word):
     with pytest.raises(hc.ParameterError, match=word):
         removed(constant, **kw)
@@ -148,6 +165,9 @@ def test_bad_tool_is_refused(constant, kw, word):
 def test_build_is_as_bare_as_ever_and_the_picture_weighs_nothing():
     bare, seen = hc.build(hc.constant_cut()), Stage(hc.constant_cut()).model
     assert bare.ngeom == bare.nhfield == bare.nlight == bare.ncam == bare.nmat == 0
-    arm = [bare.body(n).id for n in ("link1", "link2")], [seen.body(n).id for n in ("link1", "link2")]
+    arm = (
+        [bare.body(n).id for n in ("link1", "link2")],
+        [seen.body(n).id for n in ("link1", "link2")],
+    )
     np.testing.assert_array_equal(bare.body_mass[arm[0]], seen.body_mass[arm[1]])
     np.testing.assert_array_equal(bare.body_inertia[arm[0]], seen.body_inertia[arm[1]])

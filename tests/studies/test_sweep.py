@@ -86,21 +86,32 @@ def test_grid_is_every_combination_once_whatever_the_chunks(n, m, chunk):
 def test_samples_fill_the_space(design):
     s = Sweep("constant", parse_grid("b=1:1000log gain.x=0:2"), {}, design, 60, seed=3)
     points = s.points(0, 60)
-    np.testing.assert_array_equal(points, Sweep("constant", s.vary, {}, design, 60, seed=3).points(0, 60))
+    np.testing.assert_array_equal(
+        points, Sweep("constant", s.vary, {}, design, 60, seed=3).points(0, 60)
+    )
     u = np.column_stack((np.log10(points[:, 0]) / 3.0, points[:, 1] / 2.0))
     assert u.min() >= 0.0 and u.max() < 1.0
     for i in (0, 1):
         strata = np.unique((u[:, i] * (60 if design == "lhs" else 32)).astype(int))
-        assert len(strata) == (60 if design == "lhs" else 32)  # each stratum of a Latin hypercube once
+        assert len(strata) == (
+            60 if design == "lhs" else 32
+        )  # each stratum of a Latin hypercube once
     other = Sweep("constant", s.vary, {}, design, 60, seed=4)
     assert not np.array_equal(points, other.points(0, 60))
 
 
 def test_parameters_reach_the_scenario():
     vary = parse_grid("b=50 gain.y=0.3 force=2 operator.mass=1.5")
-    s = Sweep("constant", vary, parse_fixed("shaping=true operator.damper=3 t_max=5 clay=0.01,0.02"))
+    s = Sweep(
+        "constant", vary, parse_fixed("shaping=true operator.damper=3 t_max=5 clay=0.01,0.02")
+    )
     scenario = s.scenario(s.points(0, 1)[0])
-    assert scenario.gain == (1.0, 0.3) and scenario.force == (2.0, 2.0) and scenario.shaping and scenario.t_max == 5.0
+    assert (
+        scenario.gain == (1.0, 0.3)
+        and scenario.force == (2.0, 2.0)
+        and scenario.shaping
+        and scenario.t_max == 5.0
+    )
     assert (
         scenario.clay is not None
         and scenario.clay.x.values == (0.0, 50.0, 0.0)
@@ -127,51 +138,56 @@ def test_bad_sweeps_are_refused(kw, word):
 
 def test_rows_say_what_the_runs_said(tmp_path):
     s = Sweep("constant", parse_grid("b=90 gain.y=0.5,1"), {}, chunk=2)
-    assert sweep.run(s, tmp_path, workers=1) == 2
-    rows = sweep.read(tmp_path).to_pylist()
+    assert sweep.run_sweep(s, tmp_path, workers=1) == 2
+    rows = sweep.read_sweep(tmp_path).to_pylist()
     assert [r["status"] for r in rows] == ["finished", "diverged"]
     r = hc.simulate(hc.constant_cut())
     assert [rows[0][f"crossing{k}"] for k in (1, 2, 3)] == [c.time for c in r.crossings]
-    assert rows[0]["fe_over_v_x"] == pytest.approx(90.0, rel=1e-6) and rows[0]["speed_x"] == pytest.approx(
-        0.01, rel=1e-3
+    assert rows[0]["fe_over_v_x"] == pytest.approx(90.0, rel=1e-6) and rows[0][
+        "speed_x"
+    ] == pytest.approx(0.01, rel=1e-3)
+    assert (
+        rows[0]["gain_margin_y"] == pytest.approx(0.7748 / 0.5, rel=1e-4)
+        and rows[1]["gain_margin_y"] < 1.0
     )
-    assert rows[0]["gain_margin_y"] == pytest.approx(0.7748 / 0.5, rel=1e-4) and rows[1]["gain_margin_y"] < 1.0
     assert rows[1]["axis"] == "y" and rows[0]["energy_residual"] < 1e-12
 
 
 def test_a_refused_run_is_a_row(tmp_path):
     s = Sweep("constant", parse_grid("b=90 dt=0.001,0.5"), {"t_max": 0.01})
-    sweep.run(s, tmp_path, workers=1)
-    rows = sweep.read(tmp_path).to_pylist()
-    assert [r["status"] for r in rows] == ["time limit", "refused"] and "dt = 0.5" in rows[1]["cause"]
+    sweep.run_sweep(s, tmp_path, workers=1)
+    rows = sweep.read_sweep(tmp_path).to_pylist()
+    assert [r["status"] for r in rows] == ["time limit", "refused"] and "dt = 0.5" in rows[1][
+        "cause"
+    ]
 
 
 def test_only_what_is_missing_is_done_and_the_result_is_the_same(tmp_path):
     whole, torn = tmp_path / "whole", tmp_path / "torn"
-    assert sweep.run(small(), whole, workers=1) == 6
-    assert sweep.run(small(), whole, workers=1) == 0
-    sweep.run(small(), torn, workers=1)
-    sweep.part(torn, 1).unlink()
+    assert sweep.run_sweep(small(), whole, workers=1) == 6
+    assert sweep.run_sweep(small(), whole, workers=1) == 0
+    sweep.run_sweep(small(), torn, workers=1)
+    sweep.sweep_part(torn, 1).unlink()
     (torn / "data" / ".part-000001.parquet.abc").write_bytes(b"half a file")
-    assert sweep.missing(small(), torn) == [1]
-    assert sweep.run(small(), torn, workers=1) == 2
-    assert columns(sweep.read(torn)) == columns(sweep.read(whole))
+    assert sweep.missing_parts(small(), torn) == [1]
+    assert sweep.run_sweep(small(), torn, workers=1) == 2
+    assert columns(sweep.read_sweep(torn)) == columns(sweep.read_sweep(whole))
 
 
 def test_two_processes_give_the_same(tmp_path):
     one, two = tmp_path / "1", tmp_path / "2"
-    sweep.run(small(), one, workers=1)
-    sweep.run(small(), two, workers=2)
-    assert columns(sweep.read(one)) == columns(sweep.read(two))
+    sweep.run_sweep(small(), one, workers=1)
+    sweep.run_sweep(small(), two, workers=2)
+    assert columns(sweep.read_sweep(one)) == columns(sweep.read_sweep(two))
 
 
 def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
-    sweep.run(small(), tmp_path, workers=1)
+    sweep.run_sweep(small(), tmp_path, workers=1)
     with pytest.raises(ParameterError, match="another sweep"):
-        sweep.run(small(seed=1), tmp_path, workers=1)
+        sweep.run_sweep(small(seed=1), tmp_path, workers=1)
     (tmp_path / "sweep.json").write_text("{")
     with pytest.raises(ParameterError, match="another sweep"):
-        sweep.begin(small(), tmp_path)
+        sweep.begin_sweep(small(), tmp_path)
 
 
 def test_spec_file(tmp_path):
@@ -179,7 +195,7 @@ def test_spec_file(tmp_path):
     spec.write_text(
         'experiment = "free"\nchunk = 3\n[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
     )
-    s = Sweep(**sampling.load(spec))
+    s = Sweep(**sampling.load_sweep(spec))
     assert (s.experiment, len(s), s.chunk) == ("free", 4, 3)
     for text, word in (
         ("experiment = ", "TOML"),
@@ -188,9 +204,9 @@ def test_spec_file(tmp_path):
     ):
         spec.write_text(text)
         with pytest.raises(ParameterError, match=word):
-            sampling.load(spec)
+            sampling.load_sweep(spec)
     with pytest.raises(ParameterError, match="spec"):
-        sampling.load(tmp_path / "none.toml")
+        sampling.load_sweep(tmp_path / "none.toml")
 
 
 COMMAND = [sys.executable, "-m", "hapticclay", "sweep", "--grid", "b=10:1000:40log gain.x=1:2:2", "--fixed",
@@ -216,9 +232,11 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
         assert "goes on from there" in said
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
-    sweep.read(out)  # whatever is there is valid
-    again = subprocess.run([*COMMAND, "--out", str(out)], capture_output=True, text=True, check=True)
-    table = sweep.read(out)
+    sweep.read_sweep(out)  # whatever is there is valid
+    again = subprocess.run(
+        [*COMMAND, "--out", str(out)], capture_output=True, text=True, check=True
+    )
+    table = sweep.read_sweep(out)
     assert table["run"].to_pylist() == list(range(80)) and "80 runs" in again.stdout
 
 
@@ -239,14 +257,20 @@ def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys):
 
 
 def test_maps(tmp_path):
-    sweep.run(
-        Sweep("constant", parse_grid("b=10:1000:5log gain.y=0.3:1:3"), {"t_max": 2.0, "dt": 2e-3}), tmp_path, workers=1
+    sweep.run_sweep(
+        Sweep("constant", parse_grid("b=10:1000:5log gain.y=0.3:1:3"), {"t_max": 2.0, "dt": 2e-3}),
+        tmp_path,
+        workers=1,
     )
-    table = sweep.read(tmp_path)
+    table = sweep.read_sweep(tmp_path)
     figure = study_plots.heat(table)
     ax = figure.axes[0]
-    assert ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
-    assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(table["status"].to_pylist())
+    assert (
+        ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
+    )
+    assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(
+        table["status"].to_pylist()
+    )
     study_plots.heat(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
         study_plots.heat(table, "speedx")
@@ -256,11 +280,15 @@ def test_maps(tmp_path):
 def test_missing_packages_are_named(package, extra, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ParameterError, match=rf"hapticclay\[{extra}\]"):
-        sweep.run(small(), tmp_path, scheduler="tcp://127.0.0.1:1" if extra == "cluster" else None)
+        sweep.run_sweep(
+            small(), tmp_path, scheduler="tcp://127.0.0.1:1" if extra == "cluster" else None
+        )
 
 
 def spawn(*args, **kw):
-    return subprocess.Popen([sys.executable, "-m", *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **kw)
+    return subprocess.Popen(
+        [sys.executable, "-m", *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **kw
+    )
 
 
 def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
@@ -278,7 +306,13 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
         address = json.loads(file.read_text())["address"]
         workers = [
             spawn(
-                "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1", "--no-dashboard", cwd=tmp_path
+                "distributed.cli.dask_worker",
+                address,
+                "--no-nanny",
+                "--nthreads",
+                "1",
+                "--no-dashboard",
+                cwd=tmp_path,
             )
             for _ in range(2)
         ]
@@ -290,10 +324,10 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
                 workers[0].kill()
 
         far, here = tmp_path / "far", tmp_path / "here"
-        assert sweep.run(s, far, scheduler=address, progress=kill) >= 24
+        assert sweep.run_sweep(s, far, scheduler=address, progress=kill) >= 24
         assert killed and workers[0].wait(10) == -9
-        sweep.run(s, here, workers=1)
-        assert columns(sweep.read(far)) == columns(sweep.read(here))
+        sweep.run_sweep(s, here, workers=1)
+        assert columns(sweep.read_sweep(far)) == columns(sweep.read_sweep(here))
     finally:
         for p in (*workers, scheduler):
             p.kill()
@@ -304,35 +338,41 @@ def test_unreachable_scheduler_is_one_line(tmp_path, monkeypatch):
     import distributed
 
     real = distributed.Client
-    monkeypatch.setattr(distributed, "Client", lambda address, timeout, **kw: real(address, timeout="1s", **kw))
+    monkeypatch.setattr(
+        distributed, "Client", lambda address, timeout, **kw: real(address, timeout="1s", **kw)
+    )
     with pytest.raises(ParameterError, match="scheduler"):
-        sweep.run(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
+        sweep.run_sweep(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
 
 
 def test_a_damaged_folder_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="hapticclay sweep has written"):
-        sweep.read(tmp_path)
+        sweep.read_sweep(tmp_path)
     Path(tmp_path / "data").mkdir()
     with pytest.raises(ParameterError):
-        sweep.read(tmp_path)
+        sweep.read_sweep(tmp_path)
 
 
 def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
     import pyarrow.parquet as pq
 
-    sweep.run(small(), tmp_path, workers=1)
-    marked = columns(sweep.read(tmp_path))
+    sweep.run_sweep(small(), tmp_path, workers=1)
+    marked = columns(sweep.read_sweep(tmp_path))
     for n in range(3):
-        file = sweep.part(tmp_path, n)
-        pq.write_table(sweep._read(file).replace_schema_metadata(None), file)
-    assert columns(sweep.read(tmp_path)) == marked
+        file = sweep.sweep_part(tmp_path, n)
+        pq.write_table(sweep._read_part(file).replace_schema_metadata(None), file)
+    assert columns(sweep.read_sweep(tmp_path)) == marked
 
 
 def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
     """By a clock of our own: the first run compiles for a minute, each further one takes what is asked."""
     s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    real = sweep.measure
-    for each, runs in ((0.25, sweep.PROBES + 1), (0.5, 12), (30.0, 2)):  # 11 of 0.5 s are more than 5 s, and one of 30
+    real = sweep.measure_rates
+    for each, runs in (
+        (0.25, sweep.PROBES + 1),
+        (0.5, 12),
+        (30.0, 2),
+    ):  # 11 of 0.5 s are more than 5 s, and one of 30
         clock, made = [0.0], []
 
         def timed(*args, each=each, clock=clock, made=made):
@@ -340,18 +380,20 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             made.append(args[1])
             return real(*args)
 
-        monkeypatch.setattr(sweep, "measure", timed)
+        monkeypatch.setattr(sweep, "measure_rates", timed)
         monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
-        assert sweep.estimate(s)[0] == pytest.approx(each, rel=1e-12)
+        assert sweep.estimate_time(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
 
 
 def test_an_estimated_size_is_that_of_the_files(tmp_path):
     s = Sweep("constant", parse_grid("b=10:1000:16log gain.x=0.5:2:16"), {"t_max": 0.4}, chunk=64)
-    guess = sweep.estimate(s)[1] * len(s)
-    sweep.run(s, tmp_path, workers=1)
+    guess = sweep.estimate_time(s)[1] * len(s)
+    sweep.run_sweep(s, tmp_path, workers=1)
     size = sum(f.stat().st_size for f in (tmp_path / "data").iterdir())
-    assert guess == pytest.approx(size, rel=0.3)  # 20 of 256 runs, some with a longer cause than others
+    assert guess == pytest.approx(
+        size, rel=0.3
+    )  # 20 of 256 runs, some with a longer cause than others
 
 
 def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypatch):
@@ -361,16 +403,22 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
     assert app.main(args) == 0
     first, *lines = capsys.readouterr().err.splitlines()
     assert re.fullmatch(
-        r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data .* free.", first
+        r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data .* free.",
+        first,
     )
-    told = [re.match(r"hapticclay: (\d+) of 60 runs, (\d+) %, \d\d:\d\d gone, \d\d:\d\d to go", x) for x in lines]
+    told = [
+        re.match(r"hapticclay: (\d+) of 60 runs, (\d+) %, \d\d:\d\d gone, \d\d:\d\d to go", x)
+        for x in lines
+    ]
     assert [(int(m[1]), int(m[2])) for m in told if m] == [(6 * k, 10 * k) for k in range(1, 11)]
     for n in range(30):
-        sweep.part(tmp_path, n).unlink()
+        sweep.sweep_part(tmp_path, n).unlink()
     ticks = iter(range(0, 10**6, 100))  # seconds, 100 from one look at the clock to the next
     monkeypatch.setattr(sweep_command.time, "monotonic", lambda: next(ticks))
     assert app.main(args) == 0
-    lines = capsys.readouterr().err.splitlines()  # half of them is there: no estimate, and a line after each
+    lines = (
+        capsys.readouterr().err.splitlines()
+    )  # half of them is there: no estimate, and a line after each
     assert [int(x.split()[1]) for x in lines] == list(range(31, 61))
     assert lines[0].endswith("31 of 60 runs, 52 %, 01:40 gone, 48:20 to go")
 
@@ -384,7 +432,9 @@ def test_only_a_grid_counts(design, text, word):
         Sweep("constant", parse_grid(text), {}, design, None if design == "grid" else 8)
 
 
-@pytest.mark.parametrize("text", ["b=1:1000log gain.x=0:2", "b=1:1000 log  gain.x=0:2", "gain.x=0:2 b=1:1000 log"])
+@pytest.mark.parametrize(
+    "text", ["b=1:1000log gain.x=0:2", "b=1:1000 log  gain.x=0:2", "gain.x=0:2 b=1:1000 log"]
+)
 def test_samples_need_no_count(text):
     vary = parse_grid(text)
     assert vary == {"b": Range(1.0, 1000.0, log=True), "gain.x": Range(0.0, 2.0)}
@@ -402,44 +452,69 @@ def hatched(figure):
 
 def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     """The slab begins at 5 cm: with 0 or 0.01 N on the handle no run of 3 s gets there, with 1 N all do."""
-    sweep.run(
-        Sweep("constant", parse_grid("b=20:50:3 force=0,0.01,1"), {"t_max": 3.0, "dt": 2e-3}), tmp_path, workers=1
+    sweep.run_sweep(
+        Sweep("constant", parse_grid("b=20:50:3 force=0,0.01,1"), {"t_max": 3.0, "dt": 2e-3}),
+        tmp_path,
+        workers=1,
     )
-    table = sweep.read(tmp_path)
+    table = sweep.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
         assert study_plots.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
         figure = study_plots.heat(table, value)
         shown = figure.axes[0].collections[0].get_array()
-        np.testing.assert_array_equal(np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3])
-        np.testing.assert_allclose(shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0])
+        np.testing.assert_array_equal(
+            np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3]
+        )
+        np.testing.assert_allclose(
+            shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0]
+        )
         assert hatched(figure) == {"no clay reached": 6}
     assert hatched(study_plots.heat(table, "crossing1")) == {"border not reached": 6}
     assert figure.axes[1].get_ylabel() == "speed x [m/s]"
-    free = table.set_column(table.column_names.index("b_x"), "b_x", [[0.0] * 9])  # an experiment without clay
+    free = table.set_column(
+        table.column_names.index("b_x"), "b_x", [[0.0] * 9]
+    )  # an experiment without clay
     assert "no clay reached" not in study_plots.absent(free, "speed_x")
     assert set(study_plots.absent(free, "fe_over_v_x")) == {"no clay reached"}
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
-    s = Sweep("constant", parse_grid("b=20:60 force=0.01:1 dt=0.5,0.002"), {"t_max": 0.5}, "lhs", 40, seed=4)
-    sweep.run(s, tmp_path, workers=1)
-    table = sweep.read(tmp_path)
+    s = Sweep(
+        "constant",
+        parse_grid("b=20:60 force=0.01:1 dt=0.5,0.002"),
+        {"t_max": 0.5},
+        "lhs",
+        40,
+        seed=4,
+    )
+    sweep.run_sweep(s, tmp_path, workers=1)
+    table = sweep.read_sweep(tmp_path)
     why = study_plots.absent(table, "fe_over_v_x")
-    marks = {c.get_label(): len(c.get_offsets()) for c in study_plots.heat(table, "fe_over_v_x").axes[0].collections}
+    marks = {
+        c.get_label(): len(c.get_offsets())
+        for c in study_plots.heat(table, "fe_over_v_x").axes[0].collections
+    }
     for name in ("refused", "no clay reached"):
         assert marks[name] == why.count(name) > 0
-    assert sum(marks.values()) == 40 and why.count("refused") == table["status"].to_pylist().count("refused")
+    assert sum(marks.values()) == 40 and why.count("refused") == table["status"].to_pylist().count(
+        "refused"
+    )
 
 
 def test_every_column_and_parameter_has_its_unit(tmp_path):
     """As the docstrings of row and of the experiments state it; a number that has none says what it is a ratio of."""
-    sweep.run(small(), tmp_path, workers=1)
-    table = sweep.read(tmp_path)
+    sweep.run_sweep(small(), tmp_path, workers=1)
+    table = sweep.read_sweep(tmp_path)
     units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
              "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
     for name, unit in units.items():
         assert name in table.column_names and study_plots._label(name).endswith(f" [{unit}]")
-    for name, unit in {"operator.damper": "N.s/m", "operator.mass": "kg", "gain.x": "1/kg", "force.y": "N"}.items():
+    for name, unit in {
+        "operator.damper": "N.s/m",
+        "operator.mass": "kg",
+        "gain.x": "1/kg",
+        "force.y": "N",
+    }.items():
         assert study_plots._label(name).endswith(f" [{unit}]")
     for make in hc.SCENARIOS.values():
         for name, parameter in inspect.signature(make).parameters.items():

@@ -14,7 +14,9 @@ from benchmarks.peers import common, scipy_ivp
 
 @pytest.fixture(scope="module")
 def rows():
-    found, omissions = wp.measure(True, ["default cut"], ("ours", "mujoco_plain", "scipy_ivp", "no_such_peer"))
+    found, omissions = wp.measure(
+        True, ["default cut"], ("ours", "mujoco_plain", "scipy_ivp", "no_such_peer")
+    )
     assert len(omissions) == 1 and "no_such_peer" in omissions[0]
     return found
 
@@ -28,7 +30,9 @@ def test_errors_of_the_exact_solution_are_none():
     t = np.arange(0.0, 11.0, 0.01)
     p, v = exact(t)
     b = np.where((t > exact.crossings[0]) & (t < exact.crossings[1]), 90.0, 0.0)
-    found = wp.errors("default cut", problems.Result(exact.crossings, t, p, b * v[:, 0], v[:, 0], 1.0))
+    found = wp.errors(
+        "default cut", problems.Result(exact.crossings, t, p, b * v[:, 0], v[:, 0], 1.0)
+    )
     assert found["crossing"] == 0.0 and found["position"] == 0.0 and found["force"] < 1e-12
     assert found["b"] == 0.0
     late = [x + 1e-3 for x in exact.crossings]
@@ -38,7 +42,9 @@ def test_errors_of_the_exact_solution_are_none():
 
 
 def test_a_failed_run_is_a_row_without_errors():
-    r = problems.Result([], np.array([0.0]), np.zeros((1, 2)), np.zeros(1), np.zeros(1), 1.0, "blow-up")
+    r = problems.Result(
+        [], np.array([0.0]), np.zeros((1, 2)), np.zeros(1), np.zeros(1), 1.0, "blow-up"
+    )
     assert set(wp.errors("default cut", r).values()) == {None}
 
 
@@ -46,7 +52,9 @@ def test_the_default_path_is_a_thousand_times_closer_than_first_order_stepping(r
     for r in of(rows, "MuJoCo, plain"):
         for ours in of(rows, "hapticclay", method="fast", setting=r["setting"]):
             assert ours["crossing"] < 1e-3 * r["crossing"]
-    assert {r["setting"] for r in of(rows, "MuJoCo, plain")} & {r["setting"] for r in of(rows, "hapticclay")}
+    assert {r["setting"] for r in of(rows, "MuJoCo, plain")} & {
+        r["setting"] for r in of(rows, "hapticclay")
+    }
 
 
 def test_peers_converge_to_the_reference(rows):
@@ -63,7 +71,9 @@ def test_compiled_right_hand_side_is_the_plain_one(problem):
     for b in job.b:
         z = common.initial(job) + 0.1 * rng.normal(size=12)
         np.testing.assert_allclose(fast(0.0, z, b), plain(0.0, z, b), rtol=1e-12, atol=1e-12)
-    one, other = (scipy_ivp.solve(problem, m, 1e-10).crossings for m in ("DOP853", "DOP853, compiled"))
+    one, other = (
+        scipy_ivp.solve(problem, m, 1e-10).crossings for m in ("DOP853", "DOP853, compiled")
+    )
     np.testing.assert_allclose(one, other, atol=1e-9)
 
 
@@ -73,8 +83,15 @@ def test_leaders_are_said_by_the_figures():
             for k, x in times.items() for e, w in x.items()]  # fmt: skip
     found = wp.leaders(rows)
     assert [x["package"] for x in found] == ["a"] * 4 + ["b"] * 3  # from 1e-2 to 1e-5, from 1e-6 on
-    assert found[0]["factor"] == 3.0 and found[-1]["next"] == "a, m" and found[-1]["factor"] == pytest.approx(4 / 3)
-    assert wp.who_leads(found) == "Fastest, by asked error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
+    assert (
+        found[0]["factor"] == 3.0
+        and found[-1]["next"] == "a, m"
+        and found[-1]["factor"] == pytest.approx(4 / 3)
+    )
+    assert (
+        wp.who_leads(found)
+        == "Fastest, by asked error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
+    )
     assert wp.who_leads(wp.leaders(rows[:2])).endswith("a at 1e-02 to 1e-08 s.")
 
 
@@ -85,10 +102,20 @@ def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):
 
 
 def test_page_says_what_was_measured_and_nothing_else(rows, tmp_path):
-    data = {"machine": wp.machine(), "omissions": ["a peer: not installed"], "rows": rows, "hybrid": []}
+    data = {
+        "machine": wp.machine(),
+        "omissions": ["a peer: not installed"],
+        "rows": rows,
+        "hybrid": [],
+    }
     text = bench.page({"work_precision": data})
     for r in rows:
-        cells = (f"| {r['package']} ", f"| {r['method']} ", f"| {r['setting']:g} ", f"| {wp.number(r['crossing'])} ")
+        cells = (
+            f"| {r['package']} ",
+            f"| {r['method']} ",
+            f"| {r['setting']:g} ",
+            f"| {wp.number(r['crossing'])} ",
+        )
         assert any(all(c in line for c in cells) for line in text.splitlines())
     assert "- a peer: not installed" in text and "mujoco 4" in text
     changed = [{**r, "crossing": (r["crossing"] or 0) + 0.123} for r in rows]
@@ -114,15 +141,22 @@ def test_sampled_control_is_as_late_as_its_hold_and_as_exact_as_the_hybrid_syste
     for r in found:
         assert r["hybrid"] < 0.05 * r["continuous"]
     for coarse, fine in zip(found[0::2], found[1::2], strict=True):
-        assert coarse["continuous"] > 2.0 * fine["continuous"] and coarse["hybrid"] > 2.0 * fine["hybrid"]
+        assert (
+            coarse["continuous"] > 2.0 * fine["continuous"]
+            and coarse["hybrid"] > 2.0 * fine["hybrid"]
+        )
 
 
 def test_sampled_rows_recommend_nothing(rows):
-    cheap = [{**r, "crossing": 0.0, "wall": 0.0} for r in of(rows, "hapticclay", method="sampled, held")]
+    cheap = [
+        {**r, "crossing": 0.0, "wall": 0.0} for r in of(rows, "hapticclay", method="sampled, held")
+    ]
     assert cheap and wp.recommend(rows + cheap) == wp.recommend(rows)
 
 
-def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path, monkeypatch, capsys):
+def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr(wp.measure, "__defaults__", (("ours",),))
     monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
@@ -142,9 +176,19 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(tmp_path
     ]  # fmt: skip
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
-    assert methods - {"fast, native", "accurate, native"} == {"fast", "accurate", "sampled, held", "sampled, implicit"}
+    assert methods - {"fast, native", "accurate, native"} == {
+        "fast",
+        "accurate",
+        "sampled, held",
+        "sampled, implicit",
+    }
     text = readme.read_text()
-    assert text.startswith("before") and text.endswith("after\n") and "old" not in text and "hapticclay | fast" in text
+    assert (
+        text.startswith("before")
+        and text.endswith("after\n")
+        and "old" not in text
+        and "hapticclay | fast" in text
+    )
     page = (tmp_path / "o" / "bench.md").read_text()
     assert page == bench.page(data) and all(c.name in page for c in some)
 

@@ -19,7 +19,9 @@ README = (ROOT / "README.md").read_text()
 
 @pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.S))
 def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
-    out = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True)
+    out = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     said = re.findall(r"print\(.*\)  # ([^:\n]*)", block)
     assert out.stdout.splitlines() == said and len(said) >= 3
     assert (tmp_path / "out" / "record.npz").is_file()
@@ -38,7 +40,13 @@ def test_every_limit_in_the_stability_page_is_recomputed():
     text = (ROOT / "docs" / "stability.md").read_text()
     rows = re.findall(r"^\| ([xy]) \| (nominal|none) \| (\d+) \|(.*)\|$", text, re.M)
     Ts = constants.TS
-    columns = ({}, dict(Ts=Ts), dict(Ts=Ts, delay=Ts), dict(delay=1e-3), dict(Ts=Ts, render="implicit"))
+    columns = (
+        {},
+        dict(Ts=Ts),
+        dict(Ts=Ts, delay=Ts),
+        dict(delay=1e-3),
+        dict(Ts=Ts, render="implicit"),
+    )
     assert len(rows) == 12
     for axis, hand, b, cells in rows:
         for cell, kw in zip(cells.split("|"), columns, strict=True):
@@ -72,7 +80,9 @@ def test_readme_figures_and_links_exist():
 def test_make_targets_named_in_the_documents_exist():
     makefile = (ROOT / "Makefile").read_text()
     for text in (README, (ROOT / "CONTRIBUTING.md").read_text()):
-        for names in re.findall(r"^    make ((?:demo|test|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M):
+        for names in re.findall(
+            r"^    make ((?:demo|test|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M
+        ):
             for name in names.split():
                 assert re.search(rf"^{name}:", makefile, re.M), name
 
@@ -90,8 +100,11 @@ def test_inertias_in_the_documents_are_those_of_the_model():
     model = hc.build(hc.free())
     link1 = model.body("link1").inertia[2]
     assert repr(float(link1)) in text
-    assert repr(constants.L1**2 / constants.S[0].gain) in text and repr(constants.L2**2 / constants.S[1].gain) in text
-    mujoco.MjModel.from_xml_path(str(engine.folder() / "arm.xml"))
+    assert (
+        repr(constants.L1**2 / constants.S[0].gain) in text
+        and repr(constants.L2**2 / constants.S[1].gain) in text
+    )
+    mujoco.MjModel.from_xml_path(str(engine.mjcf_folder() / "arm.xml"))
 
 
 def test_every_public_name_has_a_docstring():

@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.model import constants
 from hapticclay.views.page import Gate
 from hapticclay.views.session import Session
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
 FLAGS = [
     "--no-sandbox",
     "--disable-dev-shm-usage",
@@ -26,14 +29,19 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")  # of websockets
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::DeprecationWarning", "ignore::ResourceWarning"
+)  # of websockets
 
 
 @pytest.fixture
 def page():
     from hapticclay.views.page import Page
 
-    made, done = Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0), threading.Event()
+    made, done = (
+        Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0),
+        threading.Event(),
+    )
     thread = threading.Thread(target=made.serve, args=(done.is_set,))
     thread.start()
     yield made
@@ -67,7 +75,9 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
         sliders = tab.locator("[role=slider]")
         sliders.nth(2).wait_for()
         press(sliders.nth(2), "ArrowRight", 15)
-        tab.wait_for_timeout(2000)  # the page sends at most 20 values a second, of all sliders together: the last
+        tab.wait_for_timeout(
+            2000
+        )  # the page sends at most 20 values a second, of all sliders together: the last
         press(sliders.nth(0), "ArrowLeft", 10)
         deadline = time.monotonic() + 90.0
         while time.monotonic() < deadline and page.session.frames[-1][1][0] < 0.06:
@@ -98,7 +108,9 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
     assert record.ratio(record.fe)[inside, 0] == pytest.approx(record.b[inside, 0], rel=0.01)
 
 
-@pytest.mark.parametrize("typed,taken", [(-5.0, 0.0), (1e9, 270.0), (float("nan"), 0.0), (45.0, 45.0)])
+@pytest.mark.parametrize(
+    "typed,taken", [(-5.0, 0.0), (1e9, 270.0), (float("nan"), 0.0), (45.0, 45.0)]
+)
 def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
     page.b.value = typed
     assert page.b.value == taken and page.session.scenario.clay.x.values[1] == pytest.approx(taken)
@@ -121,7 +133,7 @@ def test_first_view_holds_arm_and_clay(scenario, width, height):
         x, y = np.add(s.start, s.origin)
         hand = np.array([(x, y, 0.07), (x + 0.12, y, 0.052), (x, y + 0.12, 0.052)])
         q = page.session.run.angles[0]
-        elbow = 0.026 * ring + (hc.params.L1 * np.cos(q), hc.params.L1 * np.sin(q), 0.024)
+        elbow = 0.026 * ring + (constants.L1 * np.cos(q), constants.L1 * np.sin(q), 0.024)
         corners = [
             (cx + s.origin[0], cy + s.origin[1], stage.GROUND + cz)
             for cx in grid.x[[0, -1]] for cy in grid.y[[0, -1]] for cz in (0.0, stage.THICKNESS)
@@ -141,7 +153,9 @@ def test_page_says_what_the_monitor_says(page):
     page.gain.value = 3.0
     while time.monotonic() < deadline and "limit of K here: none" not in page.verdict.content:
         time.sleep(0.05)
-    assert "stable" in page.verdict.content  # in free space, where no gain is too much for this hand
+    assert (
+        "stable" in page.verdict.content
+    )  # in free space, where no gain is too much for this hand
     onset = hc.Outcome("diverged", 1.0, 1, "y", "growing <oscillation>")
     with page.player.lock:
         page.session.run.watch.onset, page.session._swung = onset, page.session.t + 1e3
@@ -152,7 +166,9 @@ def test_page_says_what_the_monitor_says(page):
 
 def test_page_listens_on_this_machine_alone(page):
     assert page.url == f"http://127.0.0.1:{page.gate.port}"
-    elsewhere = "127.0.0.2"  # another address of this machine: open only to who listens on all of them
+    elsewhere = (
+        "127.0.0.2"  # another address of this machine: open only to who listens on all of them
+    )
     for port in (page.gate.port, page.server.get_port()):
         with pytest.raises(ConnectionRefusedError):
             socket.create_connection((elsewhere, port), timeout=5.0)
@@ -184,9 +200,16 @@ def test_no_other_name_and_no_other_page_gets_in(host):
         return asked(port, f"GET {target} HTTP/1.1", *fields, *cookie)
 
     try:
-        for good in (own, f"localhost:{port}", "localhost:9000", f"[::1]:{port}"):  # 9000: ssh -L 9000:...
+        for good in (
+            own,
+            f"localhost:{port}",
+            "localhost:9000",
+            f"[::1]:{port}",
+        ):  # 9000: ssh -L 9000:...
             assert ask(f"Host: {good}") == "HTTP/1.1 200 OK"
-            assert ask(f"Host: {good}", f"Origin: http://{good}", *UPGRADE).startswith("HTTP/1.1 101 ")
+            assert ask(f"Host: {good}", f"Origin: http://{good}", *UPGRADE).startswith(
+                "HTTP/1.1 101 "
+            )
         for bad in (
             "evil.example",
             f"evil.example:{port}",
@@ -195,15 +218,28 @@ def test_no_other_name_and_no_other_page_gets_in(host):
             "",
             "[",
         ):
-            for more in ((), (f"Origin: http://{bad}", *UPGRADE), (f"Origin: http://{own}", *UPGRADE)):
-                assert ask(f"Host: {bad}", *more) in ("HTTP/1.1 403 Forbidden", "HTTP/1.1 400 Bad Request"), bad
+            for more in (
+                (),
+                (f"Origin: http://{bad}", *UPGRADE),
+                (f"Origin: http://{own}", *UPGRADE),
+            ):
+                assert ask(f"Host: {bad}", *more) in (
+                    "HTTP/1.1 403 Forbidden",
+                    "HTTP/1.1 400 Bad Request",
+                ), bad
         assert ask() == ask(f"Host: {own}", "Host: evil.example") == "HTTP/1.1 403 Forbidden"
         for origin in ("http://evil.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{port + 1}",
                        f"http://localhost:{port}", f"http://{own}.evil.example", "file://"):  # fmt: skip
             for more in ((), UPGRADE):
-                assert ask(f"Host: {own}", f"Origin: {origin}", *more) == "HTTP/1.1 403 Forbidden", origin
+                assert (
+                    ask(f"Host: {own}", f"Origin: {origin}", *more) == "HTTP/1.1 403 Forbidden"
+                ), origin
         if host == "0.0.0.0":
-            assert ask(f"Host: {socket.gethostname()}:{port}") == ask(f"Host: 192.0.2.7:{port}") == "HTTP/1.1 200 OK"
+            assert (
+                ask(f"Host: {socket.gethostname()}:{port}")
+                == ask(f"Host: 192.0.2.7:{port}")
+                == "HTTP/1.1 200 OK"
+            )
         else:
             assert ask(f"Host: 192.0.2.7:{port}") == "HTTP/1.1 403 Forbidden"
     finally:
@@ -218,14 +254,22 @@ def test_server_behind_the_gate_speaks_only_to_the_gate(page):
 
     speak = [Subprotocol(f"viser-v{viser.__version__}")]
     for fields in ({}, {"X-Hapticclay-Pass": "guess"}):
-        with connect(f"ws://127.0.0.1:{page.server.get_port()}", subprotocols=speak, additional_headers=fields) as s:
+        with connect(
+            f"ws://127.0.0.1:{page.server.get_port()}",
+            subprotocols=speak,
+            additional_headers=fields,
+        ) as s:
             with pytest.raises(ConnectionClosed) as closed:
                 s.recv(timeout=10.0)
             assert closed.value.rcvd.code == 1008
-    origin = {"X-Hapticclay-Pass": "guess"}  # nor does saying it at the gate help, or spoil what the gate says
+    origin = {
+        "X-Hapticclay-Pass": "guess"
+    }  # nor does saying it at the gate help, or spoil what the gate says
     with connect(f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak) as s:
         assert s.recv(timeout=10.0)
-    with connect(f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak, additional_headers=origin) as s:
+    with connect(
+        f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak, additional_headers=origin
+    ) as s:
         with pytest.raises(ConnectionClosed):
             s.recv(timeout=10.0)
 
@@ -265,7 +309,11 @@ def test_other_machines_need_the_token():
 def test_address_is_one_that_others_can_open():
     from hapticclay.views.page import _name
 
-    assert (_name("127.0.0.1"), _name("::1"), _name("box.example")) == ("127.0.0.1", "[::1]", "box.example")
+    assert (_name("127.0.0.1"), _name("::1"), _name("box.example")) == (
+        "127.0.0.1",
+        "[::1]",
+        "box.example",
+    )
     assert _name("0.0.0.0") not in ("0.0.0.0", "")
 
 
@@ -273,7 +321,10 @@ def test_address_is_one_that_others_can_open():
 def test_taken_or_impossible_port_is_refused(host):
     from hapticclay.views.page import Page
 
-    with socket.create_server((host, 0)) as s, pytest.raises(hc.ParameterError, match="cannot be listened on"):
+    with (
+        socket.create_server((host, 0)) as s,
+        pytest.raises(hc.ParameterError, match="cannot be listened on"),
+    ):
         Page(Session(hc.constant_cut()), host=host, port=s.getsockname()[1])
     with pytest.raises(hc.ParameterError, match="port = 99999: must be a whole number"):
         Page(Session(hc.constant_cut()), host=host, port=99999)
@@ -304,8 +355,21 @@ def test_player_that_dies_leaves_no_server(monkeypatch):
 def started(folder, *args, before="pass"):
     """`hapticclay view --web` as a person starts it."""
     code = f"import sys; {before}; from hapticclay.cli import app; sys.exit(app.main(sys.argv[1:]))"
-    words = [sys.executable, "-c", code, "view", "constant", "--web", "--no-plots", "--out", "o", *args]
-    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as p:
+    words = [
+        sys.executable,
+        "-c",
+        code,
+        "view",
+        "constant",
+        "--web",
+        "--no-plots",
+        "--out",
+        "o",
+        *args,
+    ]
+    with subprocess.Popen(
+        words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as p:
         try:
             yield p
         finally:
@@ -316,7 +380,9 @@ def started(folder, *args, before="pass"):
 def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
     with started(tmp_path, "--host", host, "--port", "0") as p:
         said = p.stdout.readline()
-        assert said.startswith("open http://") and ("?token=" in said) == (host == "0.0.0.0")  # nothing else before
+        assert said.startswith("open http://") and ("?token=" in said) == (
+            host == "0.0.0.0"
+        )  # nothing else before
         time.sleep(2.0)
         p.send_signal(signal.SIGINT)
         out, err = p.communicate(timeout=60)
@@ -328,7 +394,11 @@ def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
 def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
     with started(tmp_path, before="sys.modules['viser'] = None") as p:
         out, err = p.communicate(timeout=60)
-    assert (p.returncode, out) == (2, "") and err.count("\n") == 1 and "pip install 'hapticclay[web]'" in err
+    assert (
+        (p.returncode, out) == (2, "")
+        and err.count("\n") == 1
+        and "pip install 'hapticclay[web]'" in err
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -341,7 +411,9 @@ def test_gate_survives_noise(caplog):
         for line in ("GET http://[ HTTP/1.1", "GET //[ HTTP/1.1", "GET http://127.0.0.1/ HTTP/1.1", "POST / HTTP/1.1",
                      "GET", "", "GET * HTTP/1.1", "GET /?token=%ff%00\xe9 HTTP/1.1"):  # fmt: skip
             said = asked(gate.port, line, f"Host: 127.0.0.1:{gate.port}")
-            assert said == "HTTP/1.1 " + ("403 Forbidden" if "token" in line else "400 Bad Request"), line
+            assert said == "HTTP/1.1 " + (
+                "403 Forbidden" if "token" in line else "400 Bad Request"
+            ), line
         many = [f"X-{k}: 1" for k in range(200)]
         assert asked(gate.port, "GET / HTTP/1.1", *many) == "HTTP/1.1 400 Bad Request"
         assert answer(gate.port)[0] == 403

@@ -6,13 +6,25 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = ("matplotlib", "imageio", "viser", "numba", "dask", "tyro", "tqdm", "scipy", "mujoco.viewer")
+HEAVY = (
+    "matplotlib",
+    "imageio",
+    "viser",
+    "numba",
+    "dask",
+    "tyro",
+    "tqdm",
+    "scipy",
+    "mujoco.viewer",
+)
 
 
 def loaded(code, names):
     """Which of these modules a fresh process has loaded after the code."""
     code += f"; import sys; print(*[m for m in {names!r} if m in sys.modules])"
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
 
 
 @pytest.mark.parametrize(
@@ -21,7 +33,10 @@ def loaded(code, names):
         ("import hapticclay", (*HEAVY, "mujoco", "numpy")),
         ("import hapticclay as hc; hc.constant_cut()", (*HEAVY, "mujoco")),
         ("import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01))", HEAVY),
-        ("import hapticclay as hc; hc.gain_limit('x', 90.0)", ("matplotlib", "mujoco", "numba", "tyro")),
+        (
+            "import hapticclay as hc; hc.gain_limit('x', 90.0)",
+            ("matplotlib", "mujoco", "numba", "tyro"),
+        ),
     ],
 )
 def test_what_is_not_needed_is_not_loaded(code, names):
@@ -30,7 +45,11 @@ def test_what_is_not_needed_is_not_loaded(code, names):
 
 def test_the_rooms_stand_as_drawn():
     """import-linter's contracts in pyproject.toml."""
-    out = subprocess.run([Path(sys.executable).with_name("lint-imports"), "--no-cache"], capture_output=True, text=True)
+    out = subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache"],
+        capture_output=True,
+        text=True,
+    )
     assert out.returncode == 0, out.stdout
 
 
@@ -41,7 +60,11 @@ def test_import_is_quick_beside_mujoco():
         "import hapticclay.simulation.simulate; c = time.perf_counter(); print((c - b) / (b - a))"
     )
     ratios = [
-        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+        float(
+            subprocess.run(
+                [sys.executable, "-c", code], capture_output=True, text=True, check=True
+            ).stdout
+        )
         for _ in range(5)
     ]
     assert min(ratios) < 1.0

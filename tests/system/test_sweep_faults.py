@@ -36,7 +36,11 @@ def columns(table):
 def temporary(out):
     """Files that are not what a sweep is made of."""
     whole = ("sweep.json", ".lock")
-    return [f for f in out.rglob("*") if f.is_file() and f.name not in whole and not f.name.startswith("part-")]
+    return [
+        f
+        for f in out.rglob("*")
+        if f.is_file() and f.name not in whole and not f.name.startswith("part-")
+    ]
 
 
 def until(condition, seconds=60.0):
@@ -53,8 +57,8 @@ def until(condition, seconds=60.0):
 def whole(tmp_path_factory):
     """What every sweep of `command` must come to."""
     out = tmp_path_factory.mktemp("whole")
-    sweep.run(plan(), out, workers=1)
-    return columns(sweep.read(out))
+    sweep.run_sweep(plan(), out, workers=1)
+    return columns(sweep.read_sweep(out))
 
 
 @pytest.fixture
@@ -63,7 +67,9 @@ def small_disk(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = shutil.which("mount")
-    made = mount and subprocess.run([mount, "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True)
+    made = mount and subprocess.run(
+        [mount, "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True
+    )
     if not made or made.returncode:
         pytest.skip("may not mount a file system here")
     yield disk
@@ -82,21 +88,23 @@ def test_a_full_disk_is_one_line_and_the_sweep_goes_on_with_room(small_disk, who
     done = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
     one_line_of_a_full_disk(done, "No space left")
     assert not temporary(out)
-    there = len(sweep.read(out))  # all that is there is valid
+    there = len(sweep.read_sweep(out))  # all that is there is valid
     assert 0 < there < RUNS
     again = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
     one_line_of_a_full_disk(again, "No space left")
-    assert len(sweep.read(out)) >= there
+    assert len(sweep.read_sweep(out)) >= there
     subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
     subprocess.run(command(out, workers=workers), capture_output=True, check=True)
-    assert columns(sweep.read(out)) == whole
+    assert columns(sweep.read_sweep(out)) == whole
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(small_disk):
     with contextlib.suppress(OSError), open(small_disk / "fill", "wb", buffering=0) as f:
         while True:
             f.write(bytes(4096))
-    one_line_of_a_full_disk(subprocess.run(command(small_disk / "o"), capture_output=True, text=True), "No space left")
+    one_line_of_a_full_disk(
+        subprocess.run(command(small_disk / "o"), capture_output=True, text=True), "No space left"
+    )
     assert not temporary(small_disk / "o")
 
 
@@ -107,11 +115,13 @@ def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, wor
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))
 
-    done = subprocess.run(command(tmp_path, workers=workers), capture_output=True, text=True, preexec_fn=limit)
+    done = subprocess.run(
+        command(tmp_path, workers=workers), capture_output=True, text=True, preexec_fn=limit
+    )
     one_line_of_a_full_disk(done, "File too large")
     assert not temporary(tmp_path) and not list((tmp_path / "data").iterdir())
     subprocess.run(command(tmp_path, workers=workers), capture_output=True, check=True)
-    assert columns(sweep.read(tmp_path)) == whole
+    assert columns(sweep.read_sweep(tmp_path)) == whole
 
 
 def alive(process):
@@ -124,9 +134,13 @@ def alive(process):
 @contextlib.contextmanager
 def at_work(out, t_max=0.3):
     """A sweep with two workers that has written two parts, and its worker processes."""
-    with subprocess.Popen(command(out, t_max=t_max), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as p:
+    with subprocess.Popen(
+        command(out, t_max=t_max), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as p:
         try:
-            assert until(lambda: len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None)
+            assert until(
+                lambda: len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None
+            )
             assert p.poll() is None
             yield p, psutil.Process(p.pid).children(recursive=True)
         finally:
@@ -141,7 +155,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path, how):
         p.wait()
         assert p.returncode == -how
         assert until(lambda: not any(map(alive, children)), 5.0)
-    assert sweep.missing(plan(t_max=2.0), tmp_path)  # none of them had gone on to the end
+    assert sweep.missing_parts(plan(t_max=2.0), tmp_path)  # none of them had gone on to the end
 
 
 def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
@@ -150,8 +164,8 @@ def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
         _, err = p.communicate(timeout=60)
         said = [line for line in err.splitlines() if " to go" not in line]
         assert p.returncode == 1 and len(said) == 1 and "worker was killed" in said[0]
-    assert sweep.run(plan(t_max=0.3), tmp_path, workers=1) > 0
-    assert len(sweep.read(tmp_path)) == RUNS
+    assert sweep.run_sweep(plan(t_max=0.3), tmp_path, workers=1) > 0
+    assert len(sweep.read_sweep(tmp_path)) == RUNS
 
 
 def truncated(file, out):
@@ -187,25 +201,25 @@ def flipped(file, out):
 
 
 def copied(file, out):
-    shutil.copy(sweep.part(out, 2), file)
+    shutil.copy(sweep.sweep_part(out, 2), file)
 
 
 def foreign(file, out):
     other = out.parent / "other"
-    sweep.run(plan("10:1000:4log"), other, workers=1)
-    shutil.copy(sweep.part(other, 1), file)
+    sweep.run_sweep(plan("10:1000:4log"), other, workers=1)
+    shutil.copy(sweep.sweep_part(other, 1), file)
 
 
 def short(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep._read(file).slice(0, 3), file)
+    pq.write_table(sweep._read_part(file).slice(0, 3), file)
 
 
 def columnless(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep._read(file).drop_columns(["cause"]), file)
+    pq.write_table(sweep._read_part(file).drop_columns(["cause"]), file)
 
 
 @pytest.mark.parametrize("harm,fault", [
@@ -214,42 +228,45 @@ def columnless(file, out):
 ])  # fmt: skip
 def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault):
     out = tmp_path / "o"
-    sweep.run(plan(), out, workers=1)
+    sweep.run_sweep(plan(), out, workers=1)
     for n in (1, 7):
-        harm(sweep.part(out, n), out)
+        harm(sweep.sweep_part(out, n), out)
     if harm is not short:
         with pytest.raises(ParameterError, match="part-00000[17].parquet"):
-            sweep.read(out)
+            sweep.read_sweep(out)
     capsys.readouterr()
-    assert sweep.run(plan(), out, workers=1) == 8
+    assert sweep.run_sweep(plan(), out, workers=1) == 8
     said = capsys.readouterr().err
-    assert said == f"hapticclay: made again: part-000001.parquet ({fault}), part-000007.parquet ({fault})\n"
-    assert columns(sweep.read(out)) == whole
-    assert sweep.run(plan(), out, workers=1) == 0 and not capsys.readouterr().err
+    assert (
+        said
+        == f"hapticclay: made again: part-000001.parquet ({fault}), part-000007.parquet ({fault})\n"
+    )
+    assert columns(sweep.read_sweep(out)) == whole
+    assert sweep.run_sweep(plan(), out, workers=1) == 0 and not capsys.readouterr().err
 
 
 def test_many_bad_parts_are_one_short_line(tmp_path, capsys):
-    sweep.run(plan(), tmp_path, workers=1)
+    sweep.run_sweep(plan(), tmp_path, workers=1)
     for n in range(12):
-        empty(sweep.part(tmp_path, n), tmp_path)
-    assert len(sweep.begin(plan(), tmp_path)) == 12
+        empty(sweep.sweep_part(tmp_path, n), tmp_path)
+    assert len(sweep.begin_sweep(plan(), tmp_path)) == 12
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and said.count(".parquet") == 5 and "7 more" in said
 
 
 def test_a_stray_file_among_the_parts_is_refused_and_kept(tmp_path):
-    sweep.run(plan(), tmp_path, workers=1)
+    sweep.run_sweep(plan(), tmp_path, workers=1)
     stray = tmp_path / "data" / "part-000001 (copy).parquet"
-    shutil.copy(sweep.part(tmp_path, 1), stray)
+    shutil.copy(sweep.sweep_part(tmp_path, 1), stray)
     with pytest.raises(ParameterError, match="no part of the sweep"):
-        sweep.run(plan(), tmp_path, workers=1)
+        sweep.run_sweep(plan(), tmp_path, workers=1)
     with pytest.raises(ParameterError, match="copy"):
-        sweep.read(tmp_path)
+        sweep.read_sweep(tmp_path)
     assert stray.is_file()
 
 
 def test_a_part_that_may_not_be_read_is_refused_not_removed(tmp_path, monkeypatch):
-    sweep.run(plan(), tmp_path, workers=1)
+    sweep.run_sweep(plan(), tmp_path, workers=1)
     real = type(tmp_path).read_bytes
 
     def denied(self):
@@ -259,8 +276,8 @@ def test_a_part_that_may_not_be_read_is_refused_not_removed(tmp_path, monkeypatc
 
     monkeypatch.setattr(type(tmp_path), "read_bytes", denied)
     with pytest.raises(ParameterError, match="part-000003.*Permission denied"):
-        sweep.run(plan(), tmp_path, workers=1)
-    assert sweep.part(tmp_path, 3).is_file()
+        sweep.run_sweep(plan(), tmp_path, workers=1)
+    assert sweep.sweep_part(tmp_path, 3).is_file()
 
 
 @pytest.mark.parametrize("other", ["10:1000:40log", "20:1000:40log"])
@@ -274,23 +291,25 @@ def test_of_two_sweeps_started_at_once_one_wins_and_the_other_is_refused(tmp_pat
     assert said.count("\n") == 1
     assert "another sweep is at work" in said or "holds another sweep" in said
     winner = plan(("10:1000:40log", other)[[end[2] for end in ends].index(0)], t_max=0.3)
-    table = sweep.read(tmp_path)
+    table = sweep.read_sweep(tmp_path)
     assert table["run"].to_pylist() == list(range(RUNS))
     assert table["b"].to_pylist() == winner.points(0, RUNS)[:, 0].tolist()
-    assert sweep.begin(winner, tmp_path) == []
+    assert sweep.begin_sweep(winner, tmp_path) == []
 
 
 def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
     with sweep.claimed(plan(), tmp_path) as todo:
         assert len(todo) == 20
         for again in (plan(), plan("1:2:3")):
-            with pytest.raises(ParameterError, match=f"another sweep is at work .process {os.getpid()} on "):
-                sweep.run(again, tmp_path)
+            with pytest.raises(
+                ParameterError, match=f"another sweep is at work .process {os.getpid()} on "
+            ):
+                sweep.run_sweep(again, tmp_path)
         assert app.main(command(tmp_path)[3:]) == 2
         assert capsys.readouterr().err.count("\n") == 1
         assert not list(tmp_path.glob("data/*"))
     with pytest.raises(ParameterError, match="holds another sweep"):
-        sweep.run(plan("1:2:3"), tmp_path)
+        sweep.run_sweep(plan("1:2:3"), tmp_path)
     with sweep.claimed(plan(), tmp_path) as todo:
         assert len(todo) == 20
 
@@ -298,7 +317,7 @@ def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
 def test_the_lock_of_a_killed_process_holds_nobody_up(tmp_path):
     with at_work(tmp_path) as (p, _):
         with pytest.raises(ParameterError, match=f"process {p.pid} on "):
-            sweep.run(plan(t_max=0.3), tmp_path)
+            sweep.run_sweep(plan(t_max=0.3), tmp_path)
         p.kill()
         p.wait()
         with sweep.claimed(plan(t_max=0.3), tmp_path) as todo:
@@ -312,6 +331,6 @@ def test_a_file_system_without_locks_is_said(tmp_path, capsys, monkeypatch):
         raise OSError(37, "No locks available")
 
     monkeypatch.setattr(fcntl, "flock", nolocks)
-    assert sweep.run(plan("1:2:3"), tmp_path, workers=1) == 6
+    assert sweep.run_sweep(plan("1:2:3"), tmp_path, workers=1) == 6
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "no file locks" in said

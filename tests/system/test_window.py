@@ -22,7 +22,9 @@ from hapticclay.views.session import FRAME, Replay, Session
 from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
-pytestmark = pytest.mark.skipif(bool(missing), reason=f"needs {' and '.join(missing)} (apt-get install xvfb xdotool)")
+pytestmark = pytest.mark.skipif(
+    bool(missing), reason=f"needs {' and '.join(missing)} (apt-get install xvfb xdotool)"
+)
 
 
 @contextlib.contextmanager
@@ -59,13 +61,18 @@ class Mouse:
         )  # fmt: skip
         for _ in range(240):
             found = subprocess.run(
-                ["xdotool", "search", "--name", "MuJoCo"], env=screen, capture_output=True, text=True
+                ["xdotool", "search", "--name", "MuJoCo"],
+                env=screen,
+                capture_output=True,
+                text=True,
             )
             if found.stdout or self.program.poll() is not None:
                 break
             time.sleep(0.25)
         self.window = (
-            found.stdout.split()[0] if found.stdout else pytest.fail(f"no window: {self.program.communicate()}")
+            found.stdout.split()[0]
+            if found.stdout
+            else pytest.fail(f"no window: {self.program.communicate()}")
         )
         time.sleep(5.0)  # for the first pictures
 
@@ -116,7 +123,9 @@ def ask_to_close(window, display):
     x = ctypes.CDLL("libX11.so.6")
     x.XOpenDisplay.restype, x.XInternAtom.restype = ctypes.c_void_p, ctypes.c_ulong
     display = ctypes.c_void_p(x.XOpenDisplay(display.encode()))
-    kind, data = (x.XInternAtom(display, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW"))
+    kind, data = (
+        x.XInternAtom(display, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW")
+    )
     message = Message(33, 0, 1, display, window, kind, 32, (ctypes.c_long * 5)(data))
     x.XSendEvent(display, ctypes.c_ulong(window), 0, 0, ctypes.byref(message))
     x.XCloseDisplay(display)
@@ -133,7 +142,9 @@ def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_p
         mouse.do("mouseup", 3, "keyup", "ctrl")
     assert (code, err) == (0, ""), out
     record = hc.Record.load(tmp_path / "o")
-    assert record.b[-1, 0] == 200.0 and record.v[-1, 0] > 1e-3 and record.extra["removed"][-1] > 1e-6
+    assert (
+        record.b[-1, 0] == 200.0 and record.v[-1, 0] > 1e-3 and record.extra["removed"][-1] > 1e-6
+    )
     assert record.outcome.code == "finished"
 
 
@@ -155,9 +166,16 @@ def test_mouse_cuts_through_the_clay(screen, tmp_path):
     assert x.max() > 0.17, out
     inside = (record.b[:, 0] > 0.0) & (np.abs(record.v[:, 0]) > 1e-3)
     np.testing.assert_allclose(record.ratio(record.fe)[inside, 0], 90.0, rtol=0.01)
-    assert record.extra["removed"][-1] == pytest.approx(0.02 * 0.01 * 0.10, rel=0.01)  # the way is nearly straight
+    assert record.extra["removed"][-1] == pytest.approx(
+        0.02 * 0.01 * 0.10, rel=0.01
+    )  # the way is nearly straight
     assert sorted(os.listdir(tmp_path)) == ["o"]  # no MUJOCO_LOG.TXT
-    assert sorted(os.listdir(tmp_path / "o")) == ["force.png", "record.npz", "summary.json", "velocity.png"]
+    assert sorted(os.listdir(tmp_path / "o")) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
     assert sum(record.notes["late_ms"]["frames"]) == record.notes["frames"] > 100
 
 
@@ -187,7 +205,11 @@ def test_every_key_of_the_page_does_what_it_says():
     from hapticclay.views.window import BACKSPACE, DOWN, LEFT, RIGHT, SPACE, UP, Window
 
     page = (Path(__file__).parents[2] / "docs" / "view.md").read_text()
-    named = [k for row in re.findall(r"^\| (?!key|---)(.+?) \|.*\|$", page, re.M) for k in row.split(", ")]
+    named = [
+        k
+        for row in re.findall(r"^\| (?!key|---)(.+?) \|.*\|$", page, re.M)
+        for k in row.split(", ")
+    ]
     assert named == ["space", "backspace", "up", "down", "left", "right", "1", "2", "3", "R", "H"]
     session = Session(hc.constant_cut(), stiffness=10.0)
     window = Window(session)
@@ -204,12 +226,19 @@ def test_every_key_of_the_page_does_what_it_says():
     for key, gain, b in ((UP, 1.25, 90.0), (RIGHT, 1.25, 112.5), (RIGHT, 1.25, 140.625), (DOWN, 1.0, 140.625),
                          (LEFT, 1.0, 112.5)):  # fmt: skip
         press(key)
-        assert session.scenario.gain == pytest.approx((gain, 0.5 * gain)) and session.b[0] == pytest.approx(b)
+        assert session.scenario.gain == pytest.approx((gain, 0.5 * gain)) and session.b[
+            0
+        ] == pytest.approx(b)
     press(ord("R"))
     assert not session.recording
     press(BACKSPACE)
     pane.take(window.look([], None))
-    assert (session.t, session.recorded, session.recording, pane.stage.removal.volume) == (0.0, False, False, 0.0)
+    assert (session.t, session.recorded, session.recording, pane.stage.removal.volume) == (
+        0.0,
+        False,
+        False,
+        0.0,
+    )
     assert session.scenario.clay.x.values[1] == pytest.approx(112.5)  # as it was set
     press(ord("R"))
     press(ord("H"))
@@ -269,7 +298,9 @@ def test_both_axes_are_drawn_where_both_are_cut():
         n = velocity.figure.linepnt[i]
         x, v = velocity.figure.linedata[i, : 2 * n].reshape(-1, 2).T
         assert n > 50 and x.max() == pytest.approx(100 * record.p[:, i].max(), abs=0.1)
-        np.testing.assert_allclose(v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4)
+        np.testing.assert_allclose(
+            v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4
+        )
     one = picture(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
     assert [len(plot.lines) for plot in one.plots] == [1, 1, 2]
 
@@ -293,7 +324,12 @@ def test_a_replay_offers_the_keys_that_act_on_it():
 def test_without_a_display_it_says_what_to_do(tmp_path):
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     out = subprocess.run(
-        [sys.executable, "-m", "hapticclay", "view"], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60
+        [sys.executable, "-m", "hapticclay", "view"],
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert out.returncode == 2 and out.stderr.count("\n") == 1
     assert "--web" in out.stderr and "hapticclay video" in out.stderr

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.theory import linear_loop
-from hapticclay.theory.design import BAND
+from hapticclay.theory.design import DESIGN_BAND
 
 MARGINS = [
     (dict(gain_margin=2.0), lambda m: m.gain[1] - 2.0),
@@ -32,7 +32,9 @@ def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):
         assert left(hc.margins(axis, factor * K, b, impedance=on)) >= 0.0
 
 
-@pytest.mark.parametrize("kw", [dict(), dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-3, delay=1.5e-3)])
+@pytest.mark.parametrize(
+    "kw", [dict(), dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-3, delay=1.5e-3)]
+)
 def test_gain_margin_divides_the_gain_limit(kw):
     for axis in "xy":
         assert hc.design_gain(axis, 90.0, gain_margin=2.5, **kw) == pytest.approx(
@@ -45,24 +47,35 @@ def test_without_clay_and_hand_any_gain_will_do():
 
 
 def test_transparency_error_is_its_integral():
-    low, high = BAND
+    low, high = DESIGN_BAND
 
     def miss(x):
         return abs(1 - hc.transparency("x", 1.0, 90.0, np.array([math.exp(x)]))[0]) ** 2
 
-    exact = math.sqrt(quad(miss, math.log(low), math.log(high), epsabs=1e-12)[0] / math.log(high / low))
-    assert hc.transparency_error("x", 1.0, 90.0) == pytest.approx(exact, rel=1e-6)  # Simpson, steps of 1 %: h^4
+    exact = math.sqrt(
+        quad(miss, math.log(low), math.log(high), epsabs=1e-12)[0] / math.log(high / low)
+    )
+    assert hc.transparency_error("x", 1.0, 90.0) == pytest.approx(
+        exact, rel=1e-6
+    )  # Simpson, steps of 1 %: h^4
 
 
 def test_shapes_are_compared_at_equal_margin_the_best_first():
-    shapes = [hc.Compensator(), hc.Compensator(40.0), hc.Compensator(2.0), hc.Compensator(40.0, 20.0)]
+    shapes = [
+        hc.Compensator(),
+        hc.Compensator(40.0),
+        hc.Compensator(2.0),
+        hc.Compensator(40.0, 20.0),
+    ]
     for axis in "xy":
         found = hc.compare(axis, 90.0, shapes, disk_margin=0.5, delay_margin=0.005)
         assert {d.compensator for d in found} == set(shapes)
         assert np.all(np.diff([d.error for d in found]) > 0)
         assert found[0].compensator == hc.Compensator(40.0, 20.0)  # a lead pays
         for d in found:
-            assert min(d.margins.disk - 0.5, d.margins.delay - 0.005) == pytest.approx(0.0, abs=1e-9)
+            assert min(d.margins.disk - 0.5, d.margins.delay - 0.005) == pytest.approx(
+                0.0, abs=1e-9
+            )
             assert linear_loop.stable(axis, d.K, 90.0, None, d.compensator) and d.margins.stable
 
 

@@ -42,7 +42,9 @@ def polynomial(axis, K, b, hand, now=1.0, then=1.0):
     cg, t = np.convolve(c, g), [m, d + b, k]
     at_once = np.convolve(cg, [1 + SG[i] * m, SG[i] * d, SG[i] * k])
     late = np.polyadd(np.convolve(cg, [S1[i] + SG[i] * b, S0[i]]), K * G0[i] * np.convolve(s, t))
-    return np.polyadd(np.convolve(at_once, np.atleast_1d(now)), np.convolve(late, np.atleast_1d(then)))
+    return np.polyadd(
+        np.convolve(at_once, np.atleast_1d(now)), np.convolve(late, np.atleast_1d(then))
+    )
 
 
 def worst(poly):
@@ -55,12 +57,16 @@ def worst(poly):
 def test_continuous_limits(axis, on, j):
     b = (50.0, 90.0, 100.0)[j]
     found = hc.gain_limit(axis, b, impedance=on)
-    assert found == pytest.approx(PRINTED[axis, on][j], abs=0.0051)  # half the last digit, and a hair
+    assert found == pytest.approx(
+        PRINTED[axis, on][j], abs=0.0051
+    )  # half the last digit, and a hair
     assert found == pytest.approx(EXACT[axis, on][j], abs=0.5001e-4)  # half the last digit
     hand = HANDS["hand" if on else "none"]
-    root = brentq(lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13)
+    root = brentq(
+        lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13
+    )
     assert found == pytest.approx(root, rel=1e-9)  # eps times the condition of the roots, 1e4
-    K, omega = gain_limit.critical(axis, b, operator(hand))
+    K, omega = gain_limit.critical_gain(axis, b, operator(hand))
     assert abs(np.polyval(polynomial(axis, K, b, hand), 1j * omega)) < 1e-8 * np.polyval(
         np.abs(polynomial(axis, K, b, hand)), omega
     )
@@ -126,7 +132,11 @@ def radius(matrix, spring):
     return np.abs(z).max()
 
 
-CASES = list(itertools.product("xy", HANDS, [(3.6e-4, 0.0), (1e-3, 0.0), (1e-3, 4e-4), (1e-3, 2e-3), (5e-3, 7.5e-3)]))
+CASES = list(
+    itertools.product(
+        "xy", HANDS, [(3.6e-4, 0.0), (1e-3, 0.0), (1e-3, 4e-4), (1e-3, 2e-3), (5e-3, 7.5e-3)]
+    )
+)
 
 
 @pytest.mark.parametrize("axis,hand,timing", CASES)
@@ -140,7 +150,9 @@ def test_sampled_limits_against_the_period_map(axis, hand, timing, render):
         return radius(period(axis, K, 90.0, hand, Ts, delay, render), hand[2]) - 1
 
     root = brentq(beyond, 0.7 * found, 1.3 * found, xtol=1e-12)
-    assert found == pytest.approx(root, rel=1e-9)  # rounding of eigenvalues near z = 1; found: 1e-12
+    assert found == pytest.approx(
+        root, rel=1e-9
+    )  # rounding of eigenvalues near z = 1; found: 1e-12
     assert all(beyond(K) < 0 for K in np.geomspace(0.01, 0.999, 25) * found)  # no window below it
 
 
@@ -150,7 +162,10 @@ def test_sampled_limits_of_random_loops():
     zero = 0
     for _ in range(40):
         b, Ts = 10 ** rng.uniform(0.0, 4.5), 10 ** rng.uniform(-5.0, -2.0)
-        hand = [float(rng.choice([0.0, 10 ** rng.uniform(*x)])) for x in ((-2.0, 1.5), (-1.0, 2.5), (-1.0, 5.0))]
+        hand = [
+            float(rng.choice([0.0, 10 ** rng.uniform(*x)]))
+            for x in ((-2.0, 1.5), (-1.0, 2.5), (-1.0, 5.0))
+        ]
         delay = float(rng.choice([0.0, Ts * rng.uniform(0.0, 4.0), Ts * rng.integers(0, 4)]))
         axis, render = "xy"[rng.integers(2)], ("held", "implicit")[rng.integers(2)]
         found = limit(axis, b, hand, Ts=Ts, delay=delay, render=render)
@@ -162,7 +177,10 @@ def test_sampled_limits_of_random_loops():
             zero += 1
             assert beyond(1e-4) > -1e-10
         else:  # the eigenvalues of a long run of slow samples lie within 1e-10 of the circle, all of them
-            assert all(beyond(K) < 1e-10 for K in found * np.array([1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1 - 1e-5]))
+            assert all(
+                beyond(K) < 1e-10
+                for K in found * np.array([1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1 - 1e-5])
+            )
             assert beyond(found * (1 + 1e-5)) > -1e-11
     assert 0 < zero < 20
 
@@ -212,7 +230,9 @@ def is_inside(axis, K, b, hand, Ts, delay, render):
 
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
-@pytest.mark.parametrize("b,Ts,delay", [(1e9, 3.6e-4, 0.0), (1e9, 1e-6, 0.0), (1e8, 1e-3, 1.4e-3), (90.0, 3.6e-4, 0.0)])
+@pytest.mark.parametrize(
+    "b,Ts,delay", [(1e9, 3.6e-4, 0.0), (1e9, 1e-6, 0.0), (1e8, 1e-3, 1.4e-3), (90.0, 3.6e-4, 0.0)]
+)
 def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, delay):
     """Implicit clay to 1e9 N.s/m moves poles to within 1e-15 of z = 1; judged with 150 digits, by another criterion."""
     found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="implicit")
@@ -220,7 +240,12 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
     for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
         stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "implicit")
         assert stable == (share < 1.0)
-        assert gain_limit.is_stable(axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit") == stable
+        assert (
+            gain_limit.is_stable(
+                axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit"
+            )
+            == stable
+        )
 
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
@@ -237,7 +262,7 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
 def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n):
     """No hand: the loop broken at the sampled net force, from python-control's own discretisations."""
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
-    K, omega = gain_limit.critical(axis, b, None, Ts, n * Ts)
+    K, omega = gain_limit.critical_gain(axis, b, None, Ts, n * Ts)
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
     G = G0[i] / (s**2 + G1[i] * s + G0[i])
     C = K / (s**2 + 10 * s)
@@ -258,7 +283,9 @@ def test_sampled_limit_tends_to_the_continuous_one(axis, hand):
     assert np.all(np.array(gap) > 0) and gap[3] < 1e-2 * exact
     order = np.polyfit(np.log([8, 4, 2, 1]), np.log(gap), 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)  # a hold is half a sample late: first order
-    assert 2 * gap[3] - gap[2] == pytest.approx(0.0, abs=5e-4 * exact)  # extrapolated, second order is left
+    assert 2 * gap[3] - gap[2] == pytest.approx(
+        0.0, abs=5e-4 * exact
+    )  # extrapolated, second order is left
 
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
@@ -281,16 +308,27 @@ def test_late_limit_against_pade(axis, hand, delay):
 @pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "implicit"])))
 def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
     exact = hc.gain_limit(axis, 90.0, delay=2e-3, render=render)
-    gap = [exact - hc.gain_limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render) for Ts in (4e-4, 2e-4, 1e-4)]
+    gap = [
+        exact - hc.gain_limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render)
+        for Ts in (4e-4, 2e-4, 1e-4)
+    ]
     assert np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] == pytest.approx(1.0, abs=0.1)
-    assert 2 * gap[2] - gap[1] == pytest.approx(0.0, abs=5e-4 * exact)  # extrapolated, second order is left
+    assert 2 * gap[2] - gap[1] == pytest.approx(
+        0.0, abs=5e-4 * exact
+    )  # extrapolated, second order is left
 
 
 def test_limits_fall_with_delay_and_sample():
     for axis in "xy":
-        assert np.all(np.diff([hc.gain_limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0)
-        assert np.all(np.diff([hc.gain_limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0)
-        assert hc.gain_limit(axis, 90.0, delay=1e-9) == pytest.approx(hc.gain_limit(axis, 90.0), rel=1e-7)
+        assert np.all(
+            np.diff([hc.gain_limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0
+        )
+        assert np.all(
+            np.diff([hc.gain_limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0
+        )
+        assert hc.gain_limit(axis, 90.0, delay=1e-9) == pytest.approx(
+            hc.gain_limit(axis, 90.0), rel=1e-7
+        )
 
 
 def test_limits_at_the_ends():
@@ -309,11 +347,15 @@ def test_a_narrow_unstable_window_is_not_missed():
         return (1.0 - 0.1 * x) * (1.0 + 1j * (x**2 - 1e-8))
 
     edges = 1.0 / (1.0 + 1e-5), 1.0 / (1.0 - 1e-5)
-    loop = gain_limit.Family(h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1])
-    found = sorted(gain_limit.crossings(loop))
-    np.testing.assert_allclose([K for K, _ in found], edges, rtol=1e-9)  # a root beside its extreme: sqrt(eps) of 1e-4
+    loop = gain_limit.LoopFamily(
+        h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1]
+    )
+    found = sorted(gain_limit.gain_crossings(loop))
+    np.testing.assert_allclose(
+        [K for K, _ in found], edges, rtol=1e-9
+    )  # a root beside its extreme: sqrt(eps) of 1e-4
     np.testing.assert_allclose(np.log([w for _, w in found]), [1.2344, 1.2346], atol=1e-9)
-    assert gain_limit.first(loop)[0] == pytest.approx(edges[0], rel=1e-9)
+    assert gain_limit.first_instability(loop)[0] == pytest.approx(edges[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("axis,hand", [("x", "none"), ("y", "hand")])
@@ -331,22 +373,26 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
         b, tuple(gain), tuple(force), th is not None, shaping=True, dt=Ts / 8, Ts=Ts, control="sampled",
         clay=(-0.05, 0.05), origin=(0.35, 0.24), length=0.04, t_max=4.0,
     ))  # fmt: skip
-    M, beta, gamma = gain_limit.matrices(axis, b, th, Ts)
+    M, beta, gamma = gain_limit.sampled_matrices(axis, b, th, Ts)
     z = np.linalg.eigvals(M + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
     assert (rate < 0) == (factor < 1)
     v, t = np.diff(run.v[::8, i]), run.t[::8][1:]
-    peaks = np.flatnonzero((np.abs(v[1:-1]) > np.abs(v[:-2])) & (np.abs(v[1:-1]) >= np.abs(v[2:]))) + 1
+    peaks = (
+        np.flatnonzero((np.abs(v[1:-1]) > np.abs(v[:-2])) & (np.abs(v[1:-1]) >= np.abs(v[2:]))) + 1
+    )
     peaks = peaks[t[peaks] > 1.0]  # the other modes have died by then
     found = np.polyfit(t[peaks], np.log(np.abs(v[peaks])), 1)[0]
-    assert found == pytest.approx(rate, abs=0.02)  # steps of 0.25 ms: error of order dt^2 omega^3, and peaks at samples
+    assert found == pytest.approx(
+        rate, abs=0.02
+    )  # steps of 0.25 ms: error of order dt^2 omega^3, and peaks at samples
     assert abs(rate) > 0.1
 
 
 def test_hand_is_nominal_none_or_given():
     assert hc.gain_limit("x", 90.0) == hc.gain_limit("x", 90.0, operator=Operator())
-    assert hc.gain_limit("x", 90.0, impedance=False) == linear_loop.gain_limit("x", 90.0)
+    assert hc.gain_limit("x", 90.0, impedance=False) == linear_loop.continuous_gain_limit("x", 90.0)
 
 
 @pytest.mark.parametrize("call,field", [

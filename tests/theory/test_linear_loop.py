@@ -32,7 +32,9 @@ def test_characteristic_polynomial_is_one_plus_the_loop(axis, operator, K, b, om
     den = np.prod([np.polyval(np.atleast_1d(x.den[0][0]), s) for x in (C, G, S)])
     expected = (1 + (G(s) * C(s) + S(s)) * T(s)) * den
     found = np.polyval(linear_loop.characteristic(axis, K, b, operator), s)
-    assert found == pytest.approx(expected, rel=1e-11)  # cancellation between the terms costs up to 4 digits
+    assert found == pytest.approx(
+        expected, rel=1e-11
+    )  # cancellation between the terms costs up to 4 digits
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
@@ -41,7 +43,9 @@ def test_poles_are_those_of_the_state_space_model(axis):
         m = Linear("xy".index(axis), b, K, 1.0, (0.25, 2, 6) if th else (0, 0, 0))
         # the state space has p, v beside the servo's states: same loop, order 6 in both
         np.testing.assert_allclose(
-            np.sort_complex(linear_loop.closed_loop_poles(axis, K, b, th)), np.sort_complex(m.poles()), atol=1e-6
+            np.sort_complex(linear_loop.closed_loop_poles(axis, K, b, th)),
+            np.sort_complex(m.poles()),
+            atol=1e-6,
         )
 
 
@@ -52,7 +56,7 @@ def test_poles_are_those_of_the_state_space_model(axis):
     ("y", 50, False, 1.18), ("y", 90, False, 0.77), ("y", 100, False, 0.73),
 ])  # fmt: skip
 def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
-    limit = linear_loop.gain_limit(axis, b, TH if on else None)
+    limit = linear_loop.continuous_gain_limit(axis, b, TH if on else None)
     G, S, C, T = blocks(axis, 1.0, b, on)
     loop = control.minreal(G * C * T / (1 + S * T), tol=1e-8, verbose=False)
     margins = control.stability_margins(loop, returnall=True)[0]
@@ -61,20 +65,24 @@ def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, print
 
 
 def test_y_axis_is_unstable_at_unit_gain():
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(2.36, abs=0.005)
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(1.56, abs=0.005)
+    assert linear_loop.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(
+        2.36, abs=0.005
+    )
+    assert linear_loop.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(
+        1.56, abs=0.005
+    )
     assert linear_loop.stable("y", 1.0, 61.0) and not linear_loop.stable("y", 1.0, 63.0)
     assert not linear_loop.stable("y", 1.0, 3800.0) and linear_loop.stable("y", 1.0, 4000.0)
 
 
 def test_gain_limit_without_clay_and_hand_is_infinite():
-    assert linear_loop.gain_limit("x", 0.0) == float("inf")
+    assert linear_loop.continuous_gain_limit("x", 0.0) == float("inf")
 
 
 def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
     """An undamped hand makes the driven polynomial vanish at its resonance: no K puts a pole there."""
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
-        limit = linear_loop.gain_limit("y", 0.0, th)
+        limit = linear_loop.continuous_gain_limit("y", 0.0, th)
         assert limit > 0.0
         assert limit == float("inf") or not linear_loop.stable("y", 1.001 * limit, 0.0, th)
 
@@ -104,7 +112,9 @@ def test_bad_input_is_refused(call, field):
 def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
     A, B = linear_loop.state_space(axis, 0.7, 90.0, th)
     poles = np.sort_complex(linear_loop.closed_loop_poles(axis, 0.7, 90.0, th))
-    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5)  # a double pole near 0
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5
+    )  # a double pole near 0
     numbers = (th.mass, th.damper, th.spring) if th else (0.0, 0.0, 0.0)
     other = Linear("xy".index(axis), 90.0, 0.7, 1.3, numbers).A
     np.testing.assert_allclose(np.column_stack((A, 1.3 * B)), other[:6], rtol=1e-13, atol=1e-12)
@@ -112,7 +122,7 @@ def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
 
 def test_crossing_times_beside_the_oracle():
     exact, _ = piecewise_linear((0.05, 0.15, 0.2), (0.0, 90.0, 0.0), 1.0, 1.0)
-    assert linear_loop.crossing_times("x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)) == pytest.approx(
-        exact, abs=1e-10
-    )  # eleven thousand products
+    assert linear_loop.crossing_times(
+        "x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
+    ) == pytest.approx(exact, abs=1e-10)  # eleven thousand products
     assert linear_loop.crossing_times("x", 1.0, -1.0, (0.05,), (0.0,), t_max=0.5) == []

@@ -20,7 +20,12 @@ LOOPS = dict(
     K=st.floats(0.01, 20.0),
     b=st.floats(1.0, 500.0),
     th=st.none()
-    | st.builds(Operator, st.sampled_from([0.0, 0.25, 2.0]), st.floats(0.1, 20.0), st.sampled_from([0.0, 6.0, 300.0])),
+    | st.builds(
+        Operator,
+        st.sampled_from([0.0, 0.25, 2.0]),
+        st.floats(0.1, 20.0),
+        st.sampled_from([0.0, 6.0, 300.0]),
+    ),
     at=st.sampled_from(BREAKS),
 )
 
@@ -31,7 +36,9 @@ def hand(th):
 
 def roots_right(poly):
     roots = np.roots(np.trim_zeros(poly))
-    return int(np.sum(roots.real > 0.0)), float(np.min(np.abs(roots.real) / np.abs(roots), initial=1.0))
+    return int(np.sum(roots.real > 0.0)), float(
+        np.min(np.abs(roots.real) / np.abs(roots), initial=1.0)
+    )
 
 
 @settings(max_examples=300)
@@ -53,7 +60,10 @@ def test_nyquist_count_of_500_random_loops():
         while len(out) <= n:
             a, w = rng.uniform(-1.0, 2.0), 10.0 ** rng.uniform(-1.0, 2.0)
             out = np.convolve(
-                out, [1.0, 2.0 * a * w, w * w] if n - len(out) >= 1 and rng.random() < 0.5 else [1.0, a * w]
+                out,
+                [1.0, 2.0 * a * w, w * w]
+                if n - len(out) >= 1 and rng.random() < 0.5
+                else [1.0, a * w],
             )
         return out
 
@@ -62,7 +72,11 @@ def test_nyquist_count_of_500_random_loops():
         integrators = int(rng.integers(0, 4))
         d = np.concatenate((poly(int(rng.integers(1, 5))), np.zeros(integrators)))
         n = 10.0 ** rng.uniform(-2.0, 2.0) * poly(int(rng.integers(0, len(d))))
-        n *= 1.0 if len(n) == len(d) else (abs(d[-1] / n[-1]) if d[-1] else 1.0) * 10.0 ** rng.uniform(-1.0, 3.0)
+        n *= (
+            1.0
+            if len(n) == len(d)
+            else (abs(d[-1] / n[-1]) if d[-1] else 1.0) * 10.0 ** rng.uniform(-1.0, 3.0)
+        )
         right, nearest = roots_right(np.polyadd(n, d))
         if nearest < 1e-4 or (len(n) == len(d) and abs(1.0 + n[0] / d[0]) < 1e-3):
             continue
@@ -75,7 +89,7 @@ def test_nyquist_count_of_500_random_loops():
 @settings(max_examples=60)
 @given(**LOOPS)
 def test_margins_against_python_control(axis, K, b, th, at):
-    n, d = margins.loop(axis, K, b, at=at, **hand(th))
+    n, d = margins.open_loop(axis, K, b, at=at, **hand(th))
     m = hc.margins(axis, K, b, at=at, **hand(th))
     assert m.stable == linear_loop.stable(axis, K, b, th)
     if not m.stable:
@@ -85,9 +99,13 @@ def test_margins_against_python_control(axis, K, b, th, at):
     L = control.tf(n, d)
     gains, phases, _, _, crossovers, _ = control.stability_margins(L, returnall=True)
     above = [x for x in gains if x > 1.0 and math.isfinite(x)]
-    assert m.gain[1] == pytest.approx(min(above, default=math.inf), rel=1e-6)  # both roots of order 12
+    assert m.gain[1] == pytest.approx(
+        min(above, default=math.inf), rel=1e-6
+    )  # both roots of order 12
     lag = np.deg2rad(np.array(phases)) % (2.0 * np.pi)
-    assert m.phase == pytest.approx(np.min(np.minimum(lag, 2.0 * np.pi - lag), initial=math.inf), abs=1e-6)
+    assert m.phase == pytest.approx(
+        np.min(np.minimum(lag, 2.0 * np.pi - lag), initial=math.inf), abs=1e-6
+    )
     if len(n) < len(d) or abs(n[0]) < abs(d[0]):
         assert m.delay == pytest.approx(np.min(lag / crossovers, initial=math.inf), rel=1e-6)
     z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
@@ -96,13 +114,19 @@ def test_margins_against_python_control(axis, K, b, th, at):
     assert m.disk == pytest.approx(dense, rel=1e-3)  # 20 001 points, a resonance 1e-3 wide
 
 
-@pytest.mark.parametrize("axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")])
+@pytest.mark.parametrize(
+    "axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")]
+)
 def test_disk_margin_against_python_control(axis, K, at):
-    n, d = margins.loop(axis, K, 90.0, at=at)
+    n, d = margins.open_loop(axis, K, 90.0, at=at)
     alpha, down, turn = control.disk_margins(control.tf(n, d), OMEGA[OMEGA < 1e3])
     m = hc.margins(axis, K, 90.0, at=at)
-    assert m.disk == pytest.approx(float(alpha), rel=1e-5)  # its grid: 2e-4 in omega, squared, times the curvature
-    assert 20.0 * math.log10((1 + m.disk / 2) / (1 - m.disk / 2)) == pytest.approx(float(down), rel=1e-4)
+    assert m.disk == pytest.approx(
+        float(alpha), rel=1e-5
+    )  # its grid: 2e-4 in omega, squared, times the curvature
+    assert 20.0 * math.log10((1 + m.disk / 2) / (1 - m.disk / 2)) == pytest.approx(
+        float(down), rel=1e-4
+    )
     assert 2.0 * math.atan(m.disk / 2) == pytest.approx(math.radians(float(turn)), rel=1e-4)
 
 
@@ -111,12 +135,14 @@ def test_disk_margin_against_python_control(axis, K, at):
 def test_what_the_margins_allow_is_stable(axis, K, b, th, at, turn, size):
     m = hc.margins(axis, K, b, at=at, **hand(th))
     assume(m.stable and 0.01 < m.disk < 1.99)
-    n, d = margins.loop(axis, K, b, at=at, **hand(th))
+    n, d = margins.open_loop(axis, K, b, at=at, **hand(th))
     z = size * m.disk / 2 * np.exp(1j * np.pi * turn)
     factor = (1 + z) / (1 - z)
     L = factor * np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
     assert np.min(np.abs(1 + L)) > 0.0
-    both = [np.roots(np.polyadd(n * abs(factor), d)).real.max()]  # a real factor of that size lies in the disk as well
+    both = [
+        np.roots(np.polyadd(n * abs(factor), d)).real.max()
+    ]  # a real factor of that size lies in the disk as well
     assert 1 / m.gain[1] < 1 < m.gain[1]
     low, high = (1 - m.disk / 2) / (1 + m.disk / 2), (1 + m.disk / 2) / (1 - m.disk / 2)
     if low * 1.001 < abs(factor) < high * 0.999:
@@ -132,7 +158,8 @@ def test_gain_margin_at_the_compensator_is_the_gain_limit(axis, K, b, th):
 
 
 @pytest.mark.parametrize(
-    "kw", [dict(), dict(impedance=False), dict(Ts=1e-3), dict(Ts=1e-3, delay=5e-4), dict(delay=2e-3)]
+    "kw",
+    [dict(), dict(impedance=False), dict(Ts=1e-3), dict(Ts=1e-3, delay=5e-4), dict(delay=2e-3)],
 )
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_coupled_stability(axis, kw):
@@ -149,11 +176,13 @@ def test_coupled_stability(axis, kw):
 def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, th, equation):
     v = hc.small_gain(axis, K, b, equation=equation, **hand(th))
     s = 1j * OMEGA
-    T = np.polyval(linear_loop.impedance(b, th), s)
+    T = np.polyval(linear_loop.environment_polynomial(b, th), s)
     i = "xy".index(axis)
     g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
     GC, Sh = g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s), w / (s**2 + kd * s + kp)
-    left, right = (np.abs(GC), np.abs((1 + Sh * T) / T)) if equation == 13 else (np.abs(GC * T + Sh * T), 1.0)
+    left, right = (
+        (np.abs(GC), np.abs((1 + Sh * T) / T)) if equation == 13 else (np.abs(GC * T + Sh * T), 1.0)
+    )
     bad = left >= right
     assert v.margin <= np.min(right / left) * (1 + 1e-9)
     inside = np.zeros(len(OMEGA), dtype=bool)
@@ -176,15 +205,19 @@ def test_the_papers_condition_fails_near_zero_for_every_gain():
 
 
 def test_equation_9_is_the_distance_from_minus_one():
-    n, d = margins.loop("x", 2.0, 90.0)
+    n, d = margins.open_loop("x", 2.0, 90.0)
     z = np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA)
-    assert hc.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(np.min(np.abs(1 + z)), rel=1e-5)  # grid
+    assert hc.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(
+        np.min(np.abs(1 + z)), rel=1e-5
+    )  # grid
 
 
 @given(K=st.floats(0.1, 10.0), b=st.floats(1.0, 500.0), axis=st.sampled_from("xy"))
 def test_transparency_is_equation_7(K, b, axis):
     found = hc.transparency(axis, K, b, np.array([0.0, 3.0, 40.0]))
-    assert found[0] == pytest.approx(K * b / (10.0 + K * b), rel=1e-12)  # the clay's share of 10/K + b
+    assert found[0] == pytest.approx(
+        K * b / (10.0 + K * b), rel=1e-12
+    )  # the clay's share of 10/K + b
     s = 1j * np.array([3.0, 40.0])
     i = "xy".index(axis)
     g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
@@ -194,9 +227,11 @@ def test_transparency_is_equation_7(K, b, axis):
 
 def test_least_finds_the_ends_and_the_middle():
     # (x^2 - 2x + 3)/1 at x = omega^2 = 1; 1/(x + 1) at infinity; (x + 1)/(x + 2) at 0
-    assert margins.least(np.array([1.0, -2.0, 3.0]), np.array([1.0])) == pytest.approx((2.0, 1.0))
-    assert margins.least(np.array([1.0]), np.array([1.0, 1.0])) == (0.0, math.inf)
-    assert margins.least(np.array([1.0, 1.0]), np.array([1.0, 2.0])) == (0.5, 0.0)
+    assert margins.least_value(np.array([1.0, -2.0, 3.0]), np.array([1.0])) == pytest.approx(
+        (2.0, 1.0)
+    )
+    assert margins.least_value(np.array([1.0]), np.array([1.0, 1.0])) == (0.0, math.inf)
+    assert margins.least_value(np.array([1.0, 1.0]), np.array([1.0, 2.0])) == (0.5, 0.0)
 
 
 @pytest.mark.parametrize("call,field", [

@@ -18,7 +18,9 @@ OMEGA = np.geomspace(1e-2, 1e4, 20_001)
 def shown(axis, K, b, omega):
     """Z = fh/v from the printed blocks."""
     s = 1j * omega
-    g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))["xy".index(axis)]
+    g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[
+        "xy".index(axis)
+    ]
     H = g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s) + w / (s**2 + kd * s + kp)
     return b + 1 / (s * H)
 
@@ -49,7 +51,12 @@ def test_a_passive_handle_is_stable_with_every_hand(axis, K, b, m, d, k):
 def test_an_active_handle_has_a_passive_hand_that_undoes_it(axis, K, b):
     """Stable left alone and with the nominal hand, yet a mass or spring that resonates where Re Z < 0 makes it ring."""
     v = hc.passivity(axis, K, b)
-    assert not v and v.fails and hc.coupled_stability(axis, K, b) and hc.coupled_stability(axis, K, b, impedance=False)
+    assert (
+        not v
+        and v.fails
+        and hc.coupled_stability(axis, K, b)
+        and hc.coupled_stability(axis, K, b, impedance=False)
+    )
     X = shown(axis, K, b, np.array([v.omega]))[0].imag
     worst = Operator(0.0, 0.0, v.omega * X) if X > 0.0 else Operator(-X / v.omega, 0.0, 0.0)
     assert not hc.coupled_stability(axis, K, b, operator=worst)
@@ -59,14 +66,18 @@ def test_clay_passivity_is_colgate_and_schenkels_closed_form():
     for b, Ts, k in [(90.0, 3.6e-4, 0.0), (50.0, 1e-3, 2000.0), (0.0, 1e-3, 1e4)]:
         need = k * Ts / 2 + b
         v = hc.clay_passivity(b, Ts, damping=need + 1.0, stiffness=k)
-        assert v and v.margin == pytest.approx(1.0, abs=1e-9 * (1 + need))  # exact where the grid ends, at pi/Ts
+        assert v and v.margin == pytest.approx(
+            1.0, abs=1e-9 * (1 + need)
+        )  # exact where the grid ends, at pi/Ts
         assert not hc.clay_passivity(b, Ts, damping=need - 1.0, stiffness=k)
     assert hc.clay_passivity(90.0, 3.6e-4).fails and not hc.clay_passivity(90.0, 3.6e-4)
 
 
 def test_port_energy_is_what_the_ledger_says_went_in():
     r = hc.simulate(hc.constant_cut(t_max=3.0, force=(2.0, 0.0)))
-    assert hc.port_energy(r).sum(axis=1)[-1] == pytest.approx(r.energy["muscle"], rel=1e-5)  # trapezoid against kicks
+    assert hc.port_energy(r).sum(axis=1)[-1] == pytest.approx(
+        r.energy["muscle"], rel=1e-5
+    )  # trapezoid against kicks
     v = hc.observed_passivity(r)
     assert v and v.margin >= -1e-9 and np.isnan(v.omega)
 
@@ -75,7 +86,9 @@ def test_the_observer_sees_an_active_device():
     """A negative damper of 3 N.s/m in a made-up record gives back what the hand never put in."""
     r = hc.simulate(hc.constant_cut(t_max=0.2))
     fake = dataclasses.replace(
-        r, v=np.sin(20.0 * r.t)[:, None] * [1.0, 0.0], fh=-3.0 * np.sin(20.0 * r.t)[:, None] * [1.0, 0.0]
+        r,
+        v=np.sin(20.0 * r.t)[:, None] * [1.0, 0.0],
+        fh=-3.0 * np.sin(20.0 * r.t)[:, None] * [1.0, 0.0],
     )
     v = hc.observed_passivity(fake)
     assert not v

@@ -40,9 +40,14 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
     assert len(shots) == len(film.shots(record, 4.0, 30)) and shots[0].shape == (480, 640, 3)
     scene, plots = np.s_[:, :400], np.s_[:, 400:]
     for part in (scene, plots):
-        changed = [int((a[part] != b[part]).any(axis=-1).sum()) for a, b in zip(shots, shots[1:], strict=False)]
+        changed = [
+            int((a[part] != b[part]).any(axis=-1).sum())
+            for a, b in zip(shots, shots[1:], strict=False)
+        ]
         assert min(changed[:-1]) > 0
-    clay = [((x[scene].astype(int) @ [1, -1, 0]) > 40).sum() for x in (shots[0], shots[-1])]  # reddish
+    clay = [
+        ((x[scene].astype(int) @ [1, -1, 0]) > 40).sum() for x in (shots[0], shots[-1])
+    ]  # reddish
     assert clay[0] > 3000
     sky = shots[0][5, 300].astype(int)
     assert sky.min() > 150  # light behind, not black
@@ -74,7 +79,9 @@ def test_film_can_be_read_back(record, tmp_path, kind):
         import imageio_ffmpeg
 
         ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(out)]
-        raw = subprocess.run([*ffmpeg, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True)
+        raw = subprocess.run(
+            [*ffmpeg, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True
+        )
         back = np.frombuffer(raw.stdout, np.uint8).reshape(-1, 240, 320, 3)
     else:
         back = iio.imread(out, index=...)
@@ -91,7 +98,14 @@ def filmed(folder, blocked, out="x.mp4", **env):
         f"sys.exit(app.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
-    p = subprocess.run([sys.executable, "-c", code], cwd=folder, env=env, capture_output=True, text=True, timeout=120)
+    p = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert p.returncode == 2 and p.stderr.count("\n") == 1, p.stderr
     assert p.stdout == "" and list(folder.iterdir()) == []
     return p.stderr
@@ -117,7 +131,9 @@ def test_missing_gl_is_said_before_anything_is_simulated(tmp_path, env, word):
     assert word in filmed(tmp_path, "mujoco.egl", "x.webp", **env)
 
 
-@pytest.mark.parametrize("wanted,blocked", [("elg", "nothing"), ("egl", "OpenGL"), ("osmesa", "OpenGL.GL")])
+@pytest.mark.parametrize(
+    "wanted,blocked", [("elg", "nothing"), ("egl", "OpenGL"), ("osmesa", "OpenGL.GL")]
+)
 def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
     """MuJoCo itself refuses to be imported with such a setting."""
     code = (
@@ -125,7 +141,14 @@ def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
         "import hapticclay as hc; print(hc.simulate(hc.constant_cut(t_max=0.1)).status, os.environ['MUJOCO_GL'])"
     )
     env = {**os.environ, "MUJOCO_GL": wanted}
-    p = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120)
+    p = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert p.stdout == f"time limit at 0.1000 s {wanted}\n", p.stderr
 
 
@@ -174,7 +197,17 @@ def test_running_plots_end_as_the_whole_curve(record):
     assert inked.sum() > 1000 and not inked[:, :30].any()
 
 
-SIZES = [(120, 100), (120, 240), (130, 333), (180, 320), (180, 480), (240, 160), (240, 360), (360, 480), (480, 720)]
+SIZES = [
+    (120, 100),
+    (120, 240),
+    (130, 333),
+    (180, 320),
+    (180, 480),
+    (240, 160),
+    (240, 360),
+    (360, 480),
+    (480, 720),
+]
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -191,20 +224,32 @@ def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario,
         for axis in (ax.xaxis, ax.yaxis):
             low, high = sorted(axis.get_view_interval())
             drawn = axis.majorTicks[: len(axis.get_majorticklocs())]
-            hidden |= {t.label1 for t in axis.majorTicks if t not in drawn or not low <= t.get_loc() <= high}
+            hidden |= {
+                t.label1
+                for t in axis.majorTicks
+                if t not in drawn or not low <= t.get_loc() <= high
+            }
         for text in ax.findobj(Text):
-            if text.get_visible() and text.get_text() not in ("", "b") and text not in hidden:  # b names a line
+            if (
+                text.get_visible() and text.get_text() not in ("", "b") and text not in hidden
+            ):  # b names a line
                 boxes.append((text.get_text(), text.get_window_extent()))
     assert len(boxes) > 3 * len(figure.axes)
     for i, (name, box) in enumerate(boxes):
-        assert box.x0 > -0.5 and box.y0 > -0.5 and box.x1 < size[0] + 0.5 and box.y1 < size[1] + 0.5, (name, box)
+        assert (
+            box.x0 > -0.5 and box.y0 > -0.5 and box.x1 < size[0] + 0.5 and box.y1 < size[1] + 0.5
+        ), (name, box)
         for other, more in boxes[:i]:
-            apart = max(box.x0, more.x0) >= min(box.x1, more.x1) or max(box.y0, more.y0) >= min(box.y1, more.y1)
+            apart = max(box.x0, more.x0) >= min(box.x1, more.x1) or max(box.y0, more.y0) >= min(
+                box.y1, more.y1
+            )
             assert apart, (name, other)
 
 
 @needs_gl
-@pytest.mark.parametrize("size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str)
+@pytest.mark.parametrize(
+    "size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str
+)
 def test_small_films_have_what_fits_and_whole_titles(record, size):
     """The title's box is darker than the sky behind it; a clipped one would reach the right edge of the picture."""
     images = film.frames(record, speed=50.0, size=size)

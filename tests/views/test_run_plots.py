@@ -63,8 +63,13 @@ def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
         key, whole = legend.get_window_extent(), figure.bbox
         for ax in figure.axes:
             said = ax.get_title(loc="left")
-            for text in ax.findobj(lambda x, said=said: isinstance(x, Text) and said and x.get_text() == said):
+            for text in ax.findobj(
+                lambda x, said=said: isinstance(x, Text) and said and x.get_text() == said
+            ):
                 box = text.get_window_extent()
-                assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1, (name, said)
+                assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1, (
+                    name,
+                    said,
+                )
                 assert not box.overlaps(key), (name, said)
         assert figure.axes[0].get_title(loc="left").startswith(scenario.name)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.views.session import FRAME, MOST, Clock, Player, Replay, Session, played
+from hapticclay.views.session import FRAME, MOST_FORCE, Clock, Player, Replay, Session, played
 from hapticclay.views.stage import Stage
 
 
@@ -19,7 +19,9 @@ def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
     return session
 
 
-@pytest.mark.parametrize("scenario", [hc.constant_cut(), hc.variable_cut()], ids=["constant", "variable"])
+@pytest.mark.parametrize(
+    "scenario", [hc.constant_cut(), hc.variable_cut()], ids=["constant", "variable"]
+)
 def test_hand_feels_the_clay(scenario):
     session = drag(Session(scenario, stiffness=10.0), 4.0, lambda t: (0.04 * t, 0.0))
     record = session.record()
@@ -27,7 +29,9 @@ def test_hand_feels_the_clay(scenario):
     assert moving.sum() > 1000
     np.testing.assert_allclose(record.ratio(record.fe)[moving], record.b[moving], rtol=1e-9)
     assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME)
-    assert abs(record.energy["residual"]) < 1e-4 * record.energy["throughput"]  # second order in the step
+    assert (
+        abs(record.energy["residual"]) < 1e-4 * record.energy["throughput"]
+    )  # second order in the step
 
 
 def test_pull_is_the_impedance_towards_the_point():
@@ -39,7 +43,9 @@ def test_pull_is_the_impedance_towards_the_point():
     a = np.gradient(record.v, record.t, axis=0)
     expected = th.spring * (record.extra["target"] - record.p) - th.damper * record.v - th.mass * a
     quiet = slice(50, -50)
-    still = np.abs(np.gradient(a, record.t, axis=0)).max(axis=1)[quiet] < 50.0  # not at a border or a new slice
+    still = (
+        np.abs(np.gradient(a, record.t, axis=0)).max(axis=1)[quiet] < 50.0
+    )  # not at a border or a new slice
     assert still.sum() > 3000
     # 2e-3 N: m a by differences across one step
     np.testing.assert_allclose(record.fh[quiet][still], expected[quiet][still], atol=2e-3)
@@ -48,14 +54,16 @@ def test_pull_is_the_impedance_towards_the_point():
 def test_slices_are_no_part_of_the_result():
     """A still target: slices of 1/60 s, of 1/200 s and one headless run with the same muscle force agree."""
     ends = []
-    for frame in (FRAME, 0.005, MOST):
+    for frame in (FRAME, 0.005, MOST_FORCE):
         session = Session(hc.constant_cut(), stiffness=10.0)
         session.pull((0.0, 0.0))
         session.push((2.0, 0.0))
         while session.t < 3.0 - 1e-9:
             session.advance(min(frame, 3.0 - session.t + 1e-9))
         ends.append(session.record())
-    still = dataclasses.replace(played(hc.constant_cut(), 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1])
+    still = dataclasses.replace(
+        played(hc.constant_cut(), 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1]
+    )
     reference = hc.simulate(still)
     for record in ends:
         n = min(len(record.t), len(reference.t)) - 2
@@ -107,7 +115,9 @@ def test_pause_restart_and_record_switch():
 
 
 def test_record_keeps_its_extras(tmp_path):
-    record = drag(Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, lambda t: (0.06 * t, 0.0)).record()
+    record = drag(
+        Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, lambda t: (0.06 * t, 0.0)
+    ).record()
     back = hc.Record.load(record.save(tmp_path))
     assert set(back.extra) == {"removed", "removal_rate", "target", "gain"}
     for name, array in record.extra.items():
@@ -196,10 +206,10 @@ def test_slow_machine_slows_the_clock_evenly():
     clock, made = Clock(), []
     for k in range(100):
         made.append(clock.due(0.2 * k))
-    assert clock.slow and set(np.round(made[1:], 12)) == {MOST}
+    assert clock.slow and set(np.round(made[1:], 12)) == {MOST_FORCE}
     assert clock.factor == pytest.approx(0.25, rel=0.02)
     clock.rest()
-    assert clock.due(1000.0) <= MOST  # a pause is not made good
+    assert clock.due(1000.0) <= MOST_FORCE  # a pause is not made good
 
 
 def test_player_plays_and_stops():
@@ -241,19 +251,28 @@ def test_verdict_follows_the_monitor_and_the_gain():
     assert session.b == (90.0, 90.0)
     limit = hc.gain_limit("y", 90.0, operator=session.scenario.operator)
     assert session.verdict().text.startswith("stable; limit of K here: ")
-    assert session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
+    assert (
+        session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
+    )
     session.change(gain=(1.0, 3.0 * limit))
-    assert session.verdict().text == f"beyond the limit of K; here Ky {3.0 * limit:.3g} > {limit:.3g}"
+    assert (
+        session.verdict().text
+        == f"beyond the limit of K; here Ky {3.0 * limit:.3g} > {limit:.3g}"
+    )
     drag(session, 6.0, lambda t: (0.1, 0.0))
     onset = session.run.watch.onset
     said = session.verdict()
     assert said.unstable and onset.axis == "y"
-    assert said.text.startswith(f"UNSTABLE since {onset.time:.1f} s: growing oscillation of y; here Ky")
+    assert said.text.startswith(
+        f"UNSTABLE since {onset.time:.1f} s: growing oscillation of y; here Ky"
+    )
     swing = np.ptp([f[2][1] for f in session.frames[-30:]])
     session.change(gain=(1.0, 0.5 * limit))
     drag(session, 6.0, lambda t: (0.1, 0.0))
     assert np.ptp([f[2][1] for f in session.frames[-30:]]) < 0.02 * swing  # it did calm down
-    assert not session.verdict().unstable and session.verdict().text.startswith("calm again, was unstable")
+    assert not session.verdict().unstable and session.verdict().text.startswith(
+        "calm again, was unstable"
+    )
 
 
 @pytest.mark.parametrize("gain,axis", [(1.0, ""), (6.0, "x")])
