@@ -18,6 +18,7 @@ from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
+from hapticclay.stepping.sampled import HardwareLoop
 from hapticclay.theory import gain_limit
 
 EVERYWHERE = Profile((), (90.0,))
@@ -204,7 +205,7 @@ def test_difference_lags_half_its_window_in_a_run():
     s = hc.free(control="sampled", t_max=0.02)
     shown = []
 
-    class Spy(__import__("hapticclay.stepping.wired", fromlist=["Wired"]).Wired):
+    class Spy(HardwareLoop):
         def _turned(self, k, q, w, hw):
             found = super()._turned(k, q, w, hw)
             shown.append((w, found[1]))
