@@ -36,14 +36,23 @@ from .inline import inline
 from .runge_kutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    arm.handle_position, clay.damping_at, clay.enter_region, loop.velocity_at_sample, loop.loop_coefficients, loop.vector_field, loop.whole_kick, loop.step_loop,
-    stride.kick_inputs, stride.add_work, stride.position_after,
-)  # fmt: skip
+    *stride.INLINED,
+    arm.handle_position,
+    clay.damping_at,
+    clay.enter_region,
+    loop.loop_coefficients,
+    loop.step_loop,
+    loop.vector_field,
+    loop.velocity_at_sample,
+    loop.whole_kick,
+)
 PLAIN = (
-    runge_kutta.one_step, runge_kutta.stage_derivative, engine.next_sample, engine.find_root, signals.multisine_line,
-    stride.write_command, stride.first_step_of_hit, stride.region_exit, stride.kick_loop, stride.locate_event, stride.motors_limited,
-    stride.mean_signal, stride.distance_beyond, stride.step_engine, stride.record_crossing, stride.border_side, stride.step_many, stride.velocity_at_border, stride.write_row,
-)  # fmt: skip
+    *stride.COMPILED,
+    *runge_kutta.COMPILED_STAGES,
+    engine.find_root,
+    engine.next_sample,
+    signals.multisine_line,
+)
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
 NOTICE = "hapticclay: compiling, this once"

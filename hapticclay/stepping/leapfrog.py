@@ -24,14 +24,14 @@ FIRST_OF_HIT, HIT_GROWTH = (
     1.01,
 )  # first step of such a hit, in decay times of the speed; each step over the one before
 INPUTS = 12  # numbers in loop.step_inputs
-NONE = (0.0, 0.0)
+ZERO = (0.0, 0.0)
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
 
 _row = struct.Struct("14d")
 _fused: dict[Callable[..., Any], Callable[..., Any]] = {}  # loops that have been inlined
 
 
-def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
+def written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
     """The loop with its laws inlined, where so many steps are worth it or it has been done before."""
     if law not in _fused:
         if steps < FUSE_FROM:
@@ -48,7 +48,7 @@ class _Stretch(NamedTuple):
     b: Any  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all; of one row a tuple
     k: Any  # loop.step_inputs, (INPUTS, n), (INPUTS, 1) or a tuple
     H: float  # length of the kick [s]
-    rest: Any = NONE  # clay's force beside its dampers [N], (2, n) or a tuple
+    rest: Any = ZERO  # clay's force beside its dampers [N], (2, n) or a tuple
 
 
 def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
@@ -63,7 +63,7 @@ def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
     return np.concatenate(out, axis=1) if out else np.empty((2, 0))
 
 
-def _sampled(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario) -> np.ndarray:
+def _rows_at_samples(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario) -> np.ndarray:
     """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
 
     k is loop.step_inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) where they are the same for all; rest the clay's
@@ -97,9 +97,9 @@ class Leapfrog(Run):
         if (
             scenario.control == "continuous"
         ):  # what `_glide` will need is written out before the run is timed
-            _written_out(glide_varying if self.varies else glide_constant, self.last)
+            written_out(glide_varying if self.varies else glide_constant, self.last)
             if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-                _written_out(glide_varying, self.last)
+                written_out(glide_varying, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
@@ -146,7 +146,7 @@ class Leapfrog(Run):
                 ([0.0] * n, [0.0] * n),
             )
         simple = not self.varies and not k[7, 0]
-        many = _written_out(glide_constant if simple else glide_varying, self.last)
+        many = written_out(glide_constant if simple else glide_varying, self.last)
         if simple:
             steps, given = rows, (self.whole, inputs)
         else:
@@ -168,7 +168,7 @@ class Leapfrog(Run):
             if n < 1:
                 self.state = state
                 return False
-        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [NONE]).T))
+        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [ZERO]).T))
         self.filled += n
         self.steps += n
         self.i += n
@@ -189,7 +189,7 @@ class Leapfrog(Run):
                 for (b0, b1), u in zip(halves, uh, strict=True)
             ]
         else:
-            same = loop.step_inputs(b[0], b[0], NONE, dt, dt, self.hand)
+            same = loop.step_inputs(b[0], b[0], ZERO, dt, dt, self.hand)
             k = [(*same[:5], *u, *same[7:]) for u in uh]
         return b, k, self.shift(t[:n], t[1:]).T.tolist()
 
@@ -414,7 +414,7 @@ class Leapfrog(Run):
             if not all(x.is_sample for x in pieces):
                 which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
         samples = [x for x in pieces if x.is_sample]
-        rows = _sampled(raw, k, rest, self.scenario)
+        rows = _rows_at_samples(raw, k, rest, self.scenario)
         if self.final and n:
             rows[4:6, -1] = self.final
         good = self.judge(

@@ -174,7 +174,7 @@ class MarchEngine(NamedTuple):
     push: int
 
 
-def stage_derivative(c, b, uh, dampers, engine, y, dy):
+def _stage_derivative(c, b, uh, dampers, engine, y, dy):
     """Writes the derivative of all states y into dy, both (STATES,).
 
     Args:
@@ -200,13 +200,13 @@ def stage_derivative(c, b, uh, dampers, engine, y, dy):
     return command, sample
 
 
-def one_step(c, b, uh, dampers, engine, h, y, k):
+def _one_step(c, b, uh, dampers, engine, h, y, k):
     """Carries y over one step of h [s]. k: (5, STATES), to work in; its first row is the slope at y."""
     for stage in range(1, 4):
         ahead = h if stage == 3 else 0.5 * h
         for j in range(STATES):
             k[4, j] = y[j] + ahead * k[stage - 1, j]
-        stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
+        _stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
     for j in range(STATES):
         y[j] += h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
 
@@ -226,14 +226,14 @@ def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows
         for j in range(STATES):
             k[5, j] = y[j]
         for part in range(substeps):
-            command, sample = stage_derivative(c, b, uh, dampers, engine, y, k[0])
+            command, sample = _stage_derivative(c, b, uh, dampers, engine, y, k[0])
             if part == 0:
                 row = rows[i]
                 row[0], row[1] = y[0], y[1]
                 for j in range(6):
                     row[2 + j] = sample[j]
                 row[8], row[9], row[10], row[11] = command[0], command[1], y[4], y[5]
-            one_step(c, b, uh, dampers, engine, h, y, k)
+            _one_step(c, b, uh, dampers, engine, h, y, k)
             px, py = arm.handle_position(y[0], y[1])
             px, py = px - origin[0], py - origin[1]
             inside = (
@@ -248,5 +248,8 @@ def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows
 
 def march_once(c, b, uh, dampers, engine, h, y, k):
     """One step of h [s] from y."""
-    stage_derivative(c, b, uh, dampers, engine, y, k[0])
-    one_step(c, b, uh, dampers, engine, h, y, k)
+    _stage_derivative(c, b, uh, dampers, engine, y, k[0])
+    _one_step(c, b, uh, dampers, engine, h, y, k)
+
+
+COMPILED_STAGES = (_one_step, _stage_derivative)  # by `compiled`, beside `march` and `march_once`

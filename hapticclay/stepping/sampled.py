@@ -12,12 +12,10 @@ import numpy as np
 from ..model import arm, controller, hardware, operator
 from ..model.clay import damping_at
 from ..model.constants import AXES, G, S
+from ..model.hardware import Pair
 from ..model.scenario import Scenario
 from . import energy, loop
-from .leapfrog import CHUNK, Leapfrog
-
-NONE = (0.0, 0.0)
-Pair = tuple[float, float]
+from .leapfrog import CHUNK, ZERO, Leapfrog
 
 
 class Sampled(Leapfrog):
@@ -37,7 +35,7 @@ class Sampled(Leapfrog):
         ]
         s = self.state
         # (delta, delta', y, y') of each axis, the torques held, and what stiff clay owes, see loop.step_plant
-        self.state = (s[0:8:2], s[1:8:2], NONE, NONE)
+        self.state = (s[0:8:2], s[1:8:2], ZERO, ZERO)
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
@@ -52,7 +50,7 @@ class Sampled(Leapfrog):
         if self.physical:
             return super()._inputs(before, after)
         uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
-        return loop.step_inputs(NONE, NONE, uh, before, after, self.hand)
+        return loop.step_inputs(ZERO, ZERO, uh, before, after, self.hand)
 
     def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
         return inf  # torques that are held do not follow a hit
@@ -72,7 +70,7 @@ class Sampled(Leapfrog):
             else:
                 force = self._first(q, w)
             tau, f = self._control(q, seen, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else NONE
+            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else ZERO
             x, y = map(self._hold, (x, y), self.blocks, f, shift)
             before = 0.0
         at, out, owed = loop.step_plant(
@@ -108,7 +106,7 @@ class Sampled(Leapfrog):
             *tau,
             *owed,
         )
-        return (*at[:6], *NONE, *at[6:]), out
+        return (*at[:6], *ZERO, *at[6:]), out
 
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
         """arm.jacobian, position, velocity and centripetal acceleration of the handle."""
@@ -134,7 +132,7 @@ class Sampled(Leapfrog):
         if th is None:
             return uh
         u, p, v, c = self._measure(q, w)
-        b = damping_at(*self.clay, self.t) if self.physical else NONE
+        b = damping_at(*self.clay, self.t) if self.physical else ZERO
         rest = [
             uh[i] - operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
             for i in (0, 1)
@@ -235,11 +233,11 @@ class HeldForce(NamedTuple):
     coupling and velocity of its tool [m/s].
     """
 
-    torque: Pair = NONE
-    clay: Pair = NONE
-    guard: Pair = NONE
-    coupling: Pair = NONE
-    tool: Pair = NONE
+    torque: Pair = ZERO
+    clay: Pair = ZERO
+    guard: Pair = ZERO
+    coupling: Pair = ZERO
+    tool: Pair = ZERO
 
 
 class HardwareState(NamedTuple):
@@ -283,9 +281,9 @@ class HardwareLoop(Sampled):
         start: Pair = scenario.start
         rest = (0.0,) * order
         hw = HardwareState(
-            0, (), past, w, (rest, rest), NONE, NONE, start, (NONE,) * (self.whole_delay + 2), start
+            0, (), past, w, (rest, rest), ZERO, ZERO, start, (ZERO,) * (self.whole_delay + 2), start
         )
-        self.state = (*self.state[:2], HeldForce(), hw, NONE)
+        self.state = (*self.state[:2], HeldForce(), hw, ZERO)
         self.extra: list[tuple[float, ...]] = []
         self.extras: tuple[tuple[float, ...], tuple[float, ...]] = (
             (),
@@ -355,7 +353,7 @@ class HardwareLoop(Sampled):
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
         _, _, held, _, owed = self.state
         at, out, _, _ = self._push(self.before, self.before, q, w, held, owed)
-        return (*at[:6], *NONE, *at[6:]), out
+        return (*at[:6], *ZERO, *at[6:]), out
 
     def _push(
         self, before: float, after: float, q, w, held: HeldForce, owed: Pair
@@ -368,8 +366,8 @@ class HardwareLoop(Sampled):
         )
         at, out, left = loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
         limit: Any = self.parts.friction
-        if limit == NONE:
-            return at, out, left, NONE
+        if limit == ZERO:
+            return at, out, left, ZERO
         one, two = (
             loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1]
             for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
@@ -398,7 +396,7 @@ class HardwareLoop(Sampled):
             )
             due = self._when(k) + parts.delay
             hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
-        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else NONE
+        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else ZERO
         x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
         return x, y, hw
 
