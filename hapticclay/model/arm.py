@@ -1,4 +1,4 @@
-"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced at the elbow.
+"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced.
 
 Joint angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use
 the absolute angles theta1 = q1 and theta2 = q1 + q2, in which the inertia matrix is the constant
@@ -110,7 +110,7 @@ def centripetal(
     return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
 
 
-def centripetal_about_sample(
+def centripetal_about_sample(  # noqa: PLR0913  # compiled and inlined: plain numbers
     L: float,
     cx: float,
     cy: float,
@@ -210,7 +210,7 @@ def joint_velocity(
 
 
 def inverse_kinematics(x: float, y: float) -> tuple[float, float]:
-    """Joint angles that put the handle at a world position, elbow to the left of the line to it (q2 < 0).
+    """Joint angles that put the handle at a world position, elbow to the left (q2 < 0).
 
     Args:
         x: world position [m], within the reach.

@@ -15,11 +15,11 @@ from .constants import AXES, B_MAX
 def split_damping(b0, b1, H, L, R, w, damper):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
-    A step gives half of its clay to the kick before it and half to the kick after it: Crank-Nicolson,
-    second order. Where the half that acts on the velocity before the kick would overshoot, b h w > 2,
-    it is reduced to the value that just stops the handle, and the kick before the step takes the rest.
-    The two parts sum to b h, so the impulse of a step is exactly b times its distance. `slow_force`
-    corrects the effect of the uneven split on slow motion.
+    A step gives half of its clay to the kick before it and half to the kick after it:
+    Crank-Nicolson, second order. Where the half that acts on the velocity before the kick would
+    overshoot, b h w > 2, it is reduced to the value that just stops the handle, and the kick before
+    the step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times
+    its distance. `slow_force` corrects the effect of the uneven split on slow motion.
 
     Args:
         b0: damping before the sample, (x, y) [N.s/m].
@@ -31,8 +31,9 @@ def split_damping(b0, b1, H, L, R, w, damper):
         damper: of the operator's arm, which acts beside the clay [N.s/m].
 
     Returns:
-        (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on y
-        [N.s/m]; in stiff clay, fe is less by share times `slow_force`, which the next kick returns.
+        (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on
+        y [N.s/m]; in stiff clay, fe is less by share times `slow_force`, which the next kick
+        returns.
         stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
     most = 1.0 / (H * w)
@@ -53,7 +54,7 @@ def split_damping(b0, b1, H, L, R, w, damper):
     return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
 
 
-def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):
+def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # compiled and inlined: plain numbers
     """Force of stiff clay on a handle in slow motion that nothing else supports.
 
     Args:
@@ -137,10 +138,10 @@ def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
     return merged
 
 
-# Rows of a table, two each: borders on x and y between -inf and inf [m]; damping of the x and y axis and its growth
-# [N.s/m, N.s/m per s], by region of the coordinate that decides; region of the axis's own profile in which that one
-# lies; time at which this was first entered [s], NaN before. Then, in one row: which coordinate decides on the x
-# and on the y axis, and where the path ends [m], inf if nowhere.
+# Rows of a region table, two each (x, y): borders between -inf and inf [m]; damping [N.s/m] and its
+# growth [N.s/m per s], by region of the coordinate that decides; region of the axis's own profile;
+# time of its first entry [s], NaN before. The last row: the coordinate that decides on the x axis,
+# that on the y axis, and the end of the path [m], inf for none.
 EDGE_ROW, VALUE_ROW, RATE_ROW, OWN_ROW, ENTERED_ROW, AXIS_ROWS = 0, 2, 4, 6, 8, 10
 
 

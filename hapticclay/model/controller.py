@@ -39,7 +39,7 @@ def servo_coefficients(
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
-def servo_acceleration(
+def servo_acceleration(  # noqa: PLR0913  # compiled and inlined: plain numbers
     after: float,
     before: float,
     spring: float,
@@ -69,7 +69,7 @@ def servo_acceleration(
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def solve_velocity(
+def solve_velocity(  # noqa: PLR0913  # compiled and inlined: plain numbers
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
@@ -105,7 +105,7 @@ def solve_velocity(
     return ux, uy
 
 
-def velocity_under_torque(
+def velocity_under_torque(  # noqa: PLR0913  # compiled and inlined: plain numbers
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
@@ -138,7 +138,7 @@ def velocity_under_torque(
     return ux, uy
 
 
-def saturated_step(
+def saturated_step(  # noqa: PLR0913  # compiled and inlined: plain numbers
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
@@ -208,9 +208,15 @@ def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tu
 
 
 def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
+    """Compensator and reference model over a sample under a held force: z+ = A z + B f, exact.
 
-    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
+    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark,
+    Computer-Controlled Systems).
+
+    Args:
+        axis: "x" or "y".
+        K: compensator gain.
+        T: hold [s].
 
     Returns:
         A, shape (4, 4), and B, shape (4,).
@@ -225,7 +231,14 @@ def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndar
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential of a, shape (n, n)."""
+    """Matrix exponential.
+
+    Args:
+        a: shape (n, n).
+
+    Returns:
+        Shape (n, n).
+    """
     from scipy.linalg import expm
 
     return expm(a)

@@ -241,9 +241,9 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
     """Coulomb friction of two joints in one kick, implicit.
 
     Each joint either rests after the kick, under a torque within its limit, or slides against the
-    limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases fits
-    (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in Engineering 39,
-    1996).
+    limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases
+    fits (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in
+    Engineering 39, 1996).
 
     Args:
         w: rates after the kick without friction [rad/s].
@@ -284,12 +284,12 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
 def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float) -> float:
     """Passivity controller of one axis: a resisting force, changed where the clay would be active.
 
-    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held force
-    itself causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a lack of
-    energy; as Ts W goes to zero by their damping, -energy/(Ts v^2). A force that gives energy because
-    the hold overshoots is replaced by the force that takes most, v/(Ts W), which stops the handle; so
-    is a force that cannot recover the lack within a sample. Energy taken earlier is not spent: clay
-    gives nothing back.
+    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held
+    force itself causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
+    lack of energy; as Ts W goes to zero by their damping, -energy/(Ts v^2). A force that gives
+    energy because the hold overshoots is replaced by the force that takes most, v/(Ts W), which
+    stops the handle; so is a force that cannot recover the lack within a sample. Energy taken
+    earlier is not spent: clay gives nothing back.
 
     Args:
         energy: energy that the clay has taken [J].
@@ -356,7 +356,8 @@ class SampleNoise:
             k: index of the sample.
 
         Returns:
-            (offset of the sampling instant [s], whether the sample is lost, noise on the force (x, y) [N]).
+            (offset of the sampling instant [s], whether the sample is lost, noise on the force (x,
+            y) [N]).
         """
         while k >= len(self._rows):
             s, (time, loss, noise) = self.parts, self._streams

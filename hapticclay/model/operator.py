@@ -13,8 +13,8 @@ def operator_coefficients(
 ) -> tuple[float, float, float, float]:
     """Response of Th in one kick, without the delay of a step (docs/equations.md, section 4).
 
-    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the mass
-    and keeps any spring stable at any step h (Newmark, beta = 1/4).
+    The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
+    mass and keeps any spring stable at any step h (Newmark, beta = 1/4).
 
     Args:
         operator: Th; None for Th = 0.
@@ -24,8 +24,8 @@ def operator_coefficients(
         h: length of the steps [s]; H, except where the kick is one half of a step at start or end.
 
     Returns:
-        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
-        -(spring p - mass c + before v- + after v+), c the centripetal acceleration.
+        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is -(spring p -
+        mass c + before v- + after v+), c the centripetal acceleration.
     """
     mass, damper, spring = 0.0, 0.0, 0.0
     if operator is not None:
@@ -37,7 +37,7 @@ def operator_coefficients(
 def operator_force(
     spring: float, mass: float, before: float, p: float, c: float, v: float
 ) -> float:
-    """Resisting force of the operator's arm in a kick, less the part that depends on its outcome [N].
+    """Resisting force of the operator's arm in a kick, without the velocity after it.
 
     Args:
         spring: from `operator_coefficients` [N/m].

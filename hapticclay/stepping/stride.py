@@ -1,7 +1,7 @@
-"""The leapfrog in numbers alone: many steps, borders included, without an object; `native` compiles it.
+"""The leapfrog on numbers alone: many steps, borders included, without an object.
 
-What `leapfrog.Leapfrog` does with regions, signals and records, here on floats and arrays, step by step the
-same: the laws are those of `loop`, `clay`, `signals` and `energy` themselves.
+`compiled` compiles it. It repeats what `leapfrog.Leapfrog` does with regions, signals and records,
+on floats and arrays, with the same floating-point operations in the same order.
 """
 
 from __future__ import annotations
@@ -40,7 +40,13 @@ STATE = np.dtype(
 
 
 class Hand(NamedTuple):
-    """As params.Operator; zeros for Th = 0."""
+    """The operator's arm in numbers; zeros for Th = 0.
+
+    Attributes:
+        mass: [kg].
+        damper: [N.s/m].
+        spring: [N/m].
+    """
 
     mass: float
     damper: float
@@ -48,8 +54,21 @@ class Hand(NamedTuple):
 
 
 class Given(NamedTuple):
-    """What a run takes from its scenario: fields as there, held, dampers: whether there is a hand, and clay;
-    last: number of whole steps."""
+    """What a run takes from its scenario.
+
+    Attributes:
+        gain: as in Scenario.
+        force: as in Scenario [N].
+        origin: as in Scenario [m].
+        torque_limit: as in Scenario [N.m].
+        operator: the operator's arm.
+        shaping: as in Scenario.
+        held: whether there is an operator's arm.
+        dampers: whether there is clay.
+        dt: as in Scenario [s].
+        t_max: as in Scenario [s].
+        last: number of whole steps.
+    """
 
     gain: tuple[float, float]
     force: tuple[float, float]
@@ -65,7 +84,18 @@ class Given(NamedTuple):
 
 
 class StrideEngine(NamedTuple):
-    """Addresses in the engine: of mj_step, the model and the data, and of what a step reads and writes."""
+    """Addresses in the engine.
+
+    Attributes:
+        step: of mj_step.
+        model: of the model.
+        data: of the data.
+        q: of the joint angles.
+        w: of the joint rates.
+        ctrl: of the controls.
+        push: of the applied joint torques.
+        timestep: of the length of a step.
+    """
 
     step: int
     model: int
@@ -78,22 +108,37 @@ class StrideEngine(NamedTuple):
 
 
 def load_double(address):
-    """The float at an address; `native` has its own way, here and in the next two."""
+    """The float at an address.
+
+    Args:
+        address: where it lies.
+    """
     return ctypes.c_double.from_address(address).value
 
 
 def store_double(address, x):
-    """Writes a float to an address."""
+    """Writes a float to an address.
+
+    Args:
+        address: where it goes.
+        x: the float.
+    """
     ctypes.c_double.from_address(address).value = x
 
 
 def call_engine(address, a, b):
-    """Calls the function at an address with two others."""
+    """Calls the function at an address with two pointers.
+
+    Args:
+        address: of the function.
+        a: first pointer.
+        b: second pointer.
+    """
     ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)(a, b)
 
 
 def _mean_signal(lines, t, h):
-    """Mean over [t - h, t + h] [s] of a multisine, x and y; lines as `native.lines` gives them."""
+    """Mean of a multisine over [t - h, t + h] [s], x and y; lines from `compiled`, one a row."""
     x, y = 0.0, 0.0
     for j in range(len(lines)):
         x += lines[j, 3] * signals.multisine_line(lines[j, 0], lines[j, 1], t, h)
@@ -102,7 +147,7 @@ def _mean_signal(lines, t, h):
 
 
 def _kick_inputs(g, muscle, t, before, after, old, new):
-    """loop.step_inputs of the kick at time t between steps of these lengths [s], in clay old, then new: (base, rate)."""
+    """loop.step_inputs of the kick at t between two steps, in clay old, then new: (base, rate)."""
     b0 = clay.damping_at(old[0], old[1], t - 0.25 * before)
     b1 = clay.damping_at(new[0], new[1], t + 0.25 * after)
     x, y = _mean_signal(muscle, t + 0.25 * (after - before), 0.25 * (before + after))
@@ -110,8 +155,8 @@ def _kick_inputs(g, muscle, t, before, after, old, new):
     return k
 
 
-def _kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
-    """loop.step_loop between steps of any length; arguments as `_kick_inputs` and there."""
+def _kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """loop.step_loop between steps of any length; arguments as in `_kick_inputs` and there."""
     c = loop.loop_coefficients(g, before, after)
     k = _kick_inputs(g, muscle, t, before, after, old, new)
     to, command, sample, out = loop.step_loop(c, k, q1, q2, w1, w2, state)
@@ -119,18 +164,18 @@ def _kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
 
 
 def _position_after(g, q1, q2, w1, w2, h):
-    """Handle position [m] when the joints have turned from q with w for h seconds."""
+    """Handle position [m] after the joints have turned for h seconds."""
     x, y = arm.handle_position(q1 + h * w1, q2 + h * w2)
     return x - g.origin[0], y - g.origin[1]
 
 
 def _border_side(p, low, high):
-    """1 beyond the upper border, -1 beyond the lower, 0 within (a NaN is)."""
+    """1 beyond the upper border, -1 beyond the lower, 0 within; a NaN is within."""
     return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0
 
 
 def _region_exit(g, q1, q2, sample, out, after, low, high):
-    """Beyond which borders a step from angles q would end, see `_border_side`: (x, y). sample, out: from loop.step_loop."""
+    """Borders that a step from angles q would cross, as `_border_side` (x, y)."""
     r2 = out[2] + out[3]
     # where the velocity points, the handle ends up to within this
     slack = 0.5 * after * after * (L1 * out[2] * out[2] + L2 * r2 * r2) + TOUCH
@@ -141,16 +186,16 @@ def _region_exit(g, q1, q2, sample, out, after, low, high):
     return _border_side(x, low[0], high[0]), _border_side(y, low[1], high[1])
 
 
-def _distance_beyond(h, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, border):
-    """How far beyond this border of coordinate i a step of length h would end [m]."""
+def _distance_beyond(h, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, border):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Distance by which a step of length h would pass this border of coordinate i [m]."""
     out = _kick_loop(g, muscle, t, before, h, old, new, q1, q2, w1, w2, state)[3]
     return _position_after(g, q1, q2, out[2], out[3], h)[i] - border
 
 
-def _locate_event(
+def _locate_event(  # noqa: PLR0913  # compiled and inlined: plain numbers
     g, muscle, t, before, after, old, new, q1, q2, w1, w2, state, out, sx, sy, low, high
 ):
-    """(length, coordinate, side) of the step that ends on the first of the borders that lie in this one's way."""
+    """(length, coordinate, side) of the step that ends on the first border in its way."""
     x, y = _position_after(g, q1, q2, out[2], out[3], after)
     span, i, up = after, -1, 0
     if sx:
@@ -199,8 +244,8 @@ def _locate_event(
     return span, i, up
 
 
-def _velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state):
-    """See Leapfrog._velocity: of coordinate i."""
+def _velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Velocity of coordinate i at a border, see Leapfrog._velocity."""
     k = _kick_inputs(g, muscle, t, before, before, old, new)
     after = before if k[10 + i] > 0.0 else 0.0
     _, _, sample, out = _kick_loop(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state)
@@ -211,10 +256,10 @@ def _velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state
     )
 
 
-def _record_crossing(
+def _record_crossing(  # noqa: PLR0913  # compiled and inlined: plain numbers
     crossing, g, muscle, t, before, old, new, q1, q2, w1, w2, state, i, up, low, high, end
 ):
-    """Notes that the handle steps over this border; True if it is the end of the path."""
+    """Records the crossing of this border; True if it is the end of the path."""
     speed = 0.0
     if before > 0.0:
         speed = _velocity_at_border(i, g, muscle, t, before, old, new, q1, q2, w1, w2, state)
@@ -223,8 +268,8 @@ def _record_crossing(
     return i == 0 and up > 0 and border == end
 
 
-def _write_row(row, g, q1, q2, sample, command, out, k, b):
-    """Writes what belongs to a sample: see `leapfrog._rows_at_samples`."""
+def _write_row(row, g, q1, q2, sample, command, out, k, b):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Writes the row of a sample, see `leapfrog._rows_at_samples`."""
     row[0], row[1], row[2], row[3] = q1, q2, sample[0], sample[1]
     row[4] = loop.velocity_at_sample(k, 0, sample[2], out[0], sample[8])
     row[5] = loop.velocity_at_sample(k, 1, sample[3], out[1], sample[9])
@@ -237,8 +282,8 @@ def _write_row(row, g, q1, q2, sample, command, out, k, b):
     row[12], row[13] = b
 
 
-def _add_work(work, g, H, k, sample, command, out, w1, w2):
-    """Enters the work of a kick of length H into the ledger."""
+def _add_work(work, g, H, k, sample, command, out, w1, w2):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Adds the work of a kick of length H to the ledger."""
     done = energy.kick_work(
         H, k, sample[8], sample[9], sample[2], sample[3], out[0], out[1], command[0], command[1],
         0.5 * (w1 + out[2]), 0.5 * (w2 + out[3]), g.operator.damper,
@@ -248,7 +293,13 @@ def _add_work(work, g, H, k, sample, command, out, w1, w2):
 
 
 def write_command(engine, dampers, command):
-    """Gives the engine a command as of loop.step_loop; dampers: whether it has clay."""
+    """Gives the engine a command.
+
+    Args:
+        engine: addresses in the engine.
+        dampers: whether the engine has clay.
+        command: as loop.step_loop returns it.
+    """
     store_double(engine.ctrl, command[0])
     store_double(engine.ctrl + 8, command[1])
     if dampers:
@@ -258,8 +309,8 @@ def write_command(engine, dampers, command):
     store_double(engine.push + 8, command[5])
 
 
-def _step_engine(engine, dampers, whole, dt, after, command, w1, w2, out):
-    """Steps the engine by after; where that is not the length of the kick, the kick goes in whole."""
+def _step_engine(engine, dampers, whole, dt, after, command, w1, w2, out):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Steps the engine by after; if that is not the length of the kick, the kick goes in whole."""
     if not whole:
         command = loop.whole_kick(w1, w2, out[2], out[3], command[0], command[1], after)
         store_double(engine.timestep, after)
@@ -270,11 +321,11 @@ def _step_engine(engine, dampers, whole, dt, after, command, w1, w2, out):
 
 
 def _motors_limited(g, command):
-    """Whether a motor gives all it can in a kick."""
+    """Whether a motor is at its limit in a kick."""
     return abs(command[0]) >= g.torque_limit[0] or abs(command[1]) >= g.torque_limit[1]
 
 
-def _first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):
+def _first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state):  # noqa: PLR0913  # compiled and inlined: plain numbers
     """See Leapfrog._first_of_a_hit."""
     x, y = clay.damping_at(new[0], new[1], t)
     b = max(x, y)
@@ -288,17 +339,23 @@ def _first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, st
     return first if _motors_limited(g, command) else np.inf
 
 
-def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
-    """Steps on, until most kicks are made, room rows written, crossings full, or the run is over.
+def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, room):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Steps until most kicks are made, rows or crossings is full, or the run is over.
 
     Args:
-        g: Given. muscle, commanded: lines of their multisines, see `_mean_signal`. table: see clay.region_table. engine: Engine.
+        g: the scenario in numbers.
+        muscle: lines of the muscle's multisine, shape (n, 5).
+        commanded: lines of the command's multisine, shape (n, 5).
+        table: from clay.region_table.
+        engine: addresses in the engine.
         run: array of one STATE, which is advanced.
-        rows: one for each sample, (room, ROW), as Run.judge takes them, and the clay.
-        crossings: (n, 4), n >= 4: coordinate, border [m], time [s], speed along it [m/s].
+        rows: one a sample, shape (room, STRIDE_ROW), as Run.judge takes them, and the clay.
+        crossings: shape (n, 4), n >= 4: coordinate, border [m], time [s], speed along it [m/s].
+        most: largest number of kicks.
+        room: largest number of rows.
 
     Returns:
-        (MORE, FINISHED, TIME_LIMIT or NOT_FINITE; rows written, crossings noted).
+        (UNFINISHED, FINISHED, TIME_LIMIT or NOT_FINITE; rows written; crossings recorded).
     """
     now, dt = run[0], g.dt
     t, before, i, closing = now["t"], now["before"], now["i"], now["closing"]
@@ -319,19 +376,11 @@ def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, r
             closing = TIME_LIMIT
         if on_grid:
             landings = 0
-        q1, q2, w1, w2 = (
-            load_double(engine.q),
-            load_double(engine.q + 8),
-            load_double(engine.w),
-            load_double(engine.w + 8),
-        )
+        q1, q2 = load_double(engine.q), load_double(engine.q + 8)
+        w1, w2 = load_double(engine.w), load_double(engine.w + 8)
         after = min(after, fine)
-        axis, up, overx, overy = (
-            -1,
-            0,
-            0,
-            0,
-        )  # border that the step ends on; borders stepped over without a step
+        axis, up = -1, 0  # border that the step ends on
+        overx, overy = 0, 0  # borders stepped over without a step
         while True:
             if closing != UNFINISHED:
                 after = 0.0
@@ -339,7 +388,9 @@ def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, r
                 new = (base, rate)
                 struck, fine = (
                     0,
-                    _first_step_of_hit(g, muscle, t, before, after, old, new, q1, q2, w1, w2, state),
+                    _first_step_of_hit(
+                        g, muscle, t, before, after, old, new, q1, q2, w1, w2, state
+                    ),
                 )
                 if fine < after:
                     after = fine
@@ -385,24 +436,9 @@ def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, r
                 if landings >= LANDINGS:
                     break
                 after, axis, up = _locate_event(
-                    g,
-                    muscle,
-                    t,
-                    before,
-                    after,
-                    old,
-                    (base, rate),
-                    q1,
-                    q2,
-                    w1,
-                    w2,
-                    state,
-                    out,
-                    sx,
-                    sy,
-                    low,
-                    high,
-                )
+                    g, muscle, t, before, after, old, (base, rate), q1, q2, w1, w2, state, out,
+                    sx, sy, low, high,
+                )  # fmt: skip
                 continue
             up = sx if here == 0 else sy
             ended = _record_crossing(
@@ -463,9 +499,10 @@ def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, r
         if axis >= 0:
             landings += 1
             fresh = False
+            q1, q2 = load_double(engine.q), load_double(engine.q + 8)
+            w1, w2 = load_double(engine.w), load_double(engine.w + 8)
             ended = _record_crossing(
-                crossings[crossed], g, muscle, t, before, old, (base, rate),
-                load_double(engine.q), load_double(engine.q + 8), load_double(engine.w), load_double(engine.w + 8), state,
+                crossings[crossed], g, muscle, t, before, old, (base, rate), q1, q2, w1, w2, state,
                 axis, up, low, high, table[clay.AXIS_ROWS, 2],
             )  # fmt: skip
             crossed += 1
@@ -484,7 +521,7 @@ def step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, r
     return code, filled, crossed
 
 
-# What `compiled` hands to numba beside `step_many`: laws with their own laws written into them, and plain ones.
+# For numba, beside the other laws: those with their own laws written into them, and plain ones.
 INLINED = (_kick_inputs, _add_work, _position_after)
 COMPILED = (
     write_command,
