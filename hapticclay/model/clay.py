@@ -81,6 +81,21 @@ def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913 
     return x, y
 
 
+def viscous_force(bx, by, vx, vy):
+    """Resisting force of the clay, fe = b v (Eqs. 3, 4). Numbers, or arrays of one shape.
+
+    Args:
+        bx: damping, x [N.s/m].
+        by: damping, y [N.s/m].
+        vx: velocity, x [m/s].
+        vy: velocity, y [m/s].
+
+    Returns:
+        (fex, fey) [N].
+    """
+    return bx * vx, by * vy
+
+
 def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:
     """Constant damping in one interval of a coordinate, none elsewhere.
 

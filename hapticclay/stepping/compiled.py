@@ -288,7 +288,7 @@ class NativeLeapfrog(Run):
         if not self.quiet:
             return super().brief()
         px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.end
-        last = (px, py), (vx, vy), (fx, fy), (bx * vx, by * vy), (bx, by)
+        last = (px, py), (vx, vy), (fx, fy), clay.viscous_force(bx, by, vx, vy), (bx, by)
         return self.outcome, self.steps, self.crossings, last, self.balance()
 
     def balance(self) -> dict[str, float]:

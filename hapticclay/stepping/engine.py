@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..model import arm
-from ..model.clay import Regions
+from ..model.clay import Regions, viscous_force
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
@@ -351,9 +351,9 @@ class Run:
         u = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
         r1, r2 = arm.joint_velocity(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
         qd = np.column_stack((r1, r2 - r1))
-        return dict(
-            t=t, p=p, v=v, fh=fh, fe=b.T * v, b=b.T.copy(), q=q, qd=qd, tau=tau, delta=delta
-        )
+        b = b.T.copy()
+        fe = np.column_stack(viscous_force(*b.T, *v.T))
+        return dict(t=t, p=p, v=v, fh=fh, fe=fe, b=b, q=q, qd=qd, tau=tau, delta=delta)
 
     def brief(self) -> tuple[Any, ...]:
         """The end of the run: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""

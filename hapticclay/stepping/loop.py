@@ -315,6 +315,7 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  
     hx, hy = uhx, uhy
     hx -= operator.operator_force(spring, mass, damper, px, cx, vx)
     hy -= operator.operator_force(spring, mass, damper, py, cy, vy)
+    fex, fey = clay.viscous_force(bx, by, vx, vy)
     y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
     y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
     # a kick of one second from rest, in which u is the acceleration
@@ -322,14 +323,14 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  
     ay = controller.servo_acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
     _, _, _, _, ffx, ffy, t1, t2 = controller.saturated_step(
         1.0, 0.0, 0.0, u1x, u1y, u2x, u2y, 1.0, 1.0, ax, ay, sxx, sxy, syy,
-        hx - bx * vx, hy - by * vy, mass, mass, limit1, limit2, square1, square2,
+        hx - fex, hy - fey, mass, mass, limit1, limit2, square1, square2,
     )  # fmt: skip
-    hx = ffx + bx * vx
-    hy = ffy + by * vy
+    hx = ffx + fex
+    hy = ffy + fey
     p1, p2 = arm.joint_torques(hx, hy, u1x, u1y, u2x, u2y)
     muscle = uhx * vx + uhy * vy
     motors = t1 * w1 + t2 * w2
-    clay_power = bx * vx * vx + by * vy * vy
+    clay_power = fex * vx + fey * vy
     hand = damper * (vx * vx + vy * vy)
     return (
         (t1, t2, p1, p2),

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import arm, controller, hardware, operator
-from ..model.clay import damping_at
+from ..model.clay import damping_at, viscous_force
 from ..model.constants import AXES, G, S
 from ..model.hardware import Pair
 from ..model.scenario import Scenario
@@ -129,7 +129,8 @@ class Sampled(Leapfrog):
             for i in (0, 1)
         ]
         # a kick of one second from rest, in which the velocity after it is the acceleration
-        fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
+        fex, fey = viscous_force(*b, *v)
+        fx, fy = rest[0] - fex, rest[1] - fey
         a = controller.velocity_under_torque(
             1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass
         )
@@ -141,8 +142,8 @@ class Sampled(Leapfrog):
     def _control(self, q, w, x, y, force):
         """Torques to hold, and the net force for the compensator, from the present measurements."""
         u, p, v, c = self._measure(q, w)
-        bx, by = self.regions.b(self.t)
-        return self._torques(u, p, v, c, x, y, force, (bx * v[0], by * v[1]))
+        fe = viscous_force(*self.regions.b(self.t), *v)
+        return self._torques(u, p, v, c, x, y, force, fe)
 
     def _torques(
         self,
@@ -444,7 +445,7 @@ class HardwareLoop(Sampled):
     def _render(self, u, p: Pair, v: Pair, hw: HardwareState) -> tuple[HeldForce, HardwareState]:
         """Force of the clay on the handle, by coupling and passivity controller [N]."""
         parts, b = self.parts, self.regions.b(self.t)
-        fe, held = (b[0] * v[0], b[1] * v[1]), HeldForce()
+        fe, held = viscous_force(*b, *v), HeldForce()
         if parts.coupling:
             k, d = parts.coupling.spring, parts.coupling.damper
             tool = [
@@ -452,7 +453,7 @@ class HardwareLoop(Sampled):
                 for i in (0, 1)
             ]
             hw = hw._replace(tool=(tool[0][0], tool[1][0]))
-            fe = b[0] * tool[0][1], b[1] * tool[1][1]
+            fe = viscous_force(*b, tool[0][1], tool[1][1])
             held = held._replace(coupling=fe, tool=(tool[0][1], tool[1][1]))
         if not parts.passivity:
             return held._replace(clay=fe), hw
