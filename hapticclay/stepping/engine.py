@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..model import arm
 from ..model.clay import Regions, viscous_force
-from ..model.constants import AXES
+from ..model.constants import AXES, L1, L2
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from . import monitor
@@ -75,10 +75,10 @@ def warnings_caught() -> Iterator[list[str]]:
 
 
 def build(scenario: Scenario) -> mujoco.MjModel:
-    """The model that simulate(scenario) steps: joints, inertias, motors; the clay's dampers
-    and the states of an accurate run if there are any.
+    """The model that simulate(scenario) steps.
 
-    It holds no geom, sensor, contact, mesh, material, light or camera.
+    It holds joints, inertias and motors; dampers where there is clay; the controller's states for
+    an accurate run. It holds no geom, sensor, contact, mesh, material, light or camera.
 
     Args:
         scenario: what to build for.
@@ -102,7 +102,14 @@ def build(scenario: Scenario) -> mujoco.MjModel:
 def _compose(parts: list[str]) -> mujoco.MjSpec:
     text = "".join(f'<include file="{part}"/>' for part in parts)
     files = {part: (mjcf_folder() / part).read_bytes() for part in parts}
-    return mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
+    spec = mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
+    # the arm of model.constants, whatever lengths and inertias the file has
+    upper, lower = spec.body("link1"), spec.body("link2")
+    lower.pos[0], spec.site("handle").pos[0] = L1, L2
+    for body, inertia in ((upper, arm.I1 - lower.mass * L1 * L1), (lower, arm.I2)):
+        # the other two do not matter in the plane, but no body has less than half of the third
+        body.inertia = *(max(x, 0.5 * inertia) for x in body.inertia[:2]), inertia
+    return spec
 
 
 def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
@@ -112,9 +119,7 @@ def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
 
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
-CHUNK = (
-    4096  # rows between two looks at the run: progress, Ctrl-C, outcome; small enough for the cache
-)
+CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
 
 
 class Run:
