@@ -12,12 +12,12 @@ from ..errors import ParameterError, choice, numbers_of
 from .constants import AXES, B_MAX
 
 
-def split_damping(b0, b1, H, L, R, w, damper):
+def split_damping(b0, b1, H, L, R, W, damper):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     A step gives half of its clay to the kick before it and half to the kick after it:
     Crank-Nicolson, second order. Where the half that acts on the velocity before the kick would
-    overshoot, b h w > 2, it is reduced to the value that just stops the handle, and the kick before
+    overshoot, b h W > 2, it is reduced to the value that just stops the handle, and the kick before
     the step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times
     its distance. `slow_force` corrects the effect of the uneven split on slow motion.
 
@@ -27,7 +27,7 @@ def split_damping(b0, b1, H, L, R, w, damper):
         H: length of the kick [s].
         L: share of the kick before the sample.
         R: share of the kick after the sample.
-        w: largest acceleration per unit of force over all directions [1/kg].
+        W: largest acceleration per unit of force over all directions [1/kg].
         damper: of the operator's arm, which acts beside the clay [N.s/m].
 
     Returns:
@@ -36,7 +36,7 @@ def split_damping(b0, b1, H, L, R, w, damper):
         returns.
         stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
-    most = 1.0 / (H * w)
+    most = 1.0 / (H * W)
     x0, y0 = L * b0[0], L * b0[1]
     x1, y1 = R * b1[0], R * b1[1]
     stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0

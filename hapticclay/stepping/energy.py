@@ -66,7 +66,7 @@ def energy_balance(
     }
 
 
-def kick_work(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):  # noqa: PLR0913  # compiled and inlined: plain numbers
+def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damper):  # noqa: PLR0913  # compiled and inlined: plain numbers
     """Work done in a kick. Floats, or arrays over kicks.
 
     Args:
@@ -74,10 +74,10 @@ def kick_work(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):  # no
         k: from loop.step_inputs.
         restx: clay force beside its dampers, x [N].
         resty: clay force beside its dampers, y [N].
-        bx: handle velocity before the kick, x [m/s].
-        by: handle velocity before the kick, y [m/s].
-        ax: handle velocity after the kick, x [m/s].
-        ay: handle velocity after the kick, y [m/s].
+        v0x: handle velocity before the kick, x [m/s].
+        v0y: handle velocity before the kick, y [m/s].
+        v1x: handle velocity after the kick, x [m/s].
+        v1y: handle velocity after the kick, y [m/s].
         t1: torque of the shoulder motor [N.m].
         t2: torque of the elbow motor [N.m].
         w1: mean rate of joint 1 [rad/s].
@@ -87,11 +87,11 @@ def kick_work(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):  # no
     Returns:
         (muscle, motors, clay, damper of the hand, throughput) [J].
     """
-    vx = 0.5 * (bx + ax)
-    vy = 0.5 * (by + ay)
+    vx = 0.5 * (v0x + v1x)
+    vy = 0.5 * (v0y + v1y)
     muscle = H * (k[5] * vx + k[6] * vy)
     motors = H * (t1 * w1 + t2 * w2)
-    clay = H * ((k[0] * bx + k[1] * ax + restx) * vx + (k[2] * by + k[3] * ay + resty) * vy)
+    clay = H * ((k[0] * v0x + k[1] * v1x + restx) * vx + (k[2] * v0y + k[3] * v1y + resty) * vy)
     hand = H * damper * (vx * vx + vy * vy)
     return muscle, motors, clay, hand, abs(muscle) + abs(motors)
 

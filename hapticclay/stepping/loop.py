@@ -84,12 +84,12 @@ def step_inputs(b0, b1, uh, before, after, hand):
     """
     span = before + after
     L = before / span
-    w = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
-    cx0, cx1, cy0, cy1, stiff, sharex, sharey, softx, softy = clay.split_damping(
-        b0, b1, 0.5 * span, L, after / span, w, hand.damper
+    W = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
+    bx0, bx1, by0, by1, stiff, sharex, sharey, softx, softy = clay.split_damping(
+        b0, b1, 0.5 * span, L, after / span, W, hand.damper
     )
     uhx, uhy = uh
-    return cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
+    return bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
 
 
 def owed_impulse(step, H, spring, sharex, sharey, hx, hy):
@@ -165,7 +165,7 @@ def step_loop(c, k, q1, q2, w1, w2, state):
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
         ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
     u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure_handle(
@@ -181,9 +181,9 @@ def step_loop(c, k, q1, q2, w1, w2, state):
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
 
     # clay and operator: net force f = (fx - dx ux, fy - dy uy)
-    fx = uhx - cx0 * vx
-    fy = uhy - cy0 * vy
-    dx, dy = cx1, cy1
+    fx = uhx - bx0 * vx
+    fy = uhy - by0 * vy
+    dx, dy = bx1, by1
     if held:
         fx -= operator.operator_force(spring, mass, before, px, cx, vx)
         fy -= operator.operator_force(spring, mass, before, py, cy, vy)
@@ -198,11 +198,11 @@ def step_loop(c, k, q1, q2, w1, w2, state):
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        bx, by = (cx0 + cx1) * vx, (cy0 + cy1) * vy
+        fex, fey = (bx0 + bx1) * vx, (by0 + by1) * vy
         hx, hy = uhx - spring * px, uhy - spring * py
         gx = ax - mx * vx + sxx * hx + sxy * hy
         gy = ay - my * vy + sxy * hx + syy * hy
-        gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+        gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
         owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
         fx += owedx - restx
         fy += owedy - resty
@@ -220,7 +220,7 @@ def step_loop(c, k, q1, q2, w1, w2, state):
                 (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y
             )
             sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
             fx -= owedx
             fy -= owedy
             owedx, owedy, _, _ = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
@@ -255,7 +255,7 @@ def step_loop(c, k, q1, q2, w1, w2, state):
             deltax + step * ex, deltay + step * ey, ex, ey,
             yx + step * vrx, yy + step * vry, vrx, vry, g1, g2, owedx, owedy,
         ),
-        (t1, t2, cx1, cy1, p1, p2),
+        (t1, t2, bx1, by1, p1, p2),
         (px, py, vx, vy, ffx, ffy, deltax, deltay, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )  # fmt: skip
@@ -385,7 +385,7 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
         owed: impulse that the clay owes after the kick, x, y [N.s].
     """
     H, step, ox, noy, spring, mass, before, behind = c
-    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
         q1, q2, w1, w2, 0.0, 0.0, ox, noy
     )
@@ -393,9 +393,9 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
         cx, cy = arm.centripetal_about_sample(
             L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
         )
-    fx = uhx - cx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
-    fy = uhy - cy0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
-    dx, dy = cx1 + behind, cy1 + behind
+    fx = uhx - bx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
+    fy = uhy - by0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
+    dx, dy = bx1 + behind, by1 + behind
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
@@ -411,7 +411,7 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
         )
         sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
         hx, hy = clay.slow_force(
-            hx, hy, sxx, sxy, syy, sharex, sharey, (cx0 + cx1) * vx, (cy0 + cy1) * vy
+            hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )
         owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, hx, hy)
         fx += owedx - restx
