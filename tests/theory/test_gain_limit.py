@@ -31,7 +31,7 @@ def operator(hand):
 
 
 def limit(axis, b, hand=(0.25, 2.0, 6.0), **kw):
-    return hc.gain_limit(axis, b, operator=operator(hand), impedance=any(hand), **kw)
+    return hc.gain_limit(axis, b, operator(hand), **kw)
 
 
 def polynomial(axis, K, b, hand, now=1.0, then=1.0):
@@ -56,7 +56,7 @@ def worst(poly):
 @pytest.mark.parametrize("axis,on,j", list(itertools.product("xy", [True, False], [0, 1, 2])))
 def test_continuous_limits(axis, on, j):
     b = (50.0, 90.0, 100.0)[j]
-    found = hc.gain_limit(axis, b, impedance=on)
+    found = hc.gain_limit(axis, b, Operator() if on else None)
     assert found == pytest.approx(
         PRINTED[axis, on][j], abs=0.0051
     )  # half the last digit, and a hair
@@ -90,7 +90,7 @@ def routh(poly):
 
 @pytest.mark.parametrize("axis,b", list(itertools.product("xy", [50.0, 90.0, 100.0])))
 def test_continuous_limits_by_routh_hurwitz(axis, b):
-    found = hc.gain_limit(axis, b)
+    found = limit(axis, b)
     assert np.all(routh(polynomial(axis, found * (1 - 1e-9), b, HANDS["hand"])) > 0)
     assert np.any(routh(polynomial(axis, found * (1 + 1e-9), b, HANDS["hand"])) < 0)
 
@@ -307,11 +307,8 @@ def test_late_limit_against_pade(axis, hand, delay):
 
 @pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "implicit"])))
 def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
-    exact = hc.gain_limit(axis, 90.0, delay=2e-3, render=render)
-    gap = [
-        exact - hc.gain_limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render)
-        for Ts in (4e-4, 2e-4, 1e-4)
-    ]
+    exact = limit(axis, 90.0, delay=2e-3, render=render)
+    gap = [exact - limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render) for Ts in (4e-4, 2e-4, 1e-4)]
     assert np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] == pytest.approx(1.0, abs=0.1)
     assert 2 * gap[2] - gap[1] == pytest.approx(
         0.0, abs=5e-4 * exact
@@ -321,22 +318,18 @@ def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
 def test_limits_fall_with_delay_and_sample():
     for axis in "xy":
         assert np.all(
-            np.diff([hc.gain_limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0
+            np.diff([limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0
         )
-        assert np.all(
-            np.diff([hc.gain_limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0
-        )
-        assert hc.gain_limit(axis, 90.0, delay=1e-9) == pytest.approx(
-            hc.gain_limit(axis, 90.0), rel=1e-7
-        )
+        assert np.all(np.diff([limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0)
+        assert limit(axis, 90.0, delay=1e-9) == pytest.approx(limit(axis, 90.0), rel=1e-7)
 
 
 def test_limits_at_the_ends():
     for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
-        assert hc.gain_limit("x", 0.0, impedance=False, **kw) == float("inf")  # nothing to feel
+        assert hc.gain_limit("x", 0.0, **kw) == float("inf")  # nothing to feel
     for kw in (dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-4, delay=2e-3), dict(delay=1.0)):
-        assert hc.gain_limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
-    assert 0.0 < hc.gain_limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
+        assert limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
+    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
 
 
 def test_a_narrow_unstable_window_is_not_missed():
@@ -364,7 +357,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
     """Small swings about the nominal pose, 2 % inside and outside the limit, at Ts = 2 ms."""
     Ts, b, i = 2e-3, 90.0, "xy".index(axis)
     th = operator(HANDS[hand])
-    K = factor * hc.gain_limit(axis, b, operator=th, impedance=th is not None, Ts=Ts)
+    K = factor * hc.gain_limit(axis, b, th, Ts=Ts)
     gain = [0.1, 0.1]
     gain[i] = K
     force = [0.0, 0.0]
@@ -373,8 +366,8 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
         b, tuple(gain), tuple(force), th is not None, shaping=True, dt=Ts / 8, Ts=Ts, control="sampled",
         clay=(-0.05, 0.05), origin=(0.35, 0.24), length=0.04, t_max=4.0,
     ))  # fmt: skip
-    M, beta, gamma = gain_limit.sampled_matrices(axis, b, th, Ts)
-    z = np.linalg.eigvals(M + K * np.outer(beta, gamma))
+    less, beta, gamma = linear_loop.sampled_differences(axis, b, th, Ts)
+    z = 1.0 + np.linalg.eigvals(less + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
     assert (rate < 0) == (factor < 1)
@@ -390,9 +383,14 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
     assert abs(rate) > 0.1
 
 
-def test_hand_is_nominal_none_or_given():
-    assert hc.gain_limit("x", 90.0) == hc.gain_limit("x", 90.0, operator=Operator())
-    assert hc.gain_limit("x", 90.0, impedance=False) == linear_loop.continuous_gain_limit("x", 90.0)
+def test_no_operator_is_no_hand():
+    for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
+        none = hc.gain_limit("x", 90.0, **kw)
+        assert none == hc.gain_limit("x", 90.0, operator=None, **kw)
+        assert none == pytest.approx(
+            hc.gain_limit("x", 90.0, Operator(0.0, 0.0, 0.0), **kw), rel=1e-12
+        )
+        assert abs(hc.gain_limit("x", 90.0, Operator(), **kw) / none - 1.0) > 0.1
 
 
 @pytest.mark.parametrize("call,field", [
@@ -400,9 +398,10 @@ def test_hand_is_nominal_none_or_given():
     (lambda: hc.gain_limit("x", 90.0, Ts=0.0), "Ts"), (lambda: hc.gain_limit("x", 90.0, delay=-1.0), "delay"),
     (lambda: hc.gain_limit("x", 90.0, Ts=1e-4, delay=1.0), "delay"),
     (lambda: hc.gain_limit("x", 90.0, render="hold"), "render"),
-    (lambda: hc.gain_limit("x", 90.0, impedance=1), "impedance"),
     (lambda: hc.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
-    (lambda: hc.gain_limit("x", 90.0, operator=Operator(), impedance=False), "operator"),
+    (lambda: hc.gain_limit("x", 90.0, operator=True, Ts=1e-3), "operator"),
+    (lambda: hc.gain_limit("x", 90.0, operator=True, delay=1e-3), "operator"),
+    (lambda: hc.gain_limit("x", 90.0, Ts=1e-3, compensator=hc.Compensator(5.0)), "compensator"),
 ])  # fmt: skip
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
