@@ -1,5 +1,6 @@
 """The boundary found by runs against the exact one; the growth that it is read from against known modes."""
 
+import functools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,12 +15,12 @@ from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
-from hapticclay.studies.boundary import Loop
 from hapticclay.theory import gain_limit
 from hapticclay.views import study_plots
 from tests.oracles import Linear
 
 TH = Operator()
+Loop = functools.partial(boundary.Loop, operator=TH)
 
 
 @settings(max_examples=10)
@@ -150,7 +151,7 @@ def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
     """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it: a large push stays."""
     loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
     assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
-    assert boundary.linear_rate(loop) and boundary.classify_run(loop) == "limit cycle"
+    assert boundary.continuous_stable(loop) and boundary.classify_run(loop) == "limit cycle"
     assert boundary.explain_disagreement(loop, False) == "saturation"
     assert boundary.classify_run(replace(loop, torque_limit=(40.0, 40.0))) == "stable"
     assert boundary.classify_run(replace(loop, push=1e-4)) == "stable"
@@ -217,11 +218,11 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
 
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
-    b = stability_map._damping(Loop(K=1.0, Ts=Ts), delay)
+    b = stability_map._unstable_damping(Loop(), Ts, delay)
     assert gain_limit.is_stable("x", 1.0, 0.999 * b, TH, Ts, delay)
     assert not gain_limit.is_stable("x", 1.0, 1.001 * b, TH, Ts, delay)
     assert (
-        stability_map._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0
+        stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it
 
 
