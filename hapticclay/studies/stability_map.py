@@ -72,7 +72,7 @@ class StabilityMap:
     notes: tuple[str, ...] = ()
 
     def gap(self) -> float:
-        """Largest relative difference of the runs from the exact line of their loop; NaN for none."""
+        """Largest relative gap between the runs and the exact line of their loop; NaN for none."""
         pairs = [
             (a, b)
             for name, (_, y) in self.found.items()
