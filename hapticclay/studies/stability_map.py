@@ -117,7 +117,7 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> St
 
     lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
-        lines[_sampled(loop)] = line(lambda b: nominal_limit(replace(loop, b=b)))
+        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = line(lambda b: nominal_limit(replace(loop, b=b)))
     notes = []
     for name, holds in (
         ("small gain (Eq. 13)", small_gain),
@@ -152,7 +152,7 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> S
     x = np.geomspace(low, high, columns).tolist()
     lines = {
         "continuous time, late": (fine, [_unstable_damping(loop, None, d) for d in fine]),
-        f"{_sampled(replace(loop, delay=0.0))} and late": (
+        f"sampled every {1e3 * Ts:g} ms and late": (
             fine,
             [_unstable_damping(loop, Ts, d) for d in fine],
         ),
@@ -193,7 +193,7 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress: Progress) -> Stabi
     plain = [replace(loop_at, pose=(dx, 0.0)) for dx in x]
     shaped = [replace(each, shaping=True) for each in plain]
     nominal = nominal_limit(loop)
-    how = _sampled(loop) if loop.Ts else "continuous time"
+    how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
         f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
         f"linear loop at this pose, {how}": (
@@ -235,9 +235,8 @@ def _map_cells(
     return tuple(out)
 
 
-def _sampled(loop: Loop) -> str:
-    late = f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
-    return f"sampled every {1e3 * (loop.Ts or 0.0):g} ms{late}"
+def _late(loop: Loop) -> str:
+    return f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
 
 
 def _largest_gain(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e3) -> float:

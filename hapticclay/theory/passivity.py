@@ -71,7 +71,10 @@ def colgate_schenkel(
         bool(damping > need[i]),
         damping - float(need[i]),
         float(omega[i]),
-        ("only a mass and a physical damper behind the handle", "position sampled, force held"),
+        (
+            "a mass and a physical damper, nothing else, behind the handle",
+            "position sampled, force held",
+        ),
         f"Colgate and Schenkel's test at {n - 1} frequencies up to pi/Ts: sampled",
         "damping to spare [N.s/m]",
         tuple(
