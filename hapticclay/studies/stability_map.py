@@ -117,7 +117,8 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> St
 
     lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
-        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = line(lambda b: nominal_limit(replace(loop, b=b)))
+        name = f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"
+        lines[name] = line(lambda b: nominal_limit(replace(loop, b=b)))
     notes = []
     for name, holds in (
         ("small gain (Eq. 13)", small_gain),

@@ -334,7 +334,7 @@ def sampled_loop(
     delay: float = 0.0,
     render: str = "held",
 ) -> LoopFamily:
-    """The sampled loop (`control="sampled"`), x(k+1) = (M + K beta gamma) x(k), exact at the samples.
+    """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma) x(k), exact at samples.
 
     See `linear_loop.sampled_differences`. A loop is stable if every eigenvalue lies within the unit
     circle, except the one at z = 1 that moves the handle where Th has no spring. Clay of 1e9 N.s/m,

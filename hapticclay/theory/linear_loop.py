@@ -84,7 +84,7 @@ def loop_polynomials(
 def delayed_polynomials(
     axis: str, b: float, operator: Operator | None, render: str, compensator: Compensator = PRINTED
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Parts of the closed-loop polynomial where motors act late: physical + late (motors + K driven).
+    """Parts of the closed-loop polynomial with late motors: physical + late (motors + K driven).
 
     With late = exp(-s delay), W = 1/mass of the handle (the gain of Sh) and T = Te + Th,
 
@@ -209,7 +209,7 @@ def stable(
 
 def state_space(
     axes: str,
-    K: float | Sequence[float],
+    K: float | Sequence[float] | np.ndarray,
     b: float,
     operator: Operator | None = None,
     mobility: np.ndarray | None = None,

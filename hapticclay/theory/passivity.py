@@ -86,9 +86,9 @@ def colgate_schenkel(
 def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0) -> Verdict:
     """Passivity of held clay alone, its velocity the difference of two samples.
 
-    Servo and compensator are left out. In closed form: damping > stiffness Ts/2 + b, the second term at the Nyquist frequency (Colgate,
-    Schenkel 1997). The handle has no physical damper of its own, so held clay is never passive by
-    itself; clay with render="implicit" is.
+    Servo and compensator are left out. In closed form: damping > stiffness Ts/2 + b, the second
+    term at the Nyquist frequency (Colgate, Schenkel 1997). The handle has no physical damper of its
+    own, so held clay is never passive by itself; clay with render="implicit" is.
 
     Args:
         b: clay [N.s/m].

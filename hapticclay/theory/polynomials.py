@@ -6,6 +6,7 @@ Every polynomial of the package is a `numpy.polynomial.Polynomial`: coefficients
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -41,7 +42,8 @@ def multiplicity_of_zero(p: Polynomial) -> int:
 
 def on_axis(p: Polynomial) -> Polynomial:
     """p(j omega) as a polynomial in omega with complex coefficients."""
-    return Polynomial(p.coef * 1j ** np.arange(len(p.coef)))
+    powers: Any = 1j ** np.arange(len(p.coef))
+    return Polynomial(p.coef * powers)
 
 
 def cross_spectrum(p: Polynomial, q: Polynomial) -> Polynomial:

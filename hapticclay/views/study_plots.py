@@ -24,9 +24,9 @@ from ..studies.identification import (
     NOMINAL_POSE,
     Identified,
     endpoint_mobility,
+    format_coefficient,
     printed_form,
     response,
-    format_coefficient,
 )
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift

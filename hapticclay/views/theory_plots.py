@@ -172,7 +172,8 @@ def small_gain(
         said = "holds" if verdict else "fails"
         _title(
             ax,
-            f"{_name(axis, b, operator)}, K = {K:g}: (13) {said}, the loop is {'' if good else 'un'}stable",
+            f"{_name(axis, b, operator)}, K = {K:g}: (13) {said}, "
+            f"the loop is {'' if good else 'un'}stable",
         )
     return figure
 
