@@ -136,7 +136,10 @@ def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tu
     Trapezoidal in the damping, exact in total impulse: any length, any split.
 
     Args:
-        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
+        damping: [1/s].
+        H: length of the kick [s].
+        L: its share before the sample.
+        R: its share after the sample.
     """
     n = 1.0 / H + damping * R
     return (1.0 / H - damping * L) / n, 1.0 / n

@@ -197,8 +197,8 @@ def blocks(runs: Runs) -> Iterator[Row]:
             "contradicted",
             f"{ratio:.3g} m/N and 1 m/m cannot be compared; Sec. 4 calls Sh significant beside G; "
             f"with {G[i].damping:g} and {S[i].damping:g} 1/s they are not even one servo's two "
-            "answers: "
-            "no plain PD loop gives both, so reference model and feedback are separate here",
+            "answers: no plain PD loop gives both, so reference model and feedback are separate "
+            "here",
         )
 
 

@@ -30,7 +30,8 @@ class Tool:
     """The cutter at the handle.
 
     Attributes:
-        width: of its round footprint [m]. depth: of the cut [m].
+        width: of its round footprint [m].
+        depth: of the cut [m].
     """
 
     width: float = 0.02

@@ -19,7 +19,7 @@ from .identification import (
 )
 
 DRIFT_BLOCKS = ("G", "S")
-REACH_MARGIN_MAP = 0.04  # [m] to the stretched and the folded arm: nearer, joint rates grow
+MAP_REACH_MARGIN = 0.04  # [m] to the stretched and the folded arm: nearer, joint rates grow
 # A millimetre of motion would change the pose; without noise, a hundredth of that is enough.
 DRIFT_SETTINGS: dict[str, Any] = dict(
     band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
@@ -102,7 +102,7 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     grid = np.meshgrid(along(NOMINAL_POSE[0], -reach), along(NOMINAL_POSE[1], 0.0))
     x, y = (z.ravel() for z in grid)
     r = np.hypot(x, y)
-    inside = (r >= abs(L2 - L1) + REACH_MARGIN_MAP) & (r <= reach - REACH_MARGIN_MAP)
+    inside = (r >= abs(L2 - L1) + MAP_REACH_MARGIN) & (r <= reach - MAP_REACH_MARGIN)
     return x[inside], y[inside]
 
 

@@ -208,7 +208,7 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     """
     from scipy.optimize import brentq, minimize_scalar
 
-    def lean(x: float) -> float:
+    def phase_sine(x: float) -> float:
         z = loop.h(np.array([math.exp(x)]))[0]
         return z.imag / abs(z)
 
@@ -224,11 +224,11 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & ahead[1:-1]) + 1:
         sign = math.copysign(1.0, y[i])
         bottom = minimize_scalar(
-            lambda x, s=sign: s * lean(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
+            lambda x, s=sign: s * phase_sine(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
         )
         if bottom.fun < 0.0:  # type: ignore[union-attr]
             spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
-    omega = [math.exp(brentq(lean, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
+    omega = [math.exp(brentq(phase_sine, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
     omega += [] if loop.last is None else [loop.last]
     with np.errstate(divide="ignore"):
         K = 1.0 / loop.h(np.array(omega)).real if omega else np.empty(0)

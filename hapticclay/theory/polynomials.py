@@ -15,49 +15,87 @@ VARIABLE = Polynomial([0.0, 1.0])  # s itself
 
 
 def roots(p: Polynomial) -> np.ndarray:
-    """Roots of p, those at zero exactly zero (`polyroots` gives them as rounding errors)."""
+    """Roots of p, those at zero exactly zero (`polyroots` gives them as rounding errors).
+
+    Args:
+        p: polynomial.
+    """
     return np.roots(p.coef[::-1])
 
 
 def nonzero_roots(p: Polynomial) -> np.ndarray:
-    """Roots of p other than zero."""
+    """Roots of p other than zero.
+
+    Args:
+        p: polynomial.
+    """
     return np.roots(np.trim_zeros(p.coef)[::-1])
 
 
 def positive_roots(p: Polynomial) -> np.ndarray:
-    """Positive real roots of a real polynomial; imaginary parts up to 1e-6 count as rounding."""
+    """Positive real roots of a real polynomial; imaginary parts up to 1e-6 count as rounding.
+
+    Args:
+        p: polynomial with real coefficients.
+    """
     x = nonzero_roots(p)
     return x[(np.abs(x.imag) <= 1e-6 * np.abs(x)) & (x.real > 0.0)].real
 
 
 def hurwitz(p: Polynomial) -> bool:
-    """Return True if every root of p other than zero lies left of the imaginary axis."""
+    """Return True if every root of p other than zero lies left of the imaginary axis.
+
+    Args:
+        p: polynomial.
+    """
     return bool(np.all(nonzero_roots(p).real < 0.0))
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
-    """Number of roots of p at zero."""
+    """Number of roots of p at zero.
+
+    Args:
+        p: polynomial.
+    """
     return int(np.argmax(p.coef != 0.0))
 
 
 def on_axis(p: Polynomial) -> Polynomial:
-    """p(j omega) as a polynomial in omega with complex coefficients."""
+    """p(j omega) as a polynomial in omega with complex coefficients.
+
+    Args:
+        p: polynomial with real coefficients.
+    """
     powers: Any = 1j ** np.arange(len(p.coef))
     return Polynomial(p.coef * powers)
 
 
 def cross_spectrum(p: Polynomial, q: Polynomial) -> Polynomial:
-    """p(j omega) q(j omega)*, with * the conjugate, as a polynomial in omega."""
+    """p(j omega) q(j omega)*, with * the conjugate, as a polynomial in omega.
+
+    Args:
+        p: polynomial with real coefficients.
+        q: polynomial with real coefficients.
+    """
     return on_axis(p) * Polynomial(on_axis(q).coef.conj())
 
 
 def real_part(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Re p(j omega) q(j omega)* as a polynomial in omega^2."""
+    """Re p(j omega) q(j omega)* as a polynomial in omega^2.
+
+    Args:
+        p: polynomial with real coefficients.
+        q: polynomial with real coefficients.
+    """
     return Polynomial(cross_spectrum(p, q).coef.real[::2])
 
 
 def squared_magnitude(p: Polynomial) -> Polynomial:
-    """|p(j omega)|^2 as a polynomial in omega^2."""
+    """|p(j omega)|^2 as a polynomial in omega^2.
+
+    Args:
+        p: polynomial with real coefficients.
+    """
     return real_part(p, p)
 
 
@@ -106,7 +144,11 @@ def least_ratio(R: Polynomial, Q: Polynomial) -> tuple[float, float]:
 
 
 def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:
-    """Bands of omega [rad/s] in which a polynomial in omega^2 is positive."""
+    """Bands of omega [rad/s] in which a polynomial in omega^2 is positive.
+
+    Args:
+        p: polynomial with real coefficients.
+    """
     x = np.concatenate(([0.0], np.sort(positive_roots(p))))
     inside = np.concatenate((0.5 * (x[1:] + x[:-1]), [2.0 * x[-1] + 1.0]))
     edges = np.concatenate((np.sqrt(x), [math.inf]))
@@ -114,7 +156,11 @@ def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:
 
 
 def runs_of_true(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each run of True in mask, shape (n,)."""
+    """First and last index of each run of True.
+
+    Args:
+        mask: shape (n,).
+    """
     padded = np.concatenate(([False], mask, [False]))
     first = np.flatnonzero(padded[1:] & ~padded[:-1])
     last = np.flatnonzero(padded[:-1] & ~padded[1:]) - 1

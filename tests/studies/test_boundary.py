@@ -1,4 +1,7 @@
-"""The boundary found by runs against the exact one; the growth that it is read from against known modes."""
+"""The boundary found by runs against the exact one.
+
+The growth that it is read from against known modes.
+"""
 
 import functools
 import math
@@ -136,7 +139,9 @@ def test_a_slow_growth_is_still_a_divergence():
 
 
 def saturating(K, share):
-    """Rightmost pole of the y axis, b = 90 with the hand, whose motors give but a share of what they are asked for."""
+    """Rightmost pole of the y axis, b = 90 with the hand, whose motors give but a share of what
+    they are asked for.
+    """
     s = np.poly1d([1.0, 0.0])
     D, C, T = s**2 + 32.4 * s + 492.46, s * (s + 10.0), 0.25 * s**2 + 92.0 * s + 6.0
     Dg = s**2 + 30.3 * s + 765.5
@@ -148,7 +153,10 @@ SHARES = np.linspace(0.02, 1.0, 99)
 
 
 def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
-    """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it: a large push stays."""
+    """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it.
+
+    A large push stays.
+    """
     loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
     assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
     assert boundary.continuous_stable(loop) and boundary.classify_run(loop) == "limit cycle"
@@ -178,15 +186,24 @@ def test_causes():
     assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 
 
-@pytest.mark.parametrize("kw,field", [(dict(axis="z"), "axis"), (dict(K=0.0), "K"), (dict(delay=1e-3), "delay"),
-                                      (dict(b=-1.0), "b"), (dict(pose=(0.0,)), "pose")])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(axis="z"), "axis"),
+        (dict(K=0.0), "K"),
+        (dict(delay=1e-3), "delay"),
+        (dict(b=-1.0), "b"),
+        (dict(pose=(0.0,)), "pose"),
+    ],
+)
 def test_bad_loops_are_refused(kw, field):
     with pytest.raises(ParameterError) as e:
         Loop(**kw)
     assert e.value.field == field
 
 
-# ---- maps --------------------------------------------------------------------------------------------------------
+# ---- maps ----------------------------------------------------------------------------------------
+# ----------------
 
 
 @pytest.fixture(scope="module")
@@ -262,9 +279,16 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     data = json.loads((tmp_path / "o" / "stability.json").read_text())
     assert data["map"]["kind"] == "gain-pose" and len(data["verdicts"]) > 10
     assert data["asked"] == {
-        "axis": "x", "b": 90.0, "K": 0.5, "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0}, "Ts": 0.36e-3,
-        "delay": 1e-3, "shaping": False, "map": "gain-pose", "quick": False,
-    }  # fmt: skip
+        "axis": "x",
+        "b": 90.0,
+        "K": 0.5,
+        "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0},
+        "Ts": 0.36e-3,
+        "delay": 1e-3,
+        "shaping": False,
+        "map": "gain-pose",
+        "quick": False,
+    }
     limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
     kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
     assert limits == pytest.approx(

@@ -85,10 +85,16 @@ def test_a_shape_without_a_largest_gain_is_refused():
         hc.compare("x", 90.0, [hc.Compensator(40.0, 5.0)], hc.Operator(), disk_margin=0.5)
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(gain_margin=0.5), "gain_margin"), (dict(phase_margin=4.0), "phase_margin"),
-    (dict(disk_margin=3.0), "disk_margin"), (dict(at="motor"), "at"), (dict(phase_margin=0.5, Ts=1e-3), None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(gain_margin=0.5), "gain_margin"),
+        (dict(phase_margin=4.0), "phase_margin"),
+        (dict(disk_margin=3.0), "disk_margin"),
+        (dict(at="motor"), "at"),
+        (dict(phase_margin=0.5, Ts=1e-3), None),
+    ],
+)
 def test_bad_input_is_refused(kw, field):
     with pytest.raises(ParameterError) as e:
         hc.design_gain("x", 90.0, **kw)

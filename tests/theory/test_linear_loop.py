@@ -52,12 +52,23 @@ def test_poles_are_those_of_the_state_space_model(axis):
         )
 
 
-@pytest.mark.parametrize("axis,b,on,printed", [
-    ("x", 50, True, 4.74), ("x", 90, True, 3.84), ("x", 100, True, 3.79),
-    ("y", 50, True, 1.42), ("y", 90, True, 0.86), ("y", 100, True, 0.80),
-    ("x", 50, False, 3.47), ("x", 90, False, 3.23), ("x", 100, False, 3.24),
-    ("y", 50, False, 1.18), ("y", 90, False, 0.77), ("y", 100, False, 0.73),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "axis,b,on,printed",
+    [
+        ("x", 50, True, 4.74),
+        ("x", 90, True, 3.84),
+        ("x", 100, True, 3.79),
+        ("y", 50, True, 1.42),
+        ("y", 90, True, 0.86),
+        ("y", 100, True, 0.80),
+        ("x", 50, False, 3.47),
+        ("x", 90, False, 3.23),
+        ("x", 100, False, 3.24),
+        ("y", 50, False, 1.18),
+        ("y", 90, False, 0.77),
+        ("y", 100, False, 0.73),
+    ],
+)
 def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
     limit = hc.gain_limit(axis, b, TH if on else None)
     G, S, C, T = blocks(axis, 1.0, b, on)
@@ -83,7 +94,10 @@ def test_gain_limit_without_clay_and_hand_is_infinite():
 
 
 def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
-    """An undamped hand makes the driven polynomial vanish at its resonance: no K puts a pole there."""
+    """An undamped hand makes the driven polynomial vanish at its resonance.
+
+    No K puts a pole there.
+    """
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
         limit = hc.gain_limit("y", 0.0, th)
         assert limit > 0.0
@@ -99,11 +113,14 @@ def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
     assert linear_loop.steady_speed(K, f, b) == pytest.approx(s * H / (1 + H * b * s) * f, rel=1e-6)
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: linear_loop.stable("z", 1, 1), "axis"),
-    (lambda: linear_loop.stable("x", -1, 1), "K"),
-    (lambda: linear_loop.stable("x", 1, float("nan")), "b"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: linear_loop.stable("z", 1, 1), "axis"),
+        (lambda: linear_loop.stable("x", -1, 1), "K"),
+        (lambda: linear_loop.stable("x", 1, float("nan")), "b"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()
@@ -134,7 +151,10 @@ def test_crossing_times_beside_the_oracle():
 @pytest.mark.parametrize("axis", "xy")
 @given(st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6), st.floats(1e-5, 1e-2))
 def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
-    """A kick whose sample lies at its end sees the state before it: the explicit form of the law."""
+    """A kick whose sample lies at its end sees the state before it.
+
+    The explicit form of the law.
+    """
     i = "xy".index(axis)
     g, s = G[i], S[i]
     p, v, delta, _, y, yd = state

@@ -1,4 +1,6 @@
-"""Verdicts and margins against the poles, python-control, dense frequencies and the theorems they come from."""
+"""Verdicts and margins against the poles, python-control, dense frequencies and the theorems they
+come from.
+"""
 
 import math
 
@@ -43,7 +45,7 @@ def transfer_function(n, d):
 
 
 def largest(f):
-    """Largest value over OMEGA and both ends, and over ever finer grids around the point it is at."""
+    """Largest value over OMEGA and both ends, and over finer grids around the point it is at."""
     w = np.concatenate(([1e-6], OMEGA, [1e8]))
     for _ in range(6):
         i = int(np.argmax(f(w)))
@@ -205,7 +207,10 @@ def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, t
 
 
 def test_the_papers_condition_fails_near_zero_for_every_gain():
-    """C integrates and Th has a spring, so |GC| outgrows the right side (PAPER: not 5C, not any)."""
+    """C integrates and Th has a spring, so |GC| outgrows the right side (PAPER.
+
+    Not 5C, not any).
+    """
     for K in (1e-3, 1.0):
         v = hc.small_gain("x", K, 50.0, Operator())
         assert not v and v.margin == 0.0 and v.omega == 0.0 and v.fails[0][0] == 0.0
@@ -244,12 +249,17 @@ def test_least_finds_the_ends_and_the_middle():
     assert polynomials.least_ratio(Polynomial([1.0, 1.0]), Polynomial([2.0, 1.0])) == (0.5, 0.0)
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: hc.margins("z", 1.0, 90.0), "axis"), (lambda: hc.margins("x", -1.0, 90.0), "K"),
-    (lambda: hc.nyquist("x", 1.0, 90.0, at="motor"), "at"),
-    (lambda: hc.small_gain("x", 1.0, 90.0, equation=8), "equation"),
-    (lambda: hc.coupled_stability("x", 0.0, 90.0), "K"), (lambda: hc.Compensator(-1.0), "compensator.pole"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: hc.margins("z", 1.0, 90.0), "axis"),
+        (lambda: hc.margins("x", -1.0, 90.0), "K"),
+        (lambda: hc.nyquist("x", 1.0, 90.0, at="motor"), "at"),
+        (lambda: hc.small_gain("x", 1.0, 90.0, equation=8), "equation"),
+        (lambda: hc.coupled_stability("x", 0.0, 90.0), "K"),
+        (lambda: hc.Compensator(-1.0), "compensator.pole"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()

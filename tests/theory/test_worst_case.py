@@ -1,4 +1,7 @@
-"""Boxes of hands: the worst case against dense sampling and against the loop at the hand it names."""
+"""Boxes of hands.
+
+The worst case against dense sampling and against the loop at the hand it names.
+"""
 
 import numpy as np
 import pytest
@@ -58,7 +61,10 @@ def test_box_against_a_dense_grid(axis):
 
 
 def test_a_worst_case_inside_an_edge():
-    """Without mass and spring the limit in x is least near b + damper = 94 N.s/m: no corner of this box."""
+    """Without mass and spring the limit in x is least near b + damper = 94 N.s/m.
+
+    No corner of this box.
+    """
     box = hc.Box((0.0, 0.0), (0.0, 40.0), (0.0, 0.0))
     worst = hc.worst_case("x", 1.0, 70.0, box)
     dense = min((hc.gain_limit("x", 70.0 + d, None), d) for d in np.linspace(0.0, 40.0, 401))
@@ -89,7 +95,10 @@ def test_sampled_and_late_boxes_say_that_they_are_samples():
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
-    """Closed-loop poles tend to the zeros of G C + Sh, left of the axis at every K: Th may be as large as it likes."""
+    """Closed-loop poles tend to the zeros of G C + Sh, left of the axis at every K.
+
+    Th may be as large as it likes.
+    """
     limit, _ = margins.rigid_limit(axis)
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
@@ -106,7 +115,10 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
 
 
 def test_a_rigid_arm_limits_a_slower_compensator():
-    """C = K/(s (s + 1)) in y: the zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it."""
+    """C = K/(s (s + 1)) in y.
+
+    The zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it.
+    """
     c, arm = hc.Compensator(1.0), Operator(1e3, 1e8, 1e9)
     limit, omega = margins.rigid_limit("y", c)
     assert 50.0 < omega < 200.0
@@ -123,11 +135,17 @@ def test_a_rigid_arm_limits_a_slower_compensator():
         ) == (limit < alone)
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: hc.Box((1.0, 0.5)), "box.mass"), (lambda: hc.Box(damper=(-1.0, 0.5)), "box.damper[low]"),
-    (lambda: hc.Box(spring=3.0), "box.spring"), (lambda: hc.Box(rigid=1), "box.rigid"),
-    (lambda: hc.worst_case("x", 1.0, 90.0, (1, 2)), "box"), (lambda: hc.worst_case("x", 0.0, 90.0, hc.Box()), "K"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: hc.Box((1.0, 0.5)), "box.mass"),
+        (lambda: hc.Box(damper=(-1.0, 0.5)), "box.damper[low]"),
+        (lambda: hc.Box(spring=3.0), "box.spring"),
+        (lambda: hc.Box(rigid=1), "box.rigid"),
+        (lambda: hc.worst_case("x", 1.0, 90.0, (1, 2)), "box"),
+        (lambda: hc.worst_case("x", 0.0, 90.0, hc.Box()), "K"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()
