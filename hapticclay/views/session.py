@@ -31,7 +31,7 @@ from ..stepping import leapfrog, loop, monitor
 from ..stepping.leapfrog import Leapfrog, written_out
 from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
-from ..theory import linear_loop
+from ..theory import gain_limit
 
 FRAME = 1.0 / 60.0  # [s] between two looks at the person
 MOST_FORCE = (
@@ -574,7 +574,7 @@ def live_verdict(
 def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
     """The gain limit of the linear loop on each axis, with this clay at the handle [N.s/m]; inf for none."""
     x, y = (
-        linear_loop.continuous_gain_limit(axis, damping, operator)
+        gain_limit.gain_limit(axis, damping, operator)
         for axis, damping in zip(AXES, b, strict=True)
     )
     return x, y
