@@ -119,7 +119,7 @@ def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
 
 
 def arm_at(q: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The engine's own kinematics and inertia of the arm, whatever `model.arm` says of it.
+    """Kinematics and inertia of the arm by the engine, independent of the formulas of `model.arm`.
 
     Args:
         q: joint angles, shoulder and elbow [rad].
@@ -163,16 +163,12 @@ class Run:
 
     def __init__(self, scenario: Scenario, every: int):
         if mujoco.get_mjcb_control() is not None:
-            raise ParameterError(
-                "mjcb_control",
-                mujoco.get_mjcb_control(),
-                "the engine must be free of control callbacks",
-            )
+            bound = "the engine must be free of control callbacks"
+            raise ParameterError("mjcb_control", mujoco.get_mjcb_control(), bound)
         self.scenario, self.every = scenario, every
         self.model, self.data = self.engine()
-        q1, q2 = arm.inverse_kinematics(
-            scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1]
-        )
+        (x, y), (ox, oy) = scenario.start, scenario.origin
+        q1, q2 = arm.inverse_kinematics(ox + x, oy + y)
         self.data.qpos[:] = q1, q2
         r1, r2 = arm.joint_velocity(*scenario.velocity, arm.jacobian(q1, q2), 1.0)
         self.data.qvel[:] = r1, r2 - r1
@@ -219,25 +215,18 @@ class Run:
         try:
             while self.outcome is None and self.i < self.pause:
                 if self.advance() or self.outcome:
-                    enough = progress and progress(
-                        self.t, self.position(self.angles, self.rates, 0.0)[0]
-                    )
-                    if enough and self.outcome is None:
+                    x, _ = self.position(self.angles, self.rates, 0.0)
+                    if progress and progress(self.t, x) and self.outcome is None:
                         self.outcome = monitor.Outcome("interrupted", self.t, self.i)
                     self.flush()
-        except (
-            ArithmeticError,
-            ValueError,
-        ) as error:  # beyond floating point, or the arm exactly straight
-            if isinstance(error, ValueError) and all(
-                map(math.isfinite, (*self.angles, *self.rates))
-            ):
+        except (ArithmeticError, ValueError) as error:
+            finite = all(map(math.isfinite, (*self.angles, *self.rates)))
+            if isinstance(error, ValueError) and finite:
                 raise
-            self.flush()
+            self.flush()  # beyond floating point, or the arm exactly straight
             if self.outcome is None:
-                self.outcome = monitor.Outcome(
-                    "out of reach", self.t, self.i, cause="the arm is stretched or folded"
-                )
+                cause = "the arm is stretched or folded"
+                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=cause)
 
     def uh(self, begin: Any, end: Any) -> Any:
         """Mean muscle force over one interval, or over many.
@@ -360,9 +349,8 @@ class Run:
             if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
                 keep = np.append(keep, good - 1)
             everything = len(keep) == rows.shape[1]
-            self.kept.append(
-                (self.looked + keep, rows if everything else rows[:, keep], b()[:, keep])
-            )
+            rows = rows if everything else rows[:, keep]
+            self.kept.append((self.looked + keep, rows, b()[:, keep]))
         self.looked += good
         return good
 
@@ -382,10 +370,8 @@ class Run:
     def brief(self) -> tuple[Any, ...]:
         """The end of the run: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
         arrays = self.arrays()
-        last = [
-            x[-1] if len(x) else (np.nan, np.nan)
-            for x in map(arrays.__getitem__, ("p", "v", "fh", "fe", "b"))
-        ]
+        final = (arrays[name] for name in ("p", "v", "fh", "fe", "b"))
+        last = [x[-1] if len(x) else (np.nan, np.nan) for x in final]
         return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
 
 
