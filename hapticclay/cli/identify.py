@@ -135,11 +135,11 @@ def save(results: Sequence[Identified], found: Drift | None, out: Path) -> None:
     from ..views import study_plots
 
     figures = {
-        name: study_plots.bode([r for r in results if r.what == what])
-        for what, name in study_plots.FIGURES.items()
+        block.figure: study_plots.identification_plot([r for r in results if r.what == what])
+        for what, block in study_plots.BLOCKS.items()
     }
     if found:
-        figures["map"] = study_plots.workspace(found)
+        figures["map"] = study_plots.workspace_plot(found)
     for name, figure in figures.items():
         with atomic(out / f"{name}.png") as f:
             figure.savefig(f, format="png")

@@ -25,7 +25,6 @@ Experiment = (
     | Annotated[Scenario, tyro.conf.subcommand("stability", constructor=stability_test)]
     | Annotated[Scenario, tyro.conf.subcommand("free", constructor=free)]
 )
-FIGURES = ("velocity", "force", "path", "force_position")  # names that plot.figures gives
 ROWS = 6  # of a kind that the table shows
 
 
@@ -114,15 +113,15 @@ def deliver(record: Record, folder: Path, plots: bool) -> None:
 def _keep(record: Record, folder: Path, plots: bool) -> None:
     earlier = (folder / "record.npz").exists()
     record.save(folder)
-    drawn = {}
-    if plots:
-        from ..views import run_plots
+    if not (plots or earlier):
+        return
+    from ..views import run_plots
 
-        drawn = run_plots.figures(record)
+    drawn = run_plots.figures(record) if plots else {}
     for name, figure in drawn.items():
         with atomic(folder / f"{name}.png") as f:
             figure.savefig(f, format="png")
-    for name in set(FIGURES) - set(drawn) if earlier else ():
+    for name in set(run_plots.FIGURES) - set(drawn) if earlier else ():
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 

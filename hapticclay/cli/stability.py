@@ -76,7 +76,7 @@ class Stability:
         from ..views import study_plots
 
         with atomic(self.out / f"{chart.kind}.png") as f:
-            study_plots.boundaries(chart).savefig(f, format="png")
+            study_plots.stability_map_plot(chart).savefig(f, format="png")
 
 
 def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:

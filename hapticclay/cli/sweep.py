@@ -117,13 +117,13 @@ class SweepCommand:
     def _draw(self, table) -> None:
         from ..views import study_plots
 
-        if len(study_plots.columns(table)) < 2:
+        if len(study_plots.swept_parameters(table)) < 2:
             return
         for value in ("status", "fe_over_v_x", "speed_x", "end_time"):
-            if all(study_plots.absent(table, value)):
+            if all(study_plots.missing_reasons(table, value)):
                 continue
             with atomic(self.out / f"{value}.png") as f:
-                study_plots.heat(table, value).savefig(f, format="png")
+                study_plots.sweep_plot(table, value).savefig(f, format="png")
             print(f"map: {self.out / f'{value}.png'}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .run import Experiment, simulate_with_progress
 from .view import Recorded
+
+if TYPE_CHECKING:
+    from ..views.film import FilmOptions
 
 
 @dataclass(frozen=True)
@@ -42,22 +45,26 @@ class Video:
         tool = Tool(self.tool_width, self.tool_depth)
         writable(self.out.parent)
         s = self.scenario
+        from ..views.film import FilmOptions
+
+        options = FilmOptions(self.camera, self.speed, self.size, self.plots, self.smooth, tool)
         made = film_with_progress(
-            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1),
-            self.out, self.camera, self.speed, self.size, self.plots, tool, self.smooth,
-        )  # fmt: skip
+            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1), self.out, options
+        )
         print(f"written to {made}")
         return 0
 
 
-def film_with_progress(
-    record: Callable[[], Record], out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool,
-    smooth: bool,
-) -> Path:  # fmt: skip
-    """Writes a film, under a progress bar, of a record that is made once it is sure that it can be filmed.
+def film_with_progress(record: Callable[[], Record], out: Path, options: FilmOptions) -> Path:
+    """Writes a film under a progress bar; the record is made once a film is known to be possible.
+
+    Args:
+        record: makes or returns the run.
+        out: the file.
+        options: of the film.
 
     Raises:
-        ParameterError: as video.film.
+        ParameterError: as film.film.
     """
     from tqdm import tqdm
 
@@ -68,5 +75,5 @@ def film_with_progress(
             tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False)
         )
 
-    film.ready(out, speed, size)
-    return film.film(record(), out, camera, speed, size, plots, tool, progress, smooth)
+    film.ready(out, options)
+    return film.film(record(), out, options, progress)

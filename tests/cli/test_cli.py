@@ -254,7 +254,7 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
 @pytest.mark.parametrize("scenario", [hc.constant_cut(t_max=0.1), hc.variable_cut(t_max=0.1), hc.free(t_max=0.1),
                                       hc.stability_test(t_max=0.1)], ids=lambda s: s.name)  # fmt: skip
 def test_names_of_figures_are_known(scenario):
-    assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
+    assert set(run_plots.figures(hc.simulate(scenario))) <= set(run_plots.FIGURES)
 
 
 def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(

@@ -263,7 +263,7 @@ def test_maps(tmp_path):
         workers=1,
     )
     table = sweep.read_sweep(tmp_path)
-    figure = study_plots.heat(table)
+    figure = study_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
@@ -271,9 +271,9 @@ def test_maps(tmp_path):
     assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(
         table["status"].to_pylist()
     )
-    study_plots.heat(table, "speed_x").savefig(tmp_path / "a.png")
+    study_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
-        study_plots.heat(table, "speedx")
+        study_plots.sweep_plot(table, "speedx")
 
 
 @pytest.mark.parametrize("package,extra", [("pyarrow", "sweep"), ("distributed", "cluster")])
@@ -459,8 +459,8 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     )
     table = sweep.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
-        assert study_plots.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
-        figure = study_plots.heat(table, value)
+        assert study_plots.missing_reasons(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        figure = study_plots.sweep_plot(table, value)
         shown = figure.axes[0].collections[0].get_array()
         np.testing.assert_array_equal(
             np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3]
@@ -469,13 +469,13 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
             shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0]
         )
         assert hatched(figure) == {"no clay reached": 6}
-    assert hatched(study_plots.heat(table, "crossing1")) == {"border not reached": 6}
+    assert hatched(study_plots.sweep_plot(table, "crossing1")) == {"border not reached": 6}
     assert figure.axes[1].get_ylabel() == "speed x [m/s]"
     free = table.set_column(
         table.column_names.index("b_x"), "b_x", [[0.0] * 9]
     )  # an experiment without clay
-    assert "no clay reached" not in study_plots.absent(free, "speed_x")
-    assert set(study_plots.absent(free, "fe_over_v_x")) == {"no clay reached"}
+    assert "no clay reached" not in study_plots.missing_reasons(free, "speed_x")
+    assert set(study_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
@@ -489,10 +489,10 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     )
     sweep.run_sweep(s, tmp_path, workers=1)
     table = sweep.read_sweep(tmp_path)
-    why = study_plots.absent(table, "fe_over_v_x")
+    why = study_plots.missing_reasons(table, "fe_over_v_x")
     marks = {
         c.get_label(): len(c.get_offsets())
-        for c in study_plots.heat(table, "fe_over_v_x").axes[0].collections
+        for c in study_plots.sweep_plot(table, "fe_over_v_x").axes[0].collections
     }
     for name in ("refused", "no clay reached"):
         assert marks[name] == why.count(name) > 0
@@ -508,20 +508,20 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
              "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
     for name, unit in units.items():
-        assert name in table.column_names and study_plots._label(name).endswith(f" [{unit}]")
+        assert name in table.column_names and study_plots._column_label(name).endswith(f" [{unit}]")
     for name, unit in {
         "operator.damper": "N.s/m",
         "operator.mass": "kg",
         "gain.x": "1/kg",
         "force.y": "N",
     }.items():
-        assert study_plots._label(name).endswith(f" [{unit}]")
+        assert study_plots._column_label(name).endswith(f" [{unit}]")
     for make in hc.SCENARIOS.values():
         for name, parameter in inspect.signature(make).parameters.items():
             if isinstance(parameter.default, float) or (
                 isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
             ):
-                assert "[" in study_plots._label(name), name
+                assert "[" in study_plots._column_label(name), name
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
-            study_plots.heat(table, text)
+            study_plots.sweep_plot(table, text)

@@ -16,7 +16,7 @@ def lines(figure):
 
 
 def test_velocity_plot_shows_measured_and_expected(run):
-    figure = run_plots.velocity_position(run)
+    figure = run_plots.velocity_plot(run)
     found = lines(figure)
     np.testing.assert_array_equal(found["measured"].get_xdata(), 100 * run.p[:, 0])
     np.testing.assert_array_equal(found["measured"].get_ydata(), run.v[:, 0])
@@ -28,7 +28,7 @@ def test_velocity_plot_shows_measured_and_expected(run):
 
 
 def test_force_plot_shows_b_beside_the_ratios(run):
-    figure = run_plots.force_velocity(run)
+    figure = run_plots.force_ratio_plot(run)
     labels = [t for t in lines(figure) if not t.startswith("_")]
     assert labels == ["operator, f$_h$/v", "clay, f$_e$/v", "10/K + b", "b"]
     b = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
@@ -43,7 +43,7 @@ def test_force_plot_shows_b_beside_the_ratios(run):
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_any_record_can_be_drawn(scenario, axis, tmp_path):
     record = hc.simulate(scenario)
-    for draw in (run_plots.velocity_position, run_plots.force_velocity):
+    for draw in (run_plots.velocity_plot, run_plots.force_ratio_plot):
         draw(record, axis).savefig(tmp_path / "p.png")
         assert (tmp_path / "p.png").stat().st_size > 5000
 
@@ -57,7 +57,7 @@ LONG = dict(impedance=True, shaping=True, gain=(1.234, 0.5678), t_max=3.0)
 ], ids=["variable", "long", "long constant", "long free", "driven", "short", "unstable"])  # fmt: skip
 def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
     record = hc.simulate(scenario)
-    for name, figure in {**run_plots.figures(record), "map": run_plots.path(record)}.items():
+    for name, figure in {**run_plots.figures(record), "map": run_plots.path_plot(record)}.items():
         figure.draw_without_rendering()
         (legend,) = figure.legends
         key, whole = legend.get_window_extent(), figure.bbox
