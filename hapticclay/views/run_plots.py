@@ -134,14 +134,14 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
             b = [f.values[int(np.searchsorted(f.edges, at[f.along]))] for f in laws]
             if not max(b):
                 continue
-            shade = dict(color=clay_color(max(b) / top), alpha=CLAY_ALPHA, lw=0)
+            shade: Any = dict(color=clay_color(max(b) / top), alpha=CLAY_ALPHA, lw=0)
             ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **shade))
             right, bottom = min(x1, high[0]), max(y0, low[1])
             shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
             if shown[0] > 0.12 and shown[1] > 0.08:
                 place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
                 text: Any = dict(ha="right", va="bottom", fontsize=8, color=GREY)
-                ax.text(*place, f"b = ({b[0]:g}, {b[1]:g})", **text)
+                ax.text(place[0], place[1], f"b = ({b[0]:g}, {b[1]:g})", **text)
 
 
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:

@@ -101,7 +101,8 @@ def figure_style(**more: Any) -> Any:
     """
     import matplotlib
 
-    return matplotlib.rc_context({**STYLE, **{k.replace("_", ".", 1): v for k, v in more.items()}})
+    parameters: Any = {**STYLE, **{k.replace("_", ".", 1): v for k, v in more.items()}}
+    return matplotlib.rc_context(parameters)
 
 
 def set_title(ax: Axes, *parts: str, **more: Any) -> None:

@@ -156,8 +156,9 @@ def small_gain_plot(
     verdict = margins.small_gain(axis, K, b, **kw)
     stable = margins.coupled_stability(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
-    n, d = linear_loop.device_admittance(axis, 0.0)
-    left = np.abs(_response(np.polysub(linear_loop.device_admittance(axis, K)[0], n), d, w))
+    passive, d = linear_loop.device_admittance(axis, 0.0)
+    active = np.polysub(linear_loop.device_admittance(axis, K)[0], passive)
+    left = np.abs(_response(active, d, w))
     loop = margins.open_loop(axis, K, b, at="compensator", **kw)
     right = left / np.abs(_response(*loop, w))
     with figure_style():

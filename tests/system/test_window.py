@@ -18,7 +18,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.views import window
-from hapticclay.views.session import FRAME, Replay, Session
+from hapticclay.views.session import FRAME_TIME, Replay, Session
 from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
@@ -215,11 +215,11 @@ def test_every_key_of_the_page_does_what_it_says():
     window = Window(session)
     press = window._key
     press(SPACE)
-    assert session.paused and not len(session.advance(FRAME))
+    assert session.paused and not len(session.advance(FRAME_TIME))
     press(SPACE)
     session.pull((0.1, 0.0))
     while session.t < 3.0:
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     pane = Pane(session.scenario, session.tool)
     pane.take(window.look([], None))
     assert pane.stage.removal.volume > 1e-6
@@ -291,7 +291,7 @@ def test_both_axes_are_drawn_where_both_are_cut():
     record = hc.simulate(hc.variable_cut(), every=10)
     replay = Replay(record)
     while not replay.ended:
-        replay.advance(FRAME)
+        replay.advance(FRAME_TIME)
     velocity = picture(replay).plots[0]
     assert velocity.figure.title == "velocity [cm/s]: x blue, y red"
     for i in (0, 1):
@@ -302,17 +302,17 @@ def test_both_axes_are_drawn_where_both_are_cut():
             v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4
         )
     one = picture(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
-    assert [len(plot.lines) for plot in one.plots] == [1, 1, 2]
+    assert [len(plot.curves) for plot in one.plots] == [1, 1, 2]
 
 
 def test_a_replay_offers_the_keys_that_act_on_it():
-    from hapticclay.views.window import LIVE, REPLAY, Window
+    from hapticclay.views.window import LIVE_KEYS, REPLAY_KEYS, Window
 
     record = hc.simulate(hc.constant_cut(t_max=0.5), every=10)
     replay = Replay(record)
     window = Window(replay)
     window.look([], None)
-    assert {row[0] for row in LIVE} - {row[0] for row in REPLAY} == {
+    assert {row[0] for row in LIVE_KEYS} - {row[0] for row in REPLAY_KEYS} == {
         "Ctrl + right drag", "up, down", "left, right", "1, 2, 3", "R"
     }  # fmt: skip
     before = dict(vars(replay))
@@ -347,7 +347,7 @@ def test_a_window_that_fails_leaves_the_record(monkeypatch):
 
         def say(sight):
             answers.append(sight)
-            time.sleep(FRAME)
+            time.sleep(FRAME_TIME)
             heard.put(([], (0.1, 0.0)) if len(answers) < 30 else "Traceback\nValueError: no ink")
 
         yield heard, say

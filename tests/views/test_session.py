@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.views.session import FRAME, MOST_FORCE, Clock, Player, Replay, Session, played
+from hapticclay.views.session import (
+    FRAME_TIME,
+    LONGEST_SLICE,
+    Clock,
+    Player,
+    Replay,
+    Session,
+    played,
+)
 from hapticclay.views.stage import Stage
 
 
@@ -15,7 +23,7 @@ def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
     end = session.t + seconds
     while session.t < end - 1e-6 and not session.ended:
         session.pull(way(session.t))
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     return session
 
 
@@ -28,7 +36,7 @@ def test_hand_feels_the_clay(scenario):
     moving = (np.abs(record.v) > 1e-3) & (record.b > 0.0)
     assert moving.sum() > 1000
     np.testing.assert_allclose(record.ratio(record.fe)[moving], record.b[moving], rtol=1e-9)
-    assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME)
+    assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME_TIME)
     assert (
         abs(record.energy["residual"]) < 1e-4 * record.energy["throughput"]
     )  # second order in the step
@@ -54,7 +62,7 @@ def test_pull_is_the_impedance_towards_the_point():
 def test_slices_are_no_part_of_the_result():
     """A still target: slices of 1/60 s, of 1/200 s and one headless run with the same muscle force agree."""
     ends = []
-    for frame in (FRAME, 0.005, MOST_FORCE):
+    for frame in (FRAME_TIME, 0.005, LONGEST_SLICE):
         session = Session(hc.constant_cut(), stiffness=10.0)
         session.pull((0.0, 0.0))
         session.push((2.0, 0.0))
@@ -91,7 +99,7 @@ def test_letting_go_leaves_the_handle_to_itself():
     session = drag(Session(hc.free(), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
     session.pull(None)
     for _ in range(120):
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     p, v = session.frames[-1][1:3]
     assert abs(v[0]) < 1e-4 and p[0] > 0.03
 
@@ -99,14 +107,14 @@ def test_letting_go_leaves_the_handle_to_itself():
 def test_pause_restart_and_record_switch():
     session = drag(Session(hc.constant_cut(), stiffness=10.0), 0.5)
     session.paused = True
-    assert len(session.advance(FRAME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME)
+    assert len(session.advance(FRAME_TIME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME_TIME)
     session.paused, session.recording = False, False
     drag(session, 0.5)
     session.recording = True
     drag(session, 0.5)
     record = session.record()
     gap = np.diff(record.t).max()
-    assert gap == pytest.approx(0.5, abs=2 * FRAME)
+    assert gap == pytest.approx(0.5, abs=2 * FRAME_TIME)
     session.recording = False
     session.restart()
     assert session.t == 0.0 and not session.recorded and not session.recording
@@ -150,7 +158,7 @@ def test_clay_is_removed_while_recording_is_off_too():
     stage = Stage(session.scenario, session.tool)
     stage.carve([f[1] for f in session.frames])
     record = session.record()
-    assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME)
+    assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME_TIME)
     assert stage.removal.volume == pytest.approx(record.extra["removed"][-1], rel=5e-3)
     straight_on = hc.removed(record)[0][-1]
     assert record.extra["removed"][-1] > 1.1 * straight_on
@@ -172,7 +180,7 @@ def test_out_of_reach_ends_it_with_a_reason():
     session = Session(hc.free(), stiffness=1.0)
     session.push((30.0, 0.0))
     for _ in range(600):
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     assert "stretched" in session.ended and session.record().outcome.code == "out of reach"
 
 
@@ -206,10 +214,10 @@ def test_slow_machine_slows_the_clock_evenly():
     clock, made = Clock(), []
     for k in range(100):
         made.append(clock.due(0.2 * k))
-    assert clock.slow and set(np.round(made[1:], 12)) == {MOST_FORCE}
+    assert clock.slow and set(np.round(made[1:], 12)) == {LONGEST_SLICE}
     assert clock.factor == pytest.approx(0.25, rel=0.02)
     clock.rest()
-    assert clock.due(1000.0) <= MOST_FORCE  # a pause is not made good
+    assert clock.due(1000.0) <= LONGEST_SLICE  # a pause is not made good
 
 
 def test_player_plays_and_stops():
@@ -237,7 +245,7 @@ def test_replay_follows_the_record():
     record = hc.simulate(hc.constant_cut(), every=10)
     replay, went = Replay(record), [record.p[:1]]
     while not replay.ended:
-        went.append(replay.advance(FRAME))
+        went.append(replay.advance(FRAME_TIME))
     assert replay.ended == record.status
     np.testing.assert_array_equal(np.concatenate(went)[-1], record.p[-1])
 
@@ -279,7 +287,7 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     replay, said = Replay(record), []
     while not replay.ended:
         said.append((replay.t, replay.verdict()))
-        replay.advance(FRAME)
+        replay.advance(FRAME_TIME)
     said.append((replay.t, replay.verdict()))
     assert all(v.unstable == (bool(axis) and t >= record.outcome.time) for t, v in said)
     assert said[-1][1].unstable == bool(axis)
