@@ -54,7 +54,7 @@ STYLE: Any = {
 }
 TITLE_SIZE = 9.0  # [points]
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
-CLAY_ALPHA = 0.5  # of clay behind curves
+CLAY_ALPHA = 0.35  # of clay behind curves
 
 
 def rgb(color: str) -> tuple[float, float, float]:

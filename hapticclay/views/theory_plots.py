@@ -108,7 +108,7 @@ def nyquist_plot(
     with figure_style():
         figure = Figure(figsize=(5.6, 5.8))
         ax = figure.add_subplot()
-        turn = np.linspace(0.0, 2.0 * np.pi, 361)
+        columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
         ax.plot(np.cos(turn), np.sin(turn), color="#999999", lw=0.9, ls=(0, (4, 3)))
         for K, (color, style) in zip(gains, CURVE_STYLES, strict=False):
             found = margins.nyquist(axis, K, b, **kw)
@@ -118,6 +118,7 @@ def nyquist_plot(
                 label = f"K = {K:g}: {gain}, {math.degrees(m.phase):.3g}\u00b0"
             else:
                 label = f"K = {K:g}: unstable, {found.Z} poles on the right"
+                columns = 1  # two such labels are wider than the figure
             ax.plot(found.L.real, found.L.imag, color=color, ls=style, label=label)
             _arrow(ax, found.L, color)
             if m.stable and math.isfinite(m.gain[1]):
@@ -130,7 +131,7 @@ def nyquist_plot(
         ax.set(xlabel="real part of L", ylabel="imaginary part of L", aspect="equal")
         ax.set(xlim=(-2.6, 1.6), ylim=(-2.3, 1.5))
         title = "margins of gain (circle) and phase (square); arrows: rising frequency"
-        add_legend(figure, ax, 2, title=title, title_fontsize=9)
+        add_legend(figure, ax, columns, title=title, title_fontsize=9)
         set_title(ax, f"{_loop_name(axis, b, operator)}; broken {BREAKS[at]}")
     return figure
 

@@ -75,3 +75,13 @@ def test_transparency_is_drawn_for_each_design():
     )
     curve = next(line for line in figure.axes[0].lines if line.get_label() == "as printed")
     assert curve.get_ydata()[0] == pytest.approx(0.9, rel=1e-3)  # K b/(10 + K b)
+
+
+@pytest.mark.parametrize(
+    "gains", [(1.0,), (1.0, 25.0), (0.5, 1.0, 2.0), (1.0, 6.0, 12.0, 25.0, 50.0)], ids=str
+)
+def test_nyquist_legend_stays_within_the_figure(gains):
+    figure = plots.nyquist_plot("x", 50.0, gains, operator=HAND)
+    figure.draw_without_rendering()
+    box, whole = figure.legends[0].get_window_extent(), figure.bbox
+    assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1
