@@ -159,7 +159,7 @@ def _map_parts(chart: StabilityMap) -> list[str]:
 # Identification
 
 
-class Block(NamedTuple):
+class PlottedBlock(NamedTuple):
     """How an identified block is presented.
 
     Attributes:
@@ -176,9 +176,9 @@ class Block(NamedTuple):
 
 
 BLOCKS = {
-    "G": Block("fig4", "G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
-    "S": Block("fig5", "S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
-    "Th": Block("fig6", "T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
+    "G": PlottedBlock("fig4", "G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
+    "S": PlottedBlock("fig5", "S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
+    "Th": PlottedBlock("fig6", "T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
 }
 
 

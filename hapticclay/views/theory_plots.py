@@ -28,7 +28,7 @@ from .style import (
 )
 
 FAILS, BAND = "#F3D9C6", "#EEEEEE"  # behind frequencies: where (13) fails, where designs compare
-BREAKS = {"force": "at the net force", "compensator": "at the compensator"}
+BREAK_NAMES = {"force": "at the net force", "compensator": "at the compensator"}
 OMEGA_LABEL = "angular frequency [rad/s]"
 
 
@@ -53,7 +53,7 @@ def bode_plot(
         compensator: its shape.
         omega: range shown [rad/s].
     """
-    kw: Any = dict(_hand(operator), at=at, compensator=compensator)
+    kw: Any = dict(_hand_arguments(operator), at=at, compensator=compensator)
     m = margins.margins(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
     L = _response(*margins.open_loop(axis, K, b, **kw), w)
@@ -83,7 +83,9 @@ def bode_plot(
         low.set(xlabel=OMEGA_LABEL, ylabel="phase of L [degrees]", xlim=omega)
         low.set_yticks(np.arange(45.0 * math.floor(phase.min() / 45.0), phase.max() + 45.0, 45.0))
         state = "" if m.stable else " (unstable)"
-        set_title(top, f"{_loop_name(axis, b, operator)}, K = {K:g}{state}; broken {BREAKS[at]}")
+        set_title(
+            top, f"{_loop_name(axis, b, operator)}, K = {K:g}{state}; broken {BREAK_NAMES[at]}"
+        )
     return figure
 
 
@@ -104,7 +106,7 @@ def nyquist_plot(
         operator: the hand; None for no hand.
         at: where the loop is broken, "compensator" or "force".
     """
-    kw: Any = dict(_hand(operator), at=at)
+    kw: Any = dict(_hand_arguments(operator), at=at)
     with figure_style():
         figure = Figure(figsize=(5.6, 5.8))
         ax = figure.add_subplot()
@@ -132,7 +134,7 @@ def nyquist_plot(
         ax.set(xlim=(-2.6, 1.6), ylim=(-2.3, 1.5))
         title = "margins of gain (circle) and phase (square); arrows: rising frequency"
         add_legend(figure, ax, columns, title=title, title_fontsize=9)
-        set_title(ax, f"{_loop_name(axis, b, operator)}; broken {BREAKS[at]}")
+        set_title(ax, f"{_loop_name(axis, b, operator)}; broken {BREAK_NAMES[at]}")
     return figure
 
 
@@ -153,7 +155,7 @@ def small_gain_plot(
         operator: the hand; None for no hand.
         omega: range shown [rad/s].
     """
-    kw: Any = _hand(operator)
+    kw: Any = _hand_arguments(operator)
     verdict = margins.small_gain(axis, K, b, **kw)
     stable = margins.coupled_stability(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
@@ -213,7 +215,7 @@ def transparency_plot(
     return figure
 
 
-def _hand(operator: Operator | None) -> dict[str, Any]:
+def _hand_arguments(operator: Operator | None) -> dict[str, Any]:
     return {"operator": operator, "impedance": operator is not None}
 
 

@@ -141,7 +141,7 @@ class Pane:
         while True:
             begin = time.perf_counter()
             with viewer.lock():
-                hand, grip = _hand(viewer, grip)
+                hand, grip = _mouse_displacement(viewer, grip)
                 viewer.opt.geomgroup[:] = groups  # undo the viewer's own 1, 2, 3
                 if hand is None:
                     viewer.perturb.select, viewer.perturb.localpos[:] = body, (0.0, 0.0, 0.05)
@@ -175,7 +175,7 @@ class Pane:
         viewer.set_figures(figures)
 
 
-def _hand(viewer: Any, grip: np.ndarray | None) -> tuple[Any, np.ndarray | None]:
+def _mouse_displacement(viewer: Any, grip: np.ndarray | None) -> tuple[Any, np.ndarray | None]:
     """Displacement of the mouse since it took hold (x, y) [m], None while it does not; and grip.
 
     The viewer moves its point in a plane through the grip, upright unless shift is held: height

@@ -49,7 +49,7 @@ def page():
 
 
 def press(slider, key, times):
-    """One after the other: a key that comes before the last one is drawn starts from the value before it."""
+    """Presses a key again once its last effect is drawn: before, it acts on the old value."""
     from playwright.sync_api import expect
 
     for _ in range(times):
@@ -117,7 +117,7 @@ def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
 @pytest.mark.parametrize("scenario", [hc.constant_cut, hc.variable_cut, hc.free, hc.stability_test])
 @pytest.mark.parametrize("width,height", [(580, 600), (960, 800), (1600, 1000)])
 def test_first_view_holds_arm_and_clay(scenario, width, height):
-    """A pinhole camera, worked out here; 580 x 600 is what the controls leave of a page of 900 x 600."""
+    """Projects by a pinhole camera; the controls leave 580 x 600 of a page of 900 x 600."""
     from hapticclay.views import stage
 
     page = Page(Session(scenario()), port=0)
@@ -183,7 +183,7 @@ UPGRADE = (
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_no_other_name_and_no_other_page_gets_in(host):
-    """A browser sends in Host the name that it was told, and in Origin whose page it shows; with a cookie or not."""
+    """Host holds the name that the browser was given, Origin the page it shows."""
     page = Page(Session(hc.constant_cut()), host=host, port=0)
     port = page.port
     own, cookie = f"127.0.0.1:{port}", [f"Cookie: hapticclay={page.guard.token}"]
@@ -220,8 +220,9 @@ def test_no_other_name_and_no_other_page_gets_in(host):
                     "HTTP/1.1 400 Bad Request",
                 ), bad
         assert ask() == ask(f"Host: {own}", "Host: evil.example") == "HTTP/1.1 403 Forbidden"
-        for origin in ("http://evil.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{port + 1}",
-                       f"http://localhost:{port}", f"http://{own}.evil.example", "file://"):  # fmt: skip
+        foreign = ["http://evil.example", "null", "file://", f"http://{own}.evil.example"]
+        foreign += ["http://127.0.0.1", f"http://127.0.0.1:{port + 1}", f"http://localhost:{port}"]
+        for origin in foreign:
             for more in ((), UPGRADE):
                 assert (
                     ask(f"Host: {own}", f"Origin: {origin}", *more) == "HTTP/1.1 403 Forbidden"
@@ -320,7 +321,7 @@ def test_taken_or_impossible_port_is_refused(host):
 
 
 def test_reset_while_the_hand_holds_goes_on(page):
-    """The box is unticked by the reset, which is told to the session at once, by the thread that holds the lock."""
+    """The reset unticks the box, which calls the session from the thread that holds the lock."""
     page.hold.value = True
     assert page.session.point is not None
     thread = threading.Thread(target=page._reset, args=(None,), daemon=True)

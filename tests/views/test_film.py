@@ -60,7 +60,7 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
 
 @needs_gl
 def test_frame_is_quick_in_software(record):
-    """Below 60 ms of processor time at 640x480; wall time says more about the neighbours than about us."""
+    """A frame of 640x480 takes less than 60 ms of processor time; wall time depends on load."""
     images = film.frames(record, FilmOptions(size=(640, 480)))
     next(images)
     spent = []
@@ -96,7 +96,7 @@ def test_film_can_be_read_back(record, tmp_path, kind):
 
 
 def filmed(folder, blocked, out="x.mp4", **env):
-    """What `hapticclay video` says where a module is missing; a simulation would raise."""
+    """Message of `hapticclay video` where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
         "from hapticclay.cli import app, view; view.simulate_with_progress = None\n"
@@ -143,7 +143,8 @@ def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
     """MuJoCo itself refuses to be imported with such a setting."""
     code = (
         f"import os, sys; sys.modules[{blocked!r}] = None\n"
-        "import hapticclay as hc; print(hc.simulate(hc.constant_cut(t_max=0.1)).status, os.environ['MUJOCO_GL'])"
+        "import hapticclay as hc; status = hc.simulate(hc.constant_cut(t_max=0.1)).status\n"
+        "print(status, os.environ['MUJOCO_GL'])"
     )
     env = {**os.environ, "MUJOCO_GL": wanted}
     p = subprocess.run(
@@ -255,7 +256,7 @@ def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario,
     "size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str
 )
 def test_small_films_have_what_fits_and_whole_titles(record, size):
-    """The title's box is darker than the sky behind it; a clipped one would reach the right edge of the picture."""
+    """The title's box is darker than the sky; a clipped one would reach the right edge."""
     images = film.frames(record, FilmOptions(speed=50.0, size=size))
     image = next(images).astype(int)
     images.close()

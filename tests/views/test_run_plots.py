@@ -1,8 +1,12 @@
+"""What the plots of a run show is what the record holds."""
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import hapticclay as hc
+from hapticclay.cli import app
 from hapticclay.views import run_plots
 
 
@@ -51,10 +55,18 @@ def test_any_record_can_be_drawn(scenario, axis, tmp_path):
 LONG = dict(impedance=True, shaping=True, gain=(1.234, 0.5678), t_max=3.0)
 
 
-@pytest.mark.parametrize("scenario", [
-    hc.variable_cut(), hc.variable_cut(**LONG), hc.constant_cut(**LONG, force=(1.234, -0.5678)), hc.free(**LONG),
-    hc.stability_test(25.0, shaping=True, t_max=3.0), hc.constant_cut(t_max=0.1), hc.constant_cut(gain=(1.0, 1.0)),
-], ids=["variable", "long", "long constant", "long free", "driven", "short", "unstable"])  # fmt: skip
+SCENARIOS = {
+    "variable": hc.variable_cut(),
+    "long": hc.variable_cut(**LONG),
+    "long constant": hc.constant_cut(**LONG, force=(1.234, -0.5678)),
+    "long free": hc.free(**LONG),
+    "driven": hc.stability_test(25.0, shaping=True, t_max=3.0),
+    "short": hc.constant_cut(t_max=0.1),
+    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS.keys())
 def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
     record = hc.simulate(scenario)
     for name, figure in {**run_plots.figures(record), "map": run_plots.path_plot(record)}.items():
@@ -73,3 +85,27 @@ def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
                 )
                 assert not box.overlaps(key), (name, said)
         assert figure.axes[0].get_title(loc="left").startswith(scenario.name)
+
+
+def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
+    """`hapticclay run` writes it, and a later run in the same folder without plots removes it."""
+
+    def power(record):
+        figure = Figure()
+        figure.add_subplot().plot(record.t, (record.fh * record.v).sum(axis=1))
+        return figure
+
+    monkeypatch.setitem(run_plots.FIGURES, "power", power)
+    args = ["run", "constant", "--t-max", "0.1", "--out", str(tmp_path)]
+    assert app.main(args) == 0
+    plots = {"velocity.png", "force.png", "power.png"}
+    files = {"record.npz", "summary.json"}
+    assert {path.name for path in tmp_path.iterdir()} == plots | files
+    assert app.main([*args, "--no-plots"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == files
+
+
+def test_a_figure_that_does_not_apply_is_not_drawn(run, monkeypatch):
+    assert set(run_plots.figures(run)) == {"velocity", "force"}
+    monkeypatch.setitem(run_plots.FIGURES, "velocity", lambda record: None)
+    assert set(run_plots.figures(run)) == {"force"}

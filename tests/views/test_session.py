@@ -60,7 +60,7 @@ def test_pull_is_the_impedance_towards_the_point():
 
 
 def test_slices_are_no_part_of_the_result():
-    """A still target: slices of 1/60 s, of 1/200 s and one headless run with the same muscle force agree."""
+    """With a still target, slices of two lengths and a headless run with that force agree."""
     ends = []
     for frame in (FRAME_TIME, 0.005, LONGEST_SLICE):
         session = Session(hc.constant_cut(), stiffness=10.0)
@@ -95,7 +95,7 @@ def test_gain_and_damping_change_while_it_runs():
 
 
 def test_letting_go_leaves_the_handle_to_itself():
-    """No force of the hand but its mass and damper: 10/K and d slow the handle down, no spring calls it back."""
+    """The hand's mass and damper remain: 10/K and d slow the handle, no spring pulls it back."""
     session = drag(Session(hc.free(), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
     session.pull(None)
     for _ in range(120):
@@ -140,7 +140,7 @@ def straight(t):
 
 
 def test_removed_volume_is_width_times_depth_times_length_and_what_the_picture_shows():
-    """In the constant cut, to 1 %: the slab is 10 cm long, and a hand that pulls along x leaves it little."""
+    """To 1 % in the constant cut: the slab is 10 cm long, and the path nearly straight."""
     session = drag(Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, straight)
     stage = Stage(session.scenario, session.tool)
     stage.carve([f[1] for f in session.frames])
@@ -150,7 +150,7 @@ def test_removed_volume_is_width_times_depth_times_length_and_what_the_picture_s
 
 
 def test_clay_is_removed_while_recording_is_off_too():
-    """A way off the straight, and back, that the record does not hold: the volume is that of the picture."""
+    """The record lacks a detour; its volume is still that of the picture."""
     session = Session(hc.constant_cut(), stiffness=10.0, every=10)
     for recording, y in ((False, 0.0), (True, 0.0), (False, 0.05), (False, 0.0), (True, 0.0)):
         session.recording = recording
@@ -251,7 +251,7 @@ def test_replay_follows_the_record():
 
 
 def test_verdict_follows_the_monitor_and_the_gain():
-    """K_y above, below and again above nothing: the limit is where the poles of Eq. 8 cross, by numpy's roots."""
+    """K_y below its limit, above it, and below again: the verdict names each."""
     session = Session(hc.constant_cut(), stiffness=10.0)
     assert session.verdict().text == "stable; limit of K here: none"
     session.push((0.0, 0.2))
