@@ -129,7 +129,7 @@ class Page:
         )
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.fov = (0.21, -0.66, 0.64), (0.18, 0.15, -0.04), 0.60
-        sky = np.linspace(*map(rgb_bytes, SKY), 64).astype(np.uint8)
+        sky = np.linspace(rgb_bytes(SKY[0]), rgb_bytes(SKY[1]), 64).astype(np.uint8)
         add.set_background_image(sky[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)

@@ -85,7 +85,7 @@ class Stage:
         if scenario.clay is not None:
             low = origin + (grid.x[0], grid.y[0])
             high = origin + (grid.x[-1], grid.y[-1])
-            rows, columns = grid.cut.shape
+            rows, columns = len(grid.y), len(grid.x)
             block = Block(low, high, rows, columns, THICKNESS, self._colors())
         self.model = picture(block, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)

@@ -33,6 +33,8 @@ from .style import (
     CURVE_STYLES,
     GREEN,
     GREY,
+    LIGHT_GREY,
+    MID_GREY,
     ORANGE,
     PALE_GREY,
     PURPLE,
@@ -310,9 +312,9 @@ def _workspace_frame(ax: Axes) -> None:
     """Draws the limits of the reach, the shoulder, the default path and the nominal pose."""
     for r in (L1 + L2, abs(L2 - L1)):
         size = 2.0 * r, 2.0 * r
-        ax.add_patch(Arc((0.0, 0.0), *size, theta2=180.0, color=PALE_GREY, lw=2.0))
-    ax.plot([], [], color=PALE_GREY, lw=2.0, label="limits of the reach")
-    ax.plot(0.0, 0.0, "^", color=PALE_GREY, ms=7, clip_on=False, label="shoulder")
+        ax.add_patch(Arc((0.0, 0.0), *size, theta2=180.0, color=MID_GREY, lw=2.0))
+    ax.plot([], [], color=MID_GREY, lw=2.0, label="limits of the reach")
+    ax.plot(0.0, 0.0, "^", color=MID_GREY, ms=7, clip_on=False, label="shoulder")
     x, y = ORIGIN
     ax.plot((x, x + PATH_LENGTH), (y, y), color=VERMILION, label="default path")
     pose: Any = dict(mfc="none", mec=VERMILION, mew=2.0, ms=9)
@@ -325,7 +327,7 @@ def _workspace_frame(ax: Axes) -> None:
 OUTCOME_COLORS = {  # from good to bad
     "finished": BLUE,
     "time limit": SKY_BLUE,
-    "stalled": "#BBBBBB",
+    "stalled": LIGHT_GREY,
     "saturated": YELLOW,
     "limit cycle": ORANGE,
     "diverged": VERMILION,
@@ -335,9 +337,9 @@ OUTCOME_COLORS = {  # from good to bad
 }
 MISSING = {  # why a run has no figure: look of its cell and of its point
     "refused": dict(color=BLACK, hatch="", marker="X"),
-    "no clay reached": dict(color="#E4E4E4", hatch="////", marker="x"),
-    "border not reached": dict(color="#E4E4E4", hatch="////", marker="x"),
-    "no steady speed": dict(color="#F4F4F4", hatch="....", marker="+"),
+    "no clay reached": dict(color=PALE_GREY, hatch="////", marker="x"),
+    "border not reached": dict(color=PALE_GREY, hatch="////", marker="x"),
+    "no steady speed": dict(color=PALE_GREY, hatch="....", marker="+"),
     "no figure": dict(color=WHITE, hatch="xxxx", marker="1"),
 }
 COLUMN_UNITS = {
@@ -494,7 +496,7 @@ def _draw_grid(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[
             square = ((0, 0), (1, 0), (1, 1), (0, 1))
             corners = np.stack([(ex[i + u], ey[j + v]) for u, v in square])
             style: Any = dict(facecolor=kind["color"], hatch=kind["hatch"], linewidth=0.0)
-            style["edgecolor"] = PALE_GREY
+            style["edgecolor"] = MID_GREY
             cells = Path.make_compound_path_from_polys(corners.transpose(2, 0, 1))
             ax.add_patch(PathPatch(cells, **style))
             handles.append(Patch(label=name, **style))
@@ -508,7 +510,7 @@ def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, lis
     for k, (name, kind) in enumerate(MISSING.items()):
         at = data.kind == k
         if at.any():
-            style: Any = dict(marker=kind["marker"], color=OUTCOME_COLORS.get(name, PALE_GREY))
+            style: Any = dict(marker=kind["marker"], color=OUTCOME_COLORS.get(name, MID_GREY))
             style.update(s=size, linewidths=0.8, label=name)
             handles.append(ax.scatter(data.x[at], data.y[at], **style))
     points = ax.scatter(data.x[good], data.y[good], c=data.z[good], s=size, **look)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 # Okabe and Ito (2008), distinct under every form of colour blindness
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 PURPLE, SKY_BLUE, YELLOW = "#CC79A7", "#56B4E9", "#F0E442"
-BLACK, GREY, PALE_GREY, WHITE = "#222222", "#555555", "#888888", "#FFFFFF"
+BLACK, WHITE = "#222222", "#FFFFFF"
+GREY, MID_GREY, LIGHT_GREY, PALE_GREY = "#555555", "#888888", "#BBBBBB", "#E6E6E6"
 CURVE_STYLES: tuple[tuple[str, Any], ...] = (
     (BLUE, "-"),
     (VERMILION, "--"),
@@ -45,7 +46,7 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#DDDDDD",
+    "grid.color": PALE_GREY,
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
@@ -58,13 +59,21 @@ CLAY_ALPHA = 0.35  # of clay behind curves
 
 
 def rgb(color: str) -> tuple[float, float, float]:
-    """Converts a hex colour to three numbers from 0 to 1."""
+    """Converts a hex colour to three numbers from 0 to 1.
+
+    Args:
+        color: such as "#0072B2".
+    """
     r, g, b = rgb_bytes(color)
     return r / 255.0, g / 255.0, b / 255.0
 
 
 def rgb_bytes(color: str) -> tuple[int, int, int]:
-    """Converts a hex colour to three bytes."""
+    """Converts a hex colour to three bytes.
+
+    Args:
+        color: such as "#0072B2".
+    """
     r, g, b = bytes.fromhex(color.removeprefix("#"))
     return r, g, b
 
@@ -153,7 +162,11 @@ def hand_name(operator: Operator | None) -> str:
 
 
 def unit_text(text: str) -> str:
-    """Typesets the units in a text: N.s/m with a centred dot, s^2 with an exponent."""
+    """Typesets units: N.s/m with a centred dot, s^2 with an exponent.
+
+    Args:
+        text: that holds the units.
+    """
     return text.replace("N.", "N$\\cdot$").replace("^2", "$^2$")
 
 

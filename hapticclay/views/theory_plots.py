@@ -20,6 +20,8 @@ from .style import (
     BLUE,
     CURVE_STYLES,
     GREEN,
+    MID_GREY,
+    PALE_GREY,
     VERMILION,
     add_legend,
     figure_style,
@@ -27,7 +29,6 @@ from .style import (
     set_title,
 )
 
-FAILS, BAND = "#F3D9C6", "#EEEEEE"  # behind frequencies: where (13) fails, where designs compare
 BREAK_NAMES = {"force": "at the net force", "compensator": "at the compensator"}
 OMEGA_LABEL = "angular frequency [rad/s]"
 
@@ -111,7 +112,7 @@ def nyquist_plot(
         figure = Figure(figsize=(5.6, 5.8))
         ax = figure.add_subplot()
         columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
-        ax.plot(np.cos(turn), np.sin(turn), color="#999999", lw=0.9, ls=(0, (4, 3)))
+        ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=0.9, ls=(0, (4, 3)))
         for K, (color, style) in zip(gains, CURVE_STYLES, strict=False):
             found = margins.nyquist(axis, K, b, **kw)
             m = margins.margins(axis, K, b, **kw)
@@ -169,7 +170,7 @@ def small_gain_plot(
         ax = figure.add_subplot()
         for k, (low, high) in enumerate(verdict.fails):
             span = max(low, omega[0]), min(high, omega[1])
-            ax.axvspan(*span, color=FAILS, lw=0, label="_" if k else "fails", zorder=0)
+            ax.axvspan(*span, color=VERMILION, alpha=0.2, lw=0, label="_" if k else "fails")
         ax.loglog(w, left, color=BLUE, label="|G C|")
         ax.loglog(w, right, color=VERMILION, ls="--", label="|1/(T$_e$ + T$_h$) + S$_h$|")
         ax.set(xlabel=OMEGA_LABEL, ylabel="handle over force [m/N]", xlim=omega)
@@ -202,7 +203,7 @@ def transparency_plot(
     with figure_style():
         figure = Figure(figsize=(6.4, 3.8))
         ax = figure.add_subplot()
-        ax.axvspan(*band, color=BAND, lw=0, zorder=0)
+        ax.axvspan(*band, color=PALE_GREY, lw=0, zorder=0)
         ax.axhline(1.0, color=BLACK, lw=0.8)
         for (label, K, shape), (color, style) in zip(designs, CURVE_STYLES, strict=False):
             share = np.abs(margins.transparency(axis, K, b, w, compensator=shape))

@@ -27,7 +27,7 @@ from ..stepping.engine import mujoco
 from ..studies.removal import Tool
 from .session import FRAME_TIME, Frame
 from .stage import Stage, plotted_axes
-from .style import BLACK, COLOR_NAMES, FORCE_COLORS, WHITE, rgb, verdict_color
+from .style import BLACK, COLOR_NAMES, FORCE_COLORS, PALE_GREY, WHITE, rgb, verdict_color
 
 Rows = tuple[tuple[str, str], ...]
 PLOTS_WIDTH = 0.32  # of the window's
@@ -334,7 +334,7 @@ class LivePlot:
         figure.flg_ticklabel[:] = 1
         figure.xformat, figure.yformat = "%.3g", "%.3g"
         figure.figurergba[:] = figure.panergba[:] = (*rgb(WHITE), 1.0)
-        figure.gridrgb[:] = (0.85, 0.85, 0.85)
+        figure.gridrgb[:] = rgb(PALE_GREY)
         figure.textrgb[:] = rgb(BLACK)
         figure.linewidth = 2.0
         for j, curve in enumerate(self.curves):
