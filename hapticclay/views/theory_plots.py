@@ -109,7 +109,7 @@ def nyquist_plot(
     """
     kw: Any = dict(_hand_arguments(operator), at=at)
     with figure_style():
-        figure = Figure(figsize=(5.6, 5.8))
+        figure = Figure(figsize=(5.6, 5.7 + 0.2 * len(gains)))  # for the legend
         ax = figure.add_subplot()
         columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
         ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=0.9, ls=(0, (4, 3)))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import hapticclay as hc
 from hapticclay.views import theory_plots as plots
@@ -85,3 +86,7 @@ def test_nyquist_legend_stays_within_the_figure(gains):
     figure.draw_without_rendering()
     box, whole = figure.legends[0].get_window_extent(), figure.bbox
     assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1
+    ax = figure.axes[0]
+    assert ax.xaxis.label.get_window_extent().y0 >= 1.0
+    (title,) = ax.findobj(lambda x: isinstance(x, Text) and "broken at" in x.get_text())
+    assert not title.get_window_extent().overlaps(box)
