@@ -91,7 +91,7 @@ def page(found: list[dict[str, Any]]) -> str:
     return "\n\n".join(
         [
             "# Coverage of the intervals of `identify`",
-            f"Share of {n} seeds whose {100 * identification.COVER:g} % interval holds the printed value, and half the "
+            f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval holds the printed value, and half the "
             f"median interval as a share of it. By chance alone, two thirds of the shares are within "
             f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do not edit.",
             tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],

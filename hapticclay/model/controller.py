@@ -13,10 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ..errors import choice, number
 from . import arm
-from .constants import AXES, C_POLE, G, SecondOrder
+from .constants import AXES, C_POLE, G, S, SecondOrder
 
 
 def servo_coefficients(
@@ -207,25 +208,54 @@ def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tu
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
-def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample under a held force: z+ = A z + B f, exact.
-
-    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark,
-    Computer-Controlled Systems).
+def feedback_vector(axis: str) -> np.ndarray:
+    """Servo acceleration of the law above, without forces, as a row over the state of one axis.
 
     Args:
         axis: "x" or "y".
-        K: compensator gain.
-        T: hold [s].
 
     Returns:
-        A, shape (4, 4), and B, shape (4,).
+        Shape (6,): p'' = feedback @ (p, p', delta, delta', y, y').
+    """
+    i = AXES.index(choice("axis", axis, AXES))
+    g, s = G[i], S[i]
+    reference = [g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
+    return np.array([-s.stiffness, -s.damping, *reference])
+
+
+def controller_matrices(axis: str, K: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
+
+    Args:
+        axis: "x" or "y".
+        K: gain of the compensator.
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,), with z = (delta, delta', y, y') and y = G delta.
     """
     g = G[AXES.index(choice("axis", axis, AXES))]
+    A, B = np.zeros((4, 4)), np.zeros(4)
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, 1], B[1] = -PRINTED.pole, K
+    A[3] = g.gain, 0.0, -g.stiffness, -g.damping
+    return A, B
+
+
+def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample in which the net force is held: z+ = A z + B f.
+
+    Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
+
+    Args:
+        axis: "x" or "y".
+        K: gain of the compensator.
+        T: length of the sample [s].
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,); z as in `controller_matrices`.
+    """
     m = np.zeros((5, 5))
-    m[0, 1] = m[2, 3] = 1.0
-    m[1, 1], m[1, 4] = -C_POLE, K
-    m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
+    m[:4, :4], m[:4, 4] = controller_matrices(axis, K)
     e = matrix_exponential(T * m)
     return e[:4, :4], e[:4, 4]
 
@@ -246,30 +276,28 @@ def matrix_exponential(a: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Compensator:
-    """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
+    """Shape of the compensator: C = K (s + zero)/(s (s + pole)), or K/(s (s + pole)) with no zero.
 
     Attributes:
-        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
+        pole: [rad/s]; 10 as printed (Eqs. 20, 22, 27).
+        zero: [rad/s], a lead if below the pole; None for no zero.
     """
 
     pole: float = C_POLE
     zero: float | None = None
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s")
-        )
-        if self.zero is not None:
-            object.__setattr__(
-                self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s")
-            )
+        for field in ("pole", "zero"):
+            value = getattr(self, field)
+            if value is not None or field == "pole":
+                value = number(f"compensator.{field}", value, 0.0, above=True, unit="rad/s")
+                object.__setattr__(self, field, value)
 
     @property
-    def fraction(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator of C/K."""
-        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array(
-            [1.0, self.pole, 0.0]
-        )
+    def fraction(self) -> tuple[Polynomial, Polynomial]:
+        """Numerator and denominator of C/K in s."""
+        numerator = Polynomial([1.0] if self.zero is None else [self.zero, 1.0])
+        return numerator, Polynomial([0.0, self.pole, 1.0])
 
 
 PRINTED = Compensator()

@@ -118,6 +118,27 @@ def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
     return model
 
 
+def arm_at(q: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The engine's own kinematics and inertia of the arm, whatever `model.arm` says of it.
+
+    Args:
+        q: joint angles, shoulder and elbow [rad].
+
+    Returns:
+        Handle position [m], shape (2,); Jacobian J(q) [m], shape (2, 2); M(q) [kg m^2], shape (2, 2).
+    """
+    with warnings_caught() as caught:
+        model = _sound(_compose(["arm.xml"]).compile(), caught)
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    handle = model.site("handle").id
+    J, M = np.zeros((3, 2)), np.zeros((2, 2))
+    mujoco.mj_jacSite(model, data, J, None, handle)
+    mujoco.mj_fullM(model, data, M)
+    return data.site_xpos[handle][:2].copy(), J[:2], M
+
+
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..model.clay import Profile
 from ..model.constants import AXES
 from ..model.scenario import Scenario
-from ..theory import linear_loop
+from ..theory import gain_limit
 
 LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
@@ -259,7 +259,7 @@ class StabilityMonitor:
         """The clay with the least gain limit of the linear loop of axis i, and this limit."""
         return min(
             (
-                (b, linear_loop.continuous_gain_limit(AXES[i], b, self.scenario.operator))
+                (b, gain_limit.gain_limit(AXES[i], b, self.scenario.operator))
                 for b in values
             ),
             key=lambda x: x[1],

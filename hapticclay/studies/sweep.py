@@ -68,7 +68,7 @@ def result_row(
             b = entry.get("b", 0.0)
             th = r.scenario.operator
             margin = (
-                gain_limit.gain_limit(axis, b, impedance=th is not None, operator=th)
+                gain_limit.gain_limit(axis, b, th)
                 / r.scenario.gain[i]
             )
         out[f"gain_margin_{axis}"] = margin

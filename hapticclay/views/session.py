@@ -32,7 +32,7 @@ from ..stepping import leapfrog, loop, monitor
 from ..stepping.leapfrog import Leapfrog, written_out
 from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
-from ..theory import linear_loop
+from ..theory import gain_limit
 
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
@@ -703,7 +703,7 @@ def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple
         operator: the hand; None for no hand.
     """
     x, y = (
-        linear_loop.continuous_gain_limit(axis, damping, operator)
+        gain_limit.gain_limit(axis, damping, operator)
         for axis, damping in zip(AXES, b, strict=True)
     )
     return x, y

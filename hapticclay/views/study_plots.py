@@ -21,9 +21,9 @@ from ..studies.identification import (
     NOMINAL_POSE,
     Identified,
     endpoint_mobility,
+    format_coefficient,
     printed_form,
     response,
-    transfer_function,
 )
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
@@ -231,7 +231,7 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     equation = block.equations[AXES.index(result.axis)]
     set_title(magnitude, f"{block.symbol}, {result.axis} axis ({equation})")
     text = "\n".join(
-        unit_text(f"{c.name} {transfer_function(c)} {c.unit}") for c in result.coefficients
+        unit_text(f"{c.name} {format_coefficient(c)} {c.unit}") for c in result.coefficients
     )
     where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
     magnitude.text(0.04, s=text, transform=magnitude.transAxes, fontsize=8, color=GREY, **where)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.polynomial import Polynomial
 
 from ..errors import choice
 from ..model.constants import AXES
@@ -54,7 +55,7 @@ def bode_plot(
         compensator: its shape.
         omega: range shown [rad/s].
     """
-    kw: Any = dict(_hand_arguments(operator), at=at, compensator=compensator)
+    kw: Any = dict(operator=operator, at=at, compensator=compensator)
     m = margins.margins(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
     L = _response(*margins.open_loop(axis, K, b, **kw), w)
@@ -107,7 +108,7 @@ def nyquist_plot(
         operator: the hand; None for no hand.
         at: where the loop is broken, "compensator" or "force".
     """
-    kw: Any = dict(_hand_arguments(operator), at=at)
+    kw: Any = dict(operator=operator, at=at)
     with figure_style():
         figure = Figure(figsize=(5.6, 5.7 + 0.2 * len(gains)))  # for the legend
         ax = figure.add_subplot()
@@ -156,12 +157,12 @@ def small_gain_plot(
         operator: the hand; None for no hand.
         omega: range shown [rad/s].
     """
-    kw: Any = _hand_arguments(operator)
+    kw: Any = dict(operator=operator)
     verdict = margins.small_gain(axis, K, b, **kw)
     stable = margins.coupled_stability(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
     passive, d = linear_loop.device_admittance(axis, 0.0)
-    active = np.polysub(linear_loop.device_admittance(axis, K)[0], passive)
+    active = linear_loop.device_admittance(axis, K)[0] - passive
     left = np.abs(_response(active, d, w))
     loop = margins.open_loop(axis, K, b, at="compensator", **kw)
     right = left / np.abs(_response(*loop, w))
@@ -216,12 +217,8 @@ def transparency_plot(
     return figure
 
 
-def _hand_arguments(operator: Operator | None) -> dict[str, Any]:
-    return {"operator": operator, "impedance": operator is not None}
-
-
-def _response(n: np.ndarray, d: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    return np.polyval(n, 1j * omega) / np.polyval(d, 1j * omega)
+def _response(n: Polynomial, d: Polynomial, omega: np.ndarray) -> np.ndarray:
+    return n(1j * omega) / d(1j * omega)
 
 
 def _loop_name(axis: str, b: float, operator: Operator | None) -> str:

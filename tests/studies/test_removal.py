@@ -37,7 +37,10 @@ def test_samples_left_out_change_nothing(constant):
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 1.2])
 def test_oblique_stroke_is_a_stadium(angle):
-    """Width times length and the round ends: the coverage of a cell is proportional, whatever the direction."""
+    """Width times length and the round ends.
+
+    The coverage of a cell is proportional, whatever the direction.
+    """
     grid = Removal(hc.variable_cut(), Tool(0.02, 0.01))
     a = np.array([0.03, 0.03])
     b = a + 0.06 * np.array([np.cos(angle), np.sin(angle)])
@@ -60,7 +63,9 @@ def test_variable_cut_has_the_volume_of_its_path():
 
 
 def raster(clay, path, width, depth):
-    """Volume by a million points or fewer, one anywhere in each square: those in clay and within reach of the path.
+    """Volume by a million points or fewer, one anywhere in each square.
+
+    Those in clay and within reach of the path count.
 
     Of the squares that an edge passes through, n of them, it errs by some 0.3 sqrt(n): 0.05 % here.
     """
@@ -106,7 +111,8 @@ def curl(n=20_000):
 
 EVERYWHERE = Clay(Profile((), (90.0,)), Profile((), (90.0,)))
 SLAB = Clay(Profile((0.05, 0.15), (0.0, 90.0, 0.0)), Profile((0.05, 0.15), (0.0, 90.0, 0.0)))
-BANDS = Clay(  # a border that the straight path's tool grazes by a tenth of a millimetre, and thin layers across
+# A border that the straight path's tool grazes by a tenth of a millimetre, and thin layers across.
+BANDS = Clay(
     Profile((0.0213, 0.0337, 0.0612, 0.1401), (0.0, 90.0, 0.0, 90.0, 0.0)),
     Profile((-0.0999, -0.0011, 0.0099), (0.0, 50.0, 0.0, 0.0), along="y"),
 )
@@ -114,11 +120,24 @@ BANDS = Clay(  # a border that the straight path's tool grazes by a tenth of a m
 
 @pytest.mark.parametrize("width", [0.004, 0.02, 0.05])
 @pytest.mark.parametrize("clay", [EVERYWHERE, SLAB, BANDS], ids=["everywhere", "slab", "bands"])
-@pytest.mark.parametrize("path", [
-    wiggly(), wiggly(amplitude=0.3e-3, turns=200), wiggly(amplitude=0.0), resting(), resting()[:1], diagonal(), curl(),
-], ids=["wiggles", "tremor", "straight", "resting", "still", "diagonal", "curl"])  # fmt: skip
+@pytest.mark.parametrize(
+    "path",
+    [
+        wiggly(),
+        wiggly(amplitude=0.3e-3, turns=200),
+        wiggly(amplitude=0.0),
+        resting(),
+        resting()[:1],
+        diagonal(),
+        curl(),
+    ],
+    ids=["wiggles", "tremor", "straight", "resting", "still", "diagonal", "curl"],
+)
 def test_volume_of_any_path_is_that_of_a_raster(constant, path, clay, width):
-    """Cells are 1/32 of the width, pieces of the path within 1/2000 of it: 0.15 % at worst; the raster 0.05 %."""
+    """Cells are 1/32 of the width, pieces of the path within 1/2000 of it.
+
+    0.15 % at worst; the raster 0.05 %.
+    """
     scenario = dataclasses.replace(constant.scenario, clay=clay)
     n = len(path)
     t, zero = 0.36e-3 * np.arange(n), np.zeros((n, 2))
