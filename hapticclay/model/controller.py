@@ -11,10 +11,11 @@ pose. The functions below are one kick of that law (docs/equations.md, section 4
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import choice, number
+from ..errors import Bound, check_fields, choice
 from . import arm
 from .constants import AXES, C_POLE, G, SecondOrder
 
@@ -170,20 +171,15 @@ class Compensator:
     """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
 
     Attributes:
-        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
+        pole: its pole [rad/s], > 0; as printed 10 (Eqs. 20, 22, 27).
+        zero: its zero [rad/s], > 0, a lead if below the pole; None for none.
     """
 
-    pole: float = C_POLE
-    zero: float | None = None
+    pole: Annotated[float, Bound(0.0, unit="rad/s", above=True)] = C_POLE
+    zero: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s")
-        )
-        if self.zero is not None:
-            object.__setattr__(
-                self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s")
-            )
+        check_fields(self, "compensator.")
 
     @property
     def fraction(self) -> tuple[np.ndarray, np.ndarray]:

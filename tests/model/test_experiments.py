@@ -123,7 +123,7 @@ def test_bad_variable_cuts(kw, field):
 
 
 @pytest.mark.parametrize("kw,field", [
-    (dict(axis="z"), "axis"), (dict(gain=0.0), "gain"), (dict(rms=-1.0), "rms"), (dict(seed=-1), "multisine.seed"),
+    (dict(axis="z"), "axis"), (dict(gain=0.0), "gain"), (dict(rms=-1.0), "rms"), (dict(seed=-1), "seed"),
 ])  # fmt: skip
 def test_bad_stability_tests(kw, field):
     with pytest.raises(ParameterError) as e:

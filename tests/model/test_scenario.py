@@ -20,7 +20,7 @@ from hapticclay.model import operator
     (dict(gain=1.0), "gain"), (dict(gain=(1.0,)), "gain"), (dict(gain=(1.0, 0.0)), "gain[y]"),
     (dict(gain="ab"), "gain"),    (dict(gain=(1.0, -2.0)), "gain[y]"), (dict(force=(1.0, 2.0, 3.0)), "force"),
     (dict(force=(math.inf, 0.0)), "force[x]"),
-    (dict(impedance=1), "impedance"), (dict(shaping="yes"), "shaping"),
+    (dict(operator=1), "operator"), (dict(shaping="yes"), "shaping"),
     (dict(dt=0.0), "dt"), (dict(dt=-1e-3), "dt"), (dict(dt=1.0), "dt"), (dict(dt=math.nan), "dt"),
     (dict(t_max=0.0), "t_max"), (dict(t_max=-1.0), "t_max"), (dict(t_max=math.inf), "t_max"),
     (dict(clay=(0.15, 0.05)), "clay"), (dict(clay=(0.1,)), "clay"), (dict(clay=0.1), "clay"),
