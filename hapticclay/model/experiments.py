@@ -61,7 +61,7 @@ GROWTHS = {  # readings of the growth [N.s/m per s]
 }
 UNIT_FORCE = COUNTERWEIGHT[0] * cos(radians(COUNTERWEIGHT[1]))  # on each axis [N]
 
-Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, above=True)]
+Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg", above=True)]
 Damping = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
 
 
@@ -131,9 +131,9 @@ class ConstantCut(PathExperiment):
 
     Attributes:
         b: damping of the clay on both axes [N.s/m], 0 to 1e9 (Eq. 21).
-        gain: K of the compensator on each axis, > 0 (Eq. 20).
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).
         force: muscle force uh of the operator [N].
-        clay: x at which the slab begins and ends [m].
+        clay: where the slab begins and ends along x [m].
     """
 
     b: Damping = B_CONSTANT
@@ -159,7 +159,7 @@ class VariableCut(PathExperiment):
         growth: rate at which the second clay grows in x from when the handle enters it
             [N.s/m per s], 0 to 1e9; or a reading of the paper: "30/s", "0.15/s", "0.15/sample"
             (of 0.36 ms), "none".
-        gain: K of the compensator on each axis, > 0 (Eq. 22).
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 22).
         force: muscle force uh of the operator [N]; 1 N at 45 degrees by default.
         as_printed: take K = 1 on both axes, with which y is unstable.
         b: damping before and after the border, on both axes [N.s/m], 0 to 1e9 (Eqs. 23-26).
@@ -196,14 +196,15 @@ class StabilityTest(Experiment):
     unstable run goes on to the end, bounded by the motors' torque alone.
 
     Attributes:
-        gain: K of the compensator on the axis, > 0 (1 in Eq. 27; 2 or 3, and 25 in Fig. 11).
+        gain: K of the compensator on the axis [1/kg], > 0 (1 in Eq. 27; 2 or 3, and 25 in
+            Fig. 11).
         b: damping of the clay [N.s/m], 0 to 1e9 (Eq. 28).
         axis: axis of the maneuver; the other one keeps its default gain.
         rms: root mean square of the muscle force [N], 0 to 1e6.
         seed: seed of its phases, 0 to 2^32 - 1.
     """
 
-    gain: Annotated[float, Bound(0.0, 1e6, above=True)] = GAINS_FIG11[1]
+    gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]
     b: Damping = B_STABILITY
     axis: Literal["x", "y"] = "x"
     rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
@@ -232,7 +233,7 @@ class Free(PathExperiment):
     """The path of the constant cut without clay: the steady speed is K f/10.
 
     Attributes:
-        gain: K of the compensator on each axis, > 0 (Eq. 20).
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).
         force: muscle force uh of the operator [N].
     """
 

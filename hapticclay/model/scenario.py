@@ -38,7 +38,7 @@ class Scenario:
     Attributes:
         name: label used in files and plots.
         clay: the virtual clay; None for free space.
-        gain: compensator gain K on each axis, C = K/(s^2 + 10 s), 0 to 1e6; 0 turns the
+        gain: compensator gain K on each axis [1/kg], C = K/(s^2 + 10 s), 0 to 1e6; 0 turns the
             compensator off.
         force: constant part of the operator's muscle force uh on each axis [N].
         operator: impedance Th of the operator's arm; None for a pure force (Th = 0).
@@ -68,7 +68,7 @@ class Scenario:
 
     name: str = "free"
     clay: Clay | None = None
-    gain: Annotated[tuple[float, float], Bound(0.0, 1e6)] = GAIN
+    gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
     force: Force = (1.0, 0.0)
     operator: Operator | None = None
     shaping: bool = False

@@ -28,6 +28,7 @@ from ..studies.identification import (
     response,
     transfer_function,
 )
+from ..studies.sampling import parameter_unit
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, STYLE
@@ -360,11 +361,16 @@ ABSENT = {  # why a run has no figure: how its cell looks, and its point
     "no steady speed": dict(color="#F4F4F4", hatch="....", marker="+"),
     "no figure": dict(color="white", hatch="xxxx", marker="1"),
 }
-UNITS = {"b": "N.s/m", "border": "m", "clay": "m", "crossing": "s", "damper": "N.s/m", "dt": "s", "end_time": "s",
-         "energy_residual": "of what went through", "fe_over_v": "N.s/m", "force": "N", "gain": "1/kg",
-         "gain_margin": "factor on K", "growth": "N.s/m per s", "length": "m", "mass": "kg", "origin": "m", "rms": "N",
-         "speed": "m/s", "spring": "N/m", "start": "m", "t_max": "s", "torque_limit": "N.m", "Ts": "s",
-         "wall_time": "s"}  # fmt: skip
+MEASURED_UNITS = {
+    "b": "N.s/m",
+    "crossing": "s",
+    "end_time": "s",
+    "energy_residual": "of what went through",
+    "fe_over_v": "N.s/m",
+    "gain_margin": "factor on K",
+    "speed": "m/s",
+    "wall_time": "s",
+}
 
 
 def columns(table: Any) -> list[str]:
@@ -497,7 +503,7 @@ def _points(ax: Axes, px, py, z, why, worst: bool, how: dict[str, Any]) -> tuple
 
 def _label(name: str) -> str:
     stem = name.rstrip("123").removesuffix("_x").removesuffix("_y")
-    unit = next((UNITS[part] for part in (stem, *name.split(".")) if part in UNITS), "")
+    unit = MEASURED_UNITS.get(stem) or parameter_unit(name)
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 

@@ -14,8 +14,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.cli import app as cli_words
+from hapticclay.cli import console
 from hapticclay.cli import run as cli_run
+from hapticclay.simulation import record, simulate
 from hapticclay.views import run_plots
 
 
@@ -86,7 +87,7 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
     (["sweep", "--grd", "b=1:2:3"], ["did you mean --grid?"]),
     (["identify", "extra"], ["'extra': one word too many for identify"]),
     (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
-    (["video", "--speed", "2", "constnat"], ["did you mean 'constant'?; or the folder of a record"]),
+    (["video", "--speed", "2", "constnat"], ["did you mean 'constant'? (or give the folder of a record)"]),
     (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
     (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
     (["stabilty"], ["stabilty", "did you mean 'stability'"]),
@@ -105,7 +106,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, w
 
 
 def test_unwritable_out_is_refused_before_the_run(capsys, monkeypatch):
-    monkeypatch.setattr(cli_run, "simulate", lambda *a, **k: pytest.fail("ran"))
+    monkeypatch.setattr(simulate, "simulate", lambda *a, **k: pytest.fail("ran"))
     code, _, err = run(capsys, "run", "constant", "--out", "/proc/nowhere")
     assert code == 2 and "out = '/proc/nowhere'" in err and err.count("\n") == 1
 
@@ -232,7 +233,7 @@ def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeyp
     def full(self, path):
         raise app.ParameterError("out", str(path), "must be writable (No space left on device)")
 
-    monkeypatch.setattr(cli_run.Record, "save", full)
+    monkeypatch.setattr(record.Record, "save", full)
     code, out, err = run(capsys, "run", "constant", "--t-max", "0.5", "--out", str(tmp_path))
     assert code == 2 and "status: time limit" in out and err.count("\n") == 1
 
@@ -254,7 +255,7 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
 @pytest.mark.parametrize("scenario", [hc.constant_cut(t_max=0.1), hc.variable_cut(t_max=0.1), hc.free(t_max=0.1),
                                       hc.stability_test(t_max=0.1)], ids=lambda s: s.name)  # fmt: skip
 def test_names_of_figures_are_known(scenario):
-    assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
+    assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.RUN_FIGURES)
 
 
 def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
@@ -306,7 +307,7 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
 def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "o").mkdir()
-    assert cli_words.ordered(words.split(), app.COMMANDS) == ordered.split()
+    assert app.ordered(words.split()) == ordered.split()
 
 
 def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
@@ -316,7 +317,7 @@ def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
         ["view", "--tool-width", "0.01", "o"],
         ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"],
     ):
-        command = app._parsed(words)
+        command = app.parse_words(words)
         assert isinstance(command.scenario, hc.Record) and command.scenario.scenario.name == "free"
 
 
@@ -337,7 +338,7 @@ def test_the_table_fits_a_terminal_and_knows_no_negative_zero(capsys, tmp_path, 
     "x,said", [(-1e-9, "0.00"), (-0.004, "0.00"), (-0.006, "-0.01"), (0.0, "0.00"), (-2.0, "-2.00")]
 )
 def test_fixed_point_has_no_negative_zero(x, said):
-    assert cli_run.fixed(x, 2) == said
+    assert console.fixed(x, 2) == said
 
 
 @pytest.mark.parametrize("args", [("--every", "5000"), ("--t-max", "0.005")])
@@ -392,7 +393,7 @@ def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
     def full(*args, **kw):
         raise MemoryError("Unable to allocate 8 GiB")
 
-    monkeypatch.setattr(cli_run, "simulate", full)
+    monkeypatch.setattr(simulate, "simulate", full)
     code, out, err = run(capsys, "run", "constant", "--out", str(tmp_path / "o"))
     assert (code, out, err) == (1, "", "hapticclay: out of memory: Unable to allocate 8 GiB\n")
     assert os.listdir(tmp_path) == []

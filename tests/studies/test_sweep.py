@@ -229,7 +229,7 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
         said, _ = p.communicate(timeout=60)
         assert p.returncode == code
     if how == signal.SIGINT:
-        assert "goes on from there" in said
+        assert "resumes the sweep" in said
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
     sweep.read_sweep(out)  # whatever is there is valid
@@ -367,7 +367,7 @@ def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
 def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
     """By a clock of our own: the first run compiles for a minute, each further one takes what is asked."""
     s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    real = sweep.measure_rates
+    real = sweep.run_point
     for each, runs in (
         (0.25, sweep.PROBES + 1),
         (0.5, 12),
@@ -380,7 +380,7 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             made.append(args[1])
             return real(*args)
 
-        monkeypatch.setattr(sweep, "measure_rates", timed)
+        monkeypatch.setattr(sweep, "run_point", timed)
         monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
         assert sweep.estimate_time(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
@@ -399,7 +399,7 @@ def test_an_estimated_size_is_that_of_the_files(tmp_path):
 def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypatch):
     args = ["sweep", "--grid", "b=10:1000:30log gain.x=1:2:2", "--fixed", "t_max=0.01", "--chunk", "1",
             "--workers", "1", "--no-maps", "--out", str(tmp_path)]  # fmt: skip
-    monkeypatch.setattr(sweep_command, "LARGE", 60)
+    monkeypatch.setattr(sweep_command, "LARGE_SWEEP", 60)
     assert app.main(args) == 0
     first, *lines = capsys.readouterr().err.splitlines()
     assert re.fullmatch(
