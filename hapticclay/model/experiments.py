@@ -103,8 +103,13 @@ class Experiment:
         """
         raise NotImplementedError
 
-    def _scenario(self, name: str, **own: Any) -> Scenario:
-        """A scenario with the fields of this experiment that it has too, but for its own ones."""
+    def build_scenario(self, name: str, **own: Any) -> Scenario:
+        """A scenario that takes its fields from the parameters of the same names.
+
+        Args:
+            name: label of the scenario.
+            **own: fields that differ from the parameters, or that have none.
+        """
         known = field_types(Scenario)
         shared = {k: getattr(self, k) for k in field_types(type(self)) if k in known}
         return Scenario(name=name, **{**shared, **own})
@@ -146,7 +151,7 @@ class ConstantCut(PathExperiment):
         begin, end = self.clay
         if end <= begin:
             raise ParameterError("clay", self.clay, "must end beyond where it begins")
-        return self._scenario("constant", clay=slab(self.b, begin, end))
+        return self.build_scenario("constant", clay=slab(self.b, begin, end))
 
 
 @dataclass(frozen=True)
@@ -185,7 +190,7 @@ class VariableCut(PathExperiment):
         x = Profile((self.border,), self.b, "x", (0.0, growth))
         y = Profile((self.border,), self.b, "y")
         gain = (1.0, 1.0) if self.as_printed else self.gain
-        return self._scenario("variable", clay=Clay(x, y), gain=gain)
+        return self.build_scenario("variable", clay=Clay(x, y), gain=gain)
 
 
 @dataclass(frozen=True)
@@ -217,7 +222,7 @@ class StabilityTest(Experiment):
     def scenario(self) -> Scenario:
         i = AXES.index(self.axis)
         everywhere = Profile((), (self.b,))
-        return self._scenario(
+        return self.build_scenario(
             "stability",
             clay=Clay(everywhere, everywhere),
             gain=(self.gain, GAIN[1]) if i == 0 else (GAIN[0], self.gain),
@@ -241,7 +246,7 @@ class Free(PathExperiment):
     force: Force = (1.0, 0.0)
 
     def scenario(self) -> Scenario:
-        return self._scenario("free")
+        return self.build_scenario("free")
 
 
 EXPERIMENTS: dict[str, type[Experiment]] = {
