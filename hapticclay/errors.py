@@ -1,4 +1,4 @@
-"""The one exception a caller has to know, and the checks that raise it."""
+"""The exception for bad parameters, and the checks that raise it."""
 
 from __future__ import annotations
 
@@ -274,10 +274,12 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
     if origin is tuple:
         return _check_tuple(args, bound)
     if hint is float:
-        return lambda field, value, part: number(field, value, **_limits(bound, part))
+        return lambda field, value, part: number(field, value, **_bound_limits(bound, part))
     if hint is int:
         high = int(bound.high)
-        return lambda field, value, part: integer(field, value, _limits(bound, part)["low"], high)
+        return lambda field, value, part: integer(
+            field, value, _bound_limits(bound, part)["low"], high
+        )
     if hint is bool:
         return lambda field, value, part: flag(field, value)
     if hint is str:
@@ -288,7 +290,7 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
     raise TypeError(f"{hint}: no check for fields of this type")
 
 
-def _limits(bound: Bound, part: Any) -> dict[str, Any]:
+def _bound_limits(bound: Bound, part: Any) -> dict[str, Any]:
     low = getattr(part, bound.low) if isinstance(bound.low, str) else bound.low
     return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
 
@@ -317,7 +319,7 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
             if not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
             names = [str(i) for i in range(len(value))]
-        return numbers_of(field, value, names, **_limits(bound, part))
+        return numbers_of(field, value, names, **_bound_limits(bound, part))
 
     return check
 

@@ -181,12 +181,12 @@ def save_json(data: Any, file: Path) -> None:
         ParameterError: the file cannot be written.
     """
     with atomic(file) as f:
-        f.write((json.dumps(_finite(data), indent=2, allow_nan=False) + "\n").encode())
+        f.write((json.dumps(_json_ready(data), indent=2, allow_nan=False) + "\n").encode())
 
 
-def _finite(x: Any) -> Any:
+def _json_ready(x: Any) -> Any:
     if isinstance(x, dict):
-        return {k: _finite(v) for k, v in x.items()}
+        return {k: _json_ready(v) for k, v in x.items()}
     if isinstance(x, list | tuple):
-        return [_finite(v) for v in x]
+        return [_json_ready(v) for v in x]
     return None if isinstance(x, float) and not math.isfinite(x) else x

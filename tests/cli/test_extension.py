@@ -1,4 +1,4 @@
-"""What an extension costs: an experiment is a class and a line, a command is a module and a line."""
+"""The cost of extensions: a class and a line an experiment, a module and a line a command."""
 
 import dataclasses
 import os
@@ -85,8 +85,12 @@ def test_a_new_experiment_runs_and_is_drawn(capsys, tmp_path, staircase):
     words = ["--steps", "4", "--b", "30", "--impedance", "--t-max", "3", "--out", str(tmp_path)]
     code, out, err = said(capsys, "run", "staircase", *words)
     assert (code, err) == (0, "") and "border x = 1 cm crossed" in out
-    assert sorted(os.listdir(tmp_path)) == ["force.png", "record.npz", "summary.json",
-                                            "velocity.png"]  # fmt: skip
+    assert sorted(os.listdir(tmp_path)) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
     s = hc.Record.load(tmp_path).scenario
     assert s.clay.x.values == (0.0, 30.0, 60.0, 90.0, 120.0) and s.operator == hc.Operator()
     assert s == Staircase(30.0, 4, operator=hc.Operator(), t_max=3.0).scenario()
@@ -110,8 +114,18 @@ def test_a_new_experiment_has_help_and_messages(capsys, staircase):
 
 
 def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
-    words = ["sweep", "--experiment", "staircase", "--grid", "depth=0.01,0.02 steps=1,2 gain.x=1,2",
-             "--fixed", "t_max=0.5 impedance=true", "--workers", "1", "--out"]  # fmt: skip
+    words = [
+        "sweep",
+        "--experiment",
+        "staircase",
+        "--grid",
+        "depth=0.01,0.02 steps=1,2 gain.x=1,2",
+        "--fixed",
+        "t_max=0.5 impedance=true",
+        "--workers",
+        "1",
+        "--out",
+    ]
     code, out, _ = said(capsys, *words, str(tmp_path))
     assert code == 0 and "8 runs in" in out and (tmp_path / "status.png").is_file()
     assert read_sweep(tmp_path)["steps"].to_pylist() == [1, 1, 2, 2] * 2
@@ -133,12 +147,15 @@ def test_a_new_command_runs_and_has_help_and_messages(capsys, greet):
         assert (code, out, err.count("\n")) == (2, "", 1) and told in err
 
 
-@pytest.mark.parametrize("words,heavy", [
-    (["version"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
-    (["--help"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
-    (["run", "constant", "--help"], ("mujoco", "scipy", "matplotlib", "tqdm", "tabulate")),
-    (["sweep", "--help"], ("numpy", "mujoco", "scipy", "matplotlib", "pyarrow")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words,heavy",
+    [
+        (["version"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
+        (["--help"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
+        (["run", "constant", "--help"], ("mujoco", "scipy", "matplotlib", "tqdm", "tabulate")),
+        (["sweep", "--help"], ("numpy", "mujoco", "scipy", "matplotlib", "pyarrow")),
+    ],
+)
 def test_a_command_imports_what_it_needs(words, heavy):
     code = (
         "import sys; from hapticclay.cli import app; code = app.main(sys.argv[1:]);"

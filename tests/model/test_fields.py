@@ -97,7 +97,7 @@ def test_numbers_of_other_types_become_floats(case, u):
         assert taken == (x, x) and all(type(y) is float for y in taken)
         assert check(name, [x, x], part) == (x, x)
     else:
-        assert type(check(name, np.float64(x), part)) is float == type(x)
+        assert type(check(name, np.float64(x), part)) is float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,18 +114,21 @@ class Part:
         check_fields(self, "part.")
 
 
-@pytest.mark.parametrize("kw,said", [
-    (dict(way="dwn"), "part.way = 'dwn': must be one of up, down; did you mean 'down'?"),
-    (dict(way=None), "part.way = None: must be one of up, down"),
-    (dict(other=3), "part.other = 3: must be an Operator or None"),
-    (dict(pair=(0.5, 2.0)), "part.pair[b] = 2.0: must be a finite number >= 0 and <= 1 m"),
-    (dict(pair=(0.5,)), "part.pair = (0.5,): must be 2 numbers (a, b), got 1"),
-    (dict(mixed="aut"), "part.mixed = 'aut': must be one of auto; did you mean 'auto'?"),
-    (dict(mixed=-1), "part.mixed = -1: must be a finite number >= 0"),
-    (dict(mixed=6.0), "part.high = 5.0: must be a finite number >= 6 and <= 9"),
-    (dict(on=1), "part.on = 1: must be True or False"),
-    (dict(label=""), "part.label = '': must be a non-empty string"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,said",
+    [
+        (dict(way="dwn"), "part.way = 'dwn': must be one of up, down; did you mean 'down'?"),
+        (dict(way=None), "part.way = None: must be one of up, down"),
+        (dict(other=3), "part.other = 3: must be an Operator or None"),
+        (dict(pair=(0.5, 2.0)), "part.pair[b] = 2.0: must be a finite number >= 0 and <= 1 m"),
+        (dict(pair=(0.5,)), "part.pair = (0.5,): must be 2 numbers (a, b), got 1"),
+        (dict(mixed="aut"), "part.mixed = 'aut': must be one of auto; did you mean 'auto'?"),
+        (dict(mixed=-1), "part.mixed = -1: must be a finite number >= 0"),
+        (dict(mixed=6.0), "part.high = 5.0: must be a finite number >= 6 and <= 9"),
+        (dict(on=1), "part.on = 1: must be True or False"),
+        (dict(label=""), "part.label = '': must be a non-empty string"),
+    ],
+)
 def test_each_type_has_its_refusal(kw, said):
     with pytest.raises(ParameterError) as e:
         Part(**kw)
@@ -144,7 +147,9 @@ def test_a_type_without_a_check_is_no_field():
         Strange()
 
 
-@pytest.mark.parametrize("kind", [type(p) for k in PARTS for p in PARTS[k]], ids=lambda k: k.__name__)  # fmt: skip
+@pytest.mark.parametrize(
+    "kind", [type(p) for k in PARTS for p in PARTS[k]], ids=lambda k: k.__name__
+)
 def test_docstrings_name_the_unit_of_every_bound(kind):
     told = experiments._descriptions(kind)
     for name, (_, bound) in field_types(kind).items():
