@@ -165,7 +165,7 @@ def ordered(words: Sequence[str]) -> list[str]:
     if words[:1] == ["--version"]:
         return ["version"]
     if words[:1] == ["help"]:
-        return [*words[1:2], "--help"]
+        return ordered([*words[1:2], "--help"])
     if not words or words[0].startswith("-"):
         return list(words)
     command, *rest = words
@@ -261,6 +261,9 @@ def _refusal(words: Sequence[str], complaint: str) -> ParameterError:
     for word in words[1:]:
         if _is_option(word) and _plain(word.partition("=")[0]) not in names:
             return _unknown(words, word)
+    if missing := re.match(r"Expected one of {(.*)}", text):
+        what = "an experiment" if words else "a command"
+        return ParameterError("arguments", "", f"give {what}: {missing[1]}")
     found = re.match(r"(?:Error parsing|invalid choice|Missing value).*?--([\w-]+)", text)
     if not found or _plain(found[1]) not in known:
         return ParameterError("arguments", "", text)

@@ -99,7 +99,7 @@ class SweepCommand:
         from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
 
         if (self.spec is None) == (self.grid is None):
-            raise ParameterError("grid", self.grid, "give either a SPEC.toml or --grid")
+            raise ParameterError("arguments", "", "give either a SPEC.toml or --grid")
         if self.spec is not None:
             return Sweep(**load_sweep(self.spec))
         return Sweep(

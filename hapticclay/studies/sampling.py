@@ -333,7 +333,8 @@ def load_sweep(path: Path) -> dict[str, Any]:
     try:
         data = tomllib.loads(path.read_text())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ParameterError("spec", str(path), f"must be a TOML file ({error})") from None
+        fault = getattr(error, "strerror", None) or error
+        raise ParameterError("spec", str(path), f"must be a TOML file ({fault})") from None
     fields = [f.name for f in dataclasses.fields(Sweep)]
     for name in data:
         choice("field of the spec", name, fields)

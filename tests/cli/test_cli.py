@@ -115,8 +115,9 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
         (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
         (["stabilty"], ["stabilty", "did you mean 'stability'"]),
-        (["run"], ["constant"]),
-        ([], ["run"]),
+        (["run"], ["give an experiment: constant, variable, stability, free\n"]),
+        (["help", "nope"], ["command = 'nope'"]),
+        ([], ["give a command: run, stability"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
     ],
 )
