@@ -1,8 +1,8 @@
-"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced at the elbow.
+"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced.
 
-Angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use the
-absolute angles theta1 = q1, theta2 = q1 + q2, in which the inertia matrix is diag(I1, I2),
-constant, without Coriolis terms. Derivations: docs/equations.md.
+Joint angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use
+the absolute angles theta1 = q1 and theta2 = q1 + q2, in which the inertia matrix is the constant
+diag(I1, I2), without Coriolis terms. Derivations: docs/equations.md.
 """
 
 from __future__ import annotations
@@ -24,8 +24,13 @@ TRACE_W = L1 * L1 / I1 + L2 * L2 / I2  # trace of Lambda^-1 [1/kg], the same at 
 def jacobian(s1: float, c1: float, s12: float, c12: float) -> tuple[float, float, float, float]:
     """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14).
 
+    Floats, or arrays of one shape.
+
     Args:
-        s1, c1: sine and cosine of q1. s12, c12: of q1 + q2. Floats, or arrays of one shape.
+        s1: sine of q1.
+        c1: cosine of q1.
+        s12: sine of q1 + q2.
+        c12: cosine of q1 + q2.
 
     Returns:
         (u1x, u1y, u2x, u2y) [m]. The handle lies at (u1y + u2y, -u1x - u2x) in the world.
@@ -34,7 +39,15 @@ def jacobian(s1: float, c1: float, s12: float, c12: float) -> tuple[float, float
 
 
 def handle_position(q1: float, q2: float) -> tuple[float, float]:
-    """World position of the handle [m] at joint angles q1, q2 [rad]."""
+    """World position of the handle.
+
+    Args:
+        q1: angle of link 1 [rad].
+        q2: angle of link 2 against link 1 [rad].
+
+    Returns:
+        (x, y) [m].
+    """
     u1x, u1y, u2x, u2y = jacobian(sin(q1), cos(q1), sin(q1 + q2), cos(q1 + q2))
     return u1y + u2y, -u1x - u2x
 
@@ -43,7 +56,10 @@ def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, flo
     """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987).
 
     Args:
-        u1x, u1y, u2x, u2y: result of `jacobian` [m].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
 
     Returns:
         (Wxx, Wxy, Wyy) [1/kg].
@@ -57,20 +73,44 @@ def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, flo
 def handle_velocity(
     r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float
 ) -> tuple[float, float]:
-    """Handle velocity [m/s] of the absolute link rates r1, r2 [rad/s]; columns as above."""
+    """Handle velocity from the absolute link rates.
+
+    Args:
+        r1: rate of link 1 [rad/s].
+        r2: rate of link 2 [rad/s].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+
+    Returns:
+        (vx, vy) [m/s].
+    """
     return u1x * r1 + u2x * r2, u1y * r1 + u2y * r2
 
 
 def centripetal(
     r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float
 ) -> tuple[float, float]:
-    """c = -J' q', acceleration of the handle towards the joints at link rates r1, r2 [m/s^2]."""
+    """Centripetal acceleration of the handle, c = -J' q', towards the joints.
+
+    Args:
+        r1: rate of link 1 [rad/s].
+        r2: rate of link 2 [rad/s].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+
+    Returns:
+        (cx, cy) [m/s^2].
+    """
     s1 = r1 * r1
     s2 = r2 * r2
     return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
 
 
-def centripetal_about_sample(
+def centripetal_about_sample(  # noqa: PLR0913  # compiled and inlined: plain numbers
     L: float,
     cx: float,
     cy: float,
@@ -81,11 +121,21 @@ def centripetal_about_sample(
     u2x: float,
     u2y: float,
 ) -> tuple[float, float]:
-    """Mean of `centripetal` over a kick at whose sample the handle velocity leaps [m/s^2].
+    """Mean of `centripetal` over a kick in which the handle velocity jumps at the sample.
 
     Args:
-        L: share of the kick before the sample. cx, cy: centripetal acceleration there [m/s^2].
-        vx, vy: handle velocity after it [m/s]. u1x, u1y, u2x, u2y: result of `jacobian` [m].
+        L: share of the kick before the sample.
+        cx: centripetal acceleration before the sample, x [m/s^2].
+        cy: centripetal acceleration before the sample, y [m/s^2].
+        vx: handle velocity after the sample, x [m/s].
+        vy: handle velocity after the sample, y [m/s].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+
+    Returns:
+        (cx, cy) [m/s^2].
     """
     r1, r2 = joint_velocity(vx, vy, u1x, u1y, u2x, u2y, 1.0)
     x, y = centripetal(r1, r2, u1x, u1y, u2x, u2y)
@@ -95,7 +145,19 @@ def centripetal_about_sample(
 def joint_torques(
     fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
 ) -> tuple[float, float]:
-    """Joint torques J' f [N.m] of a force at the handle [N]."""
+    """Joint torques J' f of a force at the handle.
+
+    Args:
+        fx: force, x [N].
+        fy: force, y [N].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+
+    Returns:
+        (tau1, tau2) [N.m].
+    """
     t2 = u2x * fx + u2y * fy
     return u1x * fx + u1y * fy + t2, t2
 
@@ -103,7 +165,21 @@ def joint_torques(
 def handle_acceleration(
     a1: float, a2: float, fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
 ) -> tuple[float, float]:
-    """Acceleration of a handle that all but rests [m/s^2]: of links a1, a2 [rad/s^2], and of a force on it [N]."""
+    """Acceleration of a handle at rest, from link accelerations and a force.
+
+    Args:
+        a1: acceleration of link 1 [rad/s^2].
+        a2: acceleration of link 2 [rad/s^2].
+        fx: force on the handle, x [N].
+        fy: force on the handle, y [N].
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+
+    Returns:
+        (ax, ay) [m/s^2].
+    """
     ax, ay = handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
     wxx, wxy, wyy = mobility(u1x, u1y, u2x, u2y)
     return ax + wxx * fx + wxy * fy, ay + wxy * fx + wyy * fy
@@ -112,21 +188,33 @@ def handle_acceleration(
 def joint_velocity(
     vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float
 ) -> tuple[float, float]:
-    """Absolute link rates that move the handle with (vx, vy), divided by n.
+    """Absolute link rates of a handle velocity, divided by n.
 
     Args:
-        vx, vy: handle velocity, or any vector of it. u1x, u1y, u2x, u2y: result of `jacobian` [m].
-        n: divisor; zero at the stretched or folded arm raises ZeroDivisionError.
+        vx: handle velocity, or another handle vector, x.
+        vy: the same, y.
+        u1x: first column of `jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+        n: divisor; 1 for rates, a time for accelerations.
+
+    Returns:
+        (r1, r2) [rad/s for m/s and n = 1].
+
+    Raises:
+        ZeroDivisionError: the arm is stretched or folded.
     """
     det = n * (u1x * u2y - u2x * u1y)
     return (vx * u2y - vy * u2x) / det, (vy * u1x - vx * u1y) / det
 
 
 def inverse_kinematics(x: float, y: float) -> tuple[float, float]:
-    """Joint angles that put the handle at world (x, y), elbow on the left of the line to it (q2 < 0).
+    """Joint angles that put the handle at a world position, elbow to the left (q2 < 0).
 
     Args:
-        x, y: world position [m], within the reach.
+        x: world position [m], within the reach.
+        y: world position [m].
 
     Returns:
         (q1, q2) [rad]; q1 in (-pi, pi].

@@ -23,18 +23,24 @@ from .constants import AXES, C_POLE, G, SecondOrder
 def servo_coefficients(
     g: SecondOrder, s: SecondOrder, H: float, L: float, R: float
 ) -> tuple[float, float, float, float, float]:
-    """Coefficients of one axis in one kick: (keep, take) of the reference model, (after, before,
-    spring) of the handle.
+    """Coefficients of one axis of the servo in one kick.
 
     Args:
-        g, s: closed position loop G (Eqs. 15, 16) and sensitivity Sh (Eqs. 17, 18).
-        H: length of the kick [s]. L, R: its shares before and after the sample.
+        g: closed position loop G (Eqs. 15, 16).
+        s: sensitivity Sh (Eqs. 17, 18).
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        (keep, take, after, before, spring): the first two of the reference model, as in
+        `compensator_coefficients`; the others of the handle, as in `servo_acceleration`.
     """
     keep, take = compensator_coefficients(g.damping, H, L, R)
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
-def servo_acceleration(
+def servo_acceleration(  # noqa: PLR0913  # compiled and inlined: plain numbers
     after: float,
     before: float,
     spring: float,
@@ -45,27 +51,43 @@ def servo_acceleration(
     p: float,
     c: float,
 ) -> float:
-    """Acceleration of one axis in a kick before any force and without its outcome [m/s^2].
+    """Acceleration of one axis in a kick without forces and without the velocity after it [m/s^2].
 
     Args:
-        after, before, spring: from `kick`.
-        yd1, yd0: rate of the reference model after and before [m/s]. v: handle velocity before [m/s].
-        y, p: reference and handle position [m]. c: its centripetal acceleration, towards the
-            centre [m/s^2].
+        after: weight of the rate after the kick [1/s], from `servo_coefficients`.
+        before: weight of the rate before the kick [1/s], from `servo_coefficients`.
+        spring: stiffness of Sh [1/s^2], from `servo_coefficients`.
+        yd1: rate of the reference model after the kick [m/s].
+        yd0: rate of the reference model before the kick [m/s].
+        v: handle velocity before the kick [m/s].
+        y: reference position [m].
+        p: handle position [m].
+        c: centripetal acceleration, towards the centre [m/s^2].
+
+    Returns:
+        The acceleration [m/s^2].
     """
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def solve_velocity(
+def solve_velocity(  # noqa: PLR0913  # compiled and inlined: plain numbers
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Solves n u = a + S (f - d u) for the handle velocity u after the kick.
+    """Solves n u = a + S (f - d u) for the handle velocity u after a kick.
 
     Args:
-        nx, ny: the servo's own weight of u [1/s]. ax, ay: from `servo_acceleration` [m/s^2].
-        sxx, sxy, syy: acceleration per unit of net hand force [1/kg].
-        fx, fy: net hand force without u [N]. dx, dy: force per unit of u, resisting [N.s/m].
+        nx: weight of u in the servo's law, x [1/s].
+        ny: weight of u, y [1/s].
+        ax: from `servo_acceleration`, x [m/s^2].
+        ay: from `servo_acceleration`, y [m/s^2].
+        sxx: acceleration per unit of net hand force, x from x [1/kg].
+        sxy: acceleration per unit of net hand force, x from y [1/kg].
+        syy: acceleration per unit of net hand force, y from y [1/kg].
+        fx: net hand force without u, x [N].
+        fy: net hand force without u, y [N].
+        dx: resisting force per unit of u, x [N.s/m].
+        dy: resisting force per unit of u, y [N.s/m].
 
     Returns:
         (ux, uy) [m/s].
@@ -84,11 +106,30 @@ def solve_velocity(
     return ux, uy
 
 
-def velocity_under_torque(
+def velocity_under_torque(  # noqa: PLR0913  # compiled and inlined: plain numbers
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Handle velocity after a kick of length H under given motor torques t1, t2 [N.m]; the rest as in `solve_velocity`."""
+    """Handle velocity after a kick under given motor torques.
+
+    Args:
+        H: length of the kick [s].
+        vx: handle velocity before the kick, x [m/s].
+        vy: handle velocity before the kick, y [m/s].
+        u1x: first column of `arm.jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+        t1: torque of the shoulder motor [N.m].
+        t2: torque of the elbow motor [N.m].
+        fx: hand force without the velocity after the kick, x [N].
+        fy: hand force without the velocity after the kick, y [N].
+        dx: resisting force per unit of that velocity, x [N.s/m].
+        dy: resisting force per unit of that velocity, y [N.s/m].
+
+    Returns:
+        (ux, uy) [m/s].
+    """
     a1 = (t1 - t2) / arm.I1
     a2 = t2 / arm.I2
     ax, ay = arm.handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
@@ -98,21 +139,40 @@ def velocity_under_torque(
     return ux, uy
 
 
-def saturated_step(
+def saturated_step(  # noqa: PLR0913  # compiled and inlined: plain numbers
     H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
     nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
     fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
 ) -> tuple[float, float, float, float, float, float, float, float]:  # fmt: skip
-    """The kick that the servo wants, as far as the motors can give it.
+    """The kick that the servo asks for, within the torque limits of the motors.
 
     Args:
-        H: length of the kick [s]. vx, vy: handle velocity before [m/s]. u1, u2: arm.jacobian [m].
-        nx .. dy: as in `solve_velocity`.
-        limit1, limit2, square1, square2: torque limits [N.m] and their squares.
+        H: length of the kick [s].
+        vx: handle velocity before the kick, x [m/s].
+        vy: handle velocity before the kick, y [m/s].
+        u1x: first column of `arm.jacobian`, x [m].
+        u1y: first column, y [m].
+        u2x: second column, x [m].
+        u2y: second column, y [m].
+        nx: as in `solve_velocity` [1/s].
+        ny: as in `solve_velocity` [1/s].
+        ax: as in `solve_velocity` [m/s^2].
+        ay: as in `solve_velocity` [m/s^2].
+        sxx: as in `solve_velocity` [1/kg].
+        sxy: as in `solve_velocity` [1/kg].
+        syy: as in `solve_velocity` [1/kg].
+        fx: as in `solve_velocity` [N].
+        fy: as in `solve_velocity` [N].
+        dx: as in `solve_velocity` [N.s/m].
+        dy: as in `solve_velocity` [N.s/m].
+        limit1: torque limit of the shoulder motor [N.m].
+        limit2: torque limit of the elbow motor [N.m].
+        square1: square of limit1.
+        square2: square of limit2.
 
     Returns:
-        (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after [m/s], link accelerations [rad/s^2], net
-        hand force [N], motor torques [N.m].
+        (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after the kick [m/s], link accelerations
+        [rad/s^2], net hand force [N], motor torques [N.m].
     """
     ux, uy = solve_velocity(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
     ffx = fx - dx * ux
@@ -133,19 +193,31 @@ def saturated_step(
 def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
     """Coefficients (keep, take) of one kick of v' = -damping v + drive: v+ = keep v- + take drive.
 
-    Trapezoidal in the damping, exact in total impulse: any length, any split.
+    Trapezoidal in the damping and exact in total impulse, for any length and any split.
 
     Args:
-        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
+        damping: rate of decay [1/s].
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        (keep, take): dimensionless, and [s].
     """
     n = 1.0 / H + damping * R
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
 def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
+    """Compensator and reference model over a sample under a held force: z+ = A z + B f, exact.
 
-    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
+    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark,
+    Computer-Controlled Systems).
+
+    Args:
+        axis: "x" or "y".
+        K: compensator gain.
+        T: hold [s].
 
     Returns:
         A, shape (4, 4), and B, shape (4,).
@@ -160,7 +232,14 @@ def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndar
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential of a, shape (n, n)."""
+    """Matrix exponential.
+
+    Args:
+        a: shape (n, n).
+
+    Returns:
+        Shape (n, n).
+    """
     from scipy.linalg import expm
 
     return expm(a)

@@ -28,7 +28,7 @@ from ..model.signals import Multisine
 from ..simulation import record
 from ..simulation.record import Record
 from ..stepping import leapfrog, loop, monitor
-from ..stepping.leapfrog import Leapfrog, _written_out
+from ..stepping.leapfrog import Leapfrog, written_out
 from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import linear_loop
@@ -101,7 +101,7 @@ class _Live(Leapfrog):
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        _written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
+        written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
