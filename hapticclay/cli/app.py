@@ -83,7 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"hapticclay: out of memory: {error or 'none is left'}", file=sys.stderr)
         return 1
     except OSError as error:
-        print(f"hapticclay: {error}", file=sys.stderr)
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"hapticclay: {where}{error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:

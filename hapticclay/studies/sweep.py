@@ -378,9 +378,7 @@ def _run_here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generat
         for number in todo:
             yield run_chunk(sweep, number, str(out))
         return
-    context = multiprocessing.get_context(
-        "spawn"
-    )  # the engine's threads and locks do not survive a fork
+    context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         try:
             jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
