@@ -25,6 +25,7 @@ from ..studies.identification import (
     printed_form,
     response,
 )
+from ..studies.sampling import parameter_unit
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
 from .style import (
@@ -342,30 +343,14 @@ MISSING = {  # why a run has no figure: look of its cell and of its point
     "no steady speed": dict(color=PALE_GREY, hatch="....", marker="+"),
     "no figure": dict(color=WHITE, hatch="xxxx", marker="1"),
 }
-COLUMN_UNITS = {
+MEASURED_UNITS = {
     "b": "N.s/m",
-    "border": "m",
-    "clay": "m",
     "crossing": "s",
-    "damper": "N.s/m",
-    "dt": "s",
     "end_time": "s",
     "energy_residual": "of what went through",
     "fe_over_v": "N.s/m",
-    "force": "N",
-    "gain": "1/kg",
     "gain_margin": "factor on K",
-    "growth": "N.s/m per s",
-    "length": "m",
-    "mass": "kg",
-    "origin": "m",
-    "rms": "N",
     "speed": "m/s",
-    "spring": "N/m",
-    "start": "m",
-    "t_max": "s",
-    "torque_limit": "N.m",
-    "Ts": "s",
     "wall_time": "s",
 }
 
@@ -519,9 +504,7 @@ def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, lis
 
 def _column_label(name: str) -> str:
     stem = name.rstrip("123").removesuffix("_x").removesuffix("_y")
-    unit = next(
-        (COLUMN_UNITS[part] for part in (stem, *name.split(".")) if part in COLUMN_UNITS), ""
-    )
+    unit = MEASURED_UNITS.get(stem) or parameter_unit(name)
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 

@@ -99,7 +99,7 @@ def filmed(folder, blocked, out="x.mp4", **env):
     """Message of `hapticclay video` where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
-        "from hapticclay.cli import app, view; view.simulate_with_progress = None\n"
+        "from hapticclay.cli import app, video; video.simulate_with_progress = None\n"
         f"sys.exit(app.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env

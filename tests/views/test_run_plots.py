@@ -42,7 +42,7 @@ def test_force_plot_shows_b_beside_the_ratios(run):
 @pytest.mark.parametrize("scenario", [
     hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0)), hc.constant_cut(t_max=1e-5),
     hc.free(force=(0.0, 0.0), t_max=0.1),
-    hc.constant_cut(impedance=True, t_max=1.0),
+    hc.constant_cut(operator=hc.Operator(), t_max=1.0),
 ], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_any_record_can_be_drawn(scenario, axis, tmp_path):
@@ -52,7 +52,7 @@ def test_any_record_can_be_drawn(scenario, axis, tmp_path):
         assert (tmp_path / "p.png").stat().st_size > 5000
 
 
-LONG = dict(impedance=True, shaping=True, gain=(1.234, 0.5678), t_max=3.0)
+LONG = dict(operator=hc.Operator(), shaping=True, gain=(1.234, 0.5678), t_max=3.0)
 
 
 SCENARIOS = {
