@@ -133,10 +133,10 @@ def cases() -> list[Case]:
     add(
         g,
         "K = 3 on x, hand, shaped",
-        cut(gain=(3.0, 0.3), b=100.0, impedance=True, shaping=True, t_max=5.0),
+        cut(gain=(3.0, 0.3), b=100.0, operator=hc.Operator(), shaping=True, t_max=5.0),
         True,
     )
-    add(g, "K = 25 on x, goes on", cut(gain=(25.0, 0.3), b=100.0, impedance=True, stop=False, t_max=4.0, length=None,
+    add(g, "K = 25 on x, goes on", cut(gain=(25.0, 0.3), b=100.0, operator=hc.Operator(), stop=False, t_max=4.0, length=None,
                                      start=(0.1, 0.0), clay=EVERYWHERE))  # fmt: skip
     add(g, "K = 1e4", cut(gain=(1e4, 1e4)), True)
     add(g, "K = 1e4 in free space", cut(gain=(1e4, 1e4), b=0.0, force=(1e-3, 0.0)))
@@ -231,14 +231,14 @@ def cases() -> list[Case]:
     add(
         g,
         "1 h on the hand's spring",
-        cut(b=1.0, t_max=3600.0, dt=1e-2, impedance=True, force=(0.5, 0.0)),
+        cut(b=1.0, t_max=3600.0, dt=1e-2, operator=hc.Operator(), force=(0.5, 0.0)),
         False,
         100,
     )
 
     g = "sampled"
     add(g, "held", cut(control="sampled", t_max=1.5), True)
-    add(g, "held, hand", cut(control="sampled", t_max=1.5, impedance=True, force=(2.0, 0.0)))
+    add(g, "held, hand", cut(control="sampled", t_max=1.5, operator=hc.Operator(), force=(2.0, 0.0)))
     add(g, "held, b = 8e3, goes on", cut(
         control="sampled", b=8e3, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1), stop=False))  # fmt: skip
     add(g, "implicit, b = 8e3", cut(

@@ -19,7 +19,7 @@ EDGES = (0.05, 0.15, 0.20)  # [m] the clay begins, ends; the path ends
 
 PROBLEMS = {
     "default cut": hc.constant_cut(),
-    "hand in the loop": hc.constant_cut(impedance=True, force=(2.0, 0.0)),
+    "hand in the loop": hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.0)),
     "off-axis force": hc.constant_cut(force=(1.0, 0.3)),
 }
 

@@ -36,7 +36,7 @@ CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
-    "constant cut, Th": hc.constant_cut(start=(0.06, 0.0), impedance=True, force=(2.0, 0.0)),
+    "constant cut, Th": hc.constant_cut(start=(0.06, 0.0), operator=hc.Operator(), force=(2.0, 0.0)),
     "free space": hc.free(gain=(0.01, 0.01)),
 }
 

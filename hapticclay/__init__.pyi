@@ -1,10 +1,13 @@
 # Public names and the modules they come from; lazy_loader imports each when it is first used.
 
+from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .model.clay import Clay as Clay
 from .model.clay import Profile as Profile
 from .model.controller import Compensator as Compensator
+from .model.experiments import EXPERIMENTS as EXPERIMENTS
 from .model.experiments import SCENARIOS as SCENARIOS
+from .model.experiments import Experiment as Experiment
 from .model.experiments import constant_cut as constant_cut
 from .model.experiments import free as free
 from .model.experiments import stability_test as stability_test

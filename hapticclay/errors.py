@@ -1,11 +1,16 @@
-"""The one exception a caller has to know, and the checks that raise it at the door."""
+"""The exception for bad parameters, and the checks that raise it."""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
+import functools
 import math
 import numbers
-from collections.abc import Iterable, Sequence
+import types
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 
 class ParameterError(ValueError):
@@ -41,14 +46,24 @@ def number(
 ) -> float:
     """Returns value as a finite float within [low, high], or (low, high] if above.
 
+    Args:
+        field: name for the error.
+        value: the number to check [unit].
+        low: smallest value.
+        high: largest value.
+        above: whether low itself is refused.
+        unit: unit for the error.
+
     Raises:
         ParameterError: wrong type, NaN, infinite, or out of bounds.
     """
+    if type(value) is float and low < value < high:
+        return value
     bound = "must be a finite number"
     if low > -math.inf:
         bound += f" {'>' if above else '>='} {low:g}"
     if high < math.inf:
-        bound += f" {'and' if low > -math.inf else ''} <= {high:g}".replace("  ", " ")
+        bound += f"{' and' if low > -math.inf else ''} <= {high:g}"
     bound += f" {unit}" if unit else ""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ParameterError(field, value, bound)
@@ -62,7 +77,17 @@ def number(
 
 
 def integer(field: str, value: object, low: int, high: int) -> int:
-    """Returns value as an int within [low, high]; raises ParameterError otherwise."""
+    """Returns value as an int within [low, high].
+
+    Args:
+        field: name for the error.
+        value: the number to check.
+        low: smallest value.
+        high: largest value.
+
+    Raises:
+        ParameterError: wrong type, or out of bounds.
+    """
     if (
         isinstance(value, bool)
         or not isinstance(value, numbers.Integral)
@@ -73,7 +98,15 @@ def integer(field: str, value: object, low: int, high: int) -> int:
 
 
 def flag(field: str, value: object) -> bool:
-    """Returns value if it is a bool; raises ParameterError otherwise."""
+    """Returns value if it is a bool.
+
+    Args:
+        field: name for the error.
+        value: the value to check.
+
+    Raises:
+        ParameterError: it is none.
+    """
     if not isinstance(value, bool):
         raise ParameterError(field, value, "must be True or False")
     return value
@@ -89,13 +122,28 @@ def numbers_of(
     above: bool = False,
     unit: str = "",
 ) -> tuple[float, ...]:
-    """Returns value as a tuple of len(names) floats, each checked by `number`."""
+    """Returns value as a tuple of floats, each checked by `number`.
+
+    Args:
+        field: name for the error.
+        value: the numbers to check [unit], any iterable.
+        names: name of each number, for the error.
+        low: smallest value.
+        high: largest value.
+        above: whether low itself is refused.
+        unit: unit for the error.
+
+    Raises:
+        ParameterError: another count of numbers, or one of them was refused.
+    """
     bound = f"must be {len(names)} numbers ({', '.join(names)})"
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise ParameterError(field, value, bound)
-    items = list(value)
+    items = tuple(value)
     if len(items) != len(names):
         raise ParameterError(field, value, f"{bound}, got {len(items)}")
+    if all(type(x) is float and low < x < high for x in items):
+        return items
     return tuple(
         number(f"{field}[{name}]", item, low, high, above=above, unit=unit)
         for name, item in zip(names, items, strict=True)
@@ -111,15 +159,181 @@ def pair(
     above: bool = False,
     unit: str = "",
 ) -> tuple[float, float]:
-    """Returns value as an (x, y) pair of floats, each checked by `number`."""
+    """Returns value as an (x, y) pair of floats, each checked by `number`.
+
+    Args:
+        field: name for the error.
+        value: the numbers to check [unit], any iterable.
+        low: smallest value.
+        high: largest value.
+        above: whether low itself is refused.
+        unit: unit for the error.
+
+    Raises:
+        ParameterError: as `numbers_of`.
+    """
     x, y = numbers_of(field, value, ("x", "y"), low, high, above=above, unit=unit)
     return x, y
 
 
 def choice(field: str, value: object, valid: Sequence[str]) -> str:
-    """Returns value if it is one of valid; otherwise the error names the nearest."""
+    """Returns value if it is one of the valid names.
+
+    Args:
+        field: name for the error.
+        value: the name to check.
+        valid: the names to choose from.
+
+    Raises:
+        ParameterError: it is none of them; the error suggests the nearest one.
+    """
     if isinstance(value, str) and value in valid:
         return value
     near = difflib.get_close_matches(str(value), valid, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ParameterError(field, value, f"must be one of {', '.join(valid)}{hint}")
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Bounds and unit of a number, or of each number in a tuple: `Annotated[float, Bound(...)]`.
+
+    Attributes:
+        low: smallest value, or the name of the field that holds it.
+        high: largest value.
+        unit: unit, as in "N.s/m".
+        above: whether low itself is refused.
+        names: names of the numbers in a tuple of fixed length.
+    """
+
+    low: float | str = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    above: bool = False
+    names: tuple[str, ...] = ("x", "y")
+
+
+Check = Callable[[str, Any, Any], Any]  # (name for the error, value, the part it is a field of)
+
+
+def check_fields(part: Any, prefix: str = "") -> None:
+    """Checks each field of a frozen dataclass by its annotation.
+
+    Numbers become floats, sequences of numbers become tuples. Fields may be float, int, bool, str,
+    Literal, tuples of floats, other dataclasses, or a union of these with None; float and int take
+    a `Bound`.
+
+    Args:
+        part: the dataclass; call this first in its __post_init__.
+        prefix: put before the field's name in errors, as in "operator.".
+
+    Raises:
+        ParameterError: a field was refused.
+    """
+    for name, told, check in _field_checks(type(part), prefix):
+        value = getattr(part, name)
+        checked = check(told, value, part)
+        if checked is not value:
+            object.__setattr__(part, name, checked)
+
+
+@functools.cache
+def field_types(kind: type) -> dict[str, tuple[Any, Bound | None]]:
+    """Type of each field of a dataclass without its annotations, and its bound.
+
+    Args:
+        kind: the dataclass.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    out: dict[str, tuple[Any, Bound | None]] = {}
+    for field in dataclasses.fields(kind):
+        hint, *notes = (
+            get_args(hints[field.name])
+            if get_origin(hints[field.name]) is Annotated
+            else (hints[field.name],)
+        )
+        out[field.name] = hint, next((n for n in notes if isinstance(n, Bound)), None)
+    return out
+
+
+@functools.cache
+def _field_checks(kind: type, prefix: str) -> list[tuple[str, str, Check]]:
+    return [
+        (name, prefix + name, _check_of(hint, bound or Bound()))
+        for name, (hint, bound) in field_types(kind).items()
+    ]
+
+
+def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
+    """The check of a value of this type."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return _check_union(args, bound)
+    if origin is Literal:
+        return lambda field, value, part: choice(field, value, args)
+    if origin is tuple:
+        return _check_tuple(args, bound)
+    if hint is float:
+        return lambda field, value, part: number(field, value, **_bound_limits(bound, part))
+    if hint is int:
+        high = int(bound.high)
+        return lambda field, value, part: integer(
+            field, value, _bound_limits(bound, part)["low"], high
+        )
+    if hint is bool:
+        return lambda field, value, part: flag(field, value)
+    if hint is str:
+        return _check_text
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        article = "an" if hint.__name__[0] in "AEIOU" else "a"
+        return _check_part(hint, f"must be {article} {hint.__name__}{optional}")
+    raise TypeError(f"{hint}: no check for fields of this type")
+
+
+def _bound_limits(bound: Bound, part: Any) -> dict[str, Any]:
+    low = getattr(part, bound.low) if isinstance(bound.low, str) else bound.low
+    return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
+
+
+def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
+    """None, a word, or the one other type."""
+    nullable, words = type(None) in kinds, [k for k in kinds if get_origin(k) is Literal]
+    others = [k for k in kinds if k is not type(None) and k not in words]
+    other = _check_of((others or words)[0], bound, " or None" if nullable else "")
+    word = _check_of(words[0], bound) if words else other
+
+    def check(field: str, value: Any, part: Any) -> Any:
+        if value is None and nullable:
+            return None
+        return (word if isinstance(value, str) else other)(field, value, part)
+
+    return check
+
+
+def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
+    """As many floats as the bound names, or any number of them."""
+
+    def check(field: str, value: Any, part: Any) -> Any:
+        names: Sequence[str] = bound.names
+        if kinds[1:] == (...,):
+            if not hasattr(value, "__len__"):
+                raise ParameterError(field, value, "must be a sequence of numbers")
+            names = [str(i) for i in range(len(value))]
+        return numbers_of(field, value, names, **_bound_limits(bound, part))
+
+    return check
+
+
+def _check_part(kind: type, told: str) -> Check:
+    def check(field: str, value: Any, part: Any) -> Any:
+        if not isinstance(value, kind):
+            raise ParameterError(field, value, told)
+        return value
+
+    return check
+
+
+def _check_text(field: str, value: Any, part: Any) -> Any:
+    if not isinstance(value, str) or not value:
+        raise ParameterError(field, value, "must be a non-empty string")
+    return value

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and the versions noted in them."""
+"""Files that are written whole or not at all, and the versions noted in them."""
 
 from __future__ import annotations
 
@@ -26,10 +26,13 @@ def versions() -> dict[str, str]:
 
 
 def writable(folder: Path) -> None:
-    """Refuses a folder that cannot be made or written, before any work is done.
+    """Checks that a folder can be made and written, before any work is done.
+
+    Args:
+        folder: the folder; it is not made.
 
     Raises:
-        ParameterError: as said.
+        ParameterError: it cannot.
     """
     made = [p for p in (folder, *folder.parents) if not p.exists()]
     try:
@@ -41,13 +44,16 @@ def writable(folder: Path) -> None:
             "out", str(folder), f"must be a writable folder ({error.strerror})"
         ) from None
     finally:
-        for p in made:  # left for the run itself to make
+        for p in made:
             with contextlib.suppress(OSError):
                 p.rmdir()
 
 
 class atomic:
-    """Opens a file to be written under a temporary name and given its own only when complete.
+    """Opens a file under a temporary name and renames it when it is complete.
+
+    Args:
+        path: the file.
 
     Raises:
         ParameterError: the file cannot be written; nothing is left behind.

@@ -5,13 +5,16 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
+import functools
+import inspect
 import io
 import logging
 import os
+import pkgutil
 import re
 import sys
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -20,40 +23,19 @@ import tyro
 
 from ..errors import ParameterError, choice
 from ..files import versions
-from ..model.experiments import SCENARIOS
-from .bench import Bench
-from .identify import Identify
-from .reproduce import Reproduce
-from .run import Run
-from .stability import Stability
-from .sweep import SweepCommand
-from .video import Video
-from .view import View
+from .console import scenario_words
 
-
-@dataclass(frozen=True)
-class Version:
-    """Print the versions of hapticclay and of what it runs on."""
-
-    def __call__(self) -> int:
-        print("  ".join(f"{name} {number}" for name, number in versions().items()))
-        return 0
-
-
-COMMANDS = {
-    "run": Run,
-    "stability": Stability,
-    "reproduce": Reproduce,
-    "sweep": SweepCommand,
-    "identify": Identify,
-    "bench": Bench,
-    "view": View,
-    "video": Video,
-    "version": Version,
+COMMANDS = {  # a command is a dataclass of its options; calling it returns the exit status
+    "run": "hapticclay.cli.run:RunCommand",
+    "stability": "hapticclay.cli.stability:StabilityCommand",
+    "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
+    "sweep": "hapticclay.cli.sweep:SweepCommand",
+    "identify": "hapticclay.cli.identify:IdentifyCommand",
+    "bench": "hapticclay.cli.bench:BenchCommand",
+    "view": "hapticclay.cli.view:ViewCommand",
+    "video": "hapticclay.cli.video:VideoCommand",
+    "version": "hapticclay.cli.app:VersionCommand",
 }
-Command = Union[
-    tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items())
-]  # noqa: UP007
 MARKERS = (
     tyro.conf.OmitSubcommandPrefixes,
     tyro.conf.OmitArgPrefixes,
@@ -61,15 +43,31 @@ MARKERS = (
 )
 
 
+@dataclass(frozen=True)
+class VersionCommand:
+    """Print the versions of hapticclay, Python and the packages it needs."""
+
+    def __call__(self) -> int:
+        print("  ".join(f"{name} {number}" for name, number in versions().items()))
+        return 0
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command line; returns its exit status: 0, 1 if it failed, 2 for bad input, 130 for Ctrl-C."""
-    logging.getLogger("matplotlib").setLevel(
-        logging.ERROR
-    )  # it warns of a home that cannot be written
+    """Runs the command line.
+
+    Args:
+        argv: its words; None for those of this process.
+
+    Returns:
+        The exit status: 0; 1 if the command failed, 2 for bad input, 130 for Ctrl-C, 141 if the
+        reader of the output has gone.
+    """
+    # matplotlib warns of a home that cannot be written
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no frames or bullets
+        sys.stdout.reconfigure(errors="replace")  # terminals without frames or bullets
     try:
-        command = _parsed(list(sys.argv[1:] if argv is None else argv))
+        command = parse_words(list(sys.argv[1:] if argv is None else argv))
         code = command() if command else 0
         if sys.stdout:  # None where it was closed before we came
             sys.stdout.flush()
@@ -78,14 +76,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         text = error.bound if error.field == "arguments" else str(error)
         print(f"hapticclay: {text}", file=sys.stderr)
         return 2
-    except BrokenPipeError:  # whoever read our output has enough
+    except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except MemoryError as error:
-        print(f"hapticclay: out of memory: {error or 'it is all taken'}", file=sys.stderr)
+        print(f"hapticclay: out of memory: {error or 'none is left'}", file=sys.stderr)
         return 1
     except OSError as error:
-        print(f"hapticclay: {error}", file=sys.stderr)
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"hapticclay: {where}{error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
@@ -93,43 +92,73 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parsed(words: list[str]) -> Callable[[], int] | None:
-    """The command that the words stand for; None if they asked for help, which is then printed.
+def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
+    """The command of a command line; None if it asked for help, which is then printed.
+
+    Args:
+        words: the command line.
 
     Raises:
-        ParameterError: they stand for none.
+        ParameterError: there is no such command, or one of its options is wrong.
     """
-    words = ordered(words, COMMANDS)
+    words = ordered(words)
+    named = words[:1] and words[0] in COMMANDS
     tyro._experimental_options["ansi_codes"] = not os.environ.get("NO_COLOR")
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
             command, rest = tyro.cli(
-                Command,  # type: ignore[arg-type]
-                prog="hapticclay",
-                description="Virtual clay, cut with a simulated haptic arm.",
-                args=words,
+                load_command(words[0]) if named else _overview(),  # type: ignore[arg-type]
+                prog=f"hapticclay {words[0]}" if named else "hapticclay",
+                description=None if named else "Virtual clay, cut with a simulated haptic arm.",
+                args=words[1:] if named else words,
                 config=MARKERS,
                 return_unknown_args=True,
             )
     except SystemExit as stop:
         if stop.code in (0, None):
             return None
-        raise refused(words, complaint.getvalue(), COMMANDS) from None
+        raise _refusal(words, complaint.getvalue()) from None
     if rest:
-        raise unknown(words, rest, COMMANDS)
+        raise _unknown(words, rest[0])
     return command
 
 
-FRAME = " |+-\u2500\u2502\u2570\u256f"  # of tyro's complaints, with and without Unicode
-RULE = re.compile("[-\u2500]{5}")
-NUMBERS: dict[Any, str] = {float: "number", int: "whole number"}
+def load_command(name: str) -> type:
+    """The class of a command, whose module is imported only now.
+
+    Args:
+        name: a name in COMMANDS.
+    """
+    return pkgutil.resolve_name(COMMANDS[name])
 
 
-def ordered(words: Sequence[str], commands: Mapping[str, type]) -> list[str]:
-    """Words with the experiment, or "record" and its path, right behind the command, wherever they stood.
+def _overview() -> Any:
+    """All commands as subcommands that have a summary and nothing else."""
+    summaries = {
+        name: inspect.cleandoc(load_command(name).__doc__ or "").partition("\n\n")[0]
+        for name in COMMANDS
+    }
+    return Union[  # noqa: UP007
+        tuple(
+            Annotated[Any, tyro.conf.subcommand(name, constructor=dict, description=summary)]
+            for name, summary in summaries.items()
+        )
+    ]
 
-    Where a record may stand, no experiment is the constant one, and the word "record" may be left out.
+
+FRAME_CHARACTERS = " |+-\u2500\u2502\u2570\u256f"  # of tyro's messages, with and without Unicode
+FRAME_RULE = re.compile("[-\u2500]{5}")
+KINDS: dict[Any, str] = {float: "number", int: "whole number"}
+
+
+def ordered(words: Sequence[str]) -> list[str]:
+    """Moves the experiment, or "record" and its path, right behind the command.
+
+    Commands that take a record take the constant cut by default, and a path without "record".
+
+    Args:
+        words: the command line.
 
     Raises:
         ParameterError: a word is neither a command, nor an experiment, nor a file.
@@ -137,31 +166,34 @@ def ordered(words: Sequence[str], commands: Mapping[str, type]) -> list[str]:
     if words[:1] == ["--version"]:
         return ["version"]
     if words[:1] == ["help"]:
-        return [*words[1:2], "--help"]
+        return ordered([*words[1:2], "--help"])
     if not words or words[0].startswith("-"):
         return list(words)
     command, *rest = words
-    choice("command", command, tuple(commands))
-    own = options(commands[command])
+    choice("command", command, tuple(COMMANDS))
+    own = options([command])
     if "scenario" not in own:
         return list(words)
-    recorded, at = command != "run", _positional(rest, own)
+    from ..model.experiments import EXPERIMENTS
+
+    recorded = scenario_words in (m.constructor_factory for m in own["scenario"].__metadata__)
+    at = _positional(rest, own, EXPERIMENTS)
     if at is None:
         bare = not recorded or {"-h", "--help"} & set(rest)
         return [command, *rest] if bare else [command, "constant", *rest]
     word = rest.pop(at)
     if recorded and word == "record":
         return [command, word, *rest]
-    if recorded and (os.sep in word or Path(word).exists()) and word not in SCENARIOS:
+    if recorded and (os.sep in word or Path(word).exists()) and word not in EXPERIMENTS:
         return [command, "record", word, *rest]
     try:
-        return [command, choice("experiment", word, tuple(SCENARIOS)), *rest]
+        return [command, choice("experiment", word, tuple(EXPERIMENTS)), *rest]
     except ParameterError as error:
-        more = "; or the folder of a record" if recorded else ""
+        more = " (or give the folder of a record)" if recorded else ""
         raise ParameterError(error.field, error.value, error.bound + more) from None
 
 
-def _positional(words: list[str], own: dict[str, Any]) -> int | None:
+def _positional(words: list[str], own: dict[str, Any], experiments: Any) -> int | None:
     """Index of the first word that is neither an option nor the value of one."""
     i = 0
     while i < len(words):
@@ -172,53 +204,67 @@ def _positional(words: list[str], own: dict[str, Any]) -> int | None:
         i += 1
         if _plain(name) in own:
             i += 0 if given else _count(own[_plain(name)])
-        else:  # of an experiment; which one stands further on
-            while i < len(words) and not _is_option(words[i]) and words[i] not in SCENARIOS:
+        else:  # an option of the experiment, which comes later
+            while i < len(words) and not _is_option(words[i]) and words[i] not in experiments:
                 i += 1
     return None
 
 
-def options(command: type, experiment: str = "") -> dict[str, Any]:
-    """Options of a command, and of the experiment it runs, by name: their types."""
-    hints = get_type_hints(command)
-    out = {f.name: hints[f.name] for f in dataclasses.fields(command)}
-    if experiment in SCENARIOS:
-        out |= {k: v for k, v in get_type_hints(SCENARIOS[experiment]).items() if k != "return"}
+def options(words: Sequence[str]) -> dict[str, Any]:
+    """Types of the options of a command and of its experiment, by name.
+
+    Args:
+        words: the command line, ordered.
+    """
+    out: dict[str, Any] = {}
+    if words[:1] and words[0] in COMMANDS:
+        kind = load_command(words[0])
+        hints = _hints(kind)
+        out = {f.name: hints[f.name] for f in dataclasses.fields(kind)}
+    if "scenario" in out:
+        from ..model.experiments import EXPERIMENTS, parameters
+
+        if len(words) > 1 and words[1] in EXPERIMENTS:
+            out |= {name: p.kind for name, p in parameters(EXPERIMENTS[words[1]]).items()}
     return {name.replace("_", "-"): kind for name, kind in out.items()}
 
 
-def _names(known: dict[str, Any]) -> list[str]:
-    names = [n for n in known if n not in ("scenario", "spec")]  # which are no options but words
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    """Types of the fields; without annotations, but for the one that tells the scenarios."""
+    bare = get_type_hints(kind)
+    full = get_type_hints(kind, include_extras=True)
+    return {name: full[name] if name == "scenario" else bare[name] for name in bare}
+
+
+def _option_names(known: dict[str, Any]) -> list[str]:
+    names = [n for n in known if n not in ("scenario", "spec")]  # these two are words
     return names + [f"no-{n}" for n in names if known[n] is bool]
 
 
-def unknown(
-    words: Sequence[str], rest: Sequence[str], commands: Mapping[str, type]
-) -> ParameterError:
-    """What to say of the words that were left over."""
-    path = " ".join(words[: 2 if words[1:2] and words[1] in SCENARIOS else 1])
-    word = rest[0].partition("=")[0]
+def _unknown(words: Sequence[str], word: str) -> ParameterError:
+    """The error for a word that was left over."""
+    known = options(words)
+    with_experiment = "scenario" in known and words[1:2] and not _is_option(words[1])
+    path = " ".join(words[: 2 if with_experiment and words[1] != "record" else 1])
+    word = word.partition("=")[0]
     if not _is_option(word):
         return ParameterError("arguments", "", f"{word!r}: one word too many for {path}")
-    known = options(commands[words[0]], words[1] if len(words) > 1 else "")
-    near = difflib.get_close_matches(_plain(word), _names(known), n=1)
+    near = difflib.get_close_matches(_plain(word), _option_names(known), n=1)
     hint = f"; did you mean --{near[0]}?" if near else f"; see hapticclay {path} --help"
     return ParameterError("arguments", "", f"{word}: no option of {path}{hint}")
 
 
-def refused(words: Sequence[str], complaint: str, commands: Mapping[str, type]) -> ParameterError:
-    """What to say of the parser's framed complaint: what the option takes, in plain words."""
-    text = _one_line(complaint)
-    known = (
-        options(commands[words[0]], words[1] if len(words) > 1 else "")
-        if words[:1] and words[0] in commands
-        else {}
-    )
-    strange = [
-        w for w in words[1:] if _is_option(w) and _plain(w.partition("=")[0]) not in _names(known)
-    ]
-    if strange:
-        return unknown(words, strange, commands)
+def _refusal(words: Sequence[str], complaint: str) -> ParameterError:
+    """The error for tyro's framed complaint: what the option takes, in plain words."""
+    text, known = _one_line(complaint), options(words)
+    names = _option_names(known)
+    for word in words[1:]:
+        if _is_option(word) and _plain(word.partition("=")[0]) not in names:
+            return _unknown(words, word)
+    if missing := re.match(r"Expected one of {(.*)}", text):
+        what = "an experiment" if words else "a command"
+        return ParameterError("arguments", "", f"give {what}: {missing[1]}")
     found = re.match(r"(?:Error parsing|invalid choice|Missing value).*?--([\w-]+)", text)
     if not found or _plain(found[1]) not in known:
         return ParameterError("arguments", "", text)
@@ -234,9 +280,9 @@ def refused(words: Sequence[str], complaint: str, commands: Mapping[str, type]) 
     if get_origin(kind) is Literal:
         try:
             choice(name, value, get_args(kind))
-        except ParameterError as error:  # which names the nearest
+        except ParameterError as error:  # it suggests the nearest
             return error
-    return ParameterError(name, value, f"must be {_meant(kind)}")
+    return ParameterError(name, value, f"must be {_meaning(kind)}")
 
 
 def _is_option(word: str) -> bool:
@@ -258,24 +304,24 @@ def _count(kind: Any) -> int:
     return len(get_args(kind)) if get_origin(kind) is tuple else 1
 
 
-def _meant(kind: Any) -> str:
+def _meaning(kind: Any) -> str:
     """What an option of this type takes, in words."""
     if get_origin(kind) in (Union, types.UnionType):
-        return " or ".join(_meant(k) for k in get_args(kind))
+        return " or ".join(_meaning(k) for k in get_args(kind))
     if get_origin(kind) is Literal:
         return f"one of {', '.join(get_args(kind))}"
     if get_origin(kind) is tuple:
-        return f"{len(get_args(kind))} {NUMBERS[get_args(kind)[0]]}s"
+        return f"{len(get_args(kind))} {KINDS[get_args(kind)[0]]}s"
     if kind is type(None):
         return "None"
-    return f"a {NUMBERS[kind]}" if kind in NUMBERS else "a path" if kind is Path else "a word"
+    return f"a {KINDS[kind]}" if kind in KINDS else "a path" if kind is Path else "a word"
 
 
 def _one_line(box: str) -> str:
     """The message of tyro's framed complaint, without frame and hints on help."""
     text: list[str] = []
     for line in box.splitlines()[1:]:
-        if RULE.search(line) and text:
+        if FRAME_RULE.search(line) and text:
             break
-        text += filter(None, [line.strip(FRAME)])
+        text += filter(None, [line.strip(FRAME_CHARACTERS)])
     return " ".join(text) or "bad arguments"

@@ -11,16 +11,19 @@ from ..files import writable
 
 
 @dataclass(frozen=True)
-class Bench:
-    """Error against run time beside peers, stiff and extreme scenes, throughput: diagrams, a page, the figures as JSON.
+class BenchCommand:
+    """Run the benchmarks of a checkout: accuracy against run time, stiff scenes, throughput.
 
-    Needs a checkout (the benchmarks are not installed); a peer whose package is missing is listed as left out.
+    The benchmarks are not installed with the package. Peers whose package is missing are listed as
+    left out.
+
+    Attributes:
+        out: Folder for bench.md, the data and the diagrams.
+        quick: Run fewer jobs, settings and scenes: about a minute.
     """
 
     out: Path = Path("out/bench")
-    """Folder for bench.md, the data and the diagrams."""
     quick: bool = False
-    """Fewer jobs, settings and scenes: about a minute."""
 
     def __call__(self) -> int:
         checkout = Path(__file__).resolve().parents[2]

@@ -1,78 +1,117 @@
-"""What `hapticclay identify` does: identifies block by block, prints a table, writes figures and numbers."""
+"""`hapticclay identify`: identifies each block, prints a table, writes figures and numbers."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..files import atomic, writable
+from ..files import writable
 from ..model.constants import AXES
-from ..studies.identification import BLOCK_KINDS, IDENTIFICATION_SCHEMA, Identified, Noise, identify
-from ..studies.workspace import Drift, drift_map
+from . import console
 
-QUICK: dict[str, Any] = {"periods": 1, "lines": 20}
-QUICK_PERIOD = {"G": 2.5, "S": 2.5, "Th": 5.0}  # [s]
-QUICK_BAND = {"G": (0.3, 20.0), "S": (0.3, 20.0), "Th": (0.15, 3.0)}  # [Hz]
+if TYPE_CHECKING:
+    from ..studies.identification import Identified
+    from ..studies.workspace import Drift
+
+QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
+    "G": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
+    "S": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
+    "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
+}
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
 
 
-def run(
-    out: Path,
-    axes: Sequence[str],
-    noise: bool,
-    with_map: bool,
-    quick: bool,
-    seed: int,
-    control: str,
-) -> None:
-    """Does all of it, under a progress bar.
+@dataclass(frozen=True)
+class IdentifyCommand:
+    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6): half a minute.
+
+    Attributes:
+        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png.
+        axis: Axis to identify.
+        noise: Add sensor noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms.
+        map: Also map G and Sh over the workspace, with and without inertia shaping: two minutes
+            more.
+        quick: Use shorter signals and a coarser map.
+        seed: Seed of the signals' phases and of the noise.
+        control: Control of the runs; "sampled" takes some ten minutes, two with --quick.
+    """
+
+    out: Path = Path("out/identify")
+    axis: Literal["x", "y", "both"] = "both"
+    noise: bool = False
+    map: bool = False
+    quick: bool = False
+    seed: int = 0
+    control: Literal["continuous", "sampled"] = "continuous"
+
+    def __call__(self) -> int:
+        writable(self.out)
+        with console.fraction_bar("identify") as show:
+            results = self._blocks(show)
+            found = self._map(show) if self.map else None
+        try:
+            self._save(results, found)
+        finally:  # a full disk must not hide the results
+            print(coefficient_table(results))
+            if found:
+                print("\n" + drift_table(found))
+        print(f"written to {self.out}")
+        return 0
+
+    def _blocks(self, show: Callable[..., None]) -> list[Identified]:
+        from ..studies.identification import BLOCK_KINDS, Noise, identify
+
+        axes = AXES if self.axis == "both" else (self.axis,)
+        jobs = [(what, axis) for what in BLOCK_KINDS for axis in axes]
+        return [
+            identify(
+                axis,
+                what,
+                noise=Noise() if self.noise else None,
+                seed=self.seed,
+                control=self.control,
+                progress=lambda done, total, i=i: show((i + done / total) / len(jobs)),
+                **(QUICK_SIGNALS[what] if self.quick else {}),
+            )
+            for i, (what, axis) in enumerate(jobs)
+        ]
+
+    def _map(self, show: Callable[..., None]) -> Drift:
+        from ..studies.workspace import drift_map
+
+        return drift_map(
+            QUICK_SPACING if self.quick else SPACING,
+            seed=self.seed,
+            progress=lambda done, total: show(done / total, "map"),
+        )
+
+    def _save(self, results: Sequence[Identified], found: Drift | None) -> None:
+        from ..studies.identification import IDENTIFICATION_SCHEMA
+        from ..views import study_plots
+
+        data = {
+            "schema": IDENTIFICATION_SCHEMA,
+            "results": [r.summary() for r in results],
+            "map": found and found.summary(),
+        }
+        console.save_json(data, self.out / "identify.json")
+        figures = {
+            block.figure: study_plots.identification_plot([r for r in results if r.what == what])
+            for what, block in study_plots.BLOCKS.items()
+        }
+        if found:
+            figures["map"] = study_plots.workspace_plot(found)
+        console.save_figures(figures, self.out)
+
+
+def coefficient_table(results: Sequence[Identified]) -> str:
+    """Printed and fitted coefficients, for a terminal.
 
     Args:
-        out: folder for identify.json and the figures. axes: which. noise: whether the sensors have any.
-        with_map: whether to identify over the workspace too. quick: shorter signals. seed, control: as identify().
-
-    Raises:
-        ParameterError: seed is out of its bounds, or a file cannot be written.
+        results: from `identify`.
     """
-    from tqdm import tqdm
-
-    form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
-    results: list[Identified] = []
-    found = None
-    with tqdm(
-        total=1.0, desc="identify", bar_format=form, delay=2.0, disable=None, leave=False
-    ) as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.update(done / total - bar.n)
-
-        jobs = [(what, axis) for what in BLOCK_KINDS for axis in axes]
-        for i, (what, axis) in enumerate(jobs):
-            kw = {**QUICK, "period": QUICK_PERIOD[what], "band": QUICK_BAND[what]} if quick else {}
-            results.append(
-                identify(
-                    axis, what, noise=Noise() if noise else None, seed=seed, control=control, **kw,
-                    progress=lambda done, total, i=i: show(i * total + done, len(jobs) * total),
-                )
-            )  # fmt: skip
-        if with_map:
-            bar.set_description("map")
-            found = drift_map(QUICK_SPACING if quick else SPACING, seed=seed, progress=show)
-    try:
-        save(results, found, out)
-    finally:  # a full disk must not hide what was found
-        print(table(results))
-        if found:
-            print("\n" + map_table(found))
-
-
-def table(results: Sequence[Identified]) -> str:
-    """Printed and fitted coefficients, a row each."""
-    from tabulate import tabulate
-
     rows = [
         [
             r.what,
@@ -87,20 +126,18 @@ def table(results: Sequence[Identified]) -> str:
         for c in r.coefficients
     ]
     head = ["", "axis", "coefficient", "printed", "fitted", "95 % interval", "error"]
-    lines = [
-        tabulate(
-            rows, head, colalign=("left", "left", "left", *("right",) * 4), disable_numparse=True
-        )
-    ]
     low = min(float(r.coherence.min()) for r in results)
     counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
-    return "\n".join([*lines, f"lines: {counts}; lowest coherence {low:.6f}"])
+    table = console.text_table(rows, head, "lllrrrr")
+    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}"
 
 
-def map_table(found: Drift) -> str:
-    """Range of each coefficient over the workspace, with and without shaping."""
-    from tabulate import tabulate
+def drift_table(found: Drift) -> str:
+    """Range of each coefficient over the workspace, with and without shaping, for a terminal.
 
+    Args:
+        found: from `drift_map`.
+    """
     ranges = found.ranges()
     rows = [
         [
@@ -113,60 +150,5 @@ def map_table(found: Drift) -> str:
         for a, b in zip(ranges[::2], ranges[1::2], strict=True)
     ]
     head = ["", "axis", "coefficient", "printed", "without shaping", "with shaping"]
-    text = tabulate(
-        rows, head, colalign=("left", "left", "left", *("right",) * 3), disable_numparse=True
-    )
+    text = console.text_table(rows, head, "lllrrr")
     return f"over {len(found.x)} poses of the workspace:\n{text}"
-
-
-def save(results: Sequence[Identified], found: Drift | None, out: Path) -> None:
-    """Writes identify.json and the figures, each whole or not at all.
-
-    Raises:
-        ParameterError: a file cannot be written.
-    """
-    head = {"schema": IDENTIFICATION_SCHEMA, "results": [r.summary() for r in results]}
-    with atomic(out / "identify.json") as f:
-        f.write(
-            (
-                json.dumps({**head, "map": found.summary() if found else None}, indent=1) + "\n"
-            ).encode()
-        )
-    from ..views import study_plots
-
-    figures = {
-        name: study_plots.bode([r for r in results if r.what == what])
-        for what, name in study_plots.FIGURES.items()
-    }
-    if found:
-        figures["map"] = study_plots.workspace(found)
-    for name, figure in figures.items():
-        with atomic(out / f"{name}.png") as f:
-            figure.savefig(f, format="png")
-
-
-@dataclass(frozen=True)
-class Identify:
-    """Identify G, Sh and Th on the simulated arm: frequency responses, fits, Figs. 4, 5, 6 (half a minute)."""
-
-    out: Path = Path("out/identify")
-    """Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png."""
-    axis: Literal["x", "y", "both"] = "both"
-    """Which axis."""
-    noise: bool = False
-    """Record with noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms."""
-    map: bool = False
-    """Also how G and Sh drift over the workspace, with and without inertia shaping (two minutes more)."""
-    quick: bool = False
-    """Shorter signals, a coarser map."""
-    seed: int = 0
-    """Of the signals' phases and of the noise."""
-    control: Literal["continuous", "sampled"] = "continuous"
-    """Sampled control is slow: some ten minutes, two with --quick."""
-
-    def __call__(self) -> int:
-        writable(self.out)
-        axes = AXES if self.axis == "both" else (self.axis,)
-        run(self.out, axes, self.noise, self.map, self.quick, self.seed, self.control)
-        print(f"written to {self.out}")
-        return 0

@@ -2,88 +2,116 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
-from ..files import atomic, versions, writable
+from ..files import versions, writable
 from ..model.constants import AXES, B_CONSTANT, GAIN, TS
-from ..model.operator import Operator
-from ..studies import boundary, stability_map
-from ..studies.stability_map import StabilityMap
-from ..theory import margins, passivity
+from . import console
 
-SCHEMA = "hapticclay-stability-1"
-UNITS = {"b": "N.s/m", "operator": "kg, N.s/m, N/m", "Ts": "s", "delay": "s", "omega": "rad/s"}
+if TYPE_CHECKING:
+    from ..studies.boundary import Loop
+    from ..studies.stability_map import StabilityMap
+    from ..theory.margins import Verdict
+
+VERDICTS_SCHEMA = "hapticclay-stability-1"
+VERDICTS_UNITS = {
+    "b": "N.s/m",
+    "operator": "kg, N.s/m, N/m",
+    "Ts": "s",
+    "delay": "s",
+    "omega": "rad/s",
+}
 ONE_HZ = 2.0 * math.pi  # [rad/s]
 
 
 @dataclass(frozen=True)
-class Stability:
-    """Verdicts on one loop, and a map: analytic boundaries, the one found by runs, and why they differ."""
+class StabilityCommand:
+    """Judge the stability of one loop, and map where it is stable by analysis and by runs.
+
+    Attributes:
+        axis: Axis of the loop.
+        b: Damping of the clay [N.s/m].
+        gain: K of the compensator; by default 1 on x and 0.5 on y.
+        Ts: Control sample [s]; None for runs in continuous time.
+        delay: From a measurement to the torque computed from it [s].
+        impedance: Put the operator's arm Th (Eq. 19) in the loop.
+        shaping: Let the servo of the runs shape the inertia, so that Sh holds at every pose.
+        map: Plane of the map: a boundary in K or b over clay, delay or pose.
+        out: Folder for stability.json and the map.
+        quick: Draw a coarse map.
+    """
 
     axis: Literal["x", "y"] = "x"
-    """Axis of the loop."""
     b: float = B_CONSTANT
-    """Damping of the clay [N.s/m]."""
     gain: float | None = None
-    """K of the compensator; by default 1 on x and 0.5 on y."""
     Ts: float | None = TS
-    """Control sample [s]; None for runs in continuous time."""
     delay: float = 0.0
-    """From a measurement to the torque computed from it [s]."""
     impedance: bool = True
-    """The operator's arm Th (Eq. 19) is in the loop."""
     shaping: bool = False
-    """The servo of the runs shapes the inertia, so that Sh holds at every pose."""
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose"] = "none"
-    """The plane of the map: a boundary in K or b over clay, delay or pose."""
     out: Path = Path("out/stability")
-    """Folder for stability.json and the picture."""
     quick: bool = False
-    """A coarse map."""
 
     def __call__(self) -> int:
+        from ..model.operator import Operator
+        from ..studies.boundary import Loop
+
         writable(self.out)
-        K = GAIN[AXES.index(self.axis)] if self.gain is None else self.gain
-        loop = boundary.Loop(self.axis, K, self.b, Operator() if self.impedance else None, self.Ts,
-                             self.delay if self.Ts else 0.0, self.shaping)  # fmt: skip
+        loop = Loop(
+            self.axis,
+            GAIN[AXES.index(self.axis)] if self.gain is None else self.gain,
+            self.b,
+            Operator() if self.impedance else None,
+            self.Ts,
+            self.delay if self.Ts else 0.0,
+            self.shaping,
+        )
         rows = verdicts(loop, self.delay)
-        print(table(rows))
-        asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": loop.operator and asdict(loop.operator),
-                 "Ts": self.Ts, "delay": self.delay, "shaping": self.shaping, "map": self.map,
+        print(verdict_table(rows))
+        operator = loop.operator and asdict(loop.operator)
+        asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": operator, "Ts": self.Ts,
+                 "delay": self.delay, "shaping": self.shaping, "map": self.map,
                  "quick": self.quick}  # fmt: skip
-        found: dict[str, Any] = {
-            "schema": SCHEMA, "asked": asked, "units": UNITS, "verdicts": rows, "map": None, "versions": versions(),
-        }  # fmt: skip
-        if self.map != "none":
-            chart = stability_map.stability_map(self.map, replace(loop, delay=0.0 if self.map == "delay-damping" else loop.delay),
-                               self.quick, _progress)  # fmt: skip
-            found["map"] = asdict(chart)
-            self._draw(chart)
-            print(disagreements(chart))
-        with atomic(self.out / "stability.json") as f:
-            f.write((json.dumps(_finite(found), indent=2, allow_nan=False) + "\n").encode())
+        chart = self._map(loop)
+        found = {"schema": VERDICTS_SCHEMA, "asked": asked, "units": VERDICTS_UNITS,
+                 "verdicts": rows, "map": chart and asdict(chart),
+                 "versions": versions()}  # fmt: skip
+        console.save_json(found, self.out / "stability.json")
         print(f"written to {self.out}")
         return 0
 
-    def _draw(self, chart: StabilityMap) -> None:
+    def _map(self, loop: Loop) -> StabilityMap | None:
+        if self.map == "none":
+            return None
+        from ..studies.stability_map import stability_map
         from ..views import study_plots
 
-        with atomic(self.out / f"{chart.kind}.png") as f:
-            study_plots.boundaries(chart).savefig(f, format="png")
+        if self.map == "delay-damping":
+            loop = replace(loop, delay=0.0)
+        chart = stability_map(
+            self.map, loop, self.quick, lambda columns: console.progress_bar(columns, desc="map")
+        )
+        console.save_figures({chart.kind: study_plots.stability_map_plot(chart)}, self.out)
+        print(disagreements(chart))
+        return chart
 
 
-def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
-    """What the analysis says of a loop: question, answer, figure, where [rad/s]; `delay` [s] of the motors.
+def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
+    """Verdicts of the analysis on a loop: question, answer, value, meaning, omega [rad/s].
 
     Margins and transparency are those of continuous time; NaN where the loop is unstable there.
+
+    Args:
+        loop: the loop.
+        delay: of the motors [s].
     """
+    import numpy as np
+
+    from ..theory import margins, passivity
+
     axis, K, b, Ts = loop.axis, loop.K, loop.b, loop.Ts or TS
     kw: dict[str, Any] = dict(operator=loop.operator)
     rows: list[dict[str, Any]] = []
@@ -93,7 +121,7 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
             {"question": question, "answer": answer, "value": value, "what": what, "omega": omega}
         )
 
-    def judge(question: str, v: margins.Verdict, what: str) -> None:
+    def judge(question: str, v: Verdict, what: str) -> None:
         add(question, v.verdict, v.margin, what, v.omega)
 
     def stable(question: str, **late: Any) -> None:
@@ -107,9 +135,8 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
     m = margins.margins(axis, K, b, **kw)
 
-    def response(
-        question: str, value: float, what: str, omega: float
-    ) -> None:  # none without a steady state
+    def response(question: str, value: float, what: str, omega: float) -> None:
+        # an unstable loop has no steady state
         add(question, None, value if m.stable else math.nan, what, omega if m.stable else math.nan)
 
     response("gain margin", m.gain[1], "factor on K", m.gain_omega[1])
@@ -131,54 +158,39 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """The verdicts for reading."""
-    from tabulate import tabulate
+def verdict_table(rows: list[dict[str, Any]]) -> str:
+    """The verdicts, for a terminal.
 
-    said = {True: "yes", False: "no", None: ""}
+    Args:
+        rows: from `verdicts`.
+    """
+    said, number = {True: "yes", False: "no", None: ""}, console.significant
     cells = [
-        [r["question"], said[r["answer"]], _number(r["value"]), r["what"], _number(r["omega"])]
+        [r["question"], said[r["answer"]], number(r["value"]), r["what"], number(r["omega"])]
         for r in rows
     ]
-    return tabulate(cells, ["", "", "value", "what it is", "at rad/s"], disable_numparse=True)
+    return console.text_table(cells, ["", "", "value", "meaning", "at rad/s"], "lllll")
 
 
 def disagreements(chart: StabilityMap) -> str:
-    """The cells in which a run does not do what continuous time without delay at the nominal pose says; the cause."""
-    from tabulate import tabulate
+    """The cells in which a run differs from the analysis in continuous time, and the causes.
 
+    Args:
+        chart: the map.
+    """
     wrong = [c for c in chart.cells if c.cause]
     lines = [
-        f"boundary found by runs against the exact one of the same loop: within {100.0 * chart.gap():.2g} %"
+        "boundary found by runs against the exact one of the same loop: "
+        f"within {100.0 * chart.gap():.2g} %",
+        *chart.notes,
+        f"{len(wrong)} of {len(chart.cells)} cells differ from continuous time without delay "
+        "at the nominal pose",
     ]
-    lines += chart.notes
-    lines.append(
-        f"{len(wrong)} of {len(chart.cells)} cells are not as continuous time says, no delay, nominal pose"
-    )
     if wrong:
         cells = [
             [f"{c.x:.4g}", f"{c.y:.4g}", "stable" if c.theory else "unstable", c.simulated, c.cause]
             for c in wrong
         ]
         head = [chart.x_name, chart.y_name, "theory", "run", "cause"]
-        lines.append(tabulate(cells, head, disable_numparse=True))
+        lines.append(console.text_table(cells, head, "lllll"))
     return "\n".join(lines)
-
-
-def _number(x: float) -> str:
-    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.4g}"
-
-
-def _finite(x: Any) -> Any:
-    """x for JSON, which knows neither infinities nor NaN."""
-    if isinstance(x, dict):
-        return {k: _finite(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_finite(v) for v in x]
-    return None if isinstance(x, float) and not math.isfinite(x) else x
-
-
-def _progress(columns: Iterable) -> Iterable:
-    from tqdm import tqdm
-
-    return tqdm(columns, desc="map", delay=2.0, disable=None, leave=False)

@@ -1,8 +1,7 @@
-"""`hapticclay sweep`: grids and samples of runs, on these cores or on a cluster."""
+"""`hapticclay sweep`: grids and samples of runs, on this machine or on a cluster."""
 
 from __future__ import annotations
 
-import shutil
 import sys
 import time
 from collections import Counter
@@ -10,76 +9,82 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from ..errors import ParameterError, integer
-from ..files import atomic
-from ..studies import sampling, sweep
+from . import console
 
-LARGE = 1000  # runs from which an estimate, made of 20 at most, pays
-LINE = "hapticclay: {n} of {total} runs, {percentage:.0f} %, {elapsed} gone, {remaining} to go"
-EVERY = 0.1, 60.0  # of the runs, and [s], from one LINE to the next
+if TYPE_CHECKING:
+    from ..studies.sampling import Sweep
+
+LARGE_SWEEP = 1000  # runs from which an estimate, made of 20 at most, pays
+STATUS_LINE = (
+    "hapticclay: {n} of {total} runs, {percentage:.0f} %, {elapsed} gone, {remaining} to go"
+)
+STATUS_EVERY = 0.1, 60.0  # share of the runs, and time [s], between two of these lines
+MAPPED = ("status", "fe_over_v_x", "speed_x", "end_time")  # columns that are drawn
 
 
 @dataclass(frozen=True)
 class SweepCommand:
-    """Run a whole space of parameters; go on where an earlier call stopped.
+    """Run an experiment over a space of parameters; resume an interrupted sweep.
 
-    Either a SPEC.toml, or --grid. The results are one Parquet data set, a row a run, and maps of it.
+    Give either a SPEC.toml or --grid. The results are one Parquet data set, a row a run, and maps.
+
+    Attributes:
+        spec: TOML file: experiment, design, runs, seed, chunk; tables [vary] (name =
+            "low:high:n", "low:high:nlog" or [a, b], and "low:high" or "low:highlog" where design
+            samples) and [fixed].
+        grid: Parameters to vary, as in "b=1:1000:50log gain=0.2:2:20", or, to sample,
+            "b=1:1000log gain=0.2:2"; gain.x is one axis, operator.mass the hand's.
+        fixed: Fixed parameters, as in "t_max=2 shaping=true".
+        experiment: Name of an experiment, as in hapticclay run.
+        design: All combinations, a Latin hypercube or a Sobol sequence.
+        runs: Number of runs of a Latin hypercube or Sobol sequence.
+        seed: Seed of that sample.
+        chunk: Runs in one file: the most that a killed process loses.
+        out: Folder for sweep.json, data/ and the maps.
+        workers: Processes on this machine; by default one a core.
+        scheduler: Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786.
+        maps: Draw maps over the first two parameters.
     """
 
     spec: Annotated[Path | None, tyro.conf.Positional] = None
-    """TOML file: experiment, design, runs, seed, chunk; tables [vary] (name = "low:high:n", "low:high:nlog" or [a, b],
-    and "low:high" or "low:highlog" where design samples) and [fixed]."""
     grid: str | None = None
-    """Parameters to vary, as in "b=1:1000:50log gain=0.2:2:20", or, to sample, "b=1:1000log gain=0.2:2"; gain.x
-    is one axis, operator.mass the hand's."""
     fixed: str | None = None
-    """Parameters that stay, as in "t_max=2 shaping=true"."""
     experiment: str = "constant"
-    """constant, variable, stability or free."""
     design: Literal["grid", "lhs", "sobol"] = "grid"
-    """All combinations, a Latin hypercube or a Sobol sequence."""
     runs: int | None = None
-    """Number of runs of a Latin hypercube or Sobol sequence."""
     seed: int = 0
-    """Of that sample."""
     chunk: int = 64
-    """Runs in one file: what a killed process loses at most."""
     out: Path = Path("out/sweep")
-    """Folder for sweep.json, data/ and the maps."""
     workers: int | None = None
-    """Processes here; one a core if not given."""
     scheduler: str | None = None
-    """Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786."""
     maps: bool = True
-    """Draw maps over the first two parameters."""
 
     def __call__(self) -> int:
+        from ..studies import sweep
+
         plan = self._plan()
         if self.workers is not None:
             integer("workers", self.workers, 1, 1024)
         try:
             with sweep.claimed(plan, self.out) as todo:
                 left = sum(len(plan.chunk_runs(n)) for n in todo)
-                if left >= LARGE:
-                    self._foretell(plan, left, todo)
-                with (
-                    _progress(plan, len(plan) - left) as show,
-                    closing(
-                        sweep.sweep_worker(plan, self.out, todo, self.workers, self.scheduler)
-                    ) as results,
-                ):
+                if left >= LARGE_SWEEP:
+                    self._estimate(plan, left, todo)
+                chunks = sweep.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
+                with _status(plan, len(plan) - left) as show, closing(chunks) as results:
                     for n in results:
                         show(n)
         except KeyboardInterrupt:
-            here = len(plan) - sum(
-                len(plan.chunk_runs(n)) for n in sweep.missing_parts(plan, self.out)
-            )
+            missing = sweep.missing_parts(plan, self.out)
+            here = len(plan) - sum(len(plan.chunk_runs(n)) for n in missing)
             print(
-                f"{here} of {len(plan)} runs are in {self.out / 'data'}; the same command goes on from there"
+                f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
+                "the same command resumes the sweep"
             )
             raise
         table = sweep.read_sweep(self.out)
@@ -90,46 +95,57 @@ class SweepCommand:
             self._draw(table)
         return 0
 
-    def _foretell(self, plan: sampling.Sweep, left: int, todo: list[int]) -> None:
-        """Says what time and room the runs that are left will take."""
+    def _plan(self) -> Sweep:
+        from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
+
+        if (self.spec is None) == (self.grid is None):
+            raise ParameterError("arguments", "", "give either a SPEC.toml or --grid")
+        if self.spec is not None:
+            return Sweep(**load_sweep(self.spec))
+        return Sweep(
+            self.experiment,
+            parse_grid(self.grid or ""),
+            parse_fixed(self.fixed or ""),
+            self.design,
+            self.runs,
+            self.seed,
+            self.chunk,
+        )
+
+    def _estimate(self, plan: Sweep, left: int, todo: list[int]) -> None:
+        """Prints the time and room on disk that the runs left will take."""
+        import shutil
+
         from tqdm import tqdm
+
+        from ..studies import sweep
 
         seconds, size = sweep.estimate_time(plan)
         crew = 1 if self.scheduler else sweep.processes(todo, self.workers)
-        time_ = f"{tqdm.format_interval(seconds * left / crew)} on {crew} process{'es' if crew > 1 else ''}"
+        span = tqdm.format_interval(seconds * left / crew)
         free, room = shutil.disk_usage(self.out).free, size * left
         print(
-            f"hapticclay: {left} runs, {1e3 * seconds:.3g} ms each: about {time_}, {tqdm.format_sizeof(room, 'B')} in "
-            f"{self.out / 'data'} ({'only ' if free < room else ''}{tqdm.format_sizeof(free, 'B')} free)",
+            f"hapticclay: {left} runs, {1e3 * seconds:.3g} ms each: about {span} on {crew} "
+            f"process{'es' if crew > 1 else ''}, {tqdm.format_sizeof(room, 'B')} in "
+            f"{self.out / 'data'} ({'only ' if free < room else ''}"
+            f"{tqdm.format_sizeof(free, 'B')} free)",
             file=sys.stderr,
         )
 
-    def _plan(self) -> sampling.Sweep:
-        if (self.spec is None) == (self.grid is None):
-            raise ParameterError("grid", self.grid, "give either a SPEC.toml or --grid")
-        if self.spec is not None:
-            return sampling.Sweep(**sampling.load_sweep(self.spec))
-        return sampling.Sweep(
-            self.experiment, sampling.parse_grid(self.grid or ""), sampling.parse_fixed(self.fixed or ""), self.design,
-            self.runs, self.seed, self.chunk,
-        )  # fmt: skip
-
-    def _draw(self, table) -> None:
+    def _draw(self, table: Any) -> None:
         from ..views import study_plots
 
-        if len(study_plots.columns(table)) < 2:
+        if len(study_plots.swept_parameters(table)) < 2:
             return
-        for value in ("status", "fe_over_v_x", "speed_x", "end_time"):
-            if all(study_plots.absent(table, value)):
-                continue
-            with atomic(self.out / f"{value}.png") as f:
-                study_plots.heat(table, value).savefig(f, format="png")
-            print(f"map: {self.out / f'{value}.png'}")
+        for value in MAPPED:
+            if not all(study_plots.missing_reasons(table, value)):
+                console.save_figures({value: study_plots.sweep_plot(table, value)}, self.out)
+                print(f"map: {self.out / f'{value}.png'}")
 
 
 @contextmanager
-def _progress(plan: sampling.Sweep, done: int) -> Iterator[Callable[[int], object]]:
-    """What to tell of each few runs that are made: a bar shows it at a terminal, elsewhere a line now and then."""
+def _status(plan: Sweep, done: int) -> Iterator[Callable[[int], object]]:
+    """Yields show(runs), which reports finished runs: a bar on a terminal, elsewhere a line."""
     from tqdm import tqdm
 
     total, begin = len(plan), time.monotonic()
@@ -140,10 +156,12 @@ def _progress(plan: sampling.Sweep, done: int) -> Iterator[Callable[[int], objec
         nonlocal now, said, last
         now += runs
         at = time.monotonic()
-        if now == total or now - said >= EVERY[0] * total or at - last >= EVERY[1]:
+        share, span = STATUS_EVERY
+        if now == total or now - said >= share * total or at - last >= span:
             said, last = now, at
-            text = tqdm.format_meter(now, total, at - begin, initial=done, bar_format=LINE)
+            text = tqdm.format_meter(now, total, at - begin, initial=done, bar_format=STATUS_LINE)
             print(text, file=sys.stderr, flush=True)
 
-    with tqdm(total=total, initial=done, unit="run", desc=plan.experiment, disable=None) as bar:
+    look: dict[str, Any] = {"unit": "run", "desc": plan.experiment, "delay": 0.0, "leave": True}
+    with console.progress_bar(total=total, initial=done, **look) as bar:
         yield line if bar.disable else bar.update

@@ -1,72 +1,67 @@
-"""`hapticclay video`: films of scenarios and records."""
+"""`hapticclay video`: films of experiments and records."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
+import tyro
 
 from ..files import writable
-from ..simulation.record import Record
-from ..studies.removal import TOOL, Tool
-from .run import Experiment, simulate_with_progress
-from .view import Recorded
+from . import console
+from .run import simulate_with_progress
+from .view import tool_size
 
 
 @dataclass(frozen=True)
-class Video:
-    """Film a record (its folder) or an experiment: arm, clay and running plots side by side."""
+class VideoCommand:
+    """Film an experiment or a saved record: arm, clay and running plots side by side.
 
-    scenario: Experiment | Recorded
+    Attributes:
+        scenario: The experiment, or the folder of a record.
+        out: The file: .mp4, .webp or .gif.
+        camera: Point of view.
+        speed: Playing speed: 1 is real time, 2 twice as fast.
+        size: Width and height [pixels].
+        plots: Show the running plots on the right, if there is room: from 320 x 100.
+        smooth: Soften edges and shadows; takes twice as long without a graphics card.
+        tool_width: Width of the tool [m].
+        tool_depth: Depth of the cut [m].
+    """
+
+    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
     out: Path = Path("out/film.mp4")
-    """The file: .mp4, .webp or .gif."""
     camera: Literal["room", "top", "close"] = "room"
-    """Where to look from."""
     speed: float = 1.0
-    """1 is real time, 2 twice as fast."""
     size: tuple[int, int] = (960, 480)
-    """Width and height [pixels]."""
     plots: bool = True
-    """Run the plots on the right, if there is room: from 320 x 100."""
     smooth: bool = False
-    """Soften edges and shadows; takes twice as long without a graphics card."""
-    tool_width: float = TOOL.width
-    """Width of the tool [m]."""
-    tool_depth: float = TOOL.depth
-    """Depth of the cut [m]."""
+    tool_width: float = field(default_factory=tool_size("width"))
+    tool_depth: float = field(default_factory=tool_size("depth"))
 
     def __call__(self) -> int:
-        tool = Tool(self.tool_width, self.tool_depth)
+        from ..simulation.record import Record
+        from ..studies.removal import Tool
+        from ..views import film
+
+        tool, record = Tool(self.tool_width, self.tool_depth), self.scenario
+        options = film.FilmOptions(
+            self.camera, self.speed, self.size, self.plots, self.smooth, tool
+        )
         writable(self.out.parent)
-        s = self.scenario
-        made = film_with_progress(
-            lambda: s if isinstance(s, Record) else simulate_with_progress(s, 1),
-            self.out, self.camera, self.speed, self.size, self.plots, tool, self.smooth,
-        )  # fmt: skip
+        film.ready(self.out, options)
+        if not isinstance(record, Record):
+            record = simulate_with_progress(record, 1)
+
+        def progress(images: Iterator[Any], count: int) -> Iterator[Any]:
+            return iter(
+                console.progress_bar(
+                    images, total=count, desc=self.out.name, unit="frame", delay=0.0
+                )
+            )
+
+        made = film.film(record, self.out, options, progress)
         print(f"written to {made}")
         return 0
-
-
-def film_with_progress(
-    record: Callable[[], Record], out: Path, camera: str, speed: float, size: tuple[int, int], plots: bool, tool: Tool,
-    smooth: bool,
-) -> Path:  # fmt: skip
-    """Writes a film, under a progress bar, of a record that is made once it is sure that it can be filmed.
-
-    Raises:
-        ParameterError: as video.film.
-    """
-    from tqdm import tqdm
-
-    from ..views import film
-
-    def progress(images: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
-        return iter(
-            tqdm(images, total=count, desc=out.name, unit="frame", disable=None, leave=False)
-        )
-
-    film.ready(out, speed, size)
-    return film.film(record(), out, camera, speed, size, plots, tool, progress, smooth)

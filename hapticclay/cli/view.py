@@ -4,64 +4,76 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from ..errors import ParameterError
 from ..files import writable
-from ..model.scenario import Scenario
-from ..simulation.record import Record
-from ..studies.removal import TOOL, Tool
-from ..views.session import Replay, Session, stoppable
-from .run import Experiment, deliver
+from . import console
+from .run import deliver
+
+if TYPE_CHECKING:
+    from ..simulation.record import Record
+    from ..studies.removal import Tool
+    from ..views.session import Session
 
 
-def recorded(path: tyro.conf.Positional[Path]) -> Record:
-    """A saved record.
+def tool_size(name: str) -> Callable[[], float]:
+    """A function that returns the default of a field of Tool, which is imported only then.
 
     Args:
-        path: its folder, or its record.npz.
+        name: the field.
     """
-    return Record.load(path)
 
+    def size() -> float:
+        from ..studies.removal import TOOL
 
-Recorded = Annotated[Record, tyro.conf.subcommand("record", constructor=recorded)]
+        return getattr(TOOL, name)
+
+    return size
 
 
 @dataclass(frozen=True)
-class View:
-    """Take part: pull the handle with the mouse, in a window or a browser; or replay a record (its folder).
+class ViewCommand:
+    """Pull the handle with the mouse, in a window or a browser; or replay a saved record.
 
-    The person is the muscle: force, length and t_max of the experiment do not count. On exit the record, its
-    summary and its plots are written.
+    The muscle force is yours: force, length and t_max of the experiment do not apply. At the end
+    the record, its summary and its plots are written.
+
+    Attributes:
+        scenario: The experiment, or the folder of a record.
+        stiffness: Stiffness of the hand as a multiple of the spring of Th (Eq. 19); 1 is the
+            paper's arm at rest.
+        tool_width: Width of the tool [m].
+        tool_depth: Depth of the cut [m].
+        out: Folder for record.npz, summary.json and the plots.
+        every: Keep every n-th sample in the record.
+        plots: Draw the plots.
+        web: Show the session in a browser; needs no display here.
+        host: Address to serve the browser on; a token guards any but this machine's.
+        port: Port to serve the browser on.
     """
 
-    scenario: Experiment | Recorded
+    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
     stiffness: float = 10.0
-    """Of the hand, as a multiple of the spring of Th (Eq. 19): 1 is the paper's arm at rest."""
-    tool_width: float = TOOL.width
-    """Width of the tool [m]."""
-    tool_depth: float = TOOL.depth
-    """Depth of the cut [m]."""
+    tool_width: float = field(default_factory=tool_size("width"))
+    tool_depth: float = field(default_factory=tool_size("depth"))
     out: Annotated[
         Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")
     ] = None
-    """Folder for record.npz, summary.json and the plots."""
     every: int = 10
-    """Keep every n-th sample in the record."""
     plots: bool = True
-    """Draw the plots."""
     web: bool = False
-    """Show it in a browser, without a display of our own."""
     host: str = "127.0.0.1"
-    """Address to serve the browser on; other than this machine's, a token guards it."""
     port: int = 8080
-    """Port to serve the browser on."""
 
     def __call__(self) -> int:
+        from ..simulation.record import Record
+        from ..studies.removal import Tool
+
         tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
             if self.web:
@@ -73,56 +85,55 @@ class View:
             replay(self.scenario, tool)
             return 0
         writable(self.out or Path("out/view"))
-        record = look(
-            self.scenario, self.stiffness, tool, self.every, self.web, self.host, self.port
-        )
+        record = self._session(tool)
         if record is None:
             print("nothing was recorded")
             return 0
         deliver(record, self.out or Path("out/view", record.scenario.name), self.plots)
         return 0
 
+    def _session(self, tool: Tool) -> Record | None:
+        """Plays a session until its window or page is closed; None if nothing was recorded."""
+        from ..views.session import Session, stoppable
 
-def look(
-    scenario: Scenario, stiffness: float, tool: Tool, every: int, web: bool, host: str, port: int
-) -> Record | None:
-    """A session in a window or a browser, until it is closed; what was recorded, None if nothing was.
+        session = Session(self.scenario, self.stiffness, tool, self.every)
+        with stoppable() as stop:
+            if self.web:
+                _serve_page(session, self.host, self.port, stop.is_set)
+            else:
+                from ..views.window import Window
 
-    Raises:
-        ParameterError: there is no display, no OpenGL, or no viser.
-    """
-    session = Session(scenario, stiffness, tool, every)
-    with stoppable() as stop:
-        if web:
-            _serve(session, host, port, stop.is_set)
-        else:
-            from ..views.window import Window
-
-            Window(session).show(stop.is_set)
-    return session.record() if session.recorded else None
+                Window(session).show(stop.is_set)
+        return session.record() if session.recorded else None
 
 
 def replay(record: Record, tool: Tool) -> None:
     """Shows a record in a window, in real time, until it is closed.
+
+    Args:
+        record: the run.
+        tool: the cutter.
 
     Raises:
         ParameterError: there is no display, no OpenGL, or nothing in the record.
     """
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
+    from ..views.session import Replay, stoppable
     from ..views.window import Window
 
     with stoppable() as stop:
         Window(Replay(record, tool)).show(stop.is_set)
 
 
-def _serve(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
+def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
     from ..views.page import LOCAL, Page
 
     page = Page(session, host, port)
     if host not in LOCAL:
         print(
-            f"warning: {host} can be reached from other machines, unencrypted; only this address lets anyone in:",
+            f"warning: other machines can reach {host}, unencrypted; only this address grants "
+            "access:",
             file=sys.stderr,
         )
     print(f"open {page.url} in a browser; Ctrl-C ends the session", flush=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import bisect
 import math
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 
-from ..errors import ParameterError, choice, numbers_of
+from ..errors import Bound, ParameterError, check_fields, numbers_of
 from .constants import AXES, B_MAX
 
 
@@ -96,7 +97,7 @@ def viscous_force(bx, by, vx, vy):
     return bx * vx, by * vy
 
 
-def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:
+def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"] = "x") -> Profile:
     """Constant damping in one interval of a coordinate, none elsewhere.
 
     Args:
@@ -328,57 +329,40 @@ class Profile:
 
     Attributes:
         edges: borders [m], ascending, shape (n,).
-        values: b in each region [N.s/m], shape (n + 1,); region i lies between edges i - 1 and i.
+        values: b in each region [N.s/m], shape (n + 1,), 0 to 1e9; region i lies between edges
+            i - 1 and i.
         along: coordinate that decides, "x" or "y".
         growth: rate at which b of each region grows from when the handle first enters it
-            [N.s/m per s], shape (n + 1,); empty for none (Sec. 4.2).
+            [N.s/m per s], shape (n + 1,), 0 to 1e9; empty for none (Sec. 4.2).
     """
 
-    edges: tuple[float, ...]
-    values: tuple[float, ...]
-    along: str = "x"
-    growth: tuple[float, ...] = ()
+    edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
+    along: Literal["x", "y"] = "x"
+    growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
 
     def __post_init__(self):
-        edges = numbers_of(
-            "clay.edges",
-            self.edges,
-            [str(i) for i in range(_length("clay.edges", self.edges))],
-            unit="m",
-        )
-        values = numbers_of(
-            "clay.values",
-            self.values,
-            [str(i) for i in range(len(edges) + 1)],
-            0.0,
-            B_MAX,
-            unit="N.s/m",
-        )
-        names = [str(i) for i in range(len(values))] if _length("clay.growth", self.growth) else []
-        growth = numbers_of("clay.growth", self.growth, names, 0.0, B_MAX, unit="N.s/m per s")
-        if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+        check_fields(self, "clay.")
+        regions = [str(i) for i in range(len(self.edges) + 1)]
+        numbers_of("clay.values", self.values, regions)
+        numbers_of("clay.growth", self.growth, regions if self.growth else ())
+        if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
             raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
-        choice("clay.along", self.along, AXES)
-        object.__setattr__(self, "edges", edges)
-        object.__setattr__(self, "values", values)
-        object.__setattr__(self, "growth", growth if any(growth) else ())
-
-
-def _length(field: str, value: object) -> int:
-    try:
-        return len(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise ParameterError(field, value, "must be a sequence of numbers") from None
+        if not any(self.growth):
+            object.__setattr__(self, "growth", ())
 
 
 @dataclass(frozen=True)
 class Clay:
-    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0)."""
+    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0).
+
+    Attributes:
+        x: damping of motion along x.
+        y: damping of motion along y.
+    """
 
     x: Profile
     y: Profile
 
     def __post_init__(self):
-        for field in AXES:
-            if not isinstance(getattr(self, field), Profile):
-                raise ParameterError(f"clay.{field}", getattr(self, field), "must be a Profile")
+        check_fields(self, "clay.")

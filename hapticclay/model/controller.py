@@ -11,11 +11,12 @@ pose. The functions below are one kick of that law (docs/equations.md, section 4
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import choice, number
+from ..errors import Bound, check_fields, choice
 from . import arm
 from .constants import AXES, C_POLE, G, S, SecondOrder
 
@@ -245,19 +246,15 @@ class Compensator:
     """Shape of the compensator: C = K (s + zero)/(s (s + pole)), or K/(s (s + pole)) with no zero.
 
     Attributes:
-        pole: [rad/s]; 10 as printed (Eqs. 20, 22, 27).
-        zero: [rad/s], a lead if below the pole; None for no zero.
+        pole: its pole [rad/s], > 0; as printed 10 (Eqs. 20, 22, 27).
+        zero: its zero [rad/s], > 0, a lead if below the pole; None for none.
     """
 
-    pole: float = C_POLE
-    zero: float | None = None
+    pole: Annotated[float, Bound(0.0, unit="rad/s", above=True)] = C_POLE
+    zero: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
 
     def __post_init__(self):
-        for field in ("pole", "zero"):
-            value = getattr(self, field)
-            if value is not None or field == "pole":
-                value = number(f"compensator.{field}", value, 0.0, above=True, unit="rad/s")
-                object.__setattr__(self, field, value)
+        check_fields(self, "compensator.")
 
     @property
     def fraction(self) -> tuple[Polynomial, Polynomial]:

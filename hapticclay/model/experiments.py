@@ -1,12 +1,21 @@
-"""The paper's experiments as scenarios."""
+"""The paper's experiments: dataclasses of their parameters, each of which makes a scenario.
+
+A new experiment costs a subclass of `Experiment` and a line in `EXPERIMENTS`; the command line,
+sweeps and plots read its parameters, bounds, units and descriptions from the class.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+import functools
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from math import cos, radians
-from typing import Literal
+from typing import Annotated, Any, Literal, NamedTuple, ParamSpec
 
-from ..errors import ParameterError, choice, flag, number, numbers_of, pair
+from ..errors import Bound, ParameterError, check_fields, field_types, flag
 from .clay import Clay, Profile, slab
 from .constants import (
     AXES,
@@ -29,7 +38,19 @@ from .constants import (
     TS,
 )
 from .operator import Operator
-from .scenario import Scenario
+from .scenario import (
+    Control,
+    Duration,
+    Force,
+    Integrator,
+    Length,
+    Position,
+    Render,
+    SamplePeriod,
+    Scenario,
+    Step,
+    TorqueLimit,
+)
 from .signals import Multisine
 
 GROWTHS = {  # readings of the growth [N.s/m per s]
@@ -40,277 +61,289 @@ GROWTHS = {  # readings of the growth [N.s/m per s]
 }
 UNIT_FORCE = COUNTERWEIGHT[0] * cos(radians(COUNTERWEIGHT[1]))  # on each axis [N]
 
+Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg", above=True)]
+Damping = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
 
-def constant_cut(
-    b: float = B_CONSTANT,
-    gain: tuple[float, float] = GAIN,
-    force: tuple[float, float] = (1.0, 0.0),
-    impedance: bool = False,
-    shaping: bool = False,
-    dt: float = TS,
-    t_max: float = 60.0,
-    *,
-    clay: tuple[float, float] = CLAY_X,
-    length: float = PATH_LENGTH,
-    start: tuple[float, float] = (0.0, 0.0),
-    origin: tuple[float, float] = ORIGIN,
-    torque_limit: tuple[float, float] = TORQUE_LIMIT,
-    integrator: Literal["fast", "accurate"] = "fast",
-    control: Literal["continuous", "sampled"] = "continuous",
-    Ts: float | None = None,
-    render: Literal["held", "implicit"] = "held",
-) -> Scenario:
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """Parameters that all experiments share.
+
+    Attributes:
+        operator: the operator's arm Th in the loop (Eq. 19); None for a pure force.
+        shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
+        dt: physics and control step [s], 1e-6 to 0.02.
+        t_max: longest simulated time [s], > 0, at most 1e5.
+        origin: world position of p = 0 [m].
+        torque_limit: largest torque of the shoulder and elbow motor [N.m], > 0.
+        control: "continuous", part of the differential equation, or "sampled": measured and held
+            every Ts.
+        Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
+        render: clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
+    """
+
+    operator: Operator | None = None
+    shaping: bool = False
+    dt: Step = TS
+    t_max: Duration = 60.0
+    origin: Position = ORIGIN
+    torque_limit: TorqueLimit = TORQUE_LIMIT
+    control: Control = "continuous"
+    Ts: SamplePeriod = None
+    render: Render = "held"
+
+    def __post_init__(self):
+        check_fields(self)
+
+    def scenario(self) -> Scenario:
+        """The scenario of these parameters.
+
+        Raises:
+            ParameterError: the path leaves the reach of the arm, or parameters contradict.
+        """
+        raise NotImplementedError
+
+    def build_scenario(self, name: str, **own: Any) -> Scenario:
+        """A scenario that takes its fields from the parameters of the same names.
+
+        Args:
+            name: label of the scenario.
+            **own: fields that differ from the parameters, or that have none.
+        """
+        known = field_types(Scenario)
+        shared = {k: getattr(self, k) for k in field_types(type(self)) if k in known}
+        return Scenario(name=name, **{**shared, **own})
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathExperiment(Experiment):
+    """Parameters of the experiments that end where a path ends.
+
+    Attributes:
+        length: the run ends when the handle reaches this x [m], -10 to 10.
+        start: handle position at t = 0, at rest [m].
+        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
+    """
+
+    length: Length = PATH_LENGTH
+    start: Position = (0.0, 0.0)
+    integrator: Integrator = "fast"
+
+
+@dataclass(frozen=True)
+class ConstantCut(PathExperiment):
     """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
-    Args:
+    Attributes:
         b: damping of the clay on both axes [N.s/m], 0 to 1e9 (Eq. 21).
-        gain: K of the compensator on each axis, > 0 (Eq. 20).
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).
         force: muscle force uh of the operator [N].
-        impedance: True puts the operator's arm Th (Eq. 19) in the loop.
-        shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.02.
-        t_max: longest simulated time [s].
-        clay: where the slab begins and ends [m].
-        length: the run ends when the handle reaches this x [m].
-        start: handle position at t = 0 [m], at rest.
-        origin: world position of p = 0 [m].
-        torque_limit: of the shoulder and elbow motor [N.m].
-        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
-        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
-        Ts: control sample [s], a whole multiple of dt; None for dt.
-        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
-
-    Raises:
-        ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
+        clay: where the slab begins and ends along x [m].
     """
-    begin, end = numbers_of("clay", clay, ("begin", "end"), unit="m")
-    if end <= begin:
-        raise ParameterError("clay", clay, "must end beyond where it begins")
-    return Scenario(
-        name="constant",
-        clay=slab(number("b", b, 0.0, B_MAX, unit="N.s/m"), begin, end),
-        gain=pair("gain", gain, 0.0, 1e6, above=True),
-        force=force,
-        operator=Operator() if flag("impedance", impedance) else None,
-        shaping=shaping,
-        dt=dt,
-        t_max=t_max,
-        length=number("length", length, unit="m"),
-        start=start,
-        origin=origin,
-        torque_limit=torque_limit,
-        integrator=integrator,
-        control=control,
-        Ts=Ts,
-        render=render,
-    )
+
+    b: Damping = B_CONSTANT
+    gain: Gains = GAIN
+    force: Force = (1.0, 0.0)
+    _: dataclasses.KW_ONLY
+    clay: Annotated[tuple[float, float], Bound(unit="m", names=("begin", "end"))] = CLAY_X
+
+    def scenario(self) -> Scenario:
+        begin, end = self.clay
+        if end <= begin:
+            raise ParameterError("clay", self.clay, "must end beyond where it begins")
+        return self.build_scenario("constant", clay=slab(self.b, begin, end))
 
 
-def free(
-    gain: tuple[float, float] = GAIN,
-    force: tuple[float, float] = (1.0, 0.0),
-    impedance: bool = False,
-    shaping: bool = False,
-    dt: float = TS,
-    t_max: float = 60.0,
-    *,
-    length: float = PATH_LENGTH,
-    start: tuple[float, float] = (0.0, 0.0),
-    origin: tuple[float, float] = ORIGIN,
-    torque_limit: tuple[float, float] = TORQUE_LIMIT,
-    integrator: Literal["fast", "accurate"] = "fast",
-    control: Literal["continuous", "sampled"] = "continuous",
-    Ts: float | None = None,
-    render: Literal["held", "implicit"] = "held",
-) -> Scenario:
-    """The same path without clay: the steady speed is K f/10.
+@dataclass(frozen=True)
+class VariableCut(PathExperiment):
+    """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at once.
 
-    Args:
-        gain: K of the compensator on each axis, > 0 (Eq. 20).
-        force: muscle force uh of the operator [N].
-        impedance: True puts the operator's arm Th (Eq. 19) in the loop.
-        shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.02.
-        t_max: longest simulated time [s].
-        length: the run ends when the handle reaches this x [m].
-        start: handle position at t = 0 [m], at rest.
-        origin: world position of p = 0 [m].
-        torque_limit: of the shoulder and elbow motor [N.m].
-        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
-        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
-        Ts: control sample [s], a whole multiple of dt; None for dt.
-        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
+    The clay of each axis depends on the coordinate of that axis.
 
-    Raises:
-        ParameterError: a value is out of its bounds, or the path leaves the reach of the arm.
-    """
-    return Scenario(
-        name="free",
-        gain=pair("gain", gain, 0.0, 1e6, above=True),
-        force=force,
-        operator=Operator() if flag("impedance", impedance) else None,
-        shaping=shaping,
-        dt=dt,
-        t_max=t_max,
-        length=number("length", length, unit="m"),
-        start=start,
-        origin=origin,
-        torque_limit=torque_limit,
-        integrator=integrator,
-        control=control,
-        Ts=Ts,
-        render=render,
-    )
-
-
-def variable_cut(
-    growth: float | Literal["30/s", "0.15/s", "0.15/sample", "none"] = GROWTH,
-    gain: tuple[float, float] = GAIN,
-    force: tuple[float, float] = (UNIT_FORCE, UNIT_FORCE),
-    impedance: bool = False,
-    shaping: bool = False,
-    as_printed: bool = False,
-    dt: float = TS,
-    t_max: float = 60.0,
-    *,
-    b: tuple[float, float] = B_VARIABLE,
-    border: float = BORDER,
-    length: float = 0.10,
-    start: tuple[float, float] = (0.0, 0.0),
-    origin: tuple[float, float] = ORIGIN_VARIABLE,
-    torque_limit: tuple[float, float] = TORQUE_LIMIT,
-    integrator: Literal["fast", "accurate"] = "fast",
-    control: Literal["continuous", "sampled"] = "continuous",
-    Ts: float | None = None,
-    render: Literal["held", "implicit"] = "held",
-) -> Scenario:
-    """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at once, each axis by its own coordinate.
-
-    Args:
-        growth: rate at which the second clay grows in x from when it is entered [N.s/m per s]; or a reading of
-            the paper by name: "30/s", "0.15/s", "0.15/sample" (of 0.36 ms), "none".
-        gain: K of the compensator on each axis, > 0 (Eq. 22).
+    Attributes:
+        growth: rate at which the second clay grows in x from when the handle enters it
+            [N.s/m per s], 0 to 1e9; or a reading of the paper: "30/s", "0.15/s", "0.15/sample"
+            (of 0.36 ms), "none".
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 22).
         force: muscle force uh of the operator [N]; 1 N at 45 degrees by default.
-        impedance: True puts the operator's arm Th (Eq. 19) in the loop.
-        shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        as_printed: True takes K = 1 on both axes, with which y is unstable.
-        dt: physics and control step [s], 1e-6 to 0.02.
-        t_max: longest simulated time [s].
-        b: clay before and after the border, on both axes [N.s/m] (Eqs. 23-26).
-        border: where the second clay begins, on each axis [m].
-        length: the run ends when the handle reaches this x [m].
-        start: handle position at t = 0 [m], at rest.
-        origin: world position of p = 0 [m].
-        torque_limit: of the shoulder and elbow motor [N.m].
-        integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
-        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
-        Ts: control sample [s], a whole multiple of dt; None for dt.
-        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
-
-    Raises:
-        ParameterError: a value is out of its bounds, the path leaves the reach of the arm, or both as_printed and
-            a gain are given.
+        as_printed: take K = 1 on both axes, with which y is unstable.
+        b: damping before and after the border, on both axes [N.s/m], 0 to 1e9 (Eqs. 23-26).
+        border: coordinate at which the second clay begins, on each axis [m].
     """
-    if isinstance(growth, str):
-        growth = GROWTHS[choice("growth", growth, tuple(GROWTHS))]
-    growth = number("growth", growth, 0.0, B_MAX, unit="N.s/m per s")
-    if flag("as_printed", as_printed):
-        if tuple(gain) != GAIN:
+
+    growth: Annotated[
+        float | Literal["30/s", "0.15/s", "0.15/sample", "none"], Bound(0.0, B_MAX, "N.s/m per s")
+    ] = GROWTH
+    gain: Gains = GAIN
+    force: Force = (UNIT_FORCE, UNIT_FORCE)
+    _: dataclasses.KW_ONLY
+    as_printed: bool = False
+    b: Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m")] = B_VARIABLE
+    border: Annotated[float, Bound(unit="m")] = BORDER
+    length: Length = 0.10
+    origin: Position = ORIGIN_VARIABLE
+
+    def scenario(self) -> Scenario:
+        if self.as_printed and self.gain != GAIN:
             raise ParameterError("as_printed", True, "sets gain to (1, 1): give one of the two")
-        gain = (1.0, 1.0)
-    b = pair("b", b, 0.0, B_MAX, unit="N.s/m")
-    border = number("border", border, unit="m")
-    return Scenario(
-        name="variable",
-        clay=Clay(
-            x=Profile((border,), b, "x", (0.0, growth)),
-            y=Profile((border,), b, "y"),
-        ),
-        gain=pair("gain", gain, 0.0, 1e6, above=True),
-        force=force,
-        operator=Operator() if flag("impedance", impedance) else None,
-        shaping=shaping,
-        dt=dt,
-        t_max=t_max,
-        length=number("length", length, unit="m"),
-        start=start,
-        origin=origin,
-        torque_limit=torque_limit,
-        integrator=integrator,
-        control=control,
-        Ts=Ts,
-        render=render,
-    )
+        growth = GROWTHS[self.growth] if isinstance(self.growth, str) else self.growth
+        x = Profile((self.border,), self.b, "x", (0.0, growth))
+        y = Profile((self.border,), self.b, "y")
+        gain = (1.0, 1.0) if self.as_printed else self.gain
+        return self.build_scenario("variable", clay=Clay(x, y), gain=gain)
 
 
-def stability_test(
-    gain: float = GAINS_FIG11[1],
-    b: float = B_STABILITY,
-    axis: Literal["x", "y"] = "x",
-    rms: float = 1.0,
-    seed: int = 0,
-    impedance: bool = True,
-    shaping: bool = False,
-    dt: float = TS,
-    t_max: float = 20.0,
-    *,
-    origin: tuple[float, float] = NOMINAL,
-    torque_limit: tuple[float, float] = TORQUE_LIMIT,
-    control: Literal["continuous", "sampled"] = "continuous",
-    Ts: float | None = None,
-    render: Literal["held", "implicit"] = "held",
-) -> Scenario:
-    """The stability test (Sec. 4.3, Fig. 11): an arbitrary maneuver through clay, with a gain below or above the limit.
+@dataclass(frozen=True)
+class StabilityTest(Experiment):
+    """The stability test (Sec. 4.3, Fig. 11): an arbitrary maneuver through clay.
 
-    The maneuver is a muscle force of 0.1 to 2 Hz with random phases; the clay is everywhere. An unstable
-    run goes on to the end, bounded by the motors' torque alone.
+    The maneuver is a muscle force of 0.1 to 2 Hz with random phases; the clay is everywhere. An
+    unstable run goes on to the end, bounded by the motors' torque alone.
+
+    Attributes:
+        gain: K of the compensator on the axis [1/kg], > 0 (1 in Eq. 27; 2 or 3, and 25 in
+            Fig. 11).
+        b: damping of the clay [N.s/m], 0 to 1e9 (Eq. 28).
+        axis: axis of the maneuver; the other one keeps its default gain.
+        rms: root mean square of the muscle force [N], 0 to 1e6.
+        seed: seed of its phases, 0 to 2^32 - 1.
+    """
+
+    gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]
+    b: Damping = B_STABILITY
+    axis: Literal["x", "y"] = "x"
+    rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    _: dataclasses.KW_ONLY
+    operator: Operator | None = Operator()
+    t_max: Duration = 20.0
+    origin: Position = NOMINAL
+
+    def scenario(self) -> Scenario:
+        i = AXES.index(self.axis)
+        everywhere = Profile((), (self.b,))
+        return self.build_scenario(
+            "stability",
+            clay=Clay(everywhere, everywhere),
+            gain=(self.gain, GAIN[1]) if i == 0 else (GAIN[0], self.gain),
+            force=(0.0, 0.0),
+            muscle=Multisine((self.rms, 0.0) if i == 0 else (0.0, self.rms), seed=self.seed),
+            length=None,
+            stop=False,
+        )
+
+
+@dataclass(frozen=True)
+class Free(PathExperiment):
+    """The path of the constant cut without clay: the steady speed is K f/10.
+
+    Attributes:
+        gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).
+        force: muscle force uh of the operator [N].
+    """
+
+    gain: Gains = GAIN
+    force: Force = (1.0, 0.0)
+
+    def scenario(self) -> Scenario:
+        return self.build_scenario("free")
+
+
+EXPERIMENTS: dict[str, type[Experiment]] = {
+    "constant": ConstantCut,
+    "variable": VariableCut,
+    "stability": StabilityTest,
+    "free": Free,
+}
+
+
+class Parameter(NamedTuple):
+    """A parameter of an experiment in words, as the command line and sweeps take it.
+
+    Attributes:
+        kind: its type.
+        default: its default value.
+        unit: its unit, "" for none.
+        about: its description, unit and bounds included.
+    """
+
+    kind: Any
+    default: Any
+    unit: str
+    about: str
+
+
+@functools.cache
+def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
+    """Parameters of an experiment by name; `impedance`, a bool, stands for the nominal operator.
 
     Args:
-        gain: K of the compensator on the axis (Eq. 27 has 1; Fig. 11 has 2 or 3, and 25).
-        b: damping of the clay [N.s/m] (Eq. 28).
-        axis: along which the hand moves; the other keeps its default gain.
-        rms: of the muscle force [N]. seed: of its phases.
-        impedance: True has the operator's arm Th (Eq. 19) in the loop.
-        shaping: True lets the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.02.
-        t_max: simulated time [s].
-        origin: world position of p = 0, where the hand starts [m]; the nominal pose by default.
-        torque_limit: of the shoulder and elbow motor [N.m].
-        control: "continuous", part of the differential equation, or "sampled": measured and held every Ts.
-        Ts: control sample [s], a whole multiple of dt; None for dt.
-        render: the clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
+        kind: the experiment.
+    """
+    types, told, out = field_types(kind), _descriptions(kind), {}
+    for name, given in inspect.signature(kind).parameters.items():
+        hint, bound = types[name]
+        if name == "operator":
+            nominal = given.default is not None
+            about = "put the operator's arm Th (Eq. 19) in the loop."
+            out["impedance"] = Parameter(bool, nominal, "", about)
+        else:
+            out[name] = Parameter(hint, given.default, bound.unit if bound else "", told[name])
+    return out
+
+
+def from_words(kind: type[Experiment], words: Mapping[str, Any]) -> Scenario:
+    """The scenario of an experiment whose parameters are given as in `parameters`.
+
+    Args:
+        kind: the experiment.
+        words: parameters by name; those left out keep their defaults.
 
     Raises:
-        ParameterError: a value is out of its bounds.
+        ParameterError: as `Experiment.scenario`.
     """
-    i = AXES.index(choice("axis", axis, AXES))
-    b = number("b", b, 0.0, B_MAX, unit="N.s/m")
-    gain = number("gain", gain, 0.0, 1e6, above=True)
-    rms = number("rms", rms, 0.0, 1e6, unit="N")
-    everywhere = Profile((), (b,))
-    return Scenario(
-        name="stability",
-        clay=Clay(x=everywhere, y=everywhere),
-        gain=(gain, GAIN[1]) if i == 0 else (GAIN[0], gain),
-        force=(0.0, 0.0),
-        muscle=Multisine(rms=(rms, 0.0) if i == 0 else (0.0, rms), seed=seed),
-        operator=Operator() if flag("impedance", impedance) else None,
-        shaping=shaping,
-        dt=dt,
-        t_max=t_max,
-        length=None,
-        origin=origin,
-        torque_limit=torque_limit,
-        control=control,
-        Ts=Ts,
-        render=render,
-        stop=False,
-    )
+    given = dict(words)
+    if "impedance" in given:
+        given["operator"] = Operator() if flag("impedance", given.pop("impedance")) else None
+    return kind(**given).scenario()
 
 
-SCENARIOS: dict[str, Callable[..., Scenario]] = {
-    "constant": constant_cut,
-    "variable": variable_cut,
-    "stability": stability_test,
-    "free": free,
-}
+def _descriptions(kind: type) -> dict[str, str]:
+    """What the docstrings of a dataclass and its bases say of each field, on one line."""
+    out: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        _, _, section = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")
+        for name, text in re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", section, re.M):
+            out[name] = " ".join(text.split())
+    return dict.fromkeys(field_types(kind), "") | out
+
+
+P = ParamSpec("P")
+
+
+def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
+    """A function with the parameters of an experiment that returns its scenario.
+
+    Args:
+        kind: the experiment.
+    """
+    assert isinstance(kind, type)
+
+    def make(*args: P.args, **parameters: P.kwargs) -> Scenario:
+        return kind(*args, **parameters).scenario()
+
+    signature, told = inspect.signature(kind), _descriptions(kind)
+    make.__name__ = make.__qualname__ = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
+    make.__signature__ = signature.replace(return_annotation=Scenario)  # type: ignore[attr-defined]
+    summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
+    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
+    refused = "    ParameterError: a value is out of its bounds, or the path out of reach."
+    make.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n{refused}"
+    return make
+
+
+constant_cut = scenario_factory(ConstantCut)
+variable_cut = scenario_factory(VariableCut)
+stability_test = scenario_factory(StabilityTest)
+free = scenario_factory(Free)
+SCENARIOS = {name: scenario_factory(kind) for name, kind in EXPERIMENTS.items()}

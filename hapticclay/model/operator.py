@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from ..errors import number
+from ..errors import Bound, check_fields
 from .constants import B_MAX
 
 
@@ -58,21 +59,17 @@ class Operator:
     """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).
 
     Attributes:
-        mass: kg. damper: N.s/m. spring: N/m, pulling towards p = 0.
+        mass: mass of the arm at the handle [kg], 0 to 1e3.
+        damper: its damping [N.s/m], 0 to 1e9.
+        spring: its stiffness, pulling towards p = 0 [N/m], 0 to 1e9.
     """
 
-    mass: float = 0.25
-    damper: float = 2.0
-    spring: float = 6.0
+    mass: Annotated[float, Bound(0.0, 1e3, "kg")] = 0.25
+    damper: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 2.0
+    spring: Annotated[float, Bound(0.0, 1e9, "N/m")] = 6.0
 
     def __post_init__(self):
-        for field, high, unit in (
-            ("mass", 1e3, "kg"),
-            ("damper", B_MAX, "N.s/m"),
-            ("spring", 1e9, "N/m"),
-        ):
-            value = number(f"operator.{field}", getattr(self, field), 0.0, high, unit=unit)
-            object.__setattr__(self, field, value)
+        check_fields(self, "operator.")
 
 
 NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0

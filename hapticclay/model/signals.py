@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..errors import ParameterError, integer, number, pair
+from ..errors import Bound, ParameterError, check_fields, integer
+
+MOST_LINES = 100_000
 
 
 def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
@@ -83,33 +85,31 @@ class Multisine:
     2012, sec. 2.3).
 
     Attributes:
-        rms: root mean square on each axis, in the unit of what the signal adds to.
-        low, high: band [Hz]. period: [s].
-        lines: number of lines, spread evenly over the logarithm of frequency; None for every multiple.
-        seed: of the phases.
+        rms: root mean square on each axis, in the unit of what the signal adds to, 0 to 1e6.
+        low: lower end of the band [Hz], > 0.
+        high: upper end of the band [Hz], low to 1e6.
+        period: period of the signal [s], 1e-3 to 1e5.
+        lines: number of lines, spread evenly over the logarithm of frequency; None for every
+            multiple of 1/period.
+        seed: seed of the phases, 0 to 2^32 - 1.
     """
 
-    rms: tuple[float, float] = (1.0, 0.0)
-    low: float = 0.1
-    high: float = 2.0
-    period: float = 20.0
-    lines: int | None = None
-    seed: int = 0
+    rms: Annotated[tuple[float, float], Bound(0.0, 1e6)] = (1.0, 0.0)
+    low: Annotated[float, Bound(0.0, unit="Hz", above=True)] = 0.1
+    high: Annotated[float, Bound("low", 1e6, "Hz")] = 2.0
+    period: Annotated[float, Bound(1e-3, 1e5, "s")] = 20.0
+    lines: Annotated[int | None, Bound(1, MOST_LINES)] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
 
     def __post_init__(self):
-        put = lambda field, value: object.__setattr__(self, field, value)  # noqa: E731
-        put("rms", pair("multisine.rms", self.rms, 0.0, 1e6))
-        put("period", number("multisine.period", self.period, 1e-3, 1e5, unit="s"))
-        put("low", number("multisine.low", self.low, 0.0, above=True, unit="Hz"))
-        put("high", number("multisine.high", self.high, self.low, 1e6, unit="Hz"))
-        put("seed", integer("multisine.seed", self.seed, 0, 2**32 - 1))
-        most = (
-            math.floor(self.high * self.period + 1e-9)
-            - math.ceil(self.low * self.period - 1e-9)
-            + 1
-        )
-        if not 1 <= most <= 100_000:
-            bound = f"the band must hold 1 to 100000 multiples of 1/period = {1.0 / self.period:g} Hz, not {most}"
+        check_fields(self, "multisine.")
+        first = math.ceil(self.low * self.period - 1e-9)
+        most = math.floor(self.high * self.period + 1e-9) - first + 1
+        if not 1 <= most <= MOST_LINES:
+            bound = (
+                f"the band must hold 1 to {MOST_LINES} multiples of "
+                f"1/period = {1.0 / self.period:g} Hz, not {most}"
+            )
             raise ParameterError("multisine.high", self.high, bound)
         if self.lines is not None:
-            put("lines", integer("multisine.lines", self.lines, 1, most))
+            integer("multisine.lines", self.lines, 1, most)

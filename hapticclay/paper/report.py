@@ -1,4 +1,4 @@
-"""The whole paper, reproduced: one HTML page, the same in Markdown, the ledger as data."""
+"""The report of `hapticclay reproduce`: every figure and number of the paper beside ours."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from .. import views
 from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
+from ..studies import workspace
 from . import claims
 from .ledger import STATUSES, Row, Runs
 
@@ -23,90 +25,159 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the report: file name, title, caption, and what draws it."""
+    """A figure of the report.
+
+    Attributes:
+        name: of the file.
+        title: over the figure.
+        caption: under the figure.
+        draw: draws the figure from the runs of the ledger.
+        quick: whether the quick report has it.
+    """
 
     name: str
     title: str
     caption: str
     draw: Callable[[Runs], Any]
-    quick: bool = True  # whether the quick report has it
+    quick: bool = True
 
 
-def _plot(name: str, *args: Any, **kw: Any) -> Any:
-    from ..views import run_plots
-
-    return getattr(run_plots, name)(*args, **kw)
-
-
-def _response_figure(runs: Runs, what: str) -> Any:
-    from ..views import study_plots
-
-    return study_plots.bode(
-        [runs.identified(what, axis) for axis in ("x" if what == "Th" else "xy")]
-    )
+def _identified(runs: Runs, what: str) -> Any:
+    axes = "x" if what == "Th" else "xy"
+    return views.study_plots.identification_plot([runs.identified(what, axis) for axis in axes])
 
 
-def _theory(name: str, *args: Any, **kw: Any) -> Any:
-    from ..views import theory_plots
+def _readings(runs: Runs) -> Any:
+    names = ("none", "0.15/s", "30/s", "0.15/sample")
+    return views.run_plots.readings_plot({name: runs.variable(name) for name in names})
 
-    return getattr(theory_plots, name)(*args, **kw)
+
+def _maneuver(runs: Runs, over: str) -> Any:
+    return views.run_plots.maneuver_plot([runs.stability(K) for K in GAINS_FIG11], over=over)
 
 
-def _map(runs: Runs) -> Any:
-    from ..studies.workspace import drift_map
-    from ..views import study_plots
-
-    return study_plots.workspace(drift_map())
+def _nyquist(axis: str, gains: tuple[float, ...], operator: Operator | None) -> Any:
+    return views.theory_plots.nyquist_plot(axis, B_STABILITY, gains, operator=operator)
 
 
 PICTURES = (
-    Picture("fig04", "Fig. 4: closed position loop G",
-            "Response of the simulated arm to commands, and Eqs. 15 and 16.", lambda r: _response_figure(r, "G")),
-    Picture("fig05", "Fig. 5: sensitivity Sh",
-            "Response to forces at the handle, and Eqs. 17 and 18.", lambda r: _response_figure(r, "S")),
-    Picture("fig06", "Fig. 6: operator's arm Th",
-            "Hand force over handle position, and Eq. 19.", lambda r: _response_figure(r, "Th")),
-    Picture("fig07", "Fig. 7: path of the constant cut",
-            "Straight through the slab; without shaping the arm's inertia pulls it aside by less than a millimetre.",
-            lambda r: _plot("path", r.constant())),
-    Picture("fig08a", "Fig. 8, top: velocity against position",
-            "The speed K f/(10 + K b) in the clay, ten times that outside.",
-            lambda r: _plot("velocity_position", r.constant())),
-    Picture("fig08b", "Fig. 8, bottom: force over velocity",
-            "The clay's share is b inside and nothing outside; the operator feels the compensator's 10/K on top.",
-            lambda r: _plot("force_velocity", r.constant())),
-    Picture("fig09", "Fig. 9: path of the variable cut",
-            "Clay of 50 N·s/m up to 5 cm on each axis, 100 beyond, growing in x.",
-            lambda r: _plot("path", r.variable())),
-    Picture("fig10", "Fig. 10: velocity of the variable cut",
-            "Constant up to 5 cm, an abrupt drop, then slowly less in x as the clay grows by 30 N·s/m a second.",
-            lambda r: _plot("velocity_position", r.variable(), "xy")),
-    Picture("fig10_printed", "Fig. 10 with K = 1 on both axes, as printed",
-            "The y axis is unstable in the printed model; the run ends where that is certain.",
-            lambda r: _plot("velocity_position", r.variable(as_printed=True), "xy")),
-    Picture("readings", "Readings of the growth",
-            "The paper prints the growth in three ways; each would have given this speed in x.",
-            lambda r: _plot("readings", {x: r.variable(x) for x in ("none", "0.15/s", "30/s", "0.15/sample")})),
-    Picture("fig11a", "Fig. 11: force during a maneuver, against time",
-            "Below the limit the hand feels its own muscle; far above it the motors swing against their limits.",
-            lambda r: _plot("force_maneuver", [r.stability(K) for K in GAINS_FIG11])),
-    Picture("fig11b", "Fig. 11: force during a maneuver, against position", "The same runs.",
-            lambda r: _plot("force_maneuver", [r.stability(K) for K in GAINS_FIG11], "x", "position")),
-    Picture("nyquist_x", "Nyquist diagram of x", "The loop (GC + Sh)(Te + Th) for the gains of Fig. 11.",
-            lambda r: _theory("nyquist", "x", B_STABILITY, gains=GAINS_FIG11, operator=Operator())),
-    Picture("nyquist_y", "Nyquist diagram of y", "K = 1, as printed, encloses -1; K = 0.5 does not.",
-            lambda r: _theory("nyquist", "y", B_STABILITY, gains=(0.5, 1.0))),
-    Picture("bode_x", "Bode diagram of x", "Margins of the constant cut, K = 1.",
-            lambda r: _theory("bode", "x", 1.0, B_CONSTANT, operator=Operator())),
-    Picture("small_gain_y", "Inequality (13) on y", "Where the paper's sufficient condition fails, whatever K.",
-            lambda r: _theory("small_gain", "y", 1.0, B_STABILITY, operator=Operator())),
-    Picture("map", "Drift of Sh over the workspace",
-            "Without shaping the printed Sh holds at the nominal pose only.", _map, quick=False),
-)  # fmt: skip
+    Picture(
+        "fig04",
+        "Fig. 4: closed position loop G",
+        "Response of the simulated arm to position commands, and Eqs. 15 and 16.",
+        lambda r: _identified(r, "G"),
+    ),
+    Picture(
+        "fig05",
+        "Fig. 5: sensitivity Sh",
+        "Response of the simulated arm to forces at the handle, and Eqs. 17 and 18.",
+        lambda r: _identified(r, "S"),
+    ),
+    Picture(
+        "fig06",
+        "Fig. 6: operator's arm Th",
+        "Hand force over handle position, and Eq. 19.",
+        lambda r: _identified(r, "Th"),
+    ),
+    Picture(
+        "fig07",
+        "Fig. 7: path of the constant cut",
+        "Straight through the slab. Without inertia shaping the arm pulls the handle aside by less "
+        "than a millimetre.",
+        lambda r: views.run_plots.path_plot(r.constant()),
+    ),
+    Picture(
+        "fig08a",
+        "Fig. 8, top: velocity over position",
+        "The speed is K f/(10 + K b) in the clay and ten times that outside.",
+        lambda r: views.run_plots.velocity_plot(r.constant()),
+    ),
+    Picture(
+        "fig08b",
+        "Fig. 8, bottom: force over velocity",
+        "The clay's share is b inside the slab and zero outside; the operator also feels 10/K, the "
+        "compensator's own damping.",
+        lambda r: views.run_plots.force_ratio_plot(r.constant()),
+    ),
+    Picture(
+        "fig09",
+        "Fig. 9: path of the variable cut",
+        "Clay of 50 N·s/m up to 5 cm on each axis and of 100 N·s/m beyond, growing in x.",
+        lambda r: views.run_plots.path_plot(r.variable()),
+    ),
+    Picture(
+        "fig10",
+        "Fig. 10: velocity of the variable cut",
+        "Constant up to 5 cm, then an abrupt drop, then a slow decrease in x as the clay grows by "
+        "30 N·s/m each second.",
+        lambda r: views.run_plots.velocity_plot(r.variable(), "xy"),
+    ),
+    Picture(
+        "fig10_printed",
+        "Fig. 10 with K = 1 on both axes, as printed",
+        "The printed model is unstable in y. The run ends once the instability is certain.",
+        lambda r: views.run_plots.velocity_plot(r.variable(as_printed=True), "xy"),
+    ),
+    Picture(
+        "readings",
+        "Readings of the growth",
+        "The paper prints the growth of the clay in three ways; each gives a different speed in x.",
+        _readings,
+    ),
+    Picture(
+        "fig11a",
+        "Fig. 11: force during a maneuver, over time",
+        "Below the gain limit the hand feels its own muscle. Far above it the motors swing between "
+        "their limits.",
+        lambda r: _maneuver(r, "time"),
+    ),
+    Picture(
+        "fig11b",
+        "Fig. 11: force during a maneuver, over position",
+        "The same runs.",
+        lambda r: _maneuver(r, "position"),
+    ),
+    Picture(
+        "nyquist_x",
+        "Nyquist diagram of x",
+        "The loop (GC + Sh)(Te + Th) for the gains of Fig. 11.",
+        lambda r: _nyquist("x", GAINS_FIG11, Operator()),
+    ),
+    Picture(
+        "nyquist_y",
+        "Nyquist diagram of y",
+        "K = 1, as printed, encloses -1; K = 0.5 does not.",
+        lambda r: _nyquist("y", (0.5, 1.0), None),
+    ),
+    Picture(
+        "bode_x",
+        "Bode diagram of x",
+        "Margins of the constant cut with K = 1.",
+        lambda r: views.theory_plots.bode_plot("x", 1.0, B_CONSTANT, operator=Operator()),
+    ),
+    Picture(
+        "small_gain_y",
+        "Inequality (13) on y",
+        "The paper's sufficient condition fails in the shaded band for every K.",
+        lambda r: views.theory_plots.small_gain_plot("y", 1.0, B_STABILITY, operator=Operator()),
+    ),
+    Picture(
+        "map",
+        "Drift of Sh over the workspace",
+        "Without inertia shaping the printed Sh holds at the nominal pose only.",
+        lambda r: views.study_plots.workspace_plot(workspace.drift_map()),
+        quick=False,
+    ),
+)
 
 
 def format_number(x: float | None, unit: str = "") -> str:
-    """x for a table, to six digits; an empty cell for None."""
+    """Formats a value for a table with six digits; None gives an empty cell.
+
+    Args:
+        x: the value.
+        unit: its unit; "1" is not shown.
+    """
     if x is None:
         return ""
     if math.isnan(x):
@@ -116,7 +187,11 @@ def format_number(x: float | None, unit: str = "") -> str:
 
 
 def format_error(row: Row) -> str:
-    """The row's error for a table: percent, or in its unit where 0 is expected."""
+    """Formats the error of a row in percent, or in the row's unit where 0 is expected.
+
+    Args:
+        row: of the ledger.
+    """
     if row.error is None or math.isnan(row.error):
         return ""
     if row.expected == 0.0:
@@ -126,7 +201,11 @@ def format_error(row: Row) -> str:
 
 
 def format_verdict(row: Row) -> str:
-    """Whether the row agrees, for a table."""
+    """Formats the agreement of a row.
+
+    Args:
+        row: of the ledger.
+    """
     return {True: "yes", False: "NO", None: ""}[row.agrees]
 
 
@@ -134,9 +213,13 @@ def _environment():
     import jinja2
 
     env = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=jinja2.select_autoescape(["html"]), trim_blocks=True,
-        lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined,
-    )  # fmt: skip
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html"]),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
     env.filters |= {
         "number": format_number,
         "error": format_error,
@@ -147,7 +230,11 @@ def _environment():
 
 
 def paper_page(rows: list[Row]) -> str:
-    """The ledger as a Markdown page (docs/paper.md)."""
+    """Renders the ledger as a Markdown page (docs/paper.md).
+
+    Args:
+        rows: of the ledger.
+    """
     return _environment().get_template("paper.md").render(rows=rows, statuses=STATUSES)
 
 
@@ -157,10 +244,13 @@ def reproduce(
     progress: Callable[[str], None] | None = None,
     runs: Runs | None = None,
 ) -> list[Row]:
-    """Runs everything and writes report.html (self-contained), report.md, ledger.json and figures/ into out.
+    """Writes report.html (self-contained), report.md, ledger.json and figures/.
 
     Args:
-        out: folder. quick: leaves out the map over the workspace. progress: called with what comes next.
+        out: folder.
+        quick: whether to leave out the map over the workspace.
+        progress: called with the title of each step before it begins.
+        runs: runs to use again; None to make them.
 
     Returns:
         The rows of the ledger.
@@ -177,21 +267,15 @@ def reproduce(
         p.draw(runs).savefig(data, format="png")
         with atomic(out / "figures" / f"{p.name}.png") as f:
             f.write(data.getvalue())
-        pictures.append({"name": p.name, "title": p.title, "caption": p.caption,
-                         "data": base64.b64encode(data.getvalue()).decode()})  # fmt: skip
+        code = base64.b64encode(data.getvalue()).decode()
+        pictures.append({"name": p.name, "title": p.title, "caption": p.caption, "data": code})
     found = {"rows": rows, "statuses": STATUSES, "pictures": pictures, "versions": versions()}
     env = _environment()
     for name in ("report.html", "report.md"):
         with atomic(out / name) as f:
             f.write(env.get_template(name).render(found).encode())
+    table = [{**asdict(r), "error": r.error, "agrees": r.agrees} for r in rows]
+    ledger = {"schema": LEDGER_SCHEMA, "versions": versions(), "rows": table}
     with atomic(out / "ledger.json") as f:
-        table = [{**asdict(r), "error": r.error, "agrees": r.agrees} for r in rows]
-        f.write(
-            (
-                json.dumps(
-                    {"schema": LEDGER_SCHEMA, "versions": versions(), "rows": table}, indent=1
-                )
-                + "\n"
-            ).encode()
-        )
+        f.write((json.dumps(ledger, indent=1) + "\n").encode())
     return rows

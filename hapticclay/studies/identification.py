@@ -20,7 +20,7 @@ from ..files import versions
 from ..model import arm
 from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
-from ..model.scenario import Scenario
+from ..model.scenario import Control, Scenario
 from ..model.signals import Multisine, Signal
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
@@ -224,7 +224,7 @@ def identify(  # noqa: PLR0913  # the settings of one experiment, each by its na
     realisations: int = 4,
     lines: int = MULTISINE_LINES,
     amplitude: float | None = None,
-    control: str = "continuous",
+    control: Control = "continuous",
     dt: float = TS,
     progress: Callable[[int, int], None] | None = None,
 ) -> Identified:

@@ -1,11 +1,10 @@
-"""Spaces of parameters: ranges, and grids, Latin hypercubes and Sobol sequences of scenarios over them."""
+"""Spaces of parameters: ranges, and grids, Latin hypercubes and Sobol sequences over them."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import hashlib
-import inspect
 import json
 import math
 import re
@@ -15,24 +14,29 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError, choice, integer
+from ..errors import ParameterError, choice, field_types, integer
 from ..files import versions
 from ..model.constants import AXES
-from ..model.experiments import SCENARIOS
+from ..model.experiments import EXPERIMENTS, from_words, parameters
 from ..model.operator import Operator
 from ..model.scenario import Scenario
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
-LETTERS = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
+RANGE_PATTERN = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST_RUNS = 10_000_000  # runs in one sweep
 
 
 @dataclass(frozen=True)
 class Range:
-    """Values of one parameter: n from low to high, evenly spaced or, if log, by constant factors; or a list.
+    """Values of one parameter: from low to high, evenly spaced or by constant factors; or a list.
 
-    Without n it is for designs that sample: anything from low to high.
+    Attributes:
+        low: smallest value.
+        high: largest value.
+        n: number of values on a grid; None for designs that sample between low and high.
+        log: whether neighbours differ by a constant factor.
+        values: the list; empty for none.
     """
 
     low: float
@@ -43,7 +47,11 @@ class Range:
 
     @classmethod
     def parse(cls, field: str, text: object) -> Range:
-        """Reads "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5"; a number or a list of them is welcome too.
+        """Reads "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5".
+
+        Args:
+            field: name for the error.
+            text: the range; a number or a list of numbers is accepted too.
 
         Raises:
             ParameterError: it is none of these.
@@ -54,7 +62,7 @@ class Range:
         )
         try:
             if items is None:
-                found = re.fullmatch(LETTERS, str(text).strip())
+                found = re.fullmatch(RANGE_PATTERN, str(text).strip())
                 if found:
                     low, high, n = (
                         float(found["low"]),
@@ -90,7 +98,11 @@ class Range:
         )
 
     def spread(self, u: np.ndarray) -> np.ndarray:
-        """u in [0, 1) over the range; a list is drawn from."""
+        """Samples of the unit interval spread over the range.
+
+        Args:
+            u: samples in [0, 1); they draw from the list if there is one.
+        """
         if self.values:
             return np.array(self.values)[(u * len(self.values)).astype(int)]
         if self.log:
@@ -100,15 +112,20 @@ class Range:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What to run.
+    """Runs of one experiment over a space of its parameters.
+
+    A parameter is one of the experiment's, as on the command line. "gain.x" is one axis of a pair;
+    a pair without axis gets the value on both. "operator.mass" (damper, spring) puts an arm at the
+    handle.
 
     Attributes:
-        experiment: one of SCENARIOS.
-        vary: parameter -> Range. A parameter is one of the experiment's; "gain.x" is one axis of a pair, a pair without
-            axis gets the value on both; "operator.mass" (damper, spring) puts an arm at the handle.
-        fixed: parameters of the experiment that are the same in all runs.
-        design: "grid" (all combinations, the last parameter fastest), "lhs" (Latin hypercube) or "sobol".
-        runs: of "lhs" and "sobol". seed: of both.
+        experiment: a name in EXPERIMENTS.
+        vary: ranges by parameter.
+        fixed: values by parameter, the same in all runs.
+        design: "grid" (all combinations, the last parameter fastest), "lhs" (Latin hypercube) or
+            "sobol".
+        runs: number of runs of "lhs" and "sobol"; None for "grid".
+        seed: seed of both.
         chunk: runs in one file.
     """
 
@@ -121,7 +138,7 @@ class Sweep:
     chunk: int = 64
 
     def __post_init__(self):
-        choice("experiment", self.experiment, tuple(SCENARIOS))
+        choice("experiment", self.experiment, tuple(EXPERIMENTS))
         choice("design", self.design, DESIGNS)
         integer("seed", self.seed, 0, 2**32 - 1)
         integer("chunk", self.chunk, 1, 100_000)
@@ -144,11 +161,11 @@ class Sweep:
                     f"{told} ({self.design})",
                 )
         integer("runs", len(self), 1, MOST_RUNS)
-        known = tuple(inspect.signature(SCENARIOS[self.experiment]).parameters)
+        known = tuple(parameters(EXPERIMENTS[self.experiment]))
         for name in (*self.vary, *self.fixed):
             head, _, part = name.partition(".")
             if head == "operator":
-                choice("parameter", part, ("mass", "damper", "spring"))
+                choice("parameter", part, tuple(field_types(Operator)))
             else:
                 choice("parameter", head, known)
                 if part:
@@ -166,11 +183,20 @@ class Sweep:
         return -(-len(self) // self.chunk)
 
     def chunk_runs(self, number: int) -> range:
-        """The runs of one file."""
+        """The runs of one file.
+
+        Args:
+            number: of the file, from 0.
+        """
         return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
 
     def points(self, first: int, last: int) -> np.ndarray:
-        """Parameters of the runs first to last - 1, shape (last - first, parameters)."""
+        """Parameters of some runs, shape (last - first, parameters).
+
+        Args:
+            first: number of the first run.
+            last: number of the run after the last.
+        """
         axes = list(self.vary.values())
         if self.design == "grid":
             index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
@@ -181,46 +207,47 @@ class Sweep:
     def scenario(self, point: np.ndarray) -> Scenario:
         """The scenario of one run.
 
+        Args:
+            point: its parameters, a row of `points`.
+
         Raises:
             ParameterError: a value is out of its bounds.
         """
-        make = SCENARIOS[self.experiment]
-        known = inspect.signature(make).parameters
-        given: dict[str, Any] = dict(self.fixed)
+        kind = EXPERIMENTS[self.experiment]
+        known = parameters(kind)
+        words: dict[str, Any] = {}
         hand: dict[str, float] = {}
-        for name, value in zip(self.vary, point.tolist(), strict=True):
-            given[name] = value
-        plain: dict[str, Any] = {}
-        for name, value in given.items():
+        varied = dict(zip(self.vary, point.tolist(), strict=True))
+        for name, value in {**self.fixed, **varied}.items():
             head, _, part = name.partition(".")
             if head == "operator":
                 hand[part] = value
                 continue
-            usual = plain.get(head, known[head].default)
+            usual = words.get(head, known[head].default)
             if part:
                 pair = list(usual)
                 pair[AXES.index(part)] = value
-                plain[head] = tuple(pair)
+                words[head] = tuple(pair)
             elif isinstance(usual, tuple) and not isinstance(value, list | tuple):
-                plain[head] = (value,) * len(usual)
-            elif isinstance(usual, bool) or known[head].annotation in ("int", int):
-                plain[head] = type(usual)(value)
+                words[head] = (value,) * len(usual)
+            elif known[head].kind in (bool, int):
+                words[head] = known[head].kind(value)
             else:
-                plain[head] = tuple(value) if isinstance(value, list) else value
-        scenario = make(**plain)
+                words[head] = tuple(value) if isinstance(value, list) else value
+        scenario = from_words(kind, words)
         return dataclasses.replace(scenario, operator=Operator(**hand)) if hand else scenario
 
     def described(self) -> dict[str, Any]:
-        """The sweep as data, from which `digest` tells two apart."""
+        """The sweep as data."""
         return {"schema": SWEEP_SCHEMA, **dataclasses.asdict(self)}
 
     def digest(self) -> str:
-        """Fingerprint of what is run, and of the release it is run with."""
+        """Fingerprint of the sweep and of the release that runs it."""
         text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-@functools.lru_cache(1)  # a worker is asked for it with each chunk
+@functools.lru_cache(1)  # a worker needs it for each chunk
 def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndarray:
     """A sample of the unit cube, shape (runs, dimensions)."""
     from scipy.stats import qmc
@@ -236,10 +263,16 @@ def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndar
 def parse_grid(text: str) -> dict[str, Range]:
     """Reads "b=1:1000:50log gain=0.2:2:20 force=1:2 log".
 
+    Args:
+        text: the ranges.
+
     Raises:
         ParameterError: a word is not name=range, or a name stands twice.
     """
-    how = "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, each name once"
+    how = (
+        "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, "
+        "each name once"
+    )
     together = re.sub(r"\s+log(?!\S)", "log", text)
     return {
         name: Range.parse(name, values)
@@ -249,6 +282,9 @@ def parse_grid(text: str) -> dict[str, Range]:
 
 def parse_fixed(text: str) -> dict[str, Any]:
     """Reads "t_max=2 shaping=true force=1,0 growth=30/s".
+
+    Args:
+        text: the values.
 
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
@@ -260,7 +296,7 @@ def parse_fixed(text: str) -> dict[str, Any]:
 
 
 def _split_words(field: str, text: str, how: str) -> dict[str, str]:
-    """Words name=value, apart; how they must look."""
+    """Splits words name=value; `how` they must look is for the error."""
     out: dict[str, str] = {}
     for word in text.split():
         name, equals, value = word.partition("=")
@@ -283,18 +319,22 @@ def _value(text: str) -> Any:
 def load_sweep(path: Path) -> dict[str, Any]:
     """Reads a sweep from TOML: experiment, design, runs, seed, chunk; tables [vary] and [fixed].
 
+    Args:
+        path: the file.
+
     Returns:
         Arguments of `Sweep`.
 
     Raises:
-        ParameterError: the file cannot be read, or holds something else.
+        ParameterError: the file cannot be read, or does not hold a sweep.
     """
     import tomllib
 
     try:
         data = tomllib.loads(path.read_text())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ParameterError("spec", str(path), f"must be a TOML file ({error})") from None
+        fault = getattr(error, "strerror", None) or error
+        raise ParameterError("spec", str(path), f"must be a TOML file ({fault})") from None
     fields = [f.name for f in dataclasses.fields(Sweep)]
     for name in data:
         choice("field of the spec", name, fields)
@@ -303,3 +343,19 @@ def load_sweep(path: Path) -> dict[str, Any]:
             raise ParameterError(name, data[name], "must be a table")
     data["vary"] = {k: Range.parse(k, v) for k, v in data.get("vary", {}).items()}
     return {"experiment": "constant", **data}
+
+
+def parameter_unit(name: str) -> str:
+    """Unit of a parameter of any experiment, as in "gain.x" or "operator.mass"; "" for none.
+
+    Args:
+        name: the parameter, as sweeps name it.
+    """
+    head, _, part = name.partition(".")
+    if head == "operator" and part in field_types(Operator):
+        bound = field_types(Operator)[part][1]
+        return bound.unit if bound else ""
+    units = [
+        parameters(kind)[head].unit for kind in EXPERIMENTS.values() if head in parameters(kind)
+    ]
+    return next(filter(None, units), "")

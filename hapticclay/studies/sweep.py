@@ -1,7 +1,8 @@
 """Many runs over a space of parameters, as a data set that survives anything.
 
-A sweep is cut into chunks; each chunk is one Parquet file, written whole or not at all by whoever ran it. What
-is missing or damaged is what is left to do, so a sweep that was interrupted, even killed, goes on where it stopped.
+A sweep is cut into chunks; each chunk is one Parquet file, written whole or not at all by the
+process that ran it. Missing and damaged files are the work left, so that an interrupted sweep, even
+a killed one, goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -29,40 +30,45 @@ from ..theory import gain_limit
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-COMPILE_FROM = (
-    2_000_000  # steps in the whole sweep from which the compiled loop pays in every process
-)
-MARK = (
-    b"hapticclay_sweep",
-    b"hapticclay_part",
-)  # keys in a part's metadata: the sweep's digest, the chunk's number
-PROBES, CLAIM_PATIENCE = (
-    20,
-    5.0,
-)  # runs an estimate is made from, and the time after which fewer will do [s]
-NAMED = 5  # bad parts that are named, not counted
+COMPILE_FROM = 2_000_000  # steps of a sweep from which compiling pays in every process
+MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's digest, chunk's number
+PROBES = 20  # runs that an estimate is made from ...
+PROBE_TIME = 5.0  # ... or fewer after this time [s]
+BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
 
 
 def result_row(
     index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
 ) -> dict[str, Any]:
-    """One row of the data set: parameters, how the run ended, what was measured. NaN where there is nothing.
+    """One row of the data set: parameters, outcome and measurements; NaN for none.
 
     Args:
-        index: of the run. names, point: its parameters. r: its record; None if it was refused, and why.
+        index: number of the run.
+        names: names of its parameters.
+        point: their values.
+        r: its record; None if it was refused.
+        refused: why it was refused.
     """
     nan = math.nan
     out: dict[str, Any] = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
-    out |= {"status": r.outcome.code if r else "refused", "axis": r.outcome.axis if r else "",
-            "cause": r.outcome.cause if r else refused, "end_time": r.outcome.time if r else nan}  # fmt: skip
+    out |= {
+        "status": r.outcome.code if r else "refused",
+        "axis": r.outcome.axis if r else "",
+        "cause": r.outcome.cause if r else refused,
+        "end_time": r.outcome.time if r else nan,
+    }
     times = [c.time for c in r.crossings] if r else []
     out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(CROSSINGS_KEPT)}
     for i, axis in enumerate(AXES):
         deepest = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None) if r else None
         entry = deepest[axis] if deepest else {}
         fe = entry.get("steady_fe_over_v") or {}
-        out |= {f"b_{axis}": entry.get("b", nan), f"fe_over_v_{axis}": fe.get("mean", nan),
-                f"speed_{axis}": nan if entry.get("steady_speed") is None else entry["steady_speed"]}  # fmt: skip
+        speed = entry.get("steady_speed")
+        out |= {
+            f"b_{axis}": entry.get("b", nan),
+            f"fe_over_v_{axis}": fe.get("mean", nan),
+            f"speed_{axis}": nan if speed is None else speed,
+        }
         margin = nan
         if r and r.scenario.gain[i] > 0.0:
             b = entry.get("b", 0.0)
@@ -75,8 +81,14 @@ def result_row(
     return out
 
 
-def measure_rates(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
-    """Makes one run of a sweep; its row."""
+def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
+    """Makes one run of a sweep and returns its row.
+
+    Args:
+        sweep: the sweep.
+        index: number of the run.
+        point: its parameters.
+    """
     names = list(sweep.vary)
     try:
         scenario = sweep.scenario(point)
@@ -93,21 +105,32 @@ def measure_rates(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]
 
 
 def run_chunk(sweep: Sweep, number: int, out: str) -> int:
-    """Runs one chunk and writes its file; returns the number of its runs. What a worker does, here or far away."""
+    """Runs one chunk and writes its file, in any process; returns the number of its runs.
+
+    Args:
+        sweep: the sweep.
+        number: the chunk.
+        out: folder of the sweep.
+    """
     runs = sweep.chunk_runs(number)
     points = sweep.points(runs.start, runs.stop)
-    rows = [measure_rates(sweep, index, point) for index, point in zip(runs, points, strict=True)]
+    rows = [run_point(sweep, index, point) for index, point in zip(runs, points, strict=True)]
     with atomic(sweep_part(Path(out), number)) as f:
         _write_part(rows, parquet_schema(sweep, number), f)
     return len(runs)
 
 
 def parquet_schema(sweep: Sweep, number: int) -> Any:
-    """The pyarrow Schema of a chunk's file: its columns, and in its metadata which sweep and which chunk it is of."""
+    """The pyarrow Schema of a chunk's file; its metadata tell the sweep and the chunk.
+
+    Args:
+        sweep: the sweep.
+        number: the chunk.
+    """
     import pyarrow as pa
 
     empty = result_row(0, list(sweep.vary), np.zeros(len(sweep.vary)), None)
-    marks = dict(zip(MARK, (sweep.digest().encode(), b"%d" % number), strict=True))
+    marks = dict(zip(MARKS, (sweep.digest().encode(), b"%d" % number), strict=True))
     return pa.Table.from_pylist([empty]).schema.with_metadata(marks)
 
 
@@ -119,7 +142,7 @@ def _write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
 
 
 def _read_part(file: Path) -> Any:
-    """A part as a pyarrow Table, every page proven by its checksum; None if it is damaged.
+    """A part as a pyarrow Table, each page checked by its checksum; None if it is damaged.
 
     Raises:
         ParameterError: it cannot be read at all.
@@ -131,34 +154,48 @@ def _read_part(file: Path) -> Any:
         source = pa.BufferReader(file.read_bytes())
     except OSError as error:
         raise ParameterError("part", file.name, f"must be readable ({error.strerror})") from None
-    with contextlib.suppress(
-        pa.ArrowException, OSError, ValueError
-    ):  # threads of Arrow's abort some exits of Python
+    with contextlib.suppress(pa.ArrowException, OSError, ValueError):
+        # Arrow's threads abort some exits of Python
         return pq.ParquetFile(source, page_checksum_verification=True).read(use_threads=False)
     return None
 
 
 def sweep_part(out: Path, number: int) -> Path:
-    """The file of one chunk."""
+    """The file of one chunk.
+
+    Args:
+        out: folder of the sweep.
+        number: the chunk.
+    """
     return out / "data" / f"part-{number:06d}.parquet"
 
 
-def _part_numbers(out: Path) -> list[Path]:
+def _part_files(out: Path) -> list[Path]:
     return sorted((out / "data").glob("part-*.parquet"))
 
 
 def missing_parts(sweep: Sweep, out: Path) -> list[int]:
-    """Chunks that have no file yet."""
+    """Chunks without a file.
+
+    Args:
+        sweep: the sweep.
+        out: its folder.
+    """
     return [n for n in range(sweep.chunks) if not sweep_part(out, n).is_file()]
 
 
 def begin_sweep(sweep: Sweep, out: Path) -> list[int]:
-    """Makes the folder, or checks that what lies there is of this same sweep; gives the chunks that are to be done.
+    """Prepares the folder, or checks that it holds this same sweep; returns the chunks to run.
 
-    Parts that are damaged, or of another sweep or place, are named and removed, as is what a killed writer left.
+    Parts that are damaged, or of another sweep or place, are named and removed, as are the remains
+    of killed writers.
+
+    Args:
+        sweep: the sweep.
+        out: its folder.
 
     Raises:
-        ParameterError: another sweep lies there, or a file that is no part of any.
+        ParameterError: the folder holds another sweep, or a file that is no part of any.
     """
     file = out / "sweep.json"
     if file.is_file():
@@ -171,33 +208,31 @@ def begin_sweep(sweep: Sweep, out: Path) -> list[int]:
                 "out", str(out), "holds another sweep, or another release's: choose another folder"
             )
     else:
+        text = json.dumps({"digest": sweep.digest(), **sweep.described()}, indent=1)
         with atomic(file) as f:
-            f.write(
-                (
-                    json.dumps({"digest": sweep.digest(), **sweep.described()}, indent=1) + "\n"
-                ).encode()
-            )
+            f.write(f"{text}\n".encode())
     numbers = {sweep_part(out, n): n for n in range(sweep.chunks)}
-    for stray in set(_part_numbers(out)) - set(numbers):
+    for stray in set(_part_files(out)) - set(numbers):
         raise ParameterError("part", stray.name, f"is no part of the sweep in {out}: move it away")
     wanted = parquet_schema(sweep, 0)
-    bad = {f: fault for f in _part_numbers(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
+    bad = {f: fault for f in _part_files(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
     if bad:
         named = [f"{f.name} ({fault})" for f, fault in bad.items()]
-        more = [f"{len(named) - NAMED} more"] if len(named) > NAMED else []
-        print(f"hapticclay: made again: {', '.join(named[:NAMED] + more)}", file=sys.stderr)
+        more = len(named) - BAD_PARTS_NAMED
+        named = named[:BAD_PARTS_NAMED] + ([f"{more} more"] if more > 0 else [])
+        print(f"hapticclay: made again: {', '.join(named)}", file=sys.stderr)
     for left in (*bad, *(out / "data").glob(".part-*")):
         left.unlink(missing_ok=True)
     return missing_parts(sweep, out)
 
 
 def _fault(sweep: Sweep, number: int, file: Path, wanted: Any) -> str:
-    """What is wrong with a chunk's file, "" if nothing is; wanted: the schema of any chunk."""
+    """The fault of a chunk's file, "" for none; wanted: the schema of any chunk."""
     table = _read_part(file)
     if table is None:
         return "damaged"
     digest, of = _marks(table)
-    if digest != wanted.metadata[MARK[0]]:
+    if digest != wanted.metadata[MARKS[0]]:
         return "of another sweep"
     if of != b"%d" % number:
         return f"a copy of part {of.decode(errors='replace')}"
@@ -208,16 +243,21 @@ def _fault(sweep: Sweep, number: int, file: Path, wanted: Any) -> str:
 
 
 def _marks(table: Any) -> tuple[bytes, ...]:
-    """Digest and number that a part's metadata holds, empty where they are not."""
-    return tuple((table.schema.metadata or {}).get(key, b"") for key in MARK)
+    """Digest and number in a part's metadata; empty if missing."""
+    return tuple((table.schema.metadata or {}).get(key, b"") for key in MARKS)
 
 
 @contextlib.contextmanager
 def claimed(sweep: Sweep, out: Path) -> Iterator[list[int]]:
-    """Holds the folder out for this process alone, ready for the sweep; gives the chunks that are to be done.
+    """Locks the folder for this process and prepares it; yields the chunks to run.
+
+    Args:
+        sweep: the sweep.
+        out: its folder.
 
     Raises:
-        ParameterError: another sweep lies or is at work there, a file cannot be written, or a package is missing.
+        ParameterError: the folder holds another sweep, another process works in it, a file cannot
+            be written, or a package is missing.
     """
     try:
         import pyarrow  # noqa: F401
@@ -240,7 +280,7 @@ def claimed(sweep: Sweep, out: Path) -> Iterator[list[int]]:
 
 
 def _hold(lock: int, out: Path) -> None:
-    """Takes the lock, an open file's; the system lets go of it when the process ends, however it ends."""
+    """Takes the lock, an open file's; the system releases it when the process ends, even killed."""
     try:
         import fcntl
 
@@ -251,31 +291,36 @@ def _hold(lock: int, out: Path) -> None:
             "out", str(out), f"is where another sweep is at work ({who}): let it end first"
         ) from None
     except (ImportError, OSError):
-        print(
-            f"hapticclay: {out} knows no file locks: start no second sweep in it", file=sys.stderr
-        )
-    with contextlib.suppress(OSError):  # a full disk is met where it matters
+        print(f"hapticclay: no file locks in {out}: start no second sweep there", file=sys.stderr)
+    with contextlib.suppress(OSError):  # writing the parts reports a full disk
         os.truncate(lock, 0)
         os.write(lock, f"process {os.getpid()} on {platform.node()}".encode())
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, *, workers: int | None = None, scheduler: str | None = None,
+    sweep: Sweep,
+    out: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[int], None] | None = None,
-) -> int:  # fmt: skip
-    """Does what is missing of a sweep; returns the number of runs made.
+) -> int:
+    """Runs the missing chunks of a sweep; returns the number of runs made.
 
     Args:
-        sweep: what to run. out: folder of sweep.json and data/. workers, scheduler: as in `sweep_worker`.
-        progress: called with the number of runs of each chunk that is done.
+        sweep: the sweep.
+        out: folder of sweep.json and data/.
+        workers: as in `run_chunks`.
+        scheduler: as in `run_chunks`.
+        progress: called with the number of runs of each finished chunk.
 
     Raises:
-        ParameterError: as `claimed` and `sweep_worker`.
+        ParameterError: as `claimed` and `run_chunks`.
     """
     done = 0
     with (
         claimed(sweep, out) as todo,
-        contextlib.closing(sweep_worker(sweep, out, todo, workers, scheduler)) as results,
+        contextlib.closing(run_chunks(sweep, out, todo, workers, scheduler)) as results,
     ):
         for n in results:
             done += n
@@ -284,36 +329,44 @@ def run_sweep(
     return done
 
 
-def sweep_worker(
+def run_chunks(
     sweep: Sweep,
     out: Path,
     todo: list[int],
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Generator[int, None, None]:
-    """Runs chunks of a sweep whose folder is claimed; gives the number of runs of each, as it is done.
+    """Runs chunks of a sweep whose folder is claimed; yields the number of runs of each.
 
     Args:
-        sweep, out: as in `run_sweep`. todo: the chunks.
-        workers: processes here; None for one a core. scheduler: address of a dask scheduler to use instead.
+        sweep: the sweep.
+        out: its folder.
+        todo: the chunks.
+        workers: processes on this machine; None for one a core.
+        scheduler: address of a dask scheduler to use instead.
 
     Raises:
         ParameterError: a file cannot be written, or a package is missing.
         ChildProcessError: a worker here was killed.
     """
     return (
-        _far(sweep, out, todo, scheduler)
+        _run_on_cluster(sweep, out, todo, scheduler)
         if scheduler
-        else _here(sweep, out, todo, processes(todo, workers))
+        else _run_here(sweep, out, todo, processes(todo, workers))
     )
 
 
 def processes(todo: list[int], workers: int | None) -> int:
-    """How many are at work on so many chunks here."""
+    """Number of processes that run chunks on this machine.
+
+    Args:
+        todo: the chunks.
+        workers: the most to use; None for one a core.
+    """
     return max(1, min(workers or cores(), len(todo)))
 
 
-def _here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
+def _run_here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
@@ -322,24 +375,22 @@ def _here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generator[i
         for number in todo:
             yield run_chunk(sweep, number, str(out))
         return
-    context = multiprocessing.get_context(
-        "spawn"
-    )  # the engine's threads and locks do not survive a fork
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_serve_cluster) as pool:
+    context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         try:
             jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
             for job in as_completed(jobs):
                 yield job.result()
         except BrokenProcessPool:
             raise ChildProcessError(
-                "a worker was killed (memory?); the same command goes on from there"
+                "a worker was killed (memory?); the same command resumes the sweep"
             ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _serve_cluster() -> None:
-    """Leaves Ctrl-C to the process that waits, so that a worker finishes its chunk; and ends the worker with it."""
+def _start_worker() -> None:
+    """Leaves Ctrl-C to the parent, so that a worker finishes its chunk; ends with the parent."""
     import signal
     import threading
 
@@ -353,10 +404,12 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent
     parent.join()
-    os._exit(1)  # a killed parent has nobody to report to
+    os._exit(1)  # a killed parent takes no report
 
 
-def _far(sweep: Sweep, out: Path, todo: list[int], address: str) -> Generator[int, None, None]:
+def _run_on_cluster(
+    sweep: Sweep, out: Path, todo: list[int], address: str
+) -> Generator[int, None, None]:
     try:
         from distributed import Client, as_completed
     except ImportError:
@@ -378,17 +431,21 @@ def _far(sweep: Sweep, out: Path, todo: list[int], address: str) -> Generator[in
 
 
 def estimate_time(sweep: Sweep) -> tuple[float, float]:
-    """Seconds of one process and bytes on disk that a run of a sweep takes, from some of its runs, drawn at random."""
+    """Time [s] of one process and room on disk [bytes] that a run takes, from a random sample.
+
+    Args:
+        sweep: the sweep.
+    """
     import pyarrow as pa
 
     drawn = np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist()
-    probe = lambda i: measure_rates(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
+    probe = lambda i: run_point(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
     probe(drawn[0])  # the first run loads and compiles
     rows, spent, begin = [], 0.0, time.perf_counter()
     for i in drawn:
         rows.append(probe(i))
         spent = time.perf_counter() - begin
-        if spent > CLAIM_PATIENCE:
+        if spent > PROBE_TIME:
             break
     sizes = []
     for some in (rows, rows[:1]):
@@ -399,14 +456,17 @@ def estimate_time(sweep: Sweep) -> tuple[float, float]:
 
 
 def read_sweep(out: str | os.PathLike[str]):
-    """The data set in the folder out, all its chunks, as a pyarrow Table in the order of the runs.
+    """The data set of a sweep, all its chunks, as a pyarrow Table in the order of the runs.
+
+    Args:
+        out: folder of the sweep.
 
     Raises:
-        ParameterError: there is none, or a part of it is damaged or does not belong to the others.
+        ParameterError: there is none, or a part is damaged or does not belong to the others.
     """
     import pyarrow as pa
 
-    files = _part_numbers(Path(out))
+    files = _part_files(Path(out))
     if not files:
         raise ParameterError(
             "sweep", str(out), "must be a folder that hapticclay sweep has written"
@@ -421,10 +481,8 @@ def read_sweep(out: str | os.PathLike[str]):
             digest != _marks(tables[0])[0] or not table.schema.equals(tables[0].schema)
         ):
             fault = "of another sweep"
-        elif (
-            of and file.name != f"part-{of.decode(errors='replace'):0>6}.parquet"
-        ):  # 0.1.0 marked none
-            fault = "a copy of another part"
+        elif of and file.name != f"part-{of.decode(errors='replace'):0>6}.parquet":
+            fault = "a copy of another part"  # parts of 0.1.0 have no marks
         else:
             tables.append(table)
             continue

@@ -1,21 +1,19 @@
-"""A session in a browser, for people without a desktop: viser's scene, sliders and plots."""
+"""A session in a browser: viser's scene, sliders and plots, for people without a desktop."""
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import hmac
 import html
-import http.client
-import io
+import logging
 import math
 import secrets
 import socket
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from http import HTTPStatus
 from ipaddress import ip_address
-from socket import gethostname
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -23,38 +21,49 @@ import numpy as np
 
 from ..errors import ParameterError, integer
 from ..model.constants import AXES, L1, L2
-from . import stage
 from .session import Player, Session
-from .stage import Stage, cut_axes, hardest
+from .stage import GROUND, THICKNESS, Stage, hardest, plotted_axes
+from .style import (
+    CLAY_DEEP,
+    FORCE_COLORS,
+    GRID,
+    MATERIALS,
+    SKY,
+    TABLE,
+    rgb_bytes,
+    verdict_color,
+)
 
-FRAME = 1.0 / 30.0  # [s] between two looks of the browser
-CUT_EVERY, PLOT_EVERY = 0.2, 0.5  # [s] between two states of the clay, and of the plots
-POINTS = 400  # of a plot
-TITLE = "hapticclay"
-SKY, GROUND = (236, 240, 245), (214, 220, 228)  # behind the scene, above and below
-RED, GREEN, AMBER = "#c92a2a", "#0d6b52", "#b86b00"  # behind the verdict
-INK = {
-    ("hand", 0): "#009E73",
-    ("clay", 0): "#0072B2",
-    ("hand", 1): "#E69F00",
-    ("clay", 1): "#D55E00",
-}
-DARK, STEEL, BLUE, ORANGE = (56, 64, 74), (178, 186, 196), (15, 110, 173), (230, 107, 13)
+REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
+CLAY_TIME, PLOT_TIME = 0.2, 0.5  # [s] between two updates of the clay, and of the plots
+PLOT_POINTS = 400
+TAB_TITLE = "hapticclay"
+CENTRE = (0.22, 0.12)  # of the table [m]
+BANNER_STYLE = (
+    "color:white;padding:0.4em 0.6em;margin:0 0.7em 0.5em;border-radius:4px;font-size:0.85em"
+)
 
 
 class Page:
-    """The session's page, served until `close`.
+    """The page of a session, served until `close`.
 
     Attributes:
-        url: where it is, with the token if it needs one.
+        session: what is played.
+        url: address of the page, with the token if it needs one.
+        port: of the page.
+        guard: admits the requests.
+        server: viser's.
+        player: plays the session.
+        stage: holds the map of the clay.
     """
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080):
-        """Serves it.
+        """Begins to serve the page.
 
         Args:
-            session: to be played. host: address to listen on; other than this machine's own, a token guards it.
-            port: 0 for any.
+            session: to be played.
+            host: address to listen on; a token guards any address but this machine's own.
+            port: to listen on; 0 for any.
 
         Raises:
             ParameterError: viser is missing, or the address cannot be listened on.
@@ -63,219 +72,191 @@ class Page:
             import rich
             import viser
         except ImportError:
-            raise ParameterError(
-                "web", "viser", "is not installed: pip install 'hapticclay[web]'"
-            ) from None
-        self.session = session
-        port, local = integer("port", port, 0, 65535), host in LOCAL
-        self.console = rich.get_console()
-        self.quiet, self.console.quiet = (
-            self.console.quiet,
-            True,
-        )  # viser's boxes name the port behind the gate
-        with socket.create_server((LOCAL[0], 0)) as free:
-            behind = free.getsockname()[1]
-        self.server = viser.ViserServer(host=LOCAL[0], port=behind, verbose=False, label=TITLE)
-        token = "" if local else secrets.token_urlsafe(16)
-        try:
-            self.gate = Gate(host, port, self.server.get_port(), token, _titled)
-        except ParameterError:
+            bound = "is not installed: pip install 'hapticclay[web]'"
+            raise ParameterError("web", "viser", bound) from None
+        self.session, self.player = session, Player(session)
+        port = integer("port", port, 0, 65535)
+        self.guard = Guard(host, "" if host in LOCAL else secrets.token_urlsafe(16))
+        listening = _listening(host, port)
+        self.port = listening.getsockname()[1]
+        self._console = rich.get_console()
+        self._quiet, self._console.quiet = self._console.quiet, True  # viser would print its own
+        with _guarded(listening, self.guard):
+            self.server = viser.ViserServer(LOCAL[0], self.port, label=TAB_TITLE, verbose=False)
+        if self.server.get_port() != self.port:  # it listens elsewhere, unguarded
+            listening.close()
             self._stop()
-            raise
-        self.server._websock_server.on_client_connect(self._admit)
-        self.url = f"http://{_name(host)}:{self.gate.port}" + (f"/?token={token}" if token else "")
-        self.player = Player(session)
+            raise RuntimeError(f"viser {viser.__version__} cannot be guarded")
+        token = f"/?token={self.guard.token}" if self.guard.token else ""
+        self.url = f"http://{_url_host(host)}:{self.port}{token}"
         self.stage = Stage(session.scenario, session.tool)
-        self.shown = 1  # frames that the clay is cut by
-        self.cut = self.plotted = -math.inf  # when, in real time [s]
+        self._shown = 1  # frames that have cut the clay
+        self._clay_time = self._plot_time = -math.inf  # of their last updates [s]
         self._scene()
         self._controls(viser.uplot)
 
     def serve(self, until: Callable[[], bool] | None = None) -> None:
-        """Plays in real time until interrupted, or until this says so."""
+        """Plays in real time until interrupted.
+
+        Args:
+            until: ends the page when it returns True.
+        """
         self.player.start()
         try:
             while (until is None or not until()) and self.player.error is None:
                 begin = time.perf_counter()
                 self._refresh(begin)
-                time.sleep(max(0.002, FRAME - (time.perf_counter() - begin)))
+                time.sleep(max(0.002, REFRESH_TIME - (time.perf_counter() - begin)))
         finally:
             self.close()
 
     def close(self) -> None:
-        """Stops playing and serving; raises what the player died of, if it did."""
+        """Stops the player and the server; raises the error that ended the player, if any."""
         try:
             if self.player.ident:
                 self.player.stop()
         finally:
-            self.gate.close()
             self._stop()
 
     def _stop(self) -> None:
         self.server.stop()
-        self.console.quiet = self.quiet
-
-    async def _admit(self, client: Any) -> None:
-        """Sends whoever has come past the gate away, before they are told or have said anything."""
-        connection = self.server._websock_server._live_connections[client.client_id]
-        request = connection.request
-        if request is None or request.headers.get_all(PASS) != [self.gate.secret]:
-            await connection.close(1008, "not through the gate")
+        self._console.quiet = self._quiet
 
     def _scene(self) -> None:
-        add, ground = self.server.scene, stage.GROUND
+        add, tool = self.server.scene, self.session.tool
+        dark, steel, blue, orange = (
+            rgb_bytes(MATERIALS[name]) for name in ("dark", "steel", "blue", "orange")
+        )
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.fov = (0.21, -0.66, 0.64), (0.18, 0.15, -0.04), 0.60
-        add.set_background_image(
-            np.linspace(SKY, GROUND, 64).astype(np.uint8)[:, None].repeat(64, axis=1), "png"
-        )
+        sky = np.linspace(rgb_bytes(SKY[0]), rgb_bytes(SKY[1]), 64).astype(np.uint8)
+        add.set_background_image(sky[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
         add.configure_default_lights(enabled=False)
         add.add_light_ambient("/daylight", color=(255, 255, 255), intensity=0.5)
-        add.add_light_directional(
-            "/lamp",
-            color=(255, 250, 240),
-            intensity=1.2,
-            position=(-0.4, 0.6, 1.1),
-            cast_shadow=True,
-        )
+        lamp: Any = dict(color=(255, 250, 240), intensity=1.2, cast_shadow=True)
+        add.add_light_directional("/lamp", position=(-0.4, 0.6, 1.1), **lamp)
         add.world_axes.visible = False
-        add.add_box(
-            "/table", (205, 211, 216), (0.92, 0.88, 0.02), position=(0.22, 0.12, ground - 0.012)
-        )
-        add.add_grid("/grid", 0.92, 0.88, plane="xy", cell_size=0.1, section_size=0.1, cell_color=(180, 188, 196),
-                     section_color=(180, 188, 196), position=(0.22, 0.12, ground - 0.001))  # fmt: skip
-        add.add_cylinder("/foot", 0.06, 0.03, DARK, position=(0.0, 0.0, ground + 0.015))
-        add.add_cylinder("/shoulder", 0.042, 0.052, STEEL, position=(0.0, 0.0, -0.004))
-        along = (
-            math.cos(math.pi / 4),
-            0.0,
-            math.sin(math.pi / 4),
-            0.0,
-        )  # a cylinder that lies along x
-        self.link1 = add.add_frame("/link1", show_axes=False)
-        add.add_cylinder("/link1/bar", 0.017, L1, DARK, wxyz=along, position=(0.5 * L1, 0.0, 0.0))
-        self.link2 = add.add_frame("/link2", show_axes=False)
-        add.add_cylinder("/link2/bar", 0.012, L2, BLUE, wxyz=along, position=(0.5 * L2, 0.0, 0.0))
-        add.add_cylinder("/link2/elbow", 0.026, 0.048, STEEL)
-        tip = ground + stage.THICKNESS - self.session.tool.depth
-        add.add_cylinder(
-            "/link2/tool", 0.5 * self.session.tool.width, -tip, STEEL, position=(L2, 0.0, 0.5 * tip)
-        )
-        add.add_cylinder("/link2/handle", 0.008, 0.045, DARK, position=(L2, 0.0, 0.022))
-        add.add_icosphere("/link2/knob", 0.016, ORANGE, position=(L2, 0.0, 0.052))
-        self.clay: Any = None
+        table = (0.92, 0.88)
+        place = (*CENTRE, GROUND - 0.012)
+        add.add_box("/table", rgb_bytes(TABLE), (*table, 0.02), position=place)
+        lines: Any = dict(cell_size=0.1, section_size=0.1)
+        lines.update(cell_color=rgb_bytes(GRID), section_color=rgb_bytes(GRID))
+        add.add_grid("/grid", *table, plane="xy", position=(*CENTRE, GROUND - 0.001), **lines)
+        add.add_cylinder("/foot", 0.06, 0.03, dark, position=(0.0, 0.0, GROUND + 0.015))
+        add.add_cylinder("/shoulder", 0.042, 0.052, steel, position=(0.0, 0.0, -0.004))
+        along_x = math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0  # of a cylinder
+        self._link1 = add.add_frame("/link1", show_axes=False)
+        half = (0.5 * L1, 0.0, 0.0)
+        add.add_cylinder("/link1/bar", 0.017, L1, dark, wxyz=along_x, position=half)
+        self._link2 = add.add_frame("/link2", show_axes=False)
+        half = (0.5 * L2, 0.0, 0.0)
+        add.add_cylinder("/link2/bar", 0.012, L2, blue, wxyz=along_x, position=half)
+        add.add_cylinder("/link2/elbow", 0.026, 0.048, steel)
+        tip = GROUND + THICKNESS - tool.depth
+        place = (L2, 0.0, 0.5 * tip)
+        add.add_cylinder("/link2/tool", 0.5 * tool.width, -tip, steel, position=place)
+        add.add_cylinder("/link2/handle", 0.008, 0.045, dark, position=(L2, 0.0, 0.022))
+        add.add_icosphere("/link2/knob", 0.016, orange, position=(L2, 0.0, 0.052))
+        self._clay: Any = None
         if self.stage.field >= 0:
-            grid = self.stage.removal
-            x, y = (
-                grid.x + self.session.scenario.origin[0],
-                grid.y + self.session.scenario.origin[1],
-            )
-            self.plan, faces = _sheet(x, y)
-            self.clay = add.add_mesh_simple(
-                "/clay", self._vertices(), faces, color=(186, 100, 62), flat_shading=True, side="front",
-                cast_shadow=False, receive_shadow=0.45,  # on itself it would be all stripes
-            )  # fmt: skip
-        self.target = add.add_transform_controls(
-            "/hand", scale=0.12, active_axes=(True, True, False), disable_rotations=True
-        )  # fmt: skip
+            grid, origin = self.stage.removal, self.session.scenario.origin
+            self._plan, faces = _clay_sheet(grid.x + origin[0], grid.y + origin[1])
+            look: Any = dict(color=rgb_bytes(CLAY_DEEP), flat_shading=True, side="front")
+            look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
+            self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
+        in_plane: Any = dict(active_axes=(True, True, False), disable_rotations=True)
+        self.target = add.add_transform_controls("/hand", scale=0.12, **in_plane)
         self.target.on_update(self._dragged)
 
     def _vertices(self) -> np.ndarray:
-        """Corners of the clay's mesh [m], shape (n, 3): its surface, closed down to the table at the rim."""
-        height = np.pad(self.stage.removal.heights(stage.THICKNESS), 1)
-        return np.column_stack((self.plan, height.ravel() + stage.GROUND)).astype(np.float32)
+        """Corners of the clay's mesh [m], shape (n, 3): its surface, closed down to the table."""
+        height = np.pad(self.stage.removal.heights(THICKNESS), 1)
+        return np.column_stack((self._plan, height.ravel() + GROUND)).astype(np.float32)
 
     def _controls(self, uplot: Any) -> None:
-        gui, s = self.server.gui, self.session.scenario
-        gui.configure_theme(
-            control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
-        )
+        gui, session = self.server.gui, self.session
+        look: Any = dict(show_logo=False, show_share_button=False)
+        gui.configure_theme(control_layout="fixed", control_width="medium", **look)
         self.verdict, self.status = gui.add_html(""), gui.add_markdown("")
         self.run = gui.add_button("Pause")
         reset = gui.add_button("Reset")
         self.keep = gui.add_checkbox("Record", True)
-        self.hold = gui.add_checkbox(
-            "Hand holds", False, hint="The hand pulls to the arrows' centre; drag it."
-        )
-        top = hardest(self.session.given)
-        self.b = gui.add_slider(
-            "Clay b [N.s/m]", 0.0, max(3.0 * top, 1.0), 1.0, top, disabled=not top
-        )
-        self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(s.gain[0], 0.1), 5.0))
+        hint = "The hand pulls towards the arrows; drag them."
+        self.hold = gui.add_checkbox("Hand holds", False, hint=hint)
+        top, gain = hardest(session.given), session.gain[0]
+        limit = max(3.0 * top, 1.0)
+        self.b = gui.add_slider("Clay b [N.s/m]", 0.0, limit, 1.0, top, disabled=not top)
+        self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(gain, 0.1), 5.0))
         self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
-        nothing = (np.array([0.0, 1.0]), np.zeros(2))
-        form: Any = {
-            "mode": 1,
-            "scales": {"x": uplot.Scale(time=False)},
-            "aspect": 2.0,
-            "padding": (12, 4, 0, 0),
-        }
-        self.velocities = {
-            i: gui.add_uplot(
-                nothing,
-                (uplot.Series(label=f"position {AXES[i]} [cm]"),
-                 uplot.Series(label=f"v{AXES[i]} [cm/s]", stroke=INK["clay", i], width=2)),
-                title=f"velocity along {AXES[i]}", **form,
-            )
-            for i in cut_axes(s)
-        }  # fmt: skip
-        lines = [(who, i) for i in self.velocities for who in ("hand", "clay")]
-        self.forces = gui.add_uplot(
-            (nothing[0], *(np.zeros(2) for _ in lines)),
-            (uplot.Series(label="t [s]"),
-             *(uplot.Series(label=f"{who} {AXES[i]} [N]", stroke=INK[who, i], width=2) for who, i in lines)),
-            title="force against time", **form,
-        )  # fmt: skip
+        self._plots(uplot)
         self.run.on_click(self._toggle)
         reset.on_click(self._reset)
-        for slider, act in (
-            (self.b, lambda: self.session.change(b=self.b.value / (top or 1.0))), (self.gain, self._gain),
+        acts = (
+            (self.b, lambda: session.change(b=self.b.value / (top or 1.0))),
+            (self.gain, self._change_gain),
             (self.force, self._press),
-        ):  # fmt: skip
+        )
+        for slider, act in acts:
             slider.on_update(lambda _, slider=slider, act=act: self._slid(slider, act))
-        for box, act in (
-            (self.keep, lambda: setattr(self.session, "recording", self.keep.value)), (self.hold, self._hold)
-        ):  # fmt: skip
-            box.on_update(lambda _, act=act: self._locked(act))
+        self.keep.on_update(
+            lambda _: self._locked(lambda: setattr(session, "recording", self.keep.value))
+        )
+        self.hold.on_update(lambda _: self._locked(self._hold))
+
+    def _plots(self, uplot: Any) -> None:
+        zero = np.zeros(2)
+        form: Any = dict(mode=1, aspect=2.0, padding=(12, 4, 0, 0))
+        form["scales"] = {"x": uplot.Scale(time=False)}
+
+        def line(label: str, *key: Any) -> Any:
+            return uplot.Series(label=label, stroke=FORCE_COLORS[key], width=2)
+
+        self._velocities = {}
+        for i in plotted_axes(self.session.scenario):
+            a = AXES[i]
+            labels = uplot.Series(label=f"position {a} [cm]"), line(f"v{a} [cm/s]", "clay", i)
+            self._velocities[i] = self.server.gui.add_uplot(
+                (np.array([0.0, 1.0]), zero), labels, title=f"velocity along {a}", **form
+            )
+        whose = [(who, i) for i in self._velocities for who in ("hand", "clay")]
+        labels = [line(f"{who} {AXES[i]} [N]", who, i) for who, i in whose]
+        self._forces = self.server.gui.add_uplot(
+            (np.array([0.0, 1.0]), *(zero for _ in whose)),
+            (uplot.Series(label="t [s]"), *labels),
+            title="force over time",
+            **form,
+        )
 
     def _locked(self, act: Callable[[], None]) -> None:
         with self.player.lock:
             act()
 
     def _slid(self, slider: Any, act: Callable[[], None]) -> None:
-        """Acts on a slider; a number typed beside it that is out of its range becomes the end of the range."""
+        """Acts on a slider; a number out of its range, typed beside it, becomes the range's end."""
         if slider.min <= slider.value <= slider.max:
             self._locked(act)
-        else:
-            slider.value = (
-                slider.max if slider.value > slider.max else slider.min
-            )  # a change that comes here again
+        else:  # an update that comes here again
+            slider.value = slider.max if slider.value > slider.max else slider.min
 
-    def _gain(self) -> None:
+    def _change_gain(self) -> None:
         first = self.session.given.gain
-        self.session.change(gain=(self.gain.value, self.gain.value * first[1] / (first[0] or 1.0)))
+        K = self.gain.value
+        self.session.change(gain=(K, K * first[1] / (first[0] or 1.0)))
 
     def _press(self) -> None:
+        """Presses along the scenario's force, along x without one."""
         fx, fy = self.session.given.force
         size = math.hypot(fx, fy)
-        self.session.push(
-            (self.force.value * fx / size, self.force.value * fy / size)
-            if size
-            else (self.force.value, 0.0)
-        )
+        along = (fx / size, fy / size) if size else (1.0, 0.0)
+        self.session.push((self.force.value * along[0], self.force.value * along[1]))
 
     def _hold(self) -> None:
-        if self.hold.value:
-            x, y, _ = self.target.position
-            self.session.pull(
-                (x - self.session.scenario.origin[0], y - self.session.scenario.origin[1])
-            )
-        else:
-            self.session.pull(None)
+        (x, y, _), origin = self.target.position, self.session.scenario.origin
+        self.session.pull((x - origin[0], y - origin[1]) if self.hold.value else None)
 
     def _dragged(self, _: Any) -> None:
-        self.hold.value = True  # itself a change that is acted upon, but only the first
+        self.hold.value = True  # acts like a tick by hand, the first time
         self._locked(self._hold)
 
     def _toggle(self, _: Any) -> None:
@@ -287,86 +268,75 @@ class Page:
         with self.player.lock:
             self.session.restart()
             self._press()
-            self.stage.whole()
-            self.shown, self.cut = 1, -math.inf
+            self.stage.restore()
+            self._shown, self._clay_time = 1, -math.inf
             self.run.label, self.hold.value = "Pause", False
 
     def _refresh(self, now: float) -> None:
         session = self.session
         with self.player.lock:
-            frames, first = session.frames, self.shown
-            new = [f[1] for f in frames[first:]]
-            self.shown = len(frames)
+            frames = session.frames
+            new, self._shown = frames[self._shown :], len(frames)
             frame, point, q = frames[-1], session.point, list(session.run.angles)
-            clock, ended, paused, verdict = (
-                session.clock,
-                session.ended,
-                session.paused,
-                session.verdict(),
-            )
-            every = max(1, len(frames) // POINTS)
-            some = frames[::every] if now - self.plotted > PLOT_EVERY else []
-            self.stage.carve(new)
+            plots_due = now - self._plot_time > PLOT_TIME
+            some = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
+            banner = self._banner() if plots_due else ""
+            status = self._status() if plots_due else ""
+            self.stage.carve([f.p for f in new])
         with self.server.atomic():
-            self.link1.wxyz = _about_z(q[0])
-            self.link2.wxyz, self.link2.position = (
-                _about_z(q[0] + q[1]),
-                (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0),
-            )
+            self._link1.wxyz, self._link2.wxyz = _about_z(q[0]), _about_z(q[0] + q[1])
+            self._link2.position = (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0)
             if point is None:
-                x, y = (a + b for a, b in zip(frame[1], session.scenario.origin, strict=True))
+                x, y = np.add(frame.p, session.scenario.origin).tolist()
                 self.target.position = (x, y, 0.052)
-            if (
-                self.clay
-                and now - self.cut > CUT_EVERY
-                and (self.stage.stale or self.cut == -math.inf)
-            ):
-                self.stage.stale, self.cut = False, now
-                self.clay.vertices = self._vertices()
-        if some:
-            self.plotted = now
+            changed = self.stage.stale or self._clay_time == -math.inf
+            if self._clay and changed and now - self._clay_time > CLAY_TIME:
+                self.stage.stale, self._clay_time = False, now
+                self._clay.vertices = self._vertices()
+        if plots_due:
+            self._plot_time = now
             t, p, v, fe, fh = (np.array(x) for x in zip(*some, strict=True))
-            for i, plot in self.velocities.items():
+            for i, plot in self._velocities.items():
                 plot.data = _by_position(100.0 * p[:, i], 100.0 * v[:, i])
-            self.forces.data = (t, *(f[:, i] for i in self.velocities for f in (fh, fe)))
-            state = "ended" if ended else "paused" if paused else "playing"
-            slow = ", this machine is too slow" if clock.slow else ""
-            b = session.b
-            self.status.content = (
-                f"**{state}** {frame[0]:.1f} s, {clock.factor:.2f} x real{slow}  \n"
-                f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here, hand {math.hypot(*frame[4]):.2f} N  \n"
-                f"removed {1e6 * self.stage.removal.volume:.2f} cm³"
-            )
-            text = f"{ended}: reset to go on" if ended else verdict.text
-            color = RED if verdict.unstable else GREEN if text.startswith("stable") else AMBER
-            self.verdict.content = (
-                f'<div style="background:{color};color:white;padding:0.4em 0.6em;margin:0 0.7em 0.5em;'
-                f'border-radius:4px;font-size:0.85em">{html.escape(text)}</div>'
-            )
+            self._forces.data = (t, *(f[:, i] for i in self._velocities for f in (fh, fe)))
+            removed = f"removed {1e6 * self.stage.removal.volume:.2f} cm\u00b3"
+            self.status.content, self.verdict.content = f"{status}  \n{removed}", banner
+
+    def _status(self) -> str:
+        session, frame = self.session, self.session.frames[-1]
+        state = "ended" if session.ended else "paused" if session.paused else "playing"
+        slow = ", this machine is too slow" if session.clock.slow else ""
+        b = session.b
+        return (
+            f"**{state}** {frame.t:.1f} s, {session.clock.factor:.2f} x real time{slow}  \n"
+            f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here, hand {math.hypot(*frame.fh):.2f} N"
+        )
+
+    def _banner(self) -> str:
+        verdict, ended = self.session.verdict(), self.session.ended
+        text = f"{ended}: press Reset to start again" if ended else verdict.text
+        style = f"background:{verdict_color(text, verdict.unstable)};{BANNER_STYLE}"
+        return f'<div style="{style}">{html.escape(text)}</div>'
 
 
 def _about_z(angle: float) -> tuple[float, float, float, float]:
     return math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)
 
 
-def _sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A grid of corners in the plane, shape (n, 2), its rim doubled so that the edge falls steeply; and its faces."""
+def _clay_sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a grid in the plane, shape (n, 2), and its faces; the rim is double, for walls."""
     x, y = (np.concatenate((a[:1], a, a[-1:])) for a in (x, y))
     plan = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     a = (np.arange(len(y) - 1)[:, None] * len(x) + np.arange(len(x) - 1)).ravel()
-    faces = np.concatenate(
-        (
-            np.column_stack((a, a + 1, a + len(x))),
-            np.column_stack((a + 1, a + len(x) + 1, a + len(x))),
-        )
-    )
+    b, c, d = a + 1, a + len(x), a + len(x) + 1
+    faces = np.concatenate((np.column_stack((a, b, c)), np.column_stack((b, d, c))))
     return plan, faces.astype(np.uint32)
 
 
 def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The curve as a function of x, which the plot wants: where the hand came by more than once, its last pass."""
-    grid = np.linspace(x.min(), max(x.max(), x.min() + 0.1), POINTS)
-    out = np.zeros(POINTS)
+    """The curve as a function of x, as uPlot needs it; where the hand came twice, its last pass."""
+    grid = np.linspace(x.min(), max(x.max(), x.min() + 0.1), PLOT_POINTS)
+    out = np.zeros(PLOT_POINTS)
     for k in range(len(x) - 1):
         (a, ya), (b, yb) = sorted(((x[k], y[k]), (x[k + 1], y[k + 1])))
         i, j = np.searchsorted(grid, (a, b))
@@ -374,211 +344,127 @@ def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, out
 
 
-def _titled(page: bytes) -> bytes:
-    """viser's page under our own title, which it has no setting for."""
-    return page.replace(b"<title>Viser</title>", f"<title>{TITLE}</title>".encode(), 1)
+LOCAL = ("127.0.0.1", "localhost", "::1")
+COOKIE = "hapticclay"
+REFUSED = "hapticclay: open the address printed at the start; other names and pages are refused\n"
+NO_TOKEN = "hapticclay: the address lacks the token that was printed at the start\n"
 
 
-def _name(host: str) -> str:
-    """What to write in an address: of "all addresses" the one by which others know this machine."""
+@dataclass(frozen=True)
+class Guard:
+    """Admits requests that name this machine and come from its own page.
+
+    A foreign page can make a browser send requests here, under our name or under its own (DNS
+    rebinding), but it cannot forge the Host and Origin headers. Where other machines can connect, a
+    token is required as well: first in the address (?token=), then in a cookie.
+
+    Attributes:
+        host: address that the page listens on.
+        token: required of each request; "" for none.
+    """
+
+    host: str
+    token: str
+
+    def refusal(self, connection: Any, request: Any) -> Any:
+        """Judges a request.
+
+        Args:
+            connection: of websockets.
+            request: of websockets.
+
+        Returns:
+            The response to a request that is not admitted, None otherwise.
+        """
+        try:
+            query = parse_qs(urlsplit(request.path).query)
+            own = self._is_own(*(request.headers.get_all(name) for name in ("Host", "Origin")))
+        except ValueError:  # not an address
+            own, query = False, {}
+        if not own:
+            return connection.respond(HTTPStatus.FORBIDDEN, REFUSED)
+        cookies = "; ".join(request.headers.get_all("Cookie")).split("; ")
+        if not self.token or any(self._matches(c, f"{COOKIE}={self.token}") for c in cookies):
+            return None
+        if not self._matches(query.get("token", [""])[0], self.token):
+            return connection.respond(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        response = connection.respond(HTTPStatus.SEE_OTHER, "")
+        response.headers["Location"] = "/"
+        response.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+        return response
+
+    def _is_own(self, hosts: list[str], origins: list[str]) -> bool:
+        """Whether Host is a name of this machine and Origin, if there is one, the same."""
+        if len(hosts) != 1 or any(urlsplit(o).netloc.lower() != hosts[0].lower() for o in origins):
+            return False
+        name = urlsplit(f"//{hosts[0]}").hostname or ""
+        if name in LOCAL or not self.token:
+            return name in LOCAL
+        with contextlib.suppress(ValueError):
+            return bool(ip_address(name))  # a number is not a name that a foreign page could own
+        return name in (self.host.lower(), socket.gethostname().lower())
+
+    @staticmethod
+    def _matches(given: str, expected: str) -> bool:
+        return hmac.compare_digest(given.encode(errors="replace"), expected.encode())
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        why = error.strerror.lower() if error.strerror else str(error)
+        bound = f"{host} cannot be listened on ({why}): try --port 0, for any"
+        raise ParameterError("port", port, bound) from None
+
+
+@contextlib.contextmanager
+def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
+    """Makes the server that viser starts meanwhile listen on a socket, behind a guard.
+
+    viser has no setting for either. Should a later viser start its server another way, it finds the
+    port taken and listens elsewhere, which Page refuses.
+    """
+    from websockets.asyncio import server
+
+    serve = server.serve
+    quiet = logging.Logger("page")
+    quiet.addHandler(logging.NullHandler())  # requests that are not HTTP are no news
+
+    def guarded(handler: Any, host: str, port: int, *, process_request: Any, **options: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            is_page = request.path.partition("?")[0] in ("/", "/index.html")
+            if is_page and "Accept-Encoding" in request.headers:
+                del request.headers["Accept-Encoding"]  # so that its title can be changed
+            refusal = guard.refusal(connection, request)
+            response = refusal or process_request(connection, request)
+            if response is not None:
+                response.headers["X-Frame-Options"] = "DENY"
+            if is_page and response is not None and not refusal:
+                title = f"<title>{TAB_TITLE}</title>".encode()
+                response.body = response.body.replace(b"<title>Viser</title>", title, 1)
+                del response.headers["Content-Length"]
+                response.headers["Content-Length"] = str(len(response.body))
+            return response
+
+        options.update(sock=listening, process_request=answer, logger=quiet)
+        return serve(handler, **options)
+
+    server.serve = guarded
+    try:
+        yield
+    finally:
+        server.serve = serve
+
+
+def _url_host(host: str) -> str:
+    """The host of an address: for "all addresses" the one by which others know this machine."""
     if host in ("", "0.0.0.0", "::"):
         try:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-                s.connect(("192.0.2.1", 9))  # nowhere; asks for a route, sends nothing
+                s.connect(("192.0.2.1", 9))  # nowhere: asks for a route and sends nothing
                 host = s.getsockname()[0]
         except OSError:
             host = socket.gethostname()
     return f"[{host}]" if ":" in host else host
-
-
-LOCAL = ("127.0.0.1", "localhost", "::1")
-COOKIE = "hapticclay"
-PASS = "X-Hapticclay-Pass"  # header by which the server behind knows whom the gate has let in
-HEAD = 65536  # longest head of a request [bytes]
-PATIENCE = 10.0  # for it, and for a page from behind [s]
-
-
-class Gate:
-    """Lets in who asks for this machine by a name of its own, and from no page but its own.
-
-    A stranger's page can make the browser of whoever looks at it come here, under our name or (DNS rebinding) under
-    the page's; it cannot make it lie about either in Host and Origin. Where other machines can come there is a token
-    as well: in the first address (?token=), afterwards in a cookie, which the browser shows by itself.
-
-    Attributes:
-        port: where it listens. secret: what PASS says.
-
-    Raises:
-        ParameterError: the address cannot be listened on.
-    """
-
-    def __init__(
-        self,
-        host: str,
-        port: int,
-        inner: int,
-        token: str = "",
-        edit: Callable[[bytes], bytes] = bytes,
-    ):
-        """Listens.
-
-        Args:
-            host, port: address to listen on; port 0 for any. inner: port of the server on this machine.
-            token: "" for none. edit: changes the page on its way.
-        """
-        self.host, self.inner, self.token, self.edit = host, inner, token, edit
-        self.secret = secrets.token_urlsafe(16)
-        self._loop = asyncio.new_event_loop()
-        self._tasks: set[asyncio.Task] = set()
-        try:
-            self._server = self._loop.run_until_complete(
-                asyncio.start_server(self._meet, host, port, limit=HEAD)
-            )
-        except OSError as error:
-            self._loop.close()
-            why = error.strerror.lower() if error.strerror else str(error)
-            raise ParameterError(
-                "port", port, f"{host} cannot be listened on ({why}): try --port 0, for any"
-            ) from None
-        self.port = self._server.sockets[0].getsockname()[1]
-        self._thread = threading.Thread(target=self._loop.run_forever, name="gate", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Ends all connections and stops listening."""
-        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result(timeout=10.0)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
-    async def _close(self) -> None:
-        self._server.close()
-        for task in list(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
-        try:
-            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), PATIENCE)
-            target, fields, refusal = self._judge(head)
-            if refusal:
-                writer.write(refusal)
-            elif fields.get("Upgrade", "").lower() == "websocket":
-                await self._pass(
-                    head[:-2] + f"{PASS}: {self.secret}\r\n\r\n".encode(), reader, writer
-                )
-            else:
-                writer.write(await asyncio.wait_for(self._fetch(target), PATIENCE))
-            await writer.drain()
-        except (
-            OSError,
-            asyncio.IncompleteReadError,
-            asyncio.LimitOverrunError,
-            asyncio.CancelledError,
-            TimeoutError,
-        ):
-            pass  # whoever it was has gone, or never was a browser
-        finally:
-            self._tasks.discard(task)
-            writer.close()
-
-    def _judge(self, head: bytes) -> tuple[str, http.client.HTTPMessage, bytes]:
-        """Target and header fields of a request, and what to answer instead of letting it in; b"" to let it in."""
-        line, _, rest = head.partition(b"\r\n")
-        method, target, *_ = (*line.decode("latin-1").split(" "), "", "")
-        fields = http.client.HTTPMessage()
-        try:
-            fields = http.client.parse_headers(io.BytesIO(rest))
-            hosts, origins = fields.get_all("Host", []), fields.get_all("Origin", [])
-            own = len(hosts) == 1 and self._ours(urlsplit(f"//{hosts[0]}").hostname or "")
-            own = own and all(urlsplit(o).netloc.lower() == hosts[0].lower() for o in origins)
-            query = parse_qs(urlsplit(target).query)
-            understood = method == "GET" and target.startswith("/")
-        except (ValueError, http.client.HTTPException):
-            understood, own, query = False, False, {}
-        if not understood:
-            return (
-                target,
-                fields,
-                _answer("400 Bad Request", b"hapticclay: not a request for a page\n"),
-            )
-        if not own:
-            text = b"hapticclay: asked for under another name, or by another page: open the address printed at start\n"
-            return target, fields, _answer("403 Forbidden", text)
-        cookies = [c.strip().partition("=") for c in fields.get("Cookie", "").split(";")]
-        if not self.token or any(
-            name == COOKIE and self._right(value) for name, _, value in cookies
-        ):
-            return target, fields, b""
-        if self._right(query.get("token", [""])[0]):
-            cookie = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-            return (
-                target,
-                fields,
-                _answer("303 See Other", b"", f"Location: /\r\nSet-Cookie: {cookie}\r\n"),
-            )
-        text = b"hapticclay: the address lacks the token that was printed at start\n"
-        return target, fields, _answer("403 Forbidden", text)
-
-    def _ours(self, name: str) -> bool:
-        """Whether this is a name of the machine: on other addresses than its own, also any number, which is no name."""
-        if name in LOCAL or not self.token:
-            return name in LOCAL
-        with contextlib.suppress(ValueError):
-            return bool(ip_address(name))
-        return name in (self.host.lower(), gethostname().lower())
-
-    def _right(self, token: str) -> bool:
-        return hmac.compare_digest(token.encode(), self.token.encode())
-
-    async def _fetch(self, target: str) -> bytes:
-        """The page behind, as an answer of our own."""
-        reader, writer = await asyncio.open_connection("127.0.0.1", self.inner)
-        try:
-            writer.write(
-                f"GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{self.inner}\r\n\r\n".encode("latin-1")
-            )
-            head, _, body = (await reader.read(-1)).partition(b"\r\n\r\n")
-        finally:
-            writer.close()
-        line, _, rest = head.partition(b"\r\n")
-        kind = http.client.parse_headers(io.BytesIO(rest)).get("Content-Type", "text/plain")
-        return _answer(
-            line.decode("latin-1").partition(" ")[2] or "502 Bad Gateway",
-            self.edit(body),
-            kind=kind,
-        )
-
-    async def _pass(
-        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> None:
-        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self.inner)
-        try:
-            inner_writer.write(head)
-            ways = [
-                asyncio.create_task(_copy(*x))
-                for x in ((reader, inner_writer), (inner_reader, writer))
-            ]
-            try:
-                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            finally:
-                for way in ways:
-                    way.cancel()
-                await asyncio.gather(*ways, return_exceptions=True)
-        finally:
-            inner_writer.close()
-
-
-def _answer(status: str, body: bytes, more: str = "", kind: str = "text/plain") -> bytes:
-    head = f"HTTP/1.1 {status}\r\n{more}Content-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
-    return f"{head}X-Frame-Options: DENY\r\nConnection: close\r\n\r\n".encode("latin-1") + body
-
-
-async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    with contextlib.suppress(OSError):
-        while data := await reader.read(65536):
-            writer.write(data)
-            await writer.drain()

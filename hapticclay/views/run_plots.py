@@ -1,66 +1,88 @@
-"""Plots of a record, for paper and screen."""
+"""Figures of one run: the files that `hapticclay run` writes, and the plots that grow in a film."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.textpath import TextPath
+from matplotlib.patches import Rectangle
 
+from ..model.clay import Clay, Profile
 from ..model.constants import AXES, C_POLE
 from ..model.scenario import Scenario
 from ..model.signals import Signal
 from ..simulation.record import Record
 from ..theory import linear_loop
-from .style import BLACK, BLUE, CLAY, GREEN, GREY, ORANGE, STYLE
+from .style import (
+    BLACK,
+    BLUE,
+    CLAY_ALPHA,
+    GREEN,
+    GREY,
+    VERMILION,
+    add_legend,
+    clay_color,
+    figure_style,
+    set_title,
+    shade_clay,
+)
 
-TITLE = 9.0  # size of a title's type [points]
-MARGIN = 0.9  # of a figure's width that its title has not: what stands left of the axes, and a little [inch]
+BEYOND = 1e4  # [cm], past every path
+FILM_DPI = 100
+LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
+ROOMY_PANEL = (180, 110)  # ... and the names of its axes
 
 
-def velocity_position(record: Record, axis: str = "x") -> Figure:
-    """Velocity against position, the expected steady speeds beside it (Fig. 8, top; Fig. 10).
+def velocity_plot(record: Record, axis: str = "x") -> Figure:
+    """Plots velocity over position, and the expected steady speeds (Fig. 8, top; Fig. 10).
 
     Args:
-        record: what to draw. axis: "x", "y", or "xy" for one panel each.
+        record: the run.
+        axis: "x" or "y"; "xy" for a panel each.
     """
-    with matplotlib.rc_context(STYLE):
-        figure, panels = _axes(record, axis)
-        s = record.scenario
+    s = record.scenario
+    with figure_style():
+        figure, panels = _position_axes(record, axis)
         for name, ax in zip(axis, panels, strict=True):
             i = AXES.index(name)
-            ax.plot(100.0 * record.p[:, i], record.v[:, i], color=BLUE, label="measured")
+            v = record.v[:, i]
+            ax.plot(100.0 * record.p[:, i], v, color=BLUE, label="measured")
             if s.operator is None and s.muscle is None:
                 law = functools.partial(linear_loop.steady_speed, s.gain[i], s.force[i])
-                _steps(ax, record, i, law, ORANGE, "expected, K f/(10 + K b)")
+                _steps(
+                    ax, record, i, law, color=VERMILION, ls="--", label="expected, K f/(10 + K b)"
+                )
             ax.set_ylabel(f"velocity v$_{name}$ [m/s]")
-            _limits(ax, record.v[:, i])
+            low, high = min(0.0, float(v.min())), max(0.0, float(v.max()))
+            span = (high - low) or 1.0
+            ax.set_ylim(low - 0.04 * span, high + 0.12 * span)
         _finish(figure, panels, record)
     return figure
 
 
-def force_velocity(record: Record, axis: str = "x") -> Figure:
-    """fe/v and fh/v against position along one axis, b and 10/K + b beside them (Fig. 8, bottom).
+def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
+    """Plots fe/v and fh/v over position, with b and 10/K + b (Fig. 8, bottom).
 
     Args:
-        record: what to draw. axis: "x" or "y".
+        record: the run.
+        axis: "x" or "y".
     """
-    i = AXES.index(axis)
-    with matplotlib.rc_context(STYLE):
-        figure, panels = _axes(record, axis)
+    i, s = AXES.index(axis), record.scenario
+    with figure_style():
+        figure, panels = _position_axes(record, axis)
         ax = panels[0]
         x = 100.0 * record.p[:, i]
         ax.plot(x, record.ratio(record.fh)[:, i], color=GREEN, label="operator, f$_h$/v")
         ax.plot(x, record.ratio(record.fe)[:, i], color=BLUE, label="clay, f$_e$/v")
-        own = C_POLE / record.scenario.gain[i] if record.scenario.gain[i] else 0.0
-        if record.scenario.operator is None and record.scenario.muscle is None:
-            _steps(ax, record, i, lambda b: own + b, BLACK, "10/K + b", ":")
-        _steps(ax, record, i, lambda b: b, ORANGE, "b")
+        own = C_POLE / s.gain[i] if s.gain[i] else 0.0
+        if s.operator is None and s.muscle is None:
+            _steps(ax, record, i, lambda b: own + b, color=BLACK, ls=":", label="10/K + b")
+        _steps(ax, record, i, lambda b: b, color=VERMILION, ls="--", label="b")
         ax.set_ylabel("force / velocity [N$\\cdot$s/m]")
         top = own + float(np.max(record.b[:, i], initial=0.0))
         ax.set_ylim(-0.04 * top, 1.35 * top)
@@ -68,198 +90,195 @@ def force_velocity(record: Record, axis: str = "x") -> Figure:
     return figure
 
 
-def path(record: Record) -> Figure:
-    """The way of the handle over the clay (Figs. 7, 9)."""
-    with matplotlib.rc_context(STYLE):
-        p = 100.0 * record.p
-        low, high = p.min(axis=0), p.max(axis=0)
-        shape = float((high - low + 1.0)[1] / (high - low + 1.0)[0])
-        figure = Figure(figsize=(6.4, min(max(6.4 * shape, 1.0) + 1.3, 6.4)))
+def path_plot(record: Record) -> Figure:
+    """Plots the path of the handle over a map of the clay (Figs. 7, 9).
+
+    Args:
+        record: the run.
+    """
+    p = 100.0 * record.p
+    low, high = p.min(axis=0), p.max(axis=0)
+    margin = 0.08 * max(float((high - low).max()), 0.1)
+    breadth, depth = high - low + 1.0
+    low, high = low - margin, high + margin
+    with figure_style():
+        figure = Figure(figsize=(6.4, min(max(6.4 * depth / breadth, 1.0) + 1.3, 6.4)))
         ax = figure.add_subplot()
-        margin = 0.08 * max(float((high - low).max()), 0.1)
-        low, high = low - margin, high + margin
-        room = (high - low)[1] * (figure.get_figwidth() - MARGIN) / (figure.get_figheight() - 1.3)
-        wider = max(
-            0.0, 0.5 * (room - (high - low)[0])
-        )  # the axes are as wide as the figure, and so is their title
+        room = (high - low)[1] * 5.5 / (figure.get_figheight() - 1.3)
+        wider = max(0.0, 0.5 * (room - (high - low)[0]))  # axes as wide as the title over them
         low[0], high[0] = low[0] - wider, high[0] + wider
-        _clay_map(figure, ax, record, low, high)
+        if record.scenario.clay:
+            _clay_map(ax, record.scenario.clay, low, high)
         ax.plot(p[:, 0], p[:, 1], color=BLUE, label="handle")
         ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
         ax.plot(*p[-1], "s", color=BLUE, ms=5, label="end")
-        ax.set(
-            xlabel="position x [cm]",
-            ylabel="position y [cm]",
-            xlim=(low[0], high[0]),
-            ylim=(low[1], high[1]),
-        )
-        ax.set_aspect("equal")
+        ax.set(xlabel="position x [cm]", ylabel="position y [cm]", aspect="equal")
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.grid(False)
-        figure.legend(loc="outside upper center", ncols=4)
-        _title(figure, ax, _parts(record.scenario))
+        add_legend(figure, ax)
+        set_title(ax, *_scenario_parts(record.scenario))
     return figure
 
 
-def _clay_map(figure: Figure, ax: Axes, record: Record, low: Any, high: Any) -> None:
-    """Colours the regions by the damping along x and y, as it is when the handle enters them [N.s/m]."""
-    clay = record.scenario.clay
-    if clay is None:
-        return
-    wide = [[-1e4], [1e4]]
+def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
+    """Shades each region of the clay and names its damping along x and y on entry [N.s/m]."""
+    laws = (clay.x, clay.y)
     edges = [
-        sorted(
-            {100.0 * e for f in (clay.x, clay.y) if f.along == a for e in f.edges}
-            | {wide[0][0], wide[1][0]}
-        )
+        sorted({-BEYOND, BEYOND, *(100.0 * e for f in laws if f.along == a for e in f.edges)})
         for a in AXES
     ]
-    top = max(max(f.values) for f in (clay.x, clay.y)) or 1.0
+    top = max(max(f.values) for f in laws)
     for x0, x1 in zip(edges[0], edges[0][1:], strict=False):
         for y0, y1 in zip(edges[1], edges[1][1:], strict=False):
-            at = {"x": 0.5 * (x0 + x1) / 100.0, "y": 0.5 * (y0 + y1) / 100.0}
-            b = [f.values[int(np.searchsorted(f.edges, at[f.along]))] for f in (clay.x, clay.y)]
-            ax.fill_between(
-                [x0, x1],
-                y0,
-                y1,
-                color=CLAY,
-                alpha=0.15 + 0.85 * max(b) / top if max(b) else 0.0,
-                lw=0,
-            )
-            left, right = max(x0, low[0]), min(x1, high[0])
-            bottom, up = max(y0, low[1]), min(y1, high[1])
-            if (
-                right - left > 0.12 * (high[0] - low[0])
-                and up - bottom > 0.08 * (high[1] - low[1])
-                and max(b)
-            ):
-                ax.text(
-                    right - 0.01 * (high[0] - low[0]), bottom + 0.01 * (high[1] - low[1]),
-                    f"b = ({b[0]:g}, {b[1]:g})", ha="right", va="bottom", fontsize=8, color=GREY,
-                )  # fmt: skip
+            at = {"x": 0.005 * (x0 + x1), "y": 0.005 * (y0 + y1)}
+            b = [f.values[int(np.searchsorted(f.edges, at[f.along]))] for f in laws]
+            if not max(b):
+                continue
+            shade: Any = dict(color=clay_color(max(b) / top), alpha=CLAY_ALPHA, lw=0)
+            ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **shade))
+            right, bottom = min(x1, high[0]), max(y0, low[1])
+            shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
+            if shown[0] > 0.12 and shown[1] > 0.08:
+                place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
+                text: Any = dict(ha="right", va="bottom", fontsize=8, color=GREY)
+                ax.text(place[0], place[1], f"b = ({b[0]:g}, {b[1]:g})", **text)
 
 
-def force_maneuver(records: Sequence[Record], axis: str = "x", against: str = "time") -> Figure:
-    """The operator's force during a maneuver, one panel a record (Fig. 11).
+def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
+    """Plots the operator's force during a maneuver, a panel for each run (Fig. 11).
 
     Args:
-        records: what to draw. axis: "x" or "y". against: "time" or "position".
+        records: the runs.
+        axis: "x" or "y".
+        over: "time" or "position".
     """
     i = AXES.index(axis)
-    with matplotlib.rc_context(STYLE):
+    with figure_style():
         figure = Figure(figsize=(6.4, 0.8 + 2.3 * len(records)))
-        panels = figure.subplots(len(records), 1, sharex=against == "time", squeeze=False)[:, 0]
+        panels = figure.subplots(len(records), 1, sharex=over == "time", squeeze=False)[:, 0]
         for ax, r in zip(panels, records, strict=True):
-            where = r.t if against == "time" else 100.0 * r.p[:, i]
+            where = r.t if over == "time" else 100.0 * r.p[:, i]
             ax.plot(where, r.fh[:, i], color=BLUE, lw=0.9, label="operator, f$_h$")
             if r.scenario.muscle is not None:
-                muscle = Signal(
-                    r.scenario.muscle
-                )  # in pieces: of n samples it would hold n times its lines at once
-                uh = np.concatenate(
-                    [muscle(t)[:, i] for t in np.array_split(r.t, len(r.t) // 4096 + 1)]
-                )
-                ax.plot(
-                    where,
-                    r.scenario.force[i] + uh,
-                    color=ORANGE,
-                    lw=1.1,
-                    ls="--",
-                    label="muscle, u$_h$",
-                )
+                muscle = Signal(r.scenario.muscle)
+                pieces = np.array_split(r.t, len(r.t) // 4096 + 1)  # it takes (n, lines) of memory
+                uh = r.scenario.force[i] + np.concatenate([muscle(t)[:, i] for t in pieces])
+                ax.plot(where, uh, color=VERMILION, lw=1.1, ls="--", label="muscle, u$_h$")
             ax.set_ylabel(f"force along {axis} [N]")
-            _title(figure, ax, [*_parts(r.scenario), r.outcome.code])
-            if against != "time":
-                ax.set_xlabel(f"position {axis} [cm]")
-        panels[-1].set_xlabel("time [s]" if against == "time" else f"position {axis} [cm]")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=5)
+            set_title(ax, *_scenario_parts(r.scenario), r.outcome.code)
+            if over != "time" or ax is panels[-1]:
+                ax.set_xlabel("time [s]" if over == "time" else f"position {axis} [cm]")
+        add_legend(figure, panels[0])
     return figure
 
 
-def readings(records: dict[str, Record], axis: str = "x") -> Figure:
-    """Velocity against position of several runs of one path, by name."""
+def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:
+    """Plots velocity over position of several runs along one path.
+
+    Args:
+        records: the runs by name, four at most.
+        axis: "x" or "y".
+    """
     i = AXES.index(axis)
-    with matplotlib.rc_context(STYLE):
+    looks = ((BLACK, "-"), (GREEN, "--"), (BLUE, "-"), (VERMILION, "-."))
+    with figure_style():
         figure = Figure(figsize=(6.4, 3.6))
         ax = figure.add_subplot()
-        for (name, r), color, style in zip(
-            records.items(), (BLACK, GREEN, BLUE, ORANGE), ("-", "--", "-", "-."), strict=False
-        ):
+        for (name, r), (color, style) in zip(records.items(), looks, strict=False):
             ax.plot(100.0 * r.p[:, i], 1000.0 * r.v[:, i], color=color, ls=style, label=name)
         ax.set(xlabel=f"position {axis} [cm]", ylabel=f"velocity v$_{axis}$ [mm/s]")
-        figure.legend(loc="outside upper center", ncols=5)
+        add_legend(figure, ax)
     return figure
+
+
+def _clay_along_both_axes(s: Scenario) -> bool:
+    return s.clay is not None and s.clay.x.along != s.clay.y.along
+
+
+def _main_axis(s: Scenario) -> str:
+    size = s.force if s.muscle is None else s.muscle.rms
+    return "y" if abs(size[1]) > abs(size[0]) else "x"
+
+
+def _velocity(record: Record) -> Figure | None:
+    s = record.scenario
+    if s.muscle is not None:
+        return None
+    return velocity_plot(record, "xy" if _clay_along_both_axes(s) else _main_axis(s))
+
+
+def _force(record: Record) -> Figure | None:
+    s = record.scenario
+    if s.muscle is not None:
+        return maneuver_plot([record], _main_axis(s))
+    return None if _clay_along_both_axes(s) else force_ratio_plot(record, _main_axis(s))
+
+
+def _path(record: Record) -> Figure | None:
+    s = record.scenario
+    return path_plot(record) if s.muscle is None and _clay_along_both_axes(s) else None
+
+
+def _force_position(record: Record) -> Figure | None:
+    s = record.scenario
+    return maneuver_plot([record], _main_axis(s), "position") if s.muscle is not None else None
+
+
+FIGURES: dict[str, Callable[[Record], Figure | None]] = {
+    "velocity": _velocity,
+    "force": _force,
+    "path": _path,
+    "force_position": _force_position,
+}
+"""File name of each figure of a run, and the function that draws it or returns None where the
+figure does not apply. To add a plot to `hapticclay run`, add an entry."""
 
 
 def figures(record: Record) -> dict[str, Figure]:
-    """The figures that say what there is to say of a run, by name of the file."""
-    s = record.scenario
-    if s.muscle is not None:
-        axis = AXES[int(np.argmax(s.muscle.rms))]
-        return {
-            "force": force_maneuver([record], axis),
-            "force_position": force_maneuver([record], axis, "position"),
-        }
-    if s.clay is not None and s.clay.x.along != s.clay.y.along:
-        return {"velocity": velocity_position(record, "xy"), "path": path(record)}
-    axis = "y" if abs(s.force[1]) > abs(s.force[0]) else "x"
-    return {"velocity": velocity_position(record, axis), "force": force_velocity(record, axis)}
+    """Draws the figures of FIGURES that apply to a run.
+
+    Args:
+        record: the run.
+
+    Returns:
+        Figures by file name.
+    """
+    drawn = {name: draw(record) for name, draw in FIGURES.items()}
+    return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
+def _position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
+    """A panel over the position along each axis, the clay shaded."""
     figure = Figure(figsize=(6.4 if len(axes) == 1 else 9.6, 3.6))
     panels = list(figure.subplots(1, len(axes), squeeze=False)[0])
-    clay = record.scenario.clay
     for name, ax in zip(axes, panels, strict=True):
-        profile = (clay.x, clay.y)[AXES.index(name)] if clay else None
-        ax.set_xlabel(f"position {name} [cm]")
-        if profile and profile.along == name:
-            edges = (-np.inf, *profile.edges, np.inf)
-            top = max(profile.values)
-            label = "clay"
-            for low, high, b in zip(edges, edges[1:], profile.values, strict=False):
-                if b > 0.0:
-                    low, high = max(low, -1.0), min(high, 1.0)
-                    ax.axvspan(
-                        100.0 * low,
-                        100.0 * high,
-                        color=CLAY,
-                        alpha=0.6 * b / top,
-                        lw=0,
-                        label=label,
-                    )
-                    label = "_"
+        x = 100.0 * record.p[:, AXES.index(name)]
+        low, high = float(x.min()), float(x.max())
+        margin = 0.02 * ((high - low) or 1.0)
+        shade_clay(ax, _profile(record.scenario, name), name)
+        ax.set(xlabel=f"position {name} [cm]", xlim=(low - margin, high + margin))
     return figure, panels
 
 
-def _steps(
-    ax: Axes, record: Record, i: int, law: Any, color: str, label: str, style: str = "--"
-) -> None:
-    """The value of law(b) over the stretch of path that had each b."""
+def _profile(s: Scenario, axis: str) -> Profile | None:
+    return (s.clay.x, s.clay.y)[AXES.index(axis)] if s.clay else None
+
+
+def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
+    """Draws law(b) over each stretch of the path that had one b."""
     pieces = record.stretches(AXES[i])
     if len(pieces) > 20:  # an unstable run that chatters over a border
         pieces = pieces[:3]
     for piece in pieces:
         x, b = 100.0 * record.p[piece, i], record.b[piece, i]
-        if b[0] == b[-1]:
-            y = law(float(b[0]))
-            ax.plot(
-                [x.min(), x.max()], [y, y], color=color, ls=style, lw=1.4, label=label, zorder=3
-            )
-        else:
-            ax.plot(x, law(b), color=color, ls=style, lw=1.4, label=label, zorder=3)
-        label = "_"
+        constant = b[0] == b[-1]
+        x, y = ([x.min(), x.max()], [law(float(b[0]))] * 2) if constant else (x, law(b))
+        ax.plot(x, y, lw=1.4, zorder=3, **look)
+        look["label"] = "_"
 
 
-def _limits(ax: Axes, v: np.ndarray) -> None:
-    low, high = min(0.0, float(v.min())), max(0.0, float(v.max()))
-    span = (high - low) or 1.0
-    ax.set_ylim(low - 0.04 * span, high + 0.12 * span)
-
-
-def _parts(s: Scenario) -> list[str]:
-    """What a title says of a scenario."""
+def _scenario_parts(s: Scenario) -> list[str]:
+    """Phrases that describe a scenario in a title."""
 
     def pair(x: tuple[float, float]) -> str:
         return f"({x[0]:.3g}, {x[1]:.3g})"
@@ -274,26 +293,146 @@ def _parts(s: Scenario) -> list[str]:
     return out + ["T$_h$ in the loop"] * bool(s.operator) + ["inertia shaped"] * s.shaping
 
 
-def _title(figure: Figure, ax: Axes, parts: list[str]) -> None:
-    """Puts a title over the axes, in as many lines as keep it within the figure."""
-    room = 72.0 * (figure.get_figwidth() - MARGIN)
-    lines = [parts[0]]
-    for part in parts[1:]:
-        more = f"{lines[-1]}, {part}"
-        if TextPath((0.0, 0.0), more, size=TITLE).get_extents().width <= room:
-            lines[-1] = more
-        else:
-            lines[-1] += ","
-            lines.append(part)
-    ax.set_title("\n".join(lines), fontsize=TITLE, loc="left", color=GREY)
-
-
 def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:
-    for ax in panels:
-        x = 100.0 * record.p[:, AXES.index(ax.get_xlabel().split()[1])]
-        low, high = float(x.min()), float(x.max())
-        margin = 0.02 * ((high - low) or 1.0)
-        ax.set_xlim(low - margin, high + margin)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5)
-    _title(figure, panels[0], _parts(record.scenario))
+    add_legend(figure, panels[0])
+    set_title(panels[0], *_scenario_parts(record.scenario))
+
+
+class Panel(NamedTuple):
+    """A running plot.
+
+    Attributes:
+        x: of its curves, shape (n,).
+        y_range: values that the y axis must hold.
+        labels: of x and y, drawn where there is room.
+        title: where there is room for labels.
+        short: title without labels.
+        curves: (y, colour) of each curve.
+    """
+
+    x: np.ndarray
+    y_range: np.ndarray
+    labels: tuple[str, str]
+    title: str
+    short: str
+    curves: tuple[tuple[np.ndarray, str], ...]
+
+
+def plots_fit(width: int, height: int) -> bool:
+    """Tells whether running plots fit into a picture of this size.
+
+    Args:
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+    """
+    return width >= LEAST_PANEL[0] and height >= LEAST_PANEL[1]
+
+
+class RunningPlots:
+    """The plots of a run as they grow with it: velocity and fe/v over position, force over time.
+
+    The axes are drawn once; each image restores them and draws the curves (matplotlib's blitting).
+    """
+
+    def __init__(self, record: Record, width: int, height: int):
+        """Draws the axes.
+
+        Args:
+            record: the run.
+            width: of the image [pixels].
+            height: of the image [pixels]; the panels that fit are shown, three at most.
+        """
+        figure, curves = running_figure(record, width, height)
+        self._canvas: Any = figure.canvas
+        self._axes = self._canvas.copy_from_bbox(figure.bbox)
+        self._curves = []
+        for ax, x, y, color in curves:
+            known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+            (line,) = ax.plot([], [], color=color, lw=1.4)
+            self._curves.append((line, known, x[known], y[known]))
+
+    def draw(self, n: int) -> np.ndarray:
+        """Draws the first samples of the run.
+
+        Args:
+            n: number of samples.
+
+        Returns:
+            The image, shape (height, width, 3) of bytes; the next call overwrites it.
+        """
+        self._canvas.restore_region(self._axes)
+        for line, known, x, y in self._curves:
+            end = int(np.searchsorted(known, n))
+            line.set_data(x[:end], y[:end])
+            line.axes.draw_artist(line)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3]
+
+
+def running_figure(
+    record: Record, width: int, height: int
+) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
+    """Draws the axes of the running plots.
+
+    Args:
+        record: the run.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+
+    Returns:
+        The figure, and (axes, x, y, colour) of each curve to be drawn on it.
+    """
+    count = max(1, min(3, height // LEAST_PANEL[1]))
+    roomy = width >= ROOMY_PANEL[0] and height >= ROOMY_PANEL[1] * count
+    i = int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))
+    plans = _running_panels(record, i, roomy)[:count]
+    with figure_style(font_size=7.5, lines_linewidth=1.0):
+        figure = Figure(figsize=(width / FILM_DPI, height / FILM_DPI), dpi=FILM_DPI)
+        panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
+        for ax, plan in zip(panels, plans, strict=True):
+            ax.set(xlim=_limits(plan.x), ylim=_limits(plan.y_range))
+            ax.set_xlabel(plan.labels[0], labelpad=1)
+            ax.set_ylabel(plan.labels[1] if roomy else "", labelpad=2)
+            title = plan.title if roomy else plan.short
+            ax.set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
+        for ax in panels[:2]:
+            shade_clay(ax, _profile(record.scenario, AXES[i]), AXES[i])
+        b = np.unique(record.b[:, i])
+        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 else ():
+            panels[1].axhline(value, color=VERMILION, ls="--", lw=0.9)
+            at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
+            panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
+        canvas = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()  # settles the ticks, and so the room that they take
+        canvas.draw()
+    both = zip(panels, plans, strict=True)
+    return figure, [(ax, plan.x, y, color) for ax, plan in both for y, color in plan.curves]
+
+
+def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
+    axis = AXES[i]
+    x, v, fe, fh = 100.0 * r.p[:, i], r.v[:, i], r.fe[:, i], r.fh[:, i]
+    top = max(float(r.b[:, i].max(initial=0.0)), 1.0)
+    ratio = np.clip(r.ratio(r.fe)[:, i], -top, 2.0 * top)  # 0/0 as a run begins or turns
+    usual = np.percentile(np.concatenate((fh, fe)), (1.0, 99.0))  # not the spike at a border
+    where, when = (f"position {axis} [cm]", "time [s]") if roomy else (f"{axis} [cm]", "t [s]")
+    speed, share = f"v$_{axis}$ [m/s]", "f$_e$/v [N$\\cdot$s/m]"
+    force_curves = ((fh, GREEN), (fe, BLUE))
+    return (
+        Panel(x, v, (where, f"velocity {speed}"), r.scenario.name, speed, ((v, BLUE),)),
+        Panel(x, np.array((0.0, 1.25 * top)), (where, share), "", share, ((ratio, BLUE),)),
+        Panel(
+            r.t,
+            np.append(1.15 * usual, 0.0),
+            (when, "force [N]"),
+            "operator f$_h$, clay f$_e$",
+            "f$_h$, f$_e$ [N]",
+            force_curves,
+        ),
+    )
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    span = max(high - low, 1e-6)
+    return low - 0.04 * span, high + 0.06 * span

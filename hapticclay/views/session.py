@@ -1,7 +1,9 @@
-"""A run that a person takes part in: they pull at the handle while it goes on, in slices as long as a frame.
+"""Interactive sessions: a person pulls the handle while the run goes on, in slices of a frame.
 
-No graphics here: whoever shows the session (`view`, `web`) tells it where the hand pulls to and how much time
-has passed; a script can do as much. A slice is computed as any run is, by the leapfrog.
+`Session` is the run, `Replay` plays a record in its place, `Player` advances either in real time,
+and `live_verdict` says whether the loop is stable. Nothing here draws: the window and the page tell
+the session where the hand pulls to, and a script can do the same. A slice is stepped as any run is,
+by the leapfrog.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +27,6 @@ from ..model.constants import AXES, B_MAX, L1, L2
 from ..model.operator import Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..simulation import record
 from ..simulation.record import Record
 from ..stepping import leapfrog, loop, monitor
 from ..stepping.leapfrog import Leapfrog, written_out
@@ -33,90 +34,105 @@ from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import gain_limit
 
-FRAME = 1.0 / 60.0  # [s] between two looks at the person
-MOST_FORCE = (
-    0.05  # longest slice of simulated time; a machine that needs longer for it slows the clock [s]
-)
-HOUR = 3600.0  # longest session [s]
-REACH_SHORT = (
-    abs(L2 - L1) + 0.05,
-    L1 + L2 - 0.02,
-)  # from the shoulder, of the point that the hand pulls to [m]
-JITTER = (
-    0.0,
-    1.0,
-    2.0,
-    5.0,
-    10.0,
-    20.0,
-    50.0,
-    100.0,
-    1000.0,
-)  # edges of the histogram of lateness [ms]
-RECENT = 60  # frames over which the real-time factor is shown
-CALM = 1.0  # without growing swings until an unstable arm is called calm again [s]
+FRAME_TIME = 1.0 / 60.0  # [s] between two slices
+LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
+LONGEST_SESSION = 3600.0  # [s]
+PULL_REACH = (abs(L2 - L1) + 0.05, L1 + L2 - 0.02)  # of the point pulled to, from the shoulder [m]
+LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
+RECENT_FRAMES = 60  # over which the real-time factor is averaged
+CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
 
 
 class Pull:
-    """The muscle force of a hand that pulls to a point through its own spring: k times where the point is.
+    """The muscle force of a hand that pulls to a point through the spring of its impedance.
 
-    With the impedance that the loop holds against p itself, this makes fh = -Th applied to p - point.
+    The force is k times the position of the point. With the impedance of the hand, which the loop
+    holds against p itself, this makes fh = -Th applied to p - point.
 
     Attributes:
-        force: a steady force beside it [N], (2,). knots: (time [s], x, y [m]) of the point's way so far.
+        spring: k [N/m].
+        force: steady force beside it [N], (2,).
+        knots: (t [s], x, y [m]) of the point's path so far.
     """
 
     def __init__(self, spring: float, p: tuple[float, float]):
+        """Puts the point at the handle.
+
+        Args:
+            spring: k [N/m].
+            p: position of the handle [m].
+        """
         self.spring, self.force = spring, (0.0, 0.0)
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
     def lead(self, t: float, to: tuple[float, float], span: float) -> None:
-        """From t [s] on the point moves evenly to reach `to` [m] after span [s]."""
+        """Moves the point evenly to a place.
+
+        Args:
+            t: from when on [s].
+            to: the place [m].
+            span: time to get there [s].
+        """
         now = self.at(t)
         self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
         self.knots += [(t, *now), (t + span, *to)]
 
     def jump(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> None:
-        """From t [s] on the point goes along with a handle at p [m] with v [m/s]: the hand lets go."""
+        """Lets go: the point moves with the handle.
+
+        Args:
+            t: from when on [s].
+            p: position of the handle [m].
+            v: velocity of the handle [m/s].
+        """
         self._from, self._rate, self._since = np.array(p), np.array(v), t
         self.knots.append((t, *p))
 
     def at(self, t: Any) -> np.ndarray:
-        """Where the point is at t [s], shape (2,) or (n, 2) [m]."""
+        """Returns the position of the point [m], shape (2,) or (n, 2).
+
+        Args:
+            t: time [s], a number or shape (n,).
+        """
         return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
 
     def mean(self, begin: Any, end: Any) -> np.ndarray:
-        """Mean force over [begin, end] [s], as signals.Signal.mean [N]."""
+        """Returns the mean force over intervals [N], as `Signal.mean`.
+
+        Args:
+            begin: of the intervals [s].
+            end: of the intervals [s].
+        """
         return np.array(self.force) + self.spring * self.at(
             0.5 * (np.asarray(begin) + np.asarray(end))
         )
 
 
 class _Live(Leapfrog):
-    """A run that goes on slice by slice, and whose muscle, gain and clay may change between two."""
+    """A run that goes on slice by slice, and whose muscle, gain and clay may change in between."""
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
+        written_out(leapfrog.glide_varying, self.last)  # compile now, not while the hand waits
         self.limit = self.last
-        # a person moves as they like: growth is no instability while the gain is below its limit
+        # motion is the person's: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
         self.keeping = True
         self.gains = [(0, scenario.gain)]  # index of the first sample with it
 
     def slice(self, steps: int) -> None:
-        """Makes so many steps, unless the run ends."""
+        """Makes this many steps, unless the run ends."""
         self.last = self.pause = min(self.i + steps, self.limit)
         self.go(None)
         if self.filled:
             self.flush()
 
     def change(self, scenario: Scenario) -> None:
-        """Goes on with another gain, or other damping between the same borders."""
+        """Goes on with another gain, or with other damping between the same borders."""
         if scenario.gain != self.scenario.gain:
             self.gains.append((self.i, scenario.gain))
         self.scenario = scenario
@@ -139,81 +155,121 @@ class _Live(Leapfrog):
 
 
 class Clock:
-    """Deals out simulated time as real time passes; where the machine is too slow, slower, and evenly so.
+    """Deals out simulated time as real time passes, and less of it on a machine that is too slow.
 
     Attributes:
-        frames: dealt out. late: how late each was, counted by JITTER. slow: whether the machine is too slow now.
+        frames: number of slices dealt out.
+        late: histogram of how late they came, with edges LATE_EDGES.
+        slow: whether the machine is too slow now.
+        real: real time that has passed [s].
+        simulated: simulated time dealt out [s].
     """
 
     def __init__(self):
-        self.frames, self.late, self.slow = 0, np.zeros(len(JITTER) - 1, dtype=int), False
+        self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
         self.real = self.simulated = 0.0  # [s] in all
-        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT_FRAMES)
         self._then: float | None = None
         self._owed = 0.0
 
     def due(self, now: float) -> float:
-        """Simulated time to make at wall time now [s], at most MOST [s]."""
-        passed = FRAME if self._then is None else now - self._then
+        """Returns the simulated time to make now [s], LONGEST_SLICE at most.
+
+        Args:
+            now: real time [s].
+        """
+        passed = FRAME_TIME if self._then is None else now - self._then
         self._then = now
         self._owed += passed
-        due = min(self._owed, MOST_FORCE)
+        due = min(self._owed, LONGEST_SLICE)
         self._owed -= due
-        self.slow = self._owed > 0.5 * MOST_FORCE
-        if self._owed > MOST_FORCE:  # the rest will never be made good
-            self._owed = MOST_FORCE
+        self.slow = self._owed > 0.5 * LONGEST_SLICE
+        if self._owed > LONGEST_SLICE:  # the rest is lost
+            self._owed = LONGEST_SLICE
         self.frames += 1
         self.real += passed
         self.simulated += due
-        late = min(max(1e3 * (passed - FRAME), 0.0), JITTER[-1] - 1e-9)
-        self.late[np.searchsorted(JITTER, late, "right") - 1] += 1
+        late = min(max(1e3 * (passed - FRAME_TIME), 0.0), LATE_EDGES[-1] - 1e-9)
+        self.late[np.searchsorted(LATE_EDGES, late, "right") - 1] += 1
         self._recent.append((passed, due))
         return due
 
     def rest(self) -> None:
-        """Time passes that is not to be made good: a pause."""
+        """Lets time pass that is not made up for: a pause."""
         self._then, self._owed = None, 0.0
 
     @property
     def factor(self) -> float:
-        """Simulated over real time, of late."""
+        """Simulated over real time, over the last frames."""
         real, simulated = (
             (sum(x) for x in zip(*self._recent, strict=True)) if self._recent else (1.0, 1.0)
         )
         return simulated / real
 
 
+class Frame(NamedTuple):
+    """State at the end of a slice, for plots that run along.
+
+    Attributes:
+        t: time [s].
+        p: position of the handle [m], (2,).
+        v: velocity of the handle [m/s], (2,).
+        fe: force of the clay [N], (2,).
+        fh: force of the hand [N], (2,).
+    """
+
+    t: float
+    p: tuple[float, float]
+    v: tuple[float, float]
+    fe: tuple[float, float]
+    fh: tuple[float, float]
+
+
 class Session:
     """A person, the arm and the clay.
 
     Attributes:
-        scenario: what runs, with the gain and damping of now. paused: whether time stands still.
-        recording: whether samples are kept. clock: of real time. frames: (t, p, v, fe, fh) at the end of
-            each slice, for plots that run along: t [s], the others (2,).
+        tool: at the handle.
+        stiffness: of the hand's spring, as a multiple of Th's.
+        every: samples per sample kept.
+        given: scenario as it was given.
+        scenario: scenario that runs, with the present gain and damping.
+        run: that steps it.
+        paused: whether simulated time stands still.
+        recording: whether samples are kept.
+        clock: of real time.
+        point: that the hand pulls to [m]; None if it does not.
+        frames: end of each slice so far.
     """
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
     ):
-        """A session begins at the start of the scenario; its own force, length and t_max do not count.
+        """Begins at the start of a scenario; its force, length and t_max do not count.
 
         Args:
-            scenario: the clay, gain and arm. stiffness: scales the spring of Th, and its damper by the square root.
-            tool: at the handle. every: keep each every-th sample.
+            scenario: clay, gain and arm.
+            stiffness: factor on the spring of Th; its damper takes the square root.
+            tool: at the handle.
+            every: keep each every-th sample.
 
         Raises:
-            ParameterError: a value is out of its bounds; or the scenario is sampled, or accurate.
+            ParameterError: a value is out of its bounds, or the scenario is sampled or accurate.
         """
         self.tool, self.stiffness = tool, stiffness
         self.every = integer("every", every, 1, 1_000_000)
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
-        """Begins anew with a scenario: clay whole, record empty."""
+        """Begins a scenario: the clay whole, the record empty.
+
+        Args:
+            scenario: clay, gain and arm.
+        """
         for field, value in (("control", "continuous"), ("integrator", "fast")):
             if getattr(scenario, field) != value:
                 raise ParameterError(
-                    field, getattr(scenario, field), f"must be {value!r} where a person takes part"
+                    field, getattr(scenario, field), f"must be {value!r} in a session"
                 )
         self.given = scenario
         self.scenario = played(scenario, self.stiffness)
@@ -222,13 +278,13 @@ class Session:
         self.clock = Clock()
         self.point: tuple[float, float] | None = None
         self._damping = 1.0
-        self.frames: list[tuple] = []
+        self.frames: list[Frame] = []
         self._carry = 0.0
-        self._swung = -math.inf  # when it last swung so that growth would be called unstable [s]
+        self._swung = -math.inf  # time of the last growing swing [s]
         self._look()
 
     def restart(self) -> None:
-        """Begins the same scenario anew, with the gain and damping as they are now, recording if it is now."""
+        """Begins the same scenario again, with the present gain, damping and recording switch."""
         gain, b, recording = self.scenario.gain, self._damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
@@ -246,36 +302,49 @@ class Session:
 
     @property
     def recorded(self) -> bool:
-        """Whether there is anything to make a record of."""
+        """Whether anything was recorded."""
         return bool(self.run.kept)
 
     @property
     def b(self) -> tuple[float, float]:
-        """Damping of the clay where the handle is [N.s/m]."""
+        """Damping of the clay at the handle [N.s/m]."""
         return self.run.regions.b(self.run.t)
 
     @property
     def gain(self) -> tuple[float, float]:
-        """K now."""
+        """K [1/kg] at present."""
         return self.scenario.gain
 
     def verdict(self) -> LiveVerdict:
-        """What the monitor of the run, and its gain limit, say now."""
+        """Says whether the loop is stable, by the monitor of the run and its gain limit."""
         s, onset = self.scenario, self.run.watch.onset
         return live_verdict(
-            self.gain, live_gain_limits(self.b, s.operator), onset, self.t - self._swung < CALM
+            self.gain, live_gain_limits(self.b, s.operator), onset, self.t - self._swung < CALM_TIME
         )
 
     def pull(self, point: tuple[float, float] | None) -> None:
-        """The hand pulls to this point [m] from now on, as far as the arm reaches; None lets go."""
+        """Makes the hand pull to a point, as far as the arm reaches.
+
+        Args:
+            point: where to [m]; None lets go.
+        """
         self.point = None if point is None else self._within_reach(point)
 
     def push(self, force: tuple[float, float]) -> None:
-        """The hand presses with this steady force [N] from now on, beside any pull."""
+        """Makes the hand press with a steady force, beside any pull.
+
+        Args:
+            force: along x and y [N].
+        """
         self.run.muscle.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
 
     def change(self, gain: tuple[float, float] | None = None, b: float | None = None) -> None:
-        """Changes the compensator's gain, or the damping of all clay to b times what the scenario has."""
+        """Changes the gain or the damping.
+
+        Args:
+            gain: K [1/kg]; None keeps it.
+            b: damping of all clay as a multiple of the given scenario's; None keeps it.
+        """
         scenario = self.scenario
         if gain is not None:
             scenario = replace(scenario, gain=gain)
@@ -287,11 +356,18 @@ class Session:
 
     @property
     def damping(self) -> float:
-        """Damping of all clay, relative to what the scenario has."""
+        """Damping of all clay as a multiple of the given scenario's."""
         return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Makes a slice of simulated time, but nothing while paused; returns where the handle went, (n, 2) [m]."""
+        """Makes a slice of simulated time; none while paused.
+
+        Args:
+            seconds: length of the slice [s].
+
+        Returns:
+            Positions of the handle before and after [m], shape (2, 2), or (0, 2) without a step.
+        """
         run, dt = self.run, self.scenario.dt
         if self.paused or run.outcome:
             return np.empty((0, 2))
@@ -306,17 +382,21 @@ class Session:
         run.keeping = self.recording
         run.slice(steps)
         self._look()
-        return np.array([self.frames[-2][1], self.frames[-1][1]])
+        return np.array([self.frames[-2].p, self.frames[-1].p])
 
-    def record(self) -> record.Record:
-        """Ends the run and returns what was recorded, with the removed volume, the hand's point and the gain."""
+    def record(self) -> Record:
+        """Ends the run and returns its record, with removed volume, hand's point and gain.
+
+        Raises:
+            ParameterError: nothing was recorded.
+        """
         run = self.run
         if run.outcome is None and run.i:
             run.last = run.limit
             run.end()
         if not run.kept:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
-        out = record.Record.of(run, max(self.clock.real, 1e-9))
+        out = Record.of(run, max(self.clock.real, 1e-9))
         volume, rate = self._removed(out)
         knots = np.array(run.muscle.knots)
         index = np.rint(out.t / self.scenario.dt)
@@ -334,12 +414,12 @@ class Session:
             "tool": dataclasses.asdict(self.tool),
             "real_time_factor": clock.simulated / clock.real if clock.real else 1.0,
             "frames": clock.frames,
-            "late_ms": {"edges": list(JITTER), "frames": clock.late.tolist()},
+            "late_ms": {"edges": list(LATE_EDGES), "frames": clock.late.tolist()},
         }
         return replace(out, extra=extra, notes=notes)
 
-    def _removed(self, out: record.Record) -> tuple[np.ndarray, np.ndarray]:
-        """As removal.removed, along the way that was really gone where recording was off."""
+    def _removed(self, out: Record) -> tuple[np.ndarray, np.ndarray]:
+        """As `removed`, along the true path where recording was off."""
         t, p, v = (np.array(x) for x in zip(*(f[:3] for f in self.frames), strict=True))
         after = np.searchsorted(out.t, t)
         begin = out.t[np.maximum(after - 1, 0)]
@@ -374,18 +454,24 @@ class Session:
         th = self.scenario.operator
         assert th is not None
         hand = spring.mean(self.t, self.t) - th.spring * np.array(p) - th.damper * np.array(v)
-        self.frames.append((self.t, p, v, (b[0] * v[0], b[1] * v[1]), tuple(hand.tolist())))
+        fe = b[0] * v[0], b[1] * v[1]
+        self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist())))
 
     def _within_reach(self, point: tuple[float, float]) -> tuple[float, float]:
         x, y = (a + o for a, o in zip(point, self.scenario.origin, strict=True))
-        x = x or 1e-9  # the shoulder itself lies in no direction
+        x = x or 1e-9  # the shoulder has no direction
         r = math.hypot(x, y)
-        scale = min(max(r, REACH_SHORT[0]), REACH_SHORT[1]) / r
+        scale = min(max(r, PULL_REACH[0]), PULL_REACH[1]) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
-    """The scenario as a session runs it: the person is the muscle, and there is no end of the path."""
+    """Returns the scenario as a session runs it: a person as the muscle, and no end of the path.
+
+    Args:
+        scenario: clay, gain and arm.
+        stiffness: factor on the spring of Th; its damper takes the square root.
+    """
     stiffness = number("stiffness", stiffness, 1e-3, 1e4)
     th = scenario.operator or Operator()
     hand = Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)
@@ -396,13 +482,18 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
         muscle=None,
         command=None,
         length=None,
-        t_max=HOUR,
+        t_max=LONGEST_SESSION,
         stop=False,
     )
 
 
 def scaled(clay: Clay | None, factor: float) -> Clay | None:
-    """The same clay with so many times the damping, at most B_MAX."""
+    """Returns the same clay with a multiple of its damping, B_MAX at most.
+
+    Args:
+        clay: the clay; None for none.
+        factor: on the damping.
+    """
 
     def times(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(min(b * factor, B_MAX) for b in values)
@@ -414,25 +505,49 @@ def scaled(clay: Clay | None, factor: float) -> Clay | None:
 
 
 class Replay:
-    """A record, played as the session it may have been; the attributes are those of Session."""
+    """A record, played as if it were a session.
+
+    Attributes:
+        source: the record.
+        scenario: of the record.
+        tool: at the handle, as in the session that was recorded.
+        paused: whether it stands still.
+        clock: of real time.
+        t: time reached [s].
+        n: sample reached.
+        frames: states shown so far.
+    """
 
     def __init__(self, record: Record, tool: Tool = TOOL):
+        """Begins at the first sample.
+
+        Args:
+            record: to be played.
+            tool: at the handle, if the record names none.
+        """
         self.source, self.scenario = record, record.scenario
         self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
         self.restart()
 
     def restart(self) -> None:
-        """Plays from the beginning."""
+        """Begins again at the first sample."""
         self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
-        self.frames: list[tuple] = [self._frame(0)]
+        self.frames = [self._frame(0)]
 
     @property
     def ended(self) -> str:
-        """How the record ended, once it has."""
+        """How the record ended, once its end is reached; empty before."""
         return self.source.status if self.n >= len(self.source.t) - 1 else ""
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Goes on by so much simulated time, but not while paused."""
+        """Plays on; not while paused.
+
+        Args:
+            seconds: simulated time to play [s].
+
+        Returns:
+            Positions of the handle [m], shape (n, 2).
+        """
         if self.paused or self.ended:
             return np.empty((0, 2))
         self.t += seconds
@@ -445,7 +560,7 @@ class Replay:
 
     @property
     def gain(self) -> tuple[float, float]:
-        """K now."""
+        """K [1/kg] at present."""
         x, y = (
             self.source.extra["gain"][self.n].tolist()
             if "gain" in self.source.extra
@@ -455,25 +570,25 @@ class Replay:
 
     @property
     def b(self) -> tuple[float, float]:
-        """Damping of the clay where the handle is [N.s/m]."""
+        """Damping of the clay at the handle [N.s/m]."""
         x, y = self.source.b[self.n].tolist()
         return x, y
 
     def verdict(self) -> LiveVerdict:
-        """As of a session; what the monitor found is the outcome of the record."""
+        """As of a session; the monitor's finding is the outcome of the record."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
         limit = live_gain_limits(self.b, s.operator) if s.control == "continuous" else None
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
-    def _frame(self, n: int) -> tuple:
+    def _frame(self, n: int) -> Frame:
         r = self.source
-        return (float(r.t[n]), *(tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh)))
+        return Frame(float(r.t[n]), *(tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh)))
 
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[threading.Event]:
-    """An event that Ctrl-C sets, in place of an exception in the midst of anything; a second Ctrl-C is one."""
+    """Yields an event that Ctrl-C sets in place of raising; a second Ctrl-C raises."""
     stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
 
     def heard(*_) -> None:
@@ -488,22 +603,28 @@ def stoppable() -> Iterator[threading.Event]:
 
 
 class Player(threading.Thread):
-    """Plays until `stop`. Whoever reads or changes what is played holds the lock.
+    """A thread that advances a session or a replay in real time.
 
     Attributes:
-        error: what went wrong, None if nothing did.
+        play: what is played.
+        lock: to be held by any other thread that reads or changes it.
+        error: that ended the thread, None if none did.
     """
 
     def __init__(self, play: Session | Replay):
+        """Does not play yet: call `start`.
+
+        Args:
+            play: what to play.
+        """
         super().__init__(name="player", daemon=True)
-        self.play, self.lock = (
-            play,
-            threading.RLock(),
-        )  # what changes a page is told of the change at once
+        self.play = play
+        self.lock = threading.RLock()  # a change of the page's controls calls back at once
         self.error: Exception | None = None
         self._stop_now = threading.Event()
 
     def run(self) -> None:
+        """Plays until `stop`."""
         at = time.perf_counter()
         try:
             while not self._stop_now.is_set():
@@ -513,13 +634,13 @@ class Player(threading.Thread):
                         play.clock.rest()
                     else:
                         play.advance(play.clock.due(time.perf_counter()))
-                at = max(at + FRAME, time.perf_counter())
+                at = max(at + FRAME_TIME, time.perf_counter())
                 self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
-        except Exception as error:  # shown by whoever joins
+        except Exception as error:  # raised again by stop()
             self.error = error
 
     def stop(self) -> None:
-        """Ends the thread; raises what it died of, if it did."""
+        """Ends the thread; raises the error that ended it before, if any."""
         self._stop_now.set()
         self.join()
         if self.error is not None:
@@ -528,10 +649,11 @@ class Player(threading.Thread):
 
 @dataclass(frozen=True)
 class LiveVerdict:
-    """What to say of the loop now.
+    """A verdict on the loop at present.
 
     Attributes:
-        text: in a line. unstable: whether the arm swings out of hand.
+        text: one line.
+        unstable: whether the arm swings with growing amplitude.
     """
 
     text: str
@@ -544,11 +666,13 @@ def live_verdict(
     onset: Outcome | None,
     swings: bool,
 ) -> LiveVerdict:
-    """Says what the stability monitor has found, or else how far the gain is from its limit.
+    """Combines the finding of the stability monitor with the gain's distance to its limit.
 
     Args:
-        gain: K. limit: of it, in the clay at the handle; None if unknown. onset: the instability that the monitor has
-            found. swings: whether the arm still swings.
+        gain: K [1/kg].
+        limit: of K in the clay at the handle; None if unknown.
+        onset: instability that the monitor has found; None for none.
+        swings: whether the arm still swings.
     """
     far = limit or (math.inf, math.inf)
     above = [
@@ -572,7 +696,12 @@ def live_verdict(
 
 
 def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
-    """The gain limit of the linear loop on each axis, with this clay at the handle [N.s/m]; inf for none."""
+    """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
+
+    Args:
+        b: damping of the clay at the handle [N.s/m].
+        operator: the hand; None for no hand.
+    """
     x, y = (
         gain_limit.gain_limit(axis, damping, operator)
         for axis, damping in zip(AXES, b, strict=True)

@@ -1,25 +1,188 @@
-"""The look of every picture: palette, text, the shading of clay."""
+"""The palette, the shading of clay, and the helpers that all figures share.
+
+Colours are hex strings, as matplotlib takes them; `rgb` and `rgb_bytes` convert them for MuJoCo and
+viser. Importing this module does not load matplotlib: the page, the window and the stage need the
+palette alone.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-BLUE, ORANGE, GREEN, BLACK = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#222222",
-)  # Okabe and Ito, safe for all eyes
-CLAY, GREY = "#E8C9A8", "#555555"
+import numpy as np
+
+from ..model.clay import Profile
+from ..model.operator import Operator
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito (2008), distinct under every form of colour blindness
+BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
+PURPLE, SKY_BLUE, YELLOW = "#CC79A7", "#56B4E9", "#F0E442"
+BLACK, WHITE = "#222222", "#FFFFFF"
+GREY, MID_GREY, LIGHT_GREY, PALE_GREY = "#555555", "#888888", "#BBBBBB", "#E6E6E6"
+CURVE_STYLES: tuple[tuple[str, Any], ...] = (
+    (BLUE, "-"),
+    (VERMILION, "--"),
+    (GREEN, "-."),
+    (PURPLE, (0, (1, 1))),
+    (ORANGE, (0, (5, 1, 1, 1, 1, 1))),
+)
+FORCE_COLORS = {  # whose force, along which axis; the window's titles name the colours
+    ("hand", 0): GREEN,
+    ("clay", 0): BLUE,
+    ("hand", 1): ORANGE,
+    ("clay", 1): VERMILION,
+}
+COLOR_NAMES = {GREEN: "green", BLUE: "blue", ORANGE: "orange", VERMILION: "red"}
+VERDICT_COLORS = {"unstable": "#C92A2A", "stable": "#0D6B52", "other": "#B86B00"}  # under white
+MATERIALS = {"dark": "#38404A", "steel": "#B2BAC4", "blue": BLUE, "orange": VERMILION}
+TABLE, GRID, SKY = "#CDD3D8", "#B4BCC4", ("#ECF0F5", "#D6DCE4")  # of the page, as in room.xml
+CLAY_PALE, CLAY_DEEP = "#DEA884", "#BA643E"  # clay of the least and of the largest damping
 STYLE: Any = {
     "font.size": 10.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#DDDDDD",
+    "grid.color": PALE_GREY,
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
     "savefig.dpi": 160,
     "figure.constrained_layout.use": True,
 }
+TITLE_SIZE = 9.0  # [points]
+TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
+CLAY_ALPHA = 0.35  # of clay behind curves
+
+
+def rgb(color: str) -> tuple[float, float, float]:
+    """Converts a hex colour to three numbers from 0 to 1.
+
+    Args:
+        color: such as "#0072B2".
+    """
+    r, g, b = rgb_bytes(color)
+    return r / 255.0, g / 255.0, b / 255.0
+
+
+def rgb_bytes(color: str) -> tuple[int, int, int]:
+    """Converts a hex colour to three bytes.
+
+    Args:
+        color: such as "#0072B2".
+    """
+    r, g, b = bytes.fromhex(color.removeprefix("#"))
+    return r, g, b
+
+
+def clay_color(share: Any) -> np.ndarray:
+    """Shades clay by its damping.
+
+    Args:
+        share: damping over the largest damping of the scene, 0 to 1, any shape.
+
+    Returns:
+        Red, green and blue from 0 to 1, shape (..., 3).
+    """
+    pale, deep = np.array(rgb(CLAY_PALE)), np.array(rgb(CLAY_DEEP))
+    return pale + np.asarray(share)[..., None] ** 2 * (deep - pale)
+
+
+def verdict_color(text: str, unstable: bool) -> str:
+    """Returns the colour behind a verdict on the loop.
+
+    Args:
+        text: the verdict.
+        unstable: whether the arm swings with growing amplitude.
+    """
+    kind = "unstable" if unstable else "stable" if text.startswith("stable") else "other"
+    return VERDICT_COLORS[kind]
+
+
+def figure_style(**more: Any) -> Any:
+    """Returns the context in which figures are drawn.
+
+    Args:
+        more: rcParams of matplotlib that differ from STYLE, dots written as underscores.
+    """
+    import matplotlib
+
+    parameters: Any = {**STYLE, **{k.replace("_", ".", 1): v for k, v in more.items()}}
+    return matplotlib.rc_context(parameters)
+
+
+def set_title(ax: Axes, *parts: str, **more: Any) -> None:
+    """Puts a title over the axes, in as many lines as keep it within the figure.
+
+    Args:
+        ax: the axes.
+        parts: phrases, joined by commas; lines break between them.
+        more: further arguments of `Axes.set_title`.
+    """
+    from matplotlib.textpath import TextPath
+
+    figure: Any = ax.figure
+    room = 72.0 * (figure.get_figwidth() - TITLE_MARGIN)
+    lines = [parts[0]]
+    for part in parts[1:]:
+        longer = f"{lines[-1]}, {part}"
+        if TextPath((0.0, 0.0), longer, size=TITLE_SIZE).get_extents().width <= room:
+            lines[-1] = longer
+        else:
+            lines[-1] += ","
+            lines.append(part)
+    ax.set_title("\n".join(lines), fontsize=TITLE_SIZE, loc="left", color=GREY, **more)
+
+
+def add_legend(figure: Figure, ax: Axes, ncols: int = 5, **more: Any) -> None:
+    """Puts the legend of one of the axes above the figure.
+
+    Args:
+        figure: the figure.
+        ax: the axes whose labels it lists.
+        ncols: columns, at most.
+        more: further arguments of `Figure.legend`.
+    """
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=ncols, **more)
+
+
+def hand_name(operator: Operator | None) -> str:
+    """Names the hand in a title.
+
+    Args:
+        operator: the hand; None for no hand.
+    """
+    if operator is None:
+        return "no hand"
+    return "nominal hand" if operator == Operator() else "given hand"
+
+
+def unit_text(text: str) -> str:
+    """Typesets units: N.s/m with a centred dot, s^2 with an exponent.
+
+    Args:
+        text: that holds the units.
+    """
+    return text.replace("N.", "N$\\cdot$").replace("^2", "$^2$")
+
+
+def shade_clay(ax: Axes, profile: Profile | None, axis: str) -> None:
+    """Shades the intervals of the x axis that hold clay, darker where it damps more.
+
+    Args:
+        ax: axes over the position along `axis` [cm].
+        profile: of the clay; None for no clay.
+        axis: "x" or "y"; a profile along the other axis is not shown.
+    """
+    if profile is None or profile.along != axis:
+        return
+    label, edges = "clay", (-1.0, *profile.edges, 1.0)
+    for low, high, b in zip(edges, edges[1:], profile.values, strict=False):
+        if b > 0.0:
+            color = clay_color(b / max(profile.values))
+            ax.axvspan(100.0 * low, 100.0 * high, color=color, alpha=CLAY_ALPHA, lw=0, label=label)
+            label = "_"

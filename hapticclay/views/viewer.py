@@ -1,7 +1,8 @@
-"""MuJoCo's own viewer, in a process of its own, which `view` starts and answers.
+"""MuJoCo's own viewer in a process of its own, which `window` starts and answers.
 
-Once its window is closed the viewer's thread, holding the interpreter, deletes the condition on which another thread
-may wait in `update_hfield`: neither comes back. A display that goes away ends the process. Here that costs a picture.
+Once its window is closed the viewer's thread, holding the interpreter, deletes the condition on
+which another thread may wait in `update_hfield`: neither comes back. A display that goes away ends
+the process. In a process of its own either costs a picture, not the session.
 """
 
 from __future__ import annotations
@@ -24,30 +25,26 @@ from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..stepping.engine import mujoco
 from ..studies.removal import Tool
-from .session import FRAME
-from .stage import Stage, cut_axes
+from .session import FRAME_TIME, Frame
+from .stage import Stage, plotted_axes
+from .style import BLACK, COLOR_NAMES, FORCE_COLORS, PALE_GREY, WHITE, rgb, verdict_color
 
 Rows = tuple[tuple[str, str], ...]
-SHARE = 0.32  # of the width, for the plots
-BANNER = 0.05, 36  # of the height, and pixels, at least, for the verdict
-ROWS = (
-    0.24,
-    290,
-)  # of the width, and pixels, at least, that what is written beside the picture takes
-WHITE, BLACK = (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
-RED, GREEN, AMBER = (0.80, 0.13, 0.13), (0.05, 0.42, 0.32), (0.72, 0.42, 0.0)  # behind the verdict
-COLORS = {
-    "blue": (0.0, 0.45, 0.70),
-    "green": (0.0, 0.62, 0.45),
-    "red": (0.84, 0.37, 0.0),
-    "yellow": (0.90, 0.62, 0.0),
-}
-INK = {"hand": ("green", "yellow"), "clay": ("blue", "red")}  # of x, y
+PLOTS_WIDTH = 0.32  # of the window's
+BANNER_HEIGHT = 0.05, 36  # of the window's, and at least [pixels]
+TEXT_WIDTH = 0.24, 290  # of the window's, and at least [pixels]
 
 
 @dataclass(frozen=True)
 class Writing:
-    """What is written: beside the picture, of keys, and above it (unstable or not)."""
+    """Texts of the window.
+
+    Attributes:
+        rows: name and value of each line beside the picture.
+        keys: key and effect of each line of help; empty for no help.
+        verdict: on the loop, above the picture.
+        unstable: whether the arm swings with growing amplitude.
+    """
 
     rows: Rows
     keys: Rows
@@ -57,14 +54,17 @@ class Writing:
 
 @dataclass(frozen=True)
 class Sight:
-    """What there is to see now.
+    """What the window shows next.
 
     Attributes:
-        frames: as Session.frames, from the last one that was shown on. anew: whether they begin again, the clay whole.
-        angles: of the arm [rad]. target: of the hand [m], None if nobody pulls. writing: None if as it was.
+        frames: of the session, from the last one that was shown on.
+        anew: whether they begin again, with the clay whole.
+        angles: of the arm [rad].
+        target: point that the hand pulls to [m]; None if it does not.
+        writing: texts; None to keep the old ones.
     """
 
-    frames: list[tuple]
+    frames: list[Frame]
     anew: bool
     angles: list[float]
     target: tuple[float, float] | None
@@ -72,59 +72,77 @@ class Sight:
 
 
 class Pane:
-    """The picture of one scenario, and the plots beside it."""
+    """The picture of one scenario and the plots beside it.
+
+    Attributes:
+        stage: the picture.
+        plots: beside it.
+        frames: of the session so far.
+        banner: above the picture.
+        rows: lines beside the picture.
+        keys: lines of help.
+    """
 
     def __init__(self, scenario: Scenario, tool: Tool):
+        """Prepares the picture.
+
+        Args:
+            scenario: what to show.
+            tool: at the handle.
+        """
         self.stage = Stage(scenario, tool)
-        self.plots = _plots(cut_axes(scenario))
-        self.frames: list[tuple] = []
-        self.banner = _blank()
+        self.plots = _plots(plotted_axes(scenario))
+        self.frames: list[Frame] = []
+        self.banner = _banner()
+        self.rows: Rows = ()
+        self.keys: Rows = ()
 
     def take(self, sight: Sight) -> None:
-        """Takes in what there is to see; texts and plots follow when something is written."""
+        """Takes in what to show; texts and plots follow when there are new texts.
+
+        Args:
+            sight: answer of the session.
+        """
         if sight.anew:
-            self.stage.whole()
+            self.stage.restore()
             self.frames = []
             for plot in self.plots:
                 plot.clear()
         new = sight.frames if sight.anew else sight.frames[1:]
-        self.stage.carve([f[1] for f in new])
+        self.stage.carve([f.p for f in new])
         self.frames += new
         self.stage.pose(sight.angles, sight.target)
         if words := sight.writing:
             self.rows = (*words.rows, ("removed", f"{1e6 * self.stage.removal.volume:.2f} cm3"))
             self.keys = words.keys
             self.banner.title = words.verdict
-            color = (
-                RED if words.unstable else GREEN if words.verdict.startswith("stable") else AMBER
-            )
-            self.banner.figurergba[:] = (*color, 1.0)
+            color = verdict_color(words.verdict, words.unstable)
+            self.banner.figurergba[:] = (*rgb(color), 1.0)
             for plot in self.plots:
                 plot.extend(self.frames)
 
     def show(self, keys: Callable[[], list[int]], viewer: Any, ask: Callable[[Any], Sight]) -> None:
-        """Shows what is answered when asked what the keys and the hand have done, until the process ends."""
+        """Shows answers until the process ends.
+
+        Args:
+            keys: returns the keys pressed since the last call.
+            viewer: MuJoCo's.
+            ask: sends keys and hand to the session and returns its answer.
+        """
         body = self.stage.model.body("tool").id
         with viewer.lock():
-            viewer.cam.lookat[:], viewer.cam.distance = (
-                (0.33, 0.19, -0.03),
-                0.80,
-            )  # the plots cover the right
-            viewer.cam.azimuth, viewer.cam.elevation = 90.0, -55.0
+            viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
+            viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.80, 90.0, -55.0
             viewer.opt.sitegroup[:] = 0
-            for flag in (
-                "PERTOBJ",
-                "PERTFORCE",
-                "SELECT",
-            ):  # the target is shown as a ball of our own
+            for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # a ball of ours shows the target
                 viewer.opt.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 0
             groups = viewer.opt.geomgroup.copy()
         grip: np.ndarray | None = None
         while True:
             begin = time.perf_counter()
             with viewer.lock():
-                hand, grip = _hand(viewer, grip)
-                viewer.opt.geomgroup[:] = groups  # the viewer's own meaning of 1, 2, 3
+                hand, grip = _mouse_displacement(viewer, grip)
+                viewer.opt.geomgroup[:] = groups  # undo the viewer's own 1, 2, 3
                 if hand is None:
                     viewer.perturb.select, viewer.perturb.localpos[:] = body, (0.0, 0.0, 0.05)
             sight = ask((keys(), hand))
@@ -134,7 +152,7 @@ class Pane:
             if sight.writing:
                 self._write(viewer)
             viewer.sync()
-            time.sleep(max(0.001, FRAME - (time.perf_counter() - begin)))
+            time.sleep(max(0.001, FRAME_TIME - (time.perf_counter() - begin)))
 
     def _write(self, viewer: Any) -> None:
         font, room = mujoco.mjtFontScale.mjFONTSCALE_100, viewer.viewport
@@ -146,27 +164,22 @@ class Pane:
         viewer.set_texts(texts)
         if room is None or room.width <= 400:
             return
-        banner, right = (
-            max(int(BANNER[0] * room.height), BANNER[1]),
-            max(int(ROWS[0] * room.width), ROWS[1]),
-        )
-        width, height = int(SHARE * room.width), (room.height - banner) // len(self.plots)
-        figures = [
-            (mujoco.MjrRect(right, room.height - banner, room.width - right, banner), self.banner)
-        ]
+        banner = max(int(BANNER_HEIGHT[0] * room.height), BANNER_HEIGHT[1])
+        left = max(int(TEXT_WIDTH[0] * room.width), TEXT_WIDTH[1])
+        width, height = int(PLOTS_WIDTH * room.width), (room.height - banner) // len(self.plots)
+        top = mujoco.MjrRect(left, room.height - banner, room.width - left, banner)
+        figures = [(top, self.banner)]
         for i, plot in enumerate(self.plots):
             bottom = room.height - banner - (i + 1) * height
             figures.append((mujoco.MjrRect(room.width - width, bottom, width, height), plot.figure))
         viewer.set_figures(figures)
 
 
-def _hand(
-    viewer: Any, grip: np.ndarray | None
-) -> tuple[tuple[float, float] | None, np.ndarray | None]:
-    """Where the mouse has dragged to from where it took hold, (x, y) [m], None while it does not; and that place.
+def _mouse_displacement(viewer: Any, grip: np.ndarray | None) -> tuple[Any, np.ndarray | None]:
+    """Displacement of the mouse since it took hold (x, y) [m], None while it does not; and grip.
 
-    The viewer moves its point in a plane through the grip, upright unless shift is held; what it gains in height
-    counts as going away from the camera.
+    The viewer moves its point in a plane through the grip, upright unless shift is held: height
+    counts as distance from the camera.
     """
     if not viewer.perturb.active & mujoco.mjtPertBit.mjPERT_TRANSLATE:
         return None, None
@@ -177,14 +190,18 @@ def _hand(
     return (float(x), float(y)), grip
 
 
-def main() -> None:
-    """Reads (scenario, tool), then asks and reads a Sight for every picture; ends when nobody answers."""
-    import glfw  # these need libraries of a desktop
+def run_viewer() -> None:
+    """Runs the viewer's process.
+
+    Reads (scenario, tool); then, for every picture, sends (keys, hand) and reads a Sight. Ends when
+    nobody answers.
+    """
+    import glfw  # glfw and the viewer need the libraries of a desktop
     import mujoco.viewer
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal that both share
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the shared terminal is the session's
     source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever the viewer prints
+    os.dup2(2, 1)  # what the viewer prints
 
     def ask(words: Any) -> Any:
         try:
@@ -199,7 +216,7 @@ def main() -> None:
 
     class Simulate(mujoco.viewer._Simulate):
         def destroy(self) -> None:
-            """The window was closed: nothing is to be deleted under the thread that may wait for it."""
+            """Ends the process with the window, before anything is deleted that a thread awaits."""
             os._exit(0)
 
     mujoco.viewer._Simulate = Simulate
@@ -227,7 +244,7 @@ def main() -> None:
 
 
 def _probe(glfw: Any) -> None:
-    """Makes a window, and lets it go: where that fails the viewer ends the process, and leaves a log in the folder."""
+    """Opens and closes a window: where that fails the viewer would end the process."""
     if not glfw.init():
         raise OSError("does not answer")
     glfw.window_hint(glfw.VISIBLE, False)
@@ -238,13 +255,13 @@ def _probe(glfw: Any) -> None:
     glfw.default_window_hints()
 
 
-def _blank() -> mujoco.MjvFigure:
-    """A figure with nothing in it but room for a title."""
+def _banner() -> mujoco.MjvFigure:
+    """An empty figure whose title is the verdict."""
     figure = mujoco.MjvFigure()
     mujoco.mjv_defaultFigure(figure)
     figure.flg_extend = figure.flg_legend = 0
     figure.flg_ticklabel[:] = 0
-    figure.textrgb[:] = WHITE
+    figure.textrgb[:] = rgb(WHITE)
     figure.panergba[:] = 0.0
     figure.gridsize[:] = 2
     figure.gridwidth = 0.0
@@ -256,41 +273,57 @@ def _ratio(force: float, v: float) -> float:
     return force / v if abs(v) > 1e-4 else math.nan
 
 
-def _plots(axes: tuple[int, ...]) -> tuple[_Plot, ...]:
-    """Velocity and clay against position, and forces against time, along these axes."""
-    place = "position [cm]" if len(axes) > 1 else f"{''.join(AXES[i] for i in axes)} [cm]"
-    each = ", ".join(f"{AXES[i]} {INK['clay'][i]}" for i in axes)
-    named = f": {each}" if len(axes) > 1 else ""
-    hand, clay = (f"{who} {', '.join(inks[i] for i in axes)}" for who, inks in INK.items())
+def _plots(axes: tuple[int, ...]) -> tuple[LivePlot, ...]:
+    """Velocity and fe/v over position, and forces over time, along these axes."""
+    hand, clay = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
+    place, named = f"{AXES[axes[0]]} [cm]", ""
+    if len(axes) > 1:
+        place = "position [cm]"
+        named = ": " + ", ".join(f"{AXES[i]} {COLOR_NAMES[clay[i]]}" for i in axes)
     velocities, dampings, forces = [], [], []
     for i in axes:
-        ink = INK["clay"][i]
-        velocities.append(_Line(ink, lambda f, i=i: (100 * f[1][i], 100 * f[2][i])))
-        dampings.append(_Line(ink, lambda f, i=i: (100 * f[1][i], _ratio(f[3][i], f[2][i]))))
-        forces.append(_Line(INK["hand"][i], lambda f, i=i: (f[0], f[4][i])))
-        forces.append(_Line(ink, lambda f, i=i: (f[0], f[3][i])))
+        velocities.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], 100 * f.v[i])))
+        dampings.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], _ratio(f.fe[i], f.v[i]))))
+        forces.append(LiveCurve(hand[i], lambda f, i=i: (f.t, f.fh[i])))
+        forces.append(LiveCurve(clay[i], lambda f, i=i: (f.t, f.fe[i])))
+    both = (
+        f"{who} {', '.join(COLOR_NAMES[color] for color in colors.values())}"
+        for who, colors in (("hand", hand), ("clay", clay))
+    )
     return (
-        _Plot(f"velocity [cm/s]{named}", place, tuple(velocities), 0.1),
-        _Plot(f"clay, fe/v [N.s/m]{named}", place, tuple(dampings), 10.0),
-        _Plot(f"force [N]: {hand}; {clay}", "time [s]", tuple(forces), 0.1),
+        LivePlot(f"velocity [cm/s]{named}", place, tuple(velocities), 0.1),
+        LivePlot(f"clay, fe/v [N.s/m]{named}", place, tuple(dampings), 10.0),
+        LivePlot(f"force [N]: {'; '.join(both)}", "time [s]", tuple(forces), 0.1),
     )
 
 
 @dataclass(frozen=True)
-class _Line:
-    """A line of a plot: its colour by name, and its point in a frame of the session."""
+class LiveCurve:
+    """A curve of a live plot.
 
-    ink: str
-    point: Callable[[tuple], tuple[float, float]]
+    Attributes:
+        color: of the curve.
+        point: x and y of a frame of the session.
+    """
+
+    color: str
+    point: Callable[[Frame], tuple[float, float]]
 
 
 @dataclass
-class _Plot:
-    """One of the engine's figures, with at most so many points as it takes. least: smallest range of y."""
+class LivePlot:
+    """A plot that grows with the session, drawn by the engine with as many points as it takes.
+
+    Attributes:
+        title: over the plot.
+        xlabel: under it.
+        curves: of the plot.
+        least: smallest range of y.
+    """
 
     title: str
     xlabel: str
-    lines: tuple[_Line, ...]
+    curves: tuple[LiveCurve, ...]
     least: float
 
     def __post_init__(self):
@@ -300,25 +333,28 @@ class _Plot:
         figure.flg_extend = figure.flg_legend = 0
         figure.flg_ticklabel[:] = 1
         figure.xformat, figure.yformat = "%.3g", "%.3g"
-        figure.figurergba[:] = figure.panergba[:] = (*WHITE, 1.0)
-        figure.gridrgb[:] = (0.85, 0.85, 0.85)
-        figure.textrgb[:] = BLACK
+        figure.figurergba[:] = figure.panergba[:] = (*rgb(WHITE), 1.0)
+        figure.gridrgb[:] = rgb(PALE_GREY)
+        figure.textrgb[:] = rgb(BLACK)
         figure.linewidth = 2.0
-        for j, line in enumerate(self.lines):
-            figure.linergb[j] = COLORS[line.ink]
+        for j, curve in enumerate(self.curves):
+            figure.linergb[j] = rgb(curve.color)
         self.clear()
 
     def clear(self) -> None:
+        """Forgets all points."""
         self.points: list[list[tuple[float, float]]] = []
         self.seen, self.stride = 0, 1
         self.figure.linepnt[:] = 0
 
-    def extend(self, frames: list) -> None:
-        """Takes the frames that are new."""
-        new = range(self.seen, len(frames))
-        self.points += [
-            [line.point(frames[k]) for line in self.lines] for k in new if k % self.stride == 0
-        ]
+    def extend(self, frames: list[Frame]) -> None:
+        """Adds the frames that are new.
+
+        Args:
+            frames: all frames of the session so far.
+        """
+        new = (frames[k] for k in range(self.seen, len(frames)) if k % self.stride == 0)
+        self.points += [[curve.point(frame) for curve in self.curves] for frame in new]
         self.seen = len(frames)
         while len(self.points) >= mujoco.mjMAXLINEPNT - 1:
             self.points, self.stride = self.points[::2], 2 * self.stride
@@ -327,29 +363,26 @@ class _Plot:
         data = np.array(self.points)
         for axis, limits, least in ((0, _wide, 5.0), (1, _snapped, self.least)):
             known = data[..., axis][np.isfinite(data[..., axis])]
-            low, high, lines = limits(
-                float(known.min(initial=0.0)), float(known.max(initial=0.0)), least
-            )
+            ends = float(known.min(initial=0.0)), float(known.max(initial=0.0))
+            low, high, lines = limits(*ends, least)
             self.figure.range[axis], self.figure.gridsize[axis] = (low, high), lines
         span = np.diff(self.figure.range[:2])[:, 0]
-        for j in range(len(self.lines)):
-            line = data[np.isfinite(data[:, j, 1]), j]
-            way = np.cumsum(np.hypot(*(np.diff(line, axis=0, prepend=line[:1]) / span).T)) // STEP
-            line = (
-                line[np.flatnonzero(np.diff(way, prepend=-1.0, append=math.inf)[:-1])]
-                if len(line)
-                else line
-            )
-            self.figure.linepnt[j] = len(line)
-            self.figure.linedata[j, : 2 * len(line)] = line.ravel()
+        for j in range(len(self.curves)):
+            curve = data[np.isfinite(data[:, j, 1]), j]
+            if len(curve):
+                steps = np.hypot(*(np.diff(curve, axis=0, prepend=curve[:1]) / span).T)
+                way = np.cumsum(steps) // LINE_STEP
+                curve = curve[np.diff(way, prepend=-1.0) != 0.0]
+            self.figure.linepnt[j] = len(curve)
+            self.figure.linedata[j, : 2 * len(curve)] = curve.ravel()
 
 
-STEP = 1 / 160  # of a plot's size, between two points of a line: shorter ones come out dashed
-HAIR = 0.02  # of a grid step: less than the line is thick
+LINE_STEP = 1 / 160  # of a plot's size, between points of a curve: shorter steps look dashed
+HAIR = 0.02  # of a grid step: less than the width of a line
 
 
 def _wide(low: float, high: float, least: float) -> tuple[float, float, int]:
-    """Limits around a range of at least that size, and the number of grid lines, all at round steps."""
+    """Round limits around a range, and the number of grid lines; the range has a least size."""
     span = max(high - low, least)
     power = 10.0 ** math.floor(math.log10(span))
     step = power * next(f for f in (0.2, 0.5, 1.0, 2.0) if span <= 5.0 * f * power)
@@ -358,13 +391,13 @@ def _wide(low: float, high: float, least: float) -> tuple[float, float, int]:
 
 
 def _snapped(low: float, high: float, least: float) -> tuple[float, float, int]:
-    """The same for y, whose limits the engine widens to multiples of the range's power of ten.
+    """As _wide for y, whose limits the engine widens to multiples of the range's power of ten.
 
-    Returned a hair inside of such multiples, so that it widens them to these and no further.
+    The limits returned are a hair inside such multiples, so that it widens them to these.
     """
     power = 10.0 ** math.floor(math.log10(max(high - low, least)))
     while True:
-        for step in (1, 2):  # powers of ten
+        for step in (1, 2):  # of the power of ten
             first = step * math.floor(low / (step * power) + HAIR)
             last = step * math.ceil(max(high, low + least) / (step * power) - HAIR)
             if last - first <= (6, 10)[step - 1]:

@@ -22,15 +22,15 @@ from .stage import hardest
 from .viewer import Rows, Sight, Writing
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
-NAMES = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
-FACTOR = 1.25  # by which a key changes K or b
-WRITE_EVERY = 0.1  # [s]
-WAIT = 0.05  # for the window, between two looks at whether to go on [s]
+EXPERIMENT_KEYS = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
+KEY_FACTOR = 1.25  # on K or b, a keystroke
+WRITE_TIME = 0.1  # [s] between two updates of the texts
+POLL_TIME = 0.05  # [s] that the window waits before it looks at whether to go on
 INSTEAD = "use --web for a browser, or hapticclay video for a film"
-LIVE = (
+LIVE_KEYS = (
     ("Ctrl + right drag", "pull the handle"),
     ("space", "pause"),
-    ("backspace", "start anew"),
+    ("backspace", "restart"),
     ("up, down", "gain K"),
     ("left, right", "clay b"),
     ("1, 2, 3", "constant, variable, free"),
@@ -39,44 +39,49 @@ LIVE = (
     ("drag, scroll", "camera"),
     ("Ctrl + Q", "close"),
 )
-REPLAY = tuple(
-    row for row in LIVE if row[0] in ("space", "backspace", "H", "drag, scroll", "Ctrl + Q")
-)
+BOTH = ("space", "backspace", "H", "drag, scroll", "Ctrl + Q")
+REPLAY_KEYS = tuple(row for row in LIVE_KEYS if row[0] in BOTH)
 
 
 class Window:
     """The window on a session or a record, until it is closed.
 
-    The viewer draws in another process (see `pane`) and asks, once a picture, what there is to see; when nothing asks
-    any more the window is closed, however that came about.
+    The viewer draws in another process (see `viewer`) and asks, once a picture, what to show; when
+    nothing asks any more the window is closed, for whatever reason.
+
+    Attributes:
+        play: what is shown.
+        help: whether the keys are listed.
+        other: whether a key has chosen another scenario.
+        held: position of the handle when the mouse took hold [m]; None while it does not.
+        shown: number of frames sent to the viewer.
+        written: time of the last texts sent [s].
     """
 
     def __init__(self, play: Session | Replay):
-        self.play, self.help, self.other = (
-            play,
-            True,
-            False,
-        )  # other: another scenario is to be shown
-        self.held: tuple[float, float] | None = (
-            None  # where the handle was when the mouse took hold [m]
-        )
+        """Shows nothing yet: call `show`.
+
+        Args:
+            play: what to show.
+        """
+        self.play, self.help, self.other = play, True, False
+        self.held: tuple[float, float] | None = None
         self._anew()
 
     def _anew(self) -> None:
-        self.shown, self.written = (
-            0,
-            -math.inf,
-        )  # frames that have been sent; when words last were [s]
+        self.shown, self.written = 0, -math.inf
 
     def show(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Shows it; returns when the window is closed, or this says so. Raises what the player died of, if it did.
+        """Shows the window until it is closed; raises the error that ended the player, if any.
+
+        Args:
+            until: closes the window when it returns True.
 
         Raises:
             ParameterError: there is no display, or no OpenGL.
         """
-        if sys.platform.startswith("linux") and not (
-            os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        ):
+        screens = (os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+        if sys.platform.startswith("linux") and not any(screens):
             raise ParameterError("display", "", f"there is none: {INSTEAD}")
         self.other = True
         while self.other:
@@ -84,30 +89,28 @@ class Window:
             self._show(until)
 
     def _show(self, until: Callable[[], bool]) -> None:
-        """Shows one scenario, until the window is closed, or another scenario is to be shown in another."""
+        """Shows one scenario until the window is closed or a key chooses another."""
         player = Player(self.play)
         self._anew()
         with _viewer((self.play.scenario, self.play.tool)) as (heard, say):
             try:
                 while not (until() or self.other or player.error):
                     try:
-                        words = heard.get(timeout=WAIT)
+                        words = heard.get(timeout=POLL_TIME)
                     except queue.Empty:
                         continue
                     if words == 0 or (isinstance(words, int) and player.ident):
                         return  # closed, or lost
                     if not isinstance(words, tuple):
-                        if player.ident:  # what was recorded is not to be lost by it
-                            warnings.warn(
-                                f"the window failed: {words}", RuntimeWarning, stacklevel=3
-                            )
+                        if player.ident:  # keep what was recorded
+                            text = f"the window failed: {words}"
+                            warnings.warn(text, RuntimeWarning, stacklevel=3)
                             return
                         why = "the window cannot be opened"
                         if isinstance(words, str):
                             why = words.strip().rpartition("\n")[2].partition(": ")[2]
-                        raise ParameterError(
-                            "display", os.environ.get("DISPLAY", ""), f"{why}: {INSTEAD}"
-                        )
+                        display = os.environ.get("DISPLAY", "")
+                        raise ParameterError("display", display, f"{why}: {INSTEAD}")
                     if not player.ident:
                         player.start()
                     with player.lock:
@@ -118,7 +121,12 @@ class Window:
                     player.stop()
 
     def look(self, keys: list[int], hand: tuple[float, float] | None) -> Sight:
-        """Does what keys and mouse have said, while the player waits; returns what there is to see."""
+        """Acts on keys and mouse and returns what to show; the caller holds the player's lock.
+
+        Args:
+            keys: pressed since the last call, by GLFW's numbers.
+            hand: displacement of the mouse since it took hold [m]; None while it does not.
+        """
         for key in keys:
             self._key(key)
         play, target = self.play, None
@@ -127,20 +135,19 @@ class Window:
             target = play.point
         frames, anew = play.frames[max(self.shown - 1, 0) :], self.shown == 0
         self.shown = len(play.frames)
-        angles = (
-            list(play.run.angles) if isinstance(play, Session) else play.source.q[play.n].tolist()
-        )
+        live = isinstance(play, Session)
+        angles = list(play.run.angles) if live else play.source.q[play.n].tolist()
         writing, now = None, time.perf_counter()
-        if now - self.written >= WRITE_EVERY:
+        if now - self.written >= WRITE_TIME:
             self.written, writing = now, self._writing()
         return Sight(frames, anew, angles, target, writing)
 
     def _mouse(self, hand: tuple[float, float] | None) -> tuple[float, float] | None:
-        """Where the hand pulls to [m], while the mouse drags."""
+        """Point that the hand pulls to [m] while the mouse drags."""
         if hand is None:
             self.held = None
             return None
-        self.held = self.held or self.play.frames[-1][1]
+        self.held = self.held or self.play.frames[-1].p
         return self.held[0] + hand[0], self.held[1] + hand[1]
 
     def _key(self, key: int) -> None:
@@ -157,60 +164,63 @@ class Window:
             if key == ord("R"):
                 play.recording = not play.recording
             elif key in (UP, DOWN):
-                scale = FACTOR if key == UP else 1.0 / FACTOR
+                scale = KEY_FACTOR if key == UP else 1.0 / KEY_FACTOR
                 play.change(gain=(s.gain[0] * scale, s.gain[1] * scale))
             elif key in (LEFT, RIGHT):
-                play.change(b=play.damping * (FACTOR if key == RIGHT else 1.0 / FACTOR))
-            elif key in NAMES:
-                play.start(SCENARIOS[NAMES[key]]())
+                scale = KEY_FACTOR if key == RIGHT else 1.0 / KEY_FACTOR
+                play.change(b=play.damping * scale)
+            elif key in EXPERIMENT_KEYS:
+                play.start(SCENARIOS[EXPERIMENT_KEYS[key]]())
                 self.other = True
 
     def _writing(self) -> Writing:
         play = self.play
-        t, fh = play.frames[-1][0], play.frames[-1][4]
+        frame, clock = play.frames[-1], play.clock
         state = "paused" if play.paused else "ended" if play.ended else "replaying"
         if isinstance(play, Session) and not (play.paused or play.ended):
             state = "recording" if play.recording else "not recording"
+        slow = ", machine too slow" if clock.slow else ""
+        gain, b = play.gain, play.b
         rows: Rows = (
-            (
-                "time",
-                f"{t:.1f} s, {play.clock.factor:.2f} x real{', machine too slow' if play.clock.slow else ''}",
-            ),
+            ("time", f"{frame.t:.1f} s, {clock.factor:.2f} x real time{slow}"),
             ("state", state),
-            ("K", "{:.3g}, {:.3g}".format(*play.gain)),
-            ("b", "{:.4g}, {:.4g} N.s/m here; clay {:.4g}".format(*play.b, hardest(play.scenario))),
-            ("fh", f"{math.hypot(*fh):.2f} N"),
+            ("K", f"{gain[0]:.3g}, {gain[1]:.3g}"),
+            ("b", f"{b[0]:.4g}, {b[1]:.4g} N.s/m here; clay {hardest(play.scenario):.4g}"),
+            ("fh", f"{math.hypot(*frame.fh):.2f} N"),
         )
-        keys, verdict = LIVE if isinstance(play, Session) else REPLAY, play.verdict()
-        text = f"{play.ended}; backspace starts anew" if play.ended else verdict.text
+        keys, verdict = LIVE_KEYS if isinstance(play, Session) else REPLAY_KEYS, play.verdict()
+        text = f"{play.ended}: press backspace to restart" if play.ended else verdict.text
         return Writing(rows, keys if self.help else (), text, verdict.unstable)
 
 
 @contextlib.contextmanager
 def _viewer(first: Any) -> Iterator[tuple[queue.SimpleQueue, Callable[[Any], None]]]:
-    """The viewer's process, and what it says: (keys, hand); what went wrong; at last its exit status."""
-    program = (
-        "mjpython" if sys.platform == "darwin" else sys.executable
-    )  # there the viewer needs its launcher
+    """Starts the viewer's process; yields what it sends and a way to answer.
+
+    It sends (keys, hand) for each picture, or the text of an error, and at last its exit status.
+    """
+    program = "mjpython" if sys.platform == "darwin" else sys.executable  # macOS needs a launcher
     process = subprocess.Popen(
-        [program, "-P", "-c", f"from {__package__}.viewer import main; main()"],
+        [program, "-P", "-c", f"from {__package__}.viewer import run_viewer; run_viewer()"],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     source, sink = process.stdout, process.stdin
     assert source and sink
     heard: queue.SimpleQueue = queue.SimpleQueue()
 
     def listen() -> None:
-        with contextlib.suppress(
-            EOFError, OSError, pickle.UnpicklingError
-        ):  # cut short in the midst of a word
+        cut_short = EOFError, OSError, pickle.UnpicklingError
+        with contextlib.suppress(*cut_short):
             while True:
                 heard.put(pickle.load(source))
         heard.put(process.wait())
 
     def say(words: Any) -> None:
-        with contextlib.suppress(OSError):  # it is gone, and `heard` says so
+        with contextlib.suppress(OSError):  # it has ended, as `heard` tells
             pickle.dump(words, sink)
             sink.flush()
 

@@ -13,9 +13,8 @@ import termios
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli import app
-from hapticclay.cli import app as cli_words
-from hapticclay.cli import run as cli_run
+from hapticclay.cli import app, console
+from hapticclay.simulation import record, simulate
 from hapticclay.views import run_plots
 
 
@@ -56,44 +55,71 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
     assert "status: diverged: y axis at" in out and "advice: lower gain[y]" in out
 
 
-@pytest.mark.parametrize("args,words", [
-    (["run", "constant", "--b", "-1"], ["b = -1.0", ">= 0"]),
-    (["run", "constant", "--b", "nan"], ["b = nan", "finite"]),
-    (["run", "constant", "--b", "x"], ["--b = 'x': must be a number"]),
-    (["run", "constant", "--b"], ["--b = '': must be a number"]),
-    (["run", "constant", "--every", "1.5"], ["--every = '1.5': must be a whole number"]),
-    (["run", "constant", "--control", "smapled"], ["--control = 'smapled'", "did you mean 'sampled'"]),
-    (["run", "constant", "--Ts", "foo"], ["--Ts = 'foo': must be a number or None"]),
-    (["run", "constant", "--Ts", "0.00072"], ["Ts = 0.00072: must be None unless control is 'sampled'\n"]),
-    (["run", "constant", "--control", "sampled", "--Ts", "1e-3"], ["must be a whole multiple of dt = 0.00036 s\n"]),
-    (["run", "variable", "--growth", "foo"],
-     ["--growth = 'foo': must be a number or one of 30/s, 0.15/s, 0.15/sample, none\n"]),
-    (["run", "constant", "--force", "inf", "0"], ["force[x] = inf"]),
-    (["run", "constant", "--gain", "1"], ["--gain = '1': must be 2 numbers"]),
-    (["run", "constant", "--gain", "1", "a"], ["--gain = '1 a': must be 2 numbers"]),
-    (["run", "constant", "--gain", "1", "1", "7"], ["'7': one word too many for run constant"]),
-    (["run", "constant", "--gain", "0", "1"], ["gain[x] = 0.0"]),
-    (["run", "constant", "--dt", "0"], ["dt = 0.0"]),
-    (["run", "constant", "--dt", "-1e-3"], ["dt = -0.001"]),
-    (["run", "constant", "--length", "0.5"], ["length = 0.5", "unreachable"]),
-    (["run", "constant", "--origin", "2", "2"], ["unreachable"]),
-    (["run", "constant", "--clay", "0.15", "0.05"], ["clay"]),
-    (["run", "constant", "--nonsense", "1"], ["--nonsense: no option of run constant; see hapticclay run constant"]),
-    (["run", "constant", "--gan", "1", "1"], ["--gan: no option of run constant; did you mean --gain?"]),
-    (["run", "constant", "--no-plot"], ["did you mean --no-plots?"]),
-    (["run", "constant", "--torque_limits=1", "1"], ["--torque_limits: no", "did you mean --torque-limit?"]),
-    (["stability", "--axs", "y"], ["--axs: no option of stability; did you mean --axis?"]),
-    (["sweep", "--grd", "b=1:2:3"], ["did you mean --grid?"]),
-    (["identify", "extra"], ["'extra': one word too many for identify"]),
-    (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
-    (["video", "--speed", "2", "constnat"], ["did you mean 'constant'?; or the folder of a record"]),
-    (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
-    (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
-    (["stabilty"], ["stabilty", "did you mean 'stability'"]),
-    (["run"], ["constant"]),
-    ([], ["run"]),
-    (["run", "constant", "--every", "0"], ["every = 0"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "args,words",
+    [
+        (["run", "constant", "--b", "-1"], ["b = -1.0", ">= 0"]),
+        (["run", "constant", "--b", "nan"], ["b = nan", "finite"]),
+        (["run", "constant", "--b", "x"], ["--b = 'x': must be a number"]),
+        (["run", "constant", "--b"], ["--b = '': must be a number"]),
+        (["run", "constant", "--every", "1.5"], ["--every = '1.5': must be a whole number"]),
+        (
+            ["run", "constant", "--control", "smapled"],
+            ["--control = 'smapled'", "did you mean 'sampled'"],
+        ),
+        (["run", "constant", "--Ts", "foo"], ["--Ts = 'foo': must be a number or None"]),
+        (
+            ["run", "constant", "--Ts", "0.00072"],
+            ["Ts = 0.00072: must be None unless control is 'sampled'\n"],
+        ),
+        (
+            ["run", "constant", "--control", "sampled", "--Ts", "1e-3"],
+            ["must be a whole multiple of dt = 0.00036 s\n"],
+        ),
+        (
+            ["run", "variable", "--growth", "foo"],
+            ["--growth = 'foo': must be a number or one of 30/s, 0.15/s, 0.15/sample, none\n"],
+        ),
+        (["run", "constant", "--force", "inf", "0"], ["force[x] = inf"]),
+        (["run", "constant", "--gain", "1"], ["--gain = '1': must be 2 numbers"]),
+        (["run", "constant", "--gain", "1", "a"], ["--gain = '1 a': must be 2 numbers"]),
+        (["run", "constant", "--gain", "1", "1", "7"], ["'7': one word too many for run constant"]),
+        (["run", "constant", "--gain", "0", "1"], ["gain[x] = 0.0"]),
+        (["run", "constant", "--dt", "0"], ["dt = 0.0"]),
+        (["run", "constant", "--dt", "-1e-3"], ["dt = -0.001"]),
+        (["run", "constant", "--length", "0.5"], ["length = 0.5", "unreachable"]),
+        (["run", "constant", "--origin", "2", "2"], ["unreachable"]),
+        (["run", "constant", "--clay", "0.15", "0.05"], ["clay"]),
+        (
+            ["run", "constant", "--nonsense", "1"],
+            ["--nonsense: no option of run constant; see hapticclay run constant"],
+        ),
+        (
+            ["run", "constant", "--gan", "1", "1"],
+            ["--gan: no option of run constant; did you mean --gain?"],
+        ),
+        (["run", "constant", "--no-plot"], ["did you mean --no-plots?"]),
+        (
+            ["run", "constant", "--torque_limits=1", "1"],
+            ["--torque_limits: no", "did you mean --torque-limit?"],
+        ),
+        (["stability", "--axs", "y"], ["--axs: no option of stability; did you mean --axis?"]),
+        (["sweep", "--grd", "b=1:2:3"], ["did you mean --grid?"]),
+        (["identify", "extra"], ["'extra': one word too many for identify"]),
+        (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
+        (
+            ["video", "--speed", "2", "constnat"],
+            ["did you mean 'constant'? (or give the folder of a record)"],
+        ),
+        (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
+        (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
+        (["stabilty"], ["stabilty", "did you mean 'stability'"]),
+        (["run"], ["give an experiment: constant, variable, stability, free\n"]),
+        (["help", "nope"], ["command = 'nope'"]),
+        ([], ["give a command: run, stability"]),
+        (["run", "constant", "--every", "0"], ["every = 0"]),
+    ],
+)
 def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, words):
     monkeypatch.chdir(tmp_path)
     code, out, err = run(capsys, *args)
@@ -105,7 +131,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, w
 
 
 def test_unwritable_out_is_refused_before_the_run(capsys, monkeypatch):
-    monkeypatch.setattr(cli_run, "simulate", lambda *a, **k: pytest.fail("ran"))
+    monkeypatch.setattr(simulate, "simulate", lambda *a, **k: pytest.fail("ran"))
     code, _, err = run(capsys, "run", "constant", "--out", "/proc/nowhere")
     assert code == 2 and "out = '/proc/nowhere'" in err and err.count("\n") == 1
 
@@ -128,9 +154,25 @@ def test_help_and_version(capsys, args):
 def test_module_entry_point_runs_without_a_display(tmp_path):
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MPLBACKEND", "MUJOCO_GL")}
     out = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--out", "o"],
-        cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-W",
+            "error",
+            "-m",
+            "hapticclay",
+            "run",
+            "constant",
+            "--t-max",
+            "0.5",
+            "--out",
+            "o",
+        ],
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert (out.returncode, out.stderr) == (0, "")
     assert sorted(os.listdir(tmp_path)) == ["o"]  # no MUJOCO_LOG.TXT
 
@@ -145,12 +187,19 @@ def rest_of(screen):
 
 
 def stopped_at_a_terminal(folder, *args, program=("-m", "hapticclay")):
-    """Starts a run of minutes and presses Ctrl-C when the bar is there: so it runs. Its status, output and screen."""
+    """Presses Ctrl-C in a long run when its bar is shown; returns exit status, stdout, screen."""
     terminal, end = pty.openpty()
     termios.tcsetwinsize(end, (24, 80))
-    with open(terminal, "rb", buffering=0) as screen, open(folder / "said", "w+") as out, subprocess.Popen(
-        [sys.executable, *program, *args], cwd=folder, stderr=end, stdout=out,
-    ) as p:  # fmt: skip
+    with (
+        open(terminal, "rb", buffering=0) as screen,
+        open(folder / "said", "w+") as out,
+        subprocess.Popen(
+            [sys.executable, *program, *args],
+            cwd=folder,
+            stderr=end,
+            stdout=out,
+        ) as p,
+    ):
         os.close(end)
         said = b""
         while (
@@ -182,7 +231,8 @@ def test_ctrl_c_keeps_what_was_run(tmp_path):
 
 def test_ctrl_c_while_a_film_is_simulated_leaves_nothing_behind(tmp_path):
     (tmp_path / "film.py").write_text(
-        "import sys; from hapticclay.cli import app; from hapticclay.views import film; film.ready = lambda *a: None; sys.exit(app.main())"
+        "import sys; from hapticclay.cli import app; from hapticclay.views import film; "
+        "film.ready = lambda *a: None; sys.exit(app.main())"
     )  # without asking for OpenGL
     args = ("video", "constant", "--dt", "2e-6", "--out", "x.webp")
     code, out, said = stopped_at_a_terminal(tmp_path, *args, program=["film.py"])
@@ -192,9 +242,17 @@ def test_ctrl_c_while_a_film_is_simulated_leaves_nothing_behind(tmp_path):
 
 def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
     out = subprocess.run(
-        ["bash", "-c", f"set -o pipefail; {sys.executable} -m hapticclay run constant --t-max 0.5 --out o | head -0"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
+        [
+            "bash",
+            "-c",
+            f"set -o pipefail; {sys.executable} -m hapticclay run constant --t-max 0.5 --out o"
+            " | head -0",
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert "Traceback" not in out.stderr
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
@@ -207,9 +265,24 @@ def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
 def test_a_full_device_for_output_is_one_line(tmp_path):
     with open("/dev/full", "w") as full:
         out = subprocess.run(
-            [sys.executable, "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--no-plots", "--out", "o"],
-            cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "hapticclay",
+                "run",
+                "constant",
+                "--t-max",
+                "0.5",
+                "--no-plots",
+                "--out",
+                "o",
+            ],
+            cwd=tmp_path,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+        )
     assert out.returncode == 1 and out.stderr.count("\n") == 1 and "No space left" in out.stderr
 
 
@@ -232,7 +305,7 @@ def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeyp
     def full(self, path):
         raise app.ParameterError("out", str(path), "must be writable (No space left on device)")
 
-    monkeypatch.setattr(cli_run.Record, "save", full)
+    monkeypatch.setattr(record.Record, "save", full)
     code, out, err = run(capsys, "run", "constant", "--t-max", "0.5", "--out", str(tmp_path))
     assert code == 2 and "status: time limit" in out and err.count("\n") == 1
 
@@ -251,10 +324,18 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
     assert code == 0 and "diverged" in out and (tmp_path / "force.png").is_file()
 
 
-@pytest.mark.parametrize("scenario", [hc.constant_cut(t_max=0.1), hc.variable_cut(t_max=0.1), hc.free(t_max=0.1),
-                                      hc.stability_test(t_max=0.1)], ids=lambda s: s.name)  # fmt: skip
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        hc.constant_cut(t_max=0.1),
+        hc.variable_cut(t_max=0.1),
+        hc.free(t_max=0.1),
+        hc.stability_test(t_max=0.1),
+    ],
+    ids=lambda s: s.name,
+)
 def test_names_of_figures_are_known(scenario):
-    assert set(run_plots.figures(hc.simulate(scenario))) <= set(cli_run.FIGURES)
+    assert set(run_plots.figures(hc.simulate(scenario))) <= set(run_plots.FIGURES)
 
 
 def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
@@ -282,31 +363,34 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
     assert sorted(os.listdir("o")) == ["notes.png", "record.npz", "summary.json"]
 
 
-@pytest.mark.parametrize("words,ordered", [
-    ("run --out o constant --b 50", "run constant --out o --b 50"),
-    ("run --gain 1 0.5 --impedance constant", "run constant --gain 1 0.5 --impedance"),
-    ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
-    ("run --out constant variable", "run variable --out constant"),
-    ("run --help", "run --help"),
-    ("view --stiffness 2 o", "view record o --stiffness 2"),
-    ("view --web variable --port=1", "view variable --web --port=1"),
-    ("view --every 3", "view constant --every 3"),
-    ("view", "view constant"),
-    ("view --help", "view --help"),
-    ("video --speed 2 o/record.npz", "video record o/record.npz --speed 2"),
-    ("video --out x.gif --size 320 240 o", "video record o --out x.gif --size 320 240"),
-    ("video --tool_width 0.01 --smooth record o", "video record --tool_width 0.01 --smooth o"),
-    ("video --growth none variable", "video variable --growth none"),
-    ("stability --axis y", "stability --axis y"),
-    ("--version", "version"),
-    ("help", "--help"),
-    ("help run", "run --help"),
-    ("--help", "--help"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words,ordered",
+    [
+        ("run --out o constant --b 50", "run constant --out o --b 50"),
+        ("run --gain 1 0.5 --impedance constant", "run constant --gain 1 0.5 --impedance"),
+        ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
+        ("run --out constant variable", "run variable --out constant"),
+        ("run --help", "run --help"),
+        ("view --stiffness 2 o", "view record o --stiffness 2"),
+        ("view --web variable --port=1", "view variable --web --port=1"),
+        ("view --every 3", "view constant --every 3"),
+        ("view", "view constant"),
+        ("view --help", "view --help"),
+        ("video --speed 2 o/record.npz", "video record o/record.npz --speed 2"),
+        ("video --out x.gif --size 320 240 o", "video record o --out x.gif --size 320 240"),
+        ("video --tool_width 0.01 --smooth record o", "video record --tool_width 0.01 --smooth o"),
+        ("video --growth none variable", "video variable --growth none"),
+        ("stability --axis y", "stability --axis y"),
+        ("--version", "version"),
+        ("help", "--help"),
+        ("help run", "run --help"),
+        ("--help", "--help"),
+    ],
+)
 def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "o").mkdir()
-    assert cli_words.ordered(words.split(), app.COMMANDS) == ordered.split()
+    assert app.ordered(words.split()) == ordered.split()
 
 
 def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
@@ -316,7 +400,7 @@ def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
         ["view", "--tool-width", "0.01", "o"],
         ["video", "--speed", "2", "--out", "x.gif", "o/record.npz"],
     ):
-        command = app._parsed(words)
+        command = app.parse_words(words)
         assert isinstance(command.scenario, hc.Record) and command.scenario.scenario.name == "free"
 
 
@@ -337,7 +421,7 @@ def test_the_table_fits_a_terminal_and_knows_no_negative_zero(capsys, tmp_path, 
     "x,said", [(-1e-9, "0.00"), (-0.004, "0.00"), (-0.006, "-0.01"), (0.0, "0.00"), (-2.0, "-2.00")]
 )
 def test_fixed_point_has_no_negative_zero(x, said):
-    assert cli_run.fixed(x, 2) == said
+    assert console.fixed(x, 2) == said
 
 
 @pytest.mark.parametrize("args", [("--every", "5000"), ("--t-max", "0.005")])
@@ -382,8 +466,12 @@ def test_a_home_that_cannot_be_written_is_no_matter(tmp_path):
     }
     out = subprocess.run(
         [sys.executable, "-m", "hapticclay", "run", "constant", "--t-max", "0.5", "--out", "o"],
-        cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert (out.returncode, out.stderr) == (0, "")
     assert (tmp_path / "o" / "force.png").is_file()
 
@@ -392,7 +480,7 @@ def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
     def full(*args, **kw):
         raise MemoryError("Unable to allocate 8 GiB")
 
-    monkeypatch.setattr(cli_run, "simulate", full)
+    monkeypatch.setattr(simulate, "simulate", full)
     code, out, err = run(capsys, "run", "constant", "--out", str(tmp_path / "o"))
     assert (code, out, err) == (1, "", "hapticclay: out of memory: Unable to allocate 8 GiB\n")
     assert os.listdir(tmp_path) == []

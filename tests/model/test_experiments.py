@@ -1,6 +1,8 @@
-"""The paper's experiments beside exact solutions: variable cut (Figs. 9, 10), stability test (Fig. 11)."""
+"""The experiments beside exact solutions: variable cut (Figs. 9, 10), stability test (Fig. 11)."""
 
 import dataclasses
+import inspect
+import pickle
 
 import numpy as np
 import pytest
@@ -17,9 +19,13 @@ def crossings(r, axis):
     return [c for c in r.crossings if c.axis == axis and c.border == 0.05]
 
 
-@pytest.mark.parametrize("axis,K,time,before,after", [
-    (0, 1.0, 4.26391, 0.011785, 0.006428), (1, 0.5, 4.98811, 0.010102, 0.005893),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "axis,K,time,before,after",
+    [
+        (0, 1.0, 4.26391, 0.011785, 0.006428),
+        (1, 0.5, 4.98811, 0.010102, 0.005893),
+    ],
+)
 def test_variable_cut_without_growth(axis, K, time, before, after):
     exact, position = piecewise_linear((0.05, 9.0), (50.0, 100.0), K, F, axis=axis, t_max=12.0)
     assert exact[0] == pytest.approx(time, abs=5e-6)  # half the last digit
@@ -112,26 +118,68 @@ def test_irregularity_of_made_up_forces():
         hc.irregularity(hc.simulate(hc.free(t_max=0.1)))
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(growth="31/s"), "growth"), (dict(growth=-1.0), "growth"), (dict(b=(50.0,)), "b"), (dict(border=1j), "border"),
-    (dict(gain=(0.0, 0.5)), "gain[x]"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(growth="31/s"), "growth"),
+        (dict(growth=-1.0), "growth"),
+        (dict(b=(50.0,)), "b"),
+        (dict(border=1j), "border"),
+        (dict(gain=(0.0, 0.5)), "gain[x]"),
+    ],
+)
 def test_bad_variable_cuts(kw, field):
     with pytest.raises(ParameterError) as e:
         hc.variable_cut(**kw)
     assert e.value.field == field
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(axis="z"), "axis"), (dict(gain=0.0), "gain"), (dict(rms=-1.0), "rms"), (dict(seed=-1), "multisine.seed"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(axis="z"), "axis"),
+        (dict(gain=0.0), "gain"),
+        (dict(rms=-1.0), "rms"),
+        (dict(seed=-1), "seed"),
+    ],
+)
 def test_bad_stability_tests(kw, field):
     with pytest.raises(ParameterError) as e:
         hc.stability_test(**kw)
     assert e.value.field == field
 
 
-def test_every_experiment_is_on_the_command_line():
-    assert list(experiments.SCENARIOS) == ["constant", "variable", "stability", "free"]
-    for make in experiments.SCENARIOS.values():
-        assert isinstance(make(), hc.Scenario)
+def test_every_experiment_has_a_factory_of_the_same_scenario():
+    assert list(experiments.EXPERIMENTS) == ["constant", "variable", "stability", "free"]
+    assert list(hc.SCENARIOS) == list(experiments.EXPERIMENTS)
+    named = (hc.constant_cut, hc.variable_cut, hc.stability_test, hc.free)
+    for kind, make, public in zip(
+        experiments.EXPERIMENTS.values(), hc.SCENARIOS.values(), named, strict=True
+    ):
+        assert kind().scenario() == make() == public() and isinstance(make(), hc.Scenario)
+        assert inspect.signature(public).parameters == inspect.signature(kind).parameters
+        assert pickle.loads(pickle.dumps(public)) is public
+        for name in inspect.signature(public).parameters:
+            assert f"\n    {name}: " in (public.__doc__ or "")
+
+
+def test_the_first_parameters_are_positional():
+    assert hc.constant_cut(50.0, (2.0, 0.4), (0.5, 0.0)) == hc.constant_cut(
+        b=50.0, gain=(2.0, 0.4), force=(0.5, 0.0)
+    )
+    assert hc.free((2.0, 0.4), (0.5, 0.0)) == hc.free(gain=(2.0, 0.4), force=(0.5, 0.0))
+    assert hc.variable_cut("none", (2.0, 0.4)) == hc.variable_cut(growth="none", gain=(2.0, 0.4))
+    assert hc.stability_test(2.0, 50.0, "y", 0.5, 3) == hc.stability_test(
+        gain=2.0, b=50.0, axis="y", rms=0.5, seed=3
+    )
+
+
+@pytest.mark.parametrize("name", experiments.EXPERIMENTS)
+def test_the_word_impedance_is_the_nominal_operator(name):
+    kind = experiments.EXPERIMENTS[name]
+    for on, operator in ((True, hc.Operator()), (False, None)):
+        assert experiments.from_words(kind, {"impedance": on}) == hc.SCENARIOS[name](
+            operator=operator
+        )
+    with pytest.raises(ParameterError, match="impedance = 1: must be True or False"):
+        experiments.from_words(kind, {"impedance": 1})

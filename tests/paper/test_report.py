@@ -13,20 +13,36 @@ from hapticclay.paper.ledger import Row
 ROW = Row("a", "Eq. 1", "1", "m", 1.0, 1.001, 1e-2, "given", "why")
 
 
-@pytest.mark.parametrize("expected,ours,tolerance,agrees", [
-    (1.0, 1.001, 1e-2, True), (1.0, 1.1, 1e-2, False), (0.0, 1e-9, 1e-8, True), (0.0, 1e-3, 1e-8, False),
-    (1.0, None, 1e-2, False), (1.0, 2.0, None, None), (None, 2.0, None, None), (1.0, float("nan"), 1e-2, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "expected,ours,tolerance,agrees",
+    [
+        (1.0, 1.001, 1e-2, True),
+        (1.0, 1.1, 1e-2, False),
+        (0.0, 1e-9, 1e-8, True),
+        (0.0, 1e-3, 1e-8, False),
+        (1.0, None, 1e-2, False),
+        (1.0, 2.0, None, None),
+        (None, 2.0, None, None),
+        (1.0, float("nan"), 1e-2, False),
+    ],
+)
 def test_agreement(expected, ours, tolerance, agrees):
     row = dataclasses.replace(ROW, expected=expected, ours=ours, tolerance=tolerance)
     assert row.agrees is agrees
     assert report.format_verdict(row) == {True: "yes", False: "NO", None: ""}[agrees]
 
 
-@pytest.mark.parametrize("x,unit,text", [
-    (None, "m", ""), (1e-12, "m", "0 m"), (0.05, "m", "0.05 m"), (910.19, "1/s", "910.19 1/s"), (0.9, "1", "0.9"),
-    (float("nan"), "m", "none"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "x,unit,text",
+    [
+        (None, "m", ""),
+        (1e-12, "m", "0 m"),
+        (0.05, "m", "0.05 m"),
+        (910.19, "1/s", "910.19 1/s"),
+        (0.9, "1", "0.9"),
+        (float("nan"), "m", "none"),
+    ],
+)
 def test_numbers_for_tables(x, unit, text):
     assert report.format_number(x, unit) == text
 

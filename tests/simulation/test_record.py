@@ -15,7 +15,7 @@ from hapticclay.simulation import record
 
 @pytest.fixture(scope="module")
 def run():
-    return hc.simulate(hc.constant_cut(impedance=True, force=(2.0, 0.0), t_max=2.0))
+    return hc.simulate(hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.0), t_max=2.0))
 
 
 def test_save_and_load_give_back_the_same_record(run, tmp_path):

@@ -35,7 +35,12 @@ def test_shaped_cut_against_the_exact_solution(impedance, force):
     exact, position = piecewise_linear(EDGES, (0, 90, 0), 1.0, force, th)
     for dt, border, place in ((3.6e-4, 1e-6, 1e-7), (2e-3, 1e-5, 3e-6)):
         r = hc.simulate(
-            hc.constant_cut(force=(force, 0.0), impedance=impedance, shaping=True, dt=dt)
+            hc.constant_cut(
+                force=(force, 0.0),
+                operator=hc.Operator() if impedance else None,
+                shaping=True,
+                dt=dt,
+            )
         )
         assert r.outcome.code == "finished"
         np.testing.assert_allclose(times(r), exact, atol=border)
@@ -45,10 +50,10 @@ def test_shaped_cut_against_the_exact_solution(impedance, force):
 
 CASES = {
     "plain": dict(),
-    "hand": dict(impedance=True, force=(2.0, 0.0)),
+    "hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
     "off axis": dict(force=(1.0, 0.3)),
     "off axis, shaped": dict(force=(1.0, 0.3), shaping=True),
-    "off axis, hand, shaped": dict(force=(2.0, -0.5), shaping=True, impedance=True),
+    "off axis, hand, shaped": dict(force=(2.0, -0.5), shaping=True, operator=hc.Operator()),
 }
 
 
@@ -95,7 +100,14 @@ def test_any_stable_shaped_cut(b, K, f, hand):
         )
     )
     assume(np.sort(Linear(0, b, K, f, th).poles().real)[-2] < -0.02)
-    s = hc.constant_cut(b=b, gain=(K, 0.2), force=(f, 0.0), impedance=hand, shaping=True, t_max=8.0)
+    s = hc.constant_cut(
+        b=b,
+        gain=(K, 0.2),
+        force=(f, 0.0),
+        operator=hc.Operator() if hand else None,
+        shaping=True,
+        t_max=8.0,
+    )
     exact, position = piecewise_linear(EDGES, (0, b, 0), K, f, th, t_max=8.0)
     exact = [t for t in exact if t < 8.0]
     r = hc.simulate(s)

@@ -35,7 +35,7 @@ LAYERS = Clay(
 MORE = {
     "whole cut": hc.constant_cut(),
     "muscle": dataclasses.replace(
-        hc.free(impedance=True, t_max=1.0), clay=GROWING, length=None, muscle=WAVE
+        hc.free(operator=hc.Operator(), t_max=1.0), clay=GROWING, length=None, muscle=WAVE
     ),
     "command": dataclasses.replace(
         hc.free(t_max=1.0), command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3))
@@ -98,7 +98,9 @@ def test_native_is_python_within_rounding(name):
 
 STILL = {
     "cut": hc.constant_cut(),
-    "shaping, Th": hc.constant_cut(impedance=True, shaping=True, force=(2.0, 0.0), t_max=3.0),
+    "shaping, Th": hc.constant_cut(
+        operator=hc.Operator(), shaping=True, force=(2.0, 0.0), t_max=3.0
+    ),
     "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
     "stiff: substeps": hc.constant_cut(b=2e4, t_max=0.8),
     "free, not on the grid": hc.free(t_max=0.9007),
@@ -136,7 +138,7 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     from hapticclay.stepping import compiled
 
     s = hc.constant_cut(
-        gain=(4.2, 0.2), shaping=True, impedance=True, start=(0.05, 0.0), force=(0.5, 0.0)
+        gain=(4.2, 0.2), shaping=True, operator=hc.Operator(), start=(0.05, 0.0), force=(0.5, 0.0)
     )
     late, watched = compiled.NativeLeapfrog(s, 1), compiled.NativeLeapfrog(s, 1)
     watched.calm = False

@@ -54,7 +54,7 @@ def test_varying_muscle_force_and_command(kw, tolerance):
     muscle = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
     command = Multisine(rms=(1e-3, 2e-3), low=0.5, high=3.0, period=5.0, seed=6)
     s = dataclasses.replace(
-        hc.free(shaping=True, impedance=True, force=(0.5, 0.0), t_max=4.0), length=None, muscle=muscle, command=command,
+        hc.free(shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0), length=None, muscle=muscle, command=command,
         **kw,
     )  # fmt: skip
     r = hc.simulate(s)
@@ -75,7 +75,7 @@ def test_varying_scenes_converge_at_second_order():
         Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)), Profile((0.01,), (50.0, 100.0))
     )
     s = dataclasses.replace(
-        hc.free(impedance=True, t_max=3.0), clay=clay, length=None, muscle=muscle
+        hc.free(operator=hc.Operator(), t_max=3.0), clay=clay, length=None, muscle=muscle
     )
     exact = hc.simulate(dataclasses.replace(s, integrator="accurate", dt=5e-4))
     errors = []

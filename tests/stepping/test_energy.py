@@ -37,7 +37,12 @@ def test_every_entry_converges_to_the_exact_integral_at_second_order(uh, th):
     errors = []
     for dt in steps:
         e = hc.simulate(
-            hc.constant_cut(force=(uh, 0.0), impedance=any(th), shaping=True, dt=float(dt))
+            hc.constant_cut(
+                force=(uh, 0.0),
+                operator=hc.Operator() if any(th) else None,
+                shaping=True,
+                dt=float(dt),
+            )
         ).energy
         assert e["muscle"] == pytest.approx(uh * 0.20, rel=1e-3)
         errors.append(
@@ -59,7 +64,9 @@ def test_residual_with_a_hand_is_small_and_converges():
     steps = np.array([4e-3, 2e-3, 1e-3, 3.6e-4])
     rest = []
     for dt in steps:
-        e = hc.simulate(hc.constant_cut(impedance=True, force=(2.0, 0.0), dt=float(dt))).energy
+        e = hc.simulate(
+            hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.0), dt=float(dt))
+        ).energy
         rest.append(abs(e["residual"]) / e["throughput"])
     assert rest[-1] < 1e-6
     assert np.polyfit(np.log(steps), np.log(rest), 1)[0] > 1.5, rest

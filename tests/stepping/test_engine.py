@@ -43,7 +43,7 @@ def test_inertia_matrix_is_the_same_at_every_pose_and_velocity_adds_no_torque():
 
 
 @pytest.mark.parametrize(
-    "scenario", [hc.free(), hc.constant_cut(impedance=True)], ids=["free", "constant"]
+    "scenario", [hc.free(), hc.constant_cut(operator=hc.Operator())], ids=["free", "constant"]
 )
 def test_headless_scene_holds_nothing_that_it_does_not_need(scenario):
     m = hc.build(scenario)

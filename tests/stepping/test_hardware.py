@@ -44,7 +44,8 @@ def cut(parts, **kw):
 
 
 @pytest.mark.parametrize(
-    "kw", [dict(), dict(render="implicit", impedance=True, force=(2.0, 0.3)), dict(Ts=3 * TS)]
+    "kw",
+    [dict(), dict(render="implicit", operator=hc.Operator(), force=(2.0, 0.3)), dict(Ts=3 * TS)],
 )
 def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
     kw = dict(clay=(0.02, 0.15), t_max=0.4) | kw

@@ -14,7 +14,7 @@ from tests.oracles import Arm
 CASES = {
     "plain": hc.constant_cut(t_max=1.0),
     "shaped": hc.constant_cut(t_max=1.0, shaping=True, force=(1.0, 0.3)),
-    "hand": hc.constant_cut(t_max=1.0, impedance=True, force=(2.0, 0.0)),
+    "hand": hc.constant_cut(t_max=1.0, operator=hc.Operator(), force=(2.0, 0.0)),
     "stiff": hc.constant_cut(t_max=1.0, b=1e6),
     "heavy hand": dataclasses.replace(
         hc.constant_cut(t_max=1.0), operator=Operator(100.0, 10.0, 1e5)

@@ -36,7 +36,12 @@ def check_finite(r):
 @pytest.mark.parametrize("impedance", [False, True])
 def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
     r = hc.simulate(
-        hc.constant_cut(gain=(1.0, 1.0), shaping=shaping, impedance=impedance, force=(2.0, 0.1))
+        hc.constant_cut(
+            gain=(1.0, 1.0),
+            shaping=shaping,
+            operator=hc.Operator() if impedance else None,
+            force=(2.0, 0.1),
+        )
     )
     assert r.outcome.code == "diverged" and r.outcome.axis == "y"
     assert r.status.startswith("diverged: y axis at ")
@@ -69,7 +74,7 @@ def test_growth_rate_is_that_of_the_unstable_poles():
 
 
 def test_x_far_beyond_its_limit_blames_x():
-    r = hc.simulate(hc.constant_cut(b=100.0, gain=(25.0, 0.3), impedance=True))
+    r = hc.simulate(hc.constant_cut(b=100.0, gain=(25.0, 0.3), operator=hc.Operator()))
     assert (r.outcome.code, r.outcome.axis) == ("diverged", "x")
     check_finite(r)
 
@@ -114,7 +119,7 @@ def test_a_beat_between_the_axes_is_no_instability():
 
 
 @pytest.mark.parametrize("kw", [
-    dict(), dict(shaping=True), dict(impedance=True, force=(2.0, 0.0)), dict(gain=(2.5, 0.5)), dict(gain=(1.0, 0.7)),
+    dict(), dict(shaping=True), dict(operator=hc.Operator(), force=(2.0, 0.0)), dict(gain=(2.5, 0.5)), dict(gain=(1.0, 0.7)),
     dict(torque_limit=(0.05, 0.05)), dict(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0),
     dict(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6), dict(b=1.0), dict(b=1000.0, t_max=5.0),
     dict(b=1e6, t_max=2.0), dict(torque_limit=(0.2, 0.2)), dict(dt=5e-3),
@@ -151,7 +156,7 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
 @pytest.mark.parametrize("kw,code,word", [
     (dict(force=(0.0, 0.0), t_max=2.0), "stalled", "give a force"),
     (dict(b=1e9, t_max=3.0), "stalled", "lower b"),
-    (dict(impedance=True, t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01), "stalled", "spring"),
+    (dict(operator=hc.Operator(), t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01), "stalled", "spring"),
     (dict(torque_limit=(0.05, 0.05), force=(0.0, 5.0), t_max=1.5, b=1000.0), "saturated", "torque_limit"),
     (dict(b=1.0, t_max=4.0), "finished", ""),
     (dict(b=90.0, t_max=1.0), "time limit", ""),
@@ -164,7 +169,7 @@ def test_how_a_stable_run_ends(kw, code, word):
 
 
 def at_nominal(**kw):
-    s = hc.constant_cut(b=100.0, shaping=True, impedance=True, force=(0.0, 0.0), t_max=6.0)
+    s = hc.constant_cut(b=100.0, shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=6.0)
     clay = hc.Clay(hc.Profile((), (100.0,)), hc.Profile((), (100.0,)))
     muscle = hc.Multisine(rms=(1.0, 0.0), low=0.1, high=1.0, period=10.0)
     return dataclasses.replace(s, clay=clay, muscle=muscle, length=None, origin=(0.35, 0.24), **kw)

@@ -15,7 +15,7 @@ EDGES = (0.05, 0.15, 0.20)
 CASES = {
     "plain": dict(),
     "shaped": dict(shaping=True),
-    "hand": dict(impedance=True, force=(2.0, 0.0)),
+    "hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
     "off axis": dict(force=(1.0, 0.3)),
 }
 
@@ -36,7 +36,7 @@ def test_fourth_order_and_1e_9_s_at_2_ms(name):
 
 
 def test_agrees_with_the_fast_integrator_in_everything_recorded():
-    kw = dict(impedance=True, force=(2.0, 0.2), t_max=1.0)
+    kw = dict(operator=hc.Operator(), force=(2.0, 0.2), t_max=1.0)
     a, b = (
         hc.simulate(hc.constant_cut(**kw)),
         hc.simulate(hc.constant_cut(integrator="accurate", **kw)),
@@ -59,7 +59,9 @@ def test_residual_of_the_energy_converges_at_fourth_order():
     steps, rest = np.array([2e-3, 1e-3, 5e-4]), []
     for dt in steps:
         e = hc.simulate(
-            hc.constant_cut(integrator="accurate", dt=float(dt), impedance=True, force=(2.0, 0.0))
+            hc.constant_cut(
+                integrator="accurate", dt=float(dt), operator=hc.Operator(), force=(2.0, 0.0)
+            )
         ).energy
         rest.append(abs(e["residual"]) / e["throughput"])
     assert rest[-1] < 1e-8 and 3.5 < np.polyfit(np.log(steps), np.log(rest), 1)[0] < 4.5, rest

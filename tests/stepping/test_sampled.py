@@ -16,8 +16,8 @@ CASES = {
     "held": dict(),
     "implicit": dict(render="implicit"),
     "held, shaped, off axis": dict(shaping=True, force=(1.0, 0.3)),
-    "implicit, hand": dict(render="implicit", impedance=True, force=(2.0, 0.0)),
-    "held, hand": dict(impedance=True, force=(2.0, 0.0)),
+    "implicit, hand": dict(render="implicit", operator=hc.Operator(), force=(2.0, 0.0)),
+    "held, hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
 }
 
 
@@ -54,7 +54,7 @@ def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
     cut = hc.constant_cut(
         control="sampled",
         force=(0.5, 0.2),
-        impedance=True,
+        operator=hc.Operator(),
         t_max=0.2,
         render=render,
         start=(0.06, 0.02),

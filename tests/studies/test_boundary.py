@@ -222,7 +222,7 @@ def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(po
 
 
 def test_picture_shows_the_map_with_units(poses, tmp_path):
-    figure = study_plots.boundaries(poses)
+    figure = study_plots.stability_map_plot(poses)
     ax = figure.axes[0]
     assert "[cm]" in ax.get_xlabel() and "[1/kg]" in ax.get_ylabel()
     shown = {line.get_label(): line for line in ax.lines}

@@ -1,4 +1,4 @@
-"""Sweeps: the space is what was asked for, and the data set survives interruption, murder and a change of mind."""
+"""Sweeps: the points of the space, and data sets that survive interruption and killed processes."""
 
 import inspect
 import json
@@ -35,10 +35,19 @@ def columns(table):
     return {c: repr(table[c].to_pylist()) for c in table.column_names if c != "wall_time"}
 
 
-@pytest.mark.parametrize("text,values", [
-    ("1:1000:4log", [1, 10, 100, 1000]), ("0:2:3", [0, 1, 2]), ("1,2,5", [1, 2, 5]), ("7", [7]), ("3:3:1", [3]),
-    (4, [4]), ([1, 2], [1, 2]), ("-1:1:3", [-1, 0, 1]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text,values",
+    [
+        ("1:1000:4log", [1, 10, 100, 1000]),
+        ("0:2:3", [0, 1, 2]),
+        ("1,2,5", [1, 2, 5]),
+        ("7", [7]),
+        ("3:3:1", [3]),
+        (4, [4]),
+        ([1, 2], [1, 2]),
+        ("-1:1:3", [-1, 0, 1]),
+    ],
+)
 def test_ranges(text, values):
     np.testing.assert_allclose(Range.parse("b", text).grid(), values, rtol=1e-12)
 
@@ -122,14 +131,23 @@ def test_parameters_reach_the_scenario():
     assert seeded.scenario(seeded.points(1, 2)[0]).muscle.seed == 2
 
 
-@pytest.mark.parametrize("kw,word", [
-    (dict(experiment="cut"), "experiment"), (dict(vary={}), "grid"), (dict(design="random"), "design"),
-    (dict(runs=5), "runs"), (dict(design="lhs"), "runs"), (dict(vary={"bb": Range(1, 2, 2)}), "did you mean 'b'"),
-    (dict(vary={"gain.z": Range(1, 2, 2)}), "axis of gain"),
-    (dict(vary={"operator.weight": Range(1, 2, 2)}), "parameter"),
-    (dict(vary={"b": Range(-5, 2, 2)}), "b = -5"), (dict(chunk=0), "chunk"), (dict(fixed={"tmax": 3.0}), "t_max"),
-    (dict(vary={"b": Range(1, 2, 10**8)}), "runs"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,word",
+    [
+        (dict(experiment="cut"), "experiment"),
+        (dict(vary={}), "grid"),
+        (dict(design="random"), "design"),
+        (dict(runs=5), "runs"),
+        (dict(design="lhs"), "runs"),
+        (dict(vary={"bb": Range(1, 2, 2)}), "did you mean 'b'"),
+        (dict(vary={"gain.z": Range(1, 2, 2)}), "axis of gain"),
+        (dict(vary={"operator.weight": Range(1, 2, 2)}), "parameter"),
+        (dict(vary={"b": Range(-5, 2, 2)}), "b = -5"),
+        (dict(chunk=0), "chunk"),
+        (dict(fixed={"tmax": 3.0}), "t_max"),
+        (dict(vary={"b": Range(1, 2, 10**8)}), "runs"),
+    ],
+)
 def test_bad_sweeps_are_refused(kw, word):
     with pytest.raises(ParameterError) as e:
         Sweep(**{"experiment": "constant", "vary": parse_grid("b=1:2:2"), **kw})
@@ -193,7 +211,8 @@ def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
 def test_spec_file(tmp_path):
     spec = tmp_path / "s.toml"
     spec.write_text(
-        'experiment = "free"\nchunk = 3\n[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
+        'experiment = "free"\nchunk = 3\n'
+        '[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
     )
     s = Sweep(**sampling.load_sweep(spec))
     assert (s.experiment, len(s), s.chunk) == ("free", 4, 3)
@@ -209,15 +228,33 @@ def test_spec_file(tmp_path):
         sampling.load_sweep(tmp_path / "none.toml")
 
 
-COMMAND = [sys.executable, "-m", "hapticclay", "sweep", "--grid", "b=10:1000:40log gain.x=1:2:2", "--fixed",
-           "t_max=0.3", "--chunk", "4", "--workers", "2", "--no-maps"]  # fmt: skip
+COMMAND = [
+    sys.executable,
+    "-m",
+    "hapticclay",
+    "sweep",
+    "--grid",
+    "b=10:1000:40log gain.x=1:2:2",
+    "--fixed",
+    "t_max=0.3",
+    "--chunk",
+    "4",
+    "--workers",
+    "2",
+    "--no-maps",
+]
 
 
 @pytest.mark.parametrize("how,code", [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
 def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
     out = tmp_path / "o"
-    with subprocess.Popen([*COMMAND, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          start_new_session=True) as p:  # fmt: skip
+    with subprocess.Popen(
+        [*COMMAND, "--out", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as p:
         for _ in range(600):
             if len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None:
                 break
@@ -229,7 +266,7 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
         said, _ = p.communicate(timeout=60)
         assert p.returncode == code
     if how == signal.SIGINT:
-        assert "goes on from there" in said
+        assert "resumes the sweep" in said
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
     sweep.read_sweep(out)  # whatever is there is valid
@@ -245,12 +282,15 @@ def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys):
     assert app.main([*args, str(tmp_path)]) == 0
     assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
     for extra, word in (
-        (["--grid", "b=1:2"], "b = "), (["--grid", "b=1", "--runs", "3"], "runs"), ([], "either"),
-            (["--grid", "b=1", "--design", "lhs"], "runs"),
+        (["--grid", "b=1:2"], "b = "),
+        (["--grid", "b=1", "--runs", "3"], "runs"),
+        ([], "either"),
+        (["--grid", "b=1", "--design", "lhs"], "runs"),
         (["--grid", "b=1:2:2", "--workers", "0"], "workers"),
-            (["--grid", "b=1:2:2", "--experiment", "fre"], "did you mean"),
-        (["nothing.toml"], "spec"), (["--grid", GRID, "--fixed", "t_max"], "fixed"),
-    ):  # fmt: skip
+        (["--grid", "b=1:2:2", "--experiment", "fre"], "did you mean"),
+        (["nothing.toml"], "spec"),
+        (["--grid", GRID, "--fixed", "t_max"], "fixed"),
+    ):
         assert app.main(["sweep", *extra, "--out", str(tmp_path / "x")]) == 2
         err = capsys.readouterr().err
         assert word in err and err.count("\n") == 1 and not (tmp_path / "x").exists()
@@ -263,7 +303,7 @@ def test_maps(tmp_path):
         workers=1,
     )
     table = sweep.read_sweep(tmp_path)
-    figure = study_plots.heat(table)
+    figure = study_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
@@ -271,9 +311,9 @@ def test_maps(tmp_path):
     assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(
         table["status"].to_pylist()
     )
-    study_plots.heat(table, "speed_x").savefig(tmp_path / "a.png")
+    study_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
-        study_plots.heat(table, "speedx")
+        study_plots.sweep_plot(table, "speedx")
 
 
 @pytest.mark.parametrize("package,extra", [("pyarrow", "sweep"), ("distributed", "cluster")])
@@ -295,8 +335,16 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
     """A real scheduler, two worker processes without a nanny, one killed with work in hand."""
     s = Sweep("constant", parse_grid("b=10:1000:12log gain.x=1:2:2"), {"t_max": 0.5}, chunk=1)
     file = tmp_path / "scheduler.json"
-    scheduler = spawn("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-                      "--scheduler-file", str(file))  # fmt: skip
+    scheduler = spawn(
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    )
     workers = []
     try:
         for _ in range(400):
@@ -365,9 +413,9 @@ def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
 
 
 def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
-    """By a clock of our own: the first run compiles for a minute, each further one takes what is asked."""
+    """On a made-up clock: the first run compiles for a minute, each further one takes `each`."""
     s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    real = sweep.measure_rates
+    real = sweep.run_point
     for each, runs in (
         (0.25, sweep.PROBES + 1),
         (0.5, 12),
@@ -380,7 +428,7 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             made.append(args[1])
             return real(*args)
 
-        monkeypatch.setattr(sweep, "measure_rates", timed)
+        monkeypatch.setattr(sweep, "run_point", timed)
         monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
         assert sweep.estimate_time(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
@@ -397,13 +445,26 @@ def test_an_estimated_size_is_that_of_the_files(tmp_path):
 
 
 def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypatch):
-    args = ["sweep", "--grid", "b=10:1000:30log gain.x=1:2:2", "--fixed", "t_max=0.01", "--chunk", "1",
-            "--workers", "1", "--no-maps", "--out", str(tmp_path)]  # fmt: skip
-    monkeypatch.setattr(sweep_command, "LARGE", 60)
+    args = [
+        "sweep",
+        "--grid",
+        "b=10:1000:30log gain.x=1:2:2",
+        "--fixed",
+        "t_max=0.01",
+        "--chunk",
+        "1",
+        "--workers",
+        "1",
+        "--no-maps",
+        "--out",
+        str(tmp_path),
+    ]
+    monkeypatch.setattr(sweep_command, "LARGE_SWEEP", 60)
     assert app.main(args) == 0
     first, *lines = capsys.readouterr().err.splitlines()
     assert re.fullmatch(
-        r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data .* free.",
+        r"hapticclay: 60 runs, [\d.]+ ms each: about \d\d:\d\d on 1 process, \d+kB in .*data "
+        r".* free.",
         first,
     )
     told = [
@@ -423,10 +484,15 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
     assert lines[0].endswith("31 of 60 runs, 52 %, 01:40 gone, 48:20 to go")
 
 
-@pytest.mark.parametrize("design,text,word", [
-    ("lhs", "b=1:1000:50log", "takes no count"), ("sobol", "b=1:2:2", "takes no count"),
-    ("grid", "b=1:2", "have a count"), ("grid", "b=1:10log", "have a count"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "design,text,word",
+    [
+        ("lhs", "b=1:1000:50log", "takes no count"),
+        ("sobol", "b=1:2:2", "takes no count"),
+        ("grid", "b=1:2", "have a count"),
+        ("grid", "b=1:10log", "have a count"),
+    ],
+)
 def test_only_a_grid_counts(design, text, word):
     with pytest.raises(ParameterError, match=f"b = .*{word}.*{design}"):
         Sweep("constant", parse_grid(text), {}, design, None if design == "grid" else 8)
@@ -451,7 +517,7 @@ def hatched(figure):
 
 
 def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
-    """The slab begins at 5 cm: with 0 or 0.01 N on the handle no run of 3 s gets there, with 1 N all do."""
+    """The slab begins at 5 cm: runs of 3 s reach it with 1 N on the handle, not with 0.01 N."""
     sweep.run_sweep(
         Sweep("constant", parse_grid("b=20:50:3 force=0,0.01,1"), {"t_max": 3.0, "dt": 2e-3}),
         tmp_path,
@@ -459,8 +525,8 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     )
     table = sweep.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
-        assert study_plots.absent(table, value) == ["no clay reached", "no clay reached", ""] * 3
-        figure = study_plots.heat(table, value)
+        assert study_plots.missing_reasons(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        figure = study_plots.sweep_plot(table, value)
         shown = figure.axes[0].collections[0].get_array()
         np.testing.assert_array_equal(
             np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3]
@@ -469,13 +535,13 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
             shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0]
         )
         assert hatched(figure) == {"no clay reached": 6}
-    assert hatched(study_plots.heat(table, "crossing1")) == {"border not reached": 6}
+    assert hatched(study_plots.sweep_plot(table, "crossing1")) == {"border not reached": 6}
     assert figure.axes[1].get_ylabel() == "speed x [m/s]"
     free = table.set_column(
         table.column_names.index("b_x"), "b_x", [[0.0] * 9]
     )  # an experiment without clay
-    assert "no clay reached" not in study_plots.absent(free, "speed_x")
-    assert set(study_plots.absent(free, "fe_over_v_x")) == {"no clay reached"}
+    assert "no clay reached" not in study_plots.missing_reasons(free, "speed_x")
+    assert set(study_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
@@ -489,10 +555,10 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     )
     sweep.run_sweep(s, tmp_path, workers=1)
     table = sweep.read_sweep(tmp_path)
-    why = study_plots.absent(table, "fe_over_v_x")
+    why = study_plots.missing_reasons(table, "fe_over_v_x")
     marks = {
         c.get_label(): len(c.get_offsets())
-        for c in study_plots.heat(table, "fe_over_v_x").axes[0].collections
+        for c in study_plots.sweep_plot(table, "fe_over_v_x").axes[0].collections
     }
     for name in ("refused", "no clay reached"):
         assert marks[name] == why.count(name) > 0
@@ -502,26 +568,34 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
 
 
 def test_every_column_and_parameter_has_its_unit(tmp_path):
-    """As the docstrings of row and of the experiments state it; a number that has none says what it is a ratio of."""
+    """Units of the docstrings; a ratio names what it is relative to."""
     sweep.run_sweep(small(), tmp_path, workers=1)
     table = sweep.read_sweep(tmp_path)
-    units = {"end_time": "s", "crossing2": "s", "b_y": "N.s/m", "fe_over_v_y": "N.s/m", "speed_x": "m/s",
-             "wall_time": "s", "gain_margin_x": "factor on K", "energy_residual": "of what went through"}  # fmt: skip
+    units = {
+        "end_time": "s",
+        "crossing2": "s",
+        "b_y": "N.s/m",
+        "fe_over_v_y": "N.s/m",
+        "speed_x": "m/s",
+        "wall_time": "s",
+        "gain_margin_x": "factor on K",
+        "energy_residual": "of what went through",
+    }
     for name, unit in units.items():
-        assert name in table.column_names and study_plots._label(name).endswith(f" [{unit}]")
+        assert name in table.column_names and study_plots._column_label(name).endswith(f" [{unit}]")
     for name, unit in {
         "operator.damper": "N.s/m",
         "operator.mass": "kg",
         "gain.x": "1/kg",
         "force.y": "N",
     }.items():
-        assert study_plots._label(name).endswith(f" [{unit}]")
+        assert study_plots._column_label(name).endswith(f" [{unit}]")
     for make in hc.SCENARIOS.values():
         for name, parameter in inspect.signature(make).parameters.items():
             if isinstance(parameter.default, float) or (
                 isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
             ):
-                assert "[" in study_plots._label(name), name
+                assert "[" in study_plots._column_label(name), name
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
-            study_plots.heat(table, text)
+            study_plots.sweep_plot(table, text)

@@ -1,4 +1,4 @@
-"""The page in a real headless browser, and the gate that guards it from other machines."""
+"""The page in a real headless browser, and the guard that keeps other pages and machines out."""
 
 import contextlib
 import http.client
@@ -15,7 +15,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model import constants
-from hapticclay.views.page import Gate
+from hapticclay.views.page import Page
 from hapticclay.views.session import Session
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
@@ -36,8 +36,6 @@ pytestmark = pytest.mark.filterwarnings(
 
 @pytest.fixture
 def page():
-    from hapticclay.views.page import Page
-
     made, done = (
         Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0),
         threading.Event(),
@@ -51,7 +49,7 @@ def page():
 
 
 def press(slider, key, times):
-    """One after the other: a key that comes before the last one is drawn starts from the value before it."""
+    """Presses a key again once its last effect is drawn: before, it acts on the old value."""
     from playwright.sync_api import expect
 
     for _ in range(times):
@@ -119,9 +117,8 @@ def test_number_typed_beside_a_slider_stays_in_its_range(page, typed, taken):
 @pytest.mark.parametrize("scenario", [hc.constant_cut, hc.variable_cut, hc.free, hc.stability_test])
 @pytest.mark.parametrize("width,height", [(580, 600), (960, 800), (1600, 1000)])
 def test_first_view_holds_arm_and_clay(scenario, width, height):
-    """A pinhole camera, worked out here; 580 x 600 is what the controls leave of a page of 900 x 600."""
+    """Projects by a pinhole camera; the controls leave 580 x 600 of a page of 900 x 600."""
     from hapticclay.views import stage
-    from hapticclay.views.page import Page
 
     page = Page(Session(scenario()), port=0)
     try:
@@ -165,13 +162,10 @@ def test_page_says_what_the_monitor_says(page):
 
 
 def test_page_listens_on_this_machine_alone(page):
-    assert page.url == f"http://127.0.0.1:{page.gate.port}"
-    elsewhere = (
-        "127.0.0.2"  # another address of this machine: open only to who listens on all of them
-    )
-    for port in (page.gate.port, page.server.get_port()):
-        with pytest.raises(ConnectionRefusedError):
-            socket.create_connection((elsewhere, port), timeout=5.0)
+    assert page.url == f"http://127.0.0.1:{page.port}"
+    assert page.server.get_port() == page.port
+    with pytest.raises(ConnectionRefusedError):  # 127.0.0.2: open on all addresses only
+        socket.create_connection(("127.0.0.2", page.port), timeout=5.0)
 
 
 def asked(port, *lines):
@@ -189,12 +183,10 @@ UPGRADE = (
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_no_other_name_and_no_other_page_gets_in(host):
-    """A browser sends in Host the name that it was told, and in Origin whose page it shows; with a cookie or not."""
-    from hapticclay.views.page import Page
-
+    """Host holds the name that the browser was given, Origin the page it shows."""
     page = Page(Session(hc.constant_cut()), host=host, port=0)
-    port = page.gate.port
-    own, cookie = f"127.0.0.1:{port}", [f"Cookie: hapticclay={page.gate.token}"]
+    port = page.port
+    own, cookie = f"127.0.0.1:{port}", [f"Cookie: hapticclay={page.guard.token}"]
 
     def ask(*fields, target="/"):
         return asked(port, f"GET {target} HTTP/1.1", *fields, *cookie)
@@ -228,8 +220,9 @@ def test_no_other_name_and_no_other_page_gets_in(host):
                     "HTTP/1.1 400 Bad Request",
                 ), bad
         assert ask() == ask(f"Host: {own}", "Host: evil.example") == "HTTP/1.1 403 Forbidden"
-        for origin in ("http://evil.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{port + 1}",
-                       f"http://localhost:{port}", f"http://{own}.evil.example", "file://"):  # fmt: skip
+        foreign = ["http://evil.example", "null", "file://", f"http://{own}.evil.example"]
+        foreign += ["http://127.0.0.1", f"http://127.0.0.1:{port + 1}", f"http://localhost:{port}"]
+        for origin in foreign:
             for more in ((), UPGRADE):
                 assert (
                     ask(f"Host: {own}", f"Origin: {origin}", *more) == "HTTP/1.1 403 Forbidden"
@@ -246,32 +239,35 @@ def test_no_other_name_and_no_other_page_gets_in(host):
         page.close()
 
 
-def test_server_behind_the_gate_speaks_only_to_the_gate(page):
-    """Its port is open on this machine as well: whoever finds it learns nothing and changes nothing."""
-    from websockets.exceptions import ConnectionClosed
+def test_a_socket_is_no_way_around_the_guard(page):
+    """viser listens on the guarded port alone; whoever else connects learns and changes nothing."""
+    from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
     from websockets.typing import Subprotocol
 
-    speak = [Subprotocol(f"viser-v{viser.__version__}")]
-    for fields in ({}, {"X-Hapticclay-Pass": "guess"}):
-        with connect(
-            f"ws://127.0.0.1:{page.server.get_port()}",
-            subprotocols=speak,
-            additional_headers=fields,
-        ) as s:
-            with pytest.raises(ConnectionClosed) as closed:
-                s.recv(timeout=10.0)
-            assert closed.value.rcvd.code == 1008
-    origin = {
-        "X-Hapticclay-Pass": "guess"
-    }  # nor does saying it at the gate help, or spoil what the gate says
-    with connect(f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak) as s:
+    assert page.server.get_port() == page.port
+    speak: dict = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")]}
+    with connect(f"ws://127.0.0.1:{page.port}", **speak) as s:
         assert s.recv(timeout=10.0)
-    with connect(
-        f"ws://127.0.0.1:{page.gate.port}", subprotocols=speak, additional_headers=origin
-    ) as s:
-        with pytest.raises(ConnectionClosed):
-            s.recv(timeout=10.0)
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(f"ws://127.0.0.1:{page.port}", origin="http://evil.example", **speak)
+    guarded = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
+    cookie = {"Cookie": f"hapticclay={guarded.guard.token}"}
+    try:
+        for headers in ({}, {"Cookie": "hapticclay=guess"}, {"Cookie": "hapticclay="}):
+            with pytest.raises(InvalidStatus, match="403"):
+                connect(f"ws://127.0.0.1:{guarded.port}", additional_headers=headers, **speak)
+        with connect(f"ws://127.0.0.1:{guarded.port}", additional_headers=cookie, **speak) as s:
+            assert s.recv(timeout=10.0)
+    finally:
+        guarded.close()
+
+
+def test_a_viser_that_cannot_be_guarded_is_refused(monkeypatch):
+    """A server that does not start through websockets' `serve` finds the port taken."""
+    monkeypatch.setattr("hapticclay.views.page._guarded", lambda *_: contextlib.nullcontext())
+    with pytest.raises(RuntimeError, match="cannot be guarded"):
+        Page(Session(hc.constant_cut()), port=0)
 
 
 def answer(port, path="/", **headers):
@@ -284,11 +280,9 @@ def answer(port, path="/", **headers):
 
 
 def test_other_machines_need_the_token():
-    from hapticclay.views.page import Page
-
     page = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
     try:
-        port, token = page.gate.port, page.url.partition("token=")[2]
+        port, token = page.port, page.url.partition("token=")[2]
         assert len(token) >= 20
         assert answer(port)[0] == 403
         assert answer(port, "/?token=wrong")[0] == 403
@@ -299,28 +293,24 @@ def test_other_machines_need_the_token():
         cookie = headers["Set-Cookie"].partition(";")[0]
         status, _, body = answer(port, Cookie=cookie)
         assert status == 200 and b"<html" in body.lower()
-        inner = page.server.get_port()
-        with pytest.raises(ConnectionRefusedError):
-            socket.create_connection(("127.0.0.2", inner), timeout=5.0)
+        assert headers["X-Frame-Options"] == "DENY"
     finally:
         page.close()
 
 
 def test_address_is_one_that_others_can_open():
-    from hapticclay.views.page import _name
+    from hapticclay.views.page import _url_host
 
-    assert (_name("127.0.0.1"), _name("::1"), _name("box.example")) == (
+    assert (_url_host("127.0.0.1"), _url_host("::1"), _url_host("box.example")) == (
         "127.0.0.1",
         "[::1]",
         "box.example",
     )
-    assert _name("0.0.0.0") not in ("0.0.0.0", "")
+    assert _url_host("0.0.0.0") not in ("0.0.0.0", "")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
 def test_taken_or_impossible_port_is_refused(host):
-    from hapticclay.views.page import Page
-
     with (
         socket.create_server((host, 0)) as s,
         pytest.raises(hc.ParameterError, match="cannot be listened on"),
@@ -331,7 +321,7 @@ def test_taken_or_impossible_port_is_refused(host):
 
 
 def test_reset_while_the_hand_holds_goes_on(page):
-    """The box is unticked by the reset, which is told to the session at once, by the thread that holds the lock."""
+    """The reset unticks the box, which calls the session from the thread that holds the lock."""
     page.hold.value = True
     assert page.session.point is not None
     thread = threading.Thread(target=page._reset, args=(None,), daemon=True)
@@ -341,8 +331,6 @@ def test_reset_while_the_hand_holds_goes_on(page):
 
 
 def test_player_that_dies_leaves_no_server(monkeypatch):
-    from hapticclay.views.page import Page
-
     page = Page(Session(hc.constant_cut()), port=0)
     monkeypatch.setattr(page.session, "advance", lambda s: 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -402,29 +390,22 @@ def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_gate_survives_noise(caplog):
-    gate = Gate("127.0.0.1", 0, 9, "secret")
+def test_guard_survives_noise(caplog, capfd):
+    """Whatever is not a request for the page gets no page, and leaves no trace in the log."""
+    page = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
+    refused = ("HTTP/1.1 403 Forbidden", "HTTP/1.1 400 Bad Request", "")
+    own = f"Host: 127.0.0.1:{page.port}"
     try:
         for noise in (b"\r\n\r\n", b"\xff" * 100 + b"\r\n\r\n", b"GET\r\n\r\n", b"x" * 100_000):
-            with socket.create_connection(("127.0.0.1", gate.port), timeout=5.0) as s:
+            with socket.create_connection(("127.0.0.1", page.port), timeout=5.0) as s:
                 s.sendall(noise)
-        for line in ("GET http://[ HTTP/1.1", "GET //[ HTTP/1.1", "GET http://127.0.0.1/ HTTP/1.1", "POST / HTTP/1.1",
-                     "GET", "", "GET * HTTP/1.1", "GET /?token=%ff%00\xe9 HTTP/1.1"):  # fmt: skip
-            said = asked(gate.port, line, f"Host: 127.0.0.1:{gate.port}")
-            assert said == "HTTP/1.1 " + (
-                "403 Forbidden" if "token" in line else "400 Bad Request"
-            ), line
+        lines = ("GET http://[ HTTP/1.1", "GET //[ HTTP/1.1", "GET http://127.0.0.1/ HTTP/1.1")
+        lines += ("POST / HTTP/1.1", "GET", "", "GET * HTTP/1.1", "GET /?token=%ff%00\xe9 HTTP/1.1")
+        for line in lines:
+            assert asked(page.port, line, own) in refused, line
         many = [f"X-{k}: 1" for k in range(200)]
-        assert asked(gate.port, "GET / HTTP/1.1", *many) == "HTTP/1.1 400 Bad Request"
-        assert answer(gate.port)[0] == 403
+        assert asked(page.port, "GET / HTTP/1.1", own, *many) in refused
+        assert answer(page.port)[0] == 403
     finally:
-        gate.close()
-    assert caplog.records == []
-
-
-def test_taken_address_is_refused():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        s.listen()
-        with pytest.raises(hc.ParameterError, match="cannot be listened on"):
-            Gate("127.0.0.1", s.getsockname()[1], 9, "secret")
+        page.close()
+    assert caplog.records == [] and capfd.readouterr().err == ""

@@ -1,4 +1,4 @@
-"""What may happen to a sweep: a full disk, a killed parent or worker, damaged files, two sweeps in one folder."""
+"""Faults of sweeps: a full disk, killed processes, damaged files, two sweeps in one folder."""
 
 import contextlib
 import os
@@ -21,8 +21,24 @@ RUNS = 80
 
 
 def command(out, *extra, t_max=0.02, b="10:1000:40log", workers=2):
-    return [sys.executable, "-m", "hapticclay", "sweep", "--grid", f"b={b} gain.x=1:2:2", "--fixed", f"t_max={t_max}",
-            "--chunk", "4", "--workers", str(workers), "--no-maps", "--out", str(out), *extra]  # fmt: skip
+    return [
+        sys.executable,
+        "-m",
+        "hapticclay",
+        "sweep",
+        "--grid",
+        f"b={b} gain.x=1:2:2",
+        "--fixed",
+        f"t_max={t_max}",
+        "--chunk",
+        "4",
+        "--workers",
+        str(workers),
+        "--no-maps",
+        "--out",
+        str(out),
+        *extra,
+    ]
 
 
 def plan(b="10:1000:40log", t_max=0.02):
@@ -110,7 +126,7 @@ def test_a_disk_that_is_full_from_the_start_is_one_line(small_disk):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, workers):
-    """As the full disk, where no file system may be mounted: sweep.json fits into 2 kB, a part does not."""
+    """The full disk without a mount: sweep.json fits into 2 kB, a part does not."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))
@@ -222,10 +238,19 @@ def columnless(file, out):
     pq.write_table(sweep._read_part(file).drop_columns(["cause"]), file)
 
 
-@pytest.mark.parametrize("harm,fault", [
-    (truncated, "damaged"), (empty, "damaged"), (garbage, "damaged"), (flipped, "damaged"),
-    (copied, "a copy of part 2"), (foreign, "of another sweep"), (short, "incomplete"), (columnless, "incomplete"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "harm,fault",
+    [
+        (truncated, "damaged"),
+        (empty, "damaged"),
+        (garbage, "damaged"),
+        (flipped, "damaged"),
+        (copied, "a copy of part 2"),
+        (foreign, "of another sweep"),
+        (short, "incomplete"),
+        (columnless, "incomplete"),
+    ],
+)
 def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault):
     out = tmp_path / "o"
     sweep.run_sweep(plan(), out, workers=1)
@@ -283,8 +308,15 @@ def test_a_part_that_may_not_be_read_is_refused_not_removed(tmp_path, monkeypatc
 @pytest.mark.parametrize("other", ["10:1000:40log", "20:1000:40log"])
 def test_of_two_sweeps_started_at_once_one_wins_and_the_other_is_refused(tmp_path, other):
     """The same twice, and two that differ."""
-    starts = [subprocess.Popen(command(tmp_path, t_max=0.3, b=b), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                               text=True) for b in ("10:1000:40log", other)]  # fmt: skip
+    starts = [
+        subprocess.Popen(
+            command(tmp_path, t_max=0.3, b=b),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for b in ("10:1000:40log", other)
+    ]
     ends = [(*p.communicate(timeout=120), p.returncode) for p in starts]
     (_, _, won), (_, said, lost) = sorted(ends, key=lambda end: end[2])
     assert (won, lost) == (0, 2), ends

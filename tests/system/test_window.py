@@ -1,4 +1,4 @@
-"""The window under a real X server without a screen: a mouse drags, keys are pressed, the record tells."""
+"""The window under a real X server: a mouse drags, keys are pressed, the record tells."""
 
 import contextlib
 import ctypes
@@ -18,7 +18,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.views import window
-from hapticclay.views.session import FRAME, Replay, Session
+from hapticclay.views.session import FRAME_TIME, Replay, Session
 from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
@@ -87,7 +87,7 @@ class Mouse:
             time.sleep(0.1)
 
     def end(self, how):
-        """Closes the window in this way; exit status, output. Fails if that takes longer than a minute."""
+        """Closes the window and returns exit status and output; fails after a minute."""
         if how == "Ctrl-Q":
             self.do("keydown", "ctrl", "key", "q", "keyup", "ctrl")
         elif how == "Ctrl-C":
@@ -111,14 +111,20 @@ class Mouse:
 
 
 def ask_to_close(window, display):
-    """Sends what a window manager sends when somebody clicks on the cross: WM_DELETE_WINDOW (ICCCM 4.2.8.1)."""
+    """Sends WM_DELETE_WINDOW, as a click on the window's cross does (ICCCM 4.2.8.1)."""
 
     class Message(ctypes.Structure):
         _fields_ = [
-            ("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int), ("display", ctypes.c_void_p),
-            ("window", ctypes.c_ulong), ("message", ctypes.c_ulong), ("format", ctypes.c_int),
-            ("data", ctypes.c_long * 5), ("rest", ctypes.c_long * 12),
-        ]  # fmt: skip
+            ("type", ctypes.c_int),
+            ("serial", ctypes.c_ulong),
+            ("sent", ctypes.c_int),
+            ("display", ctypes.c_void_p),
+            ("window", ctypes.c_ulong),
+            ("message", ctypes.c_ulong),
+            ("format", ctypes.c_int),
+            ("data", ctypes.c_long * 5),
+            ("rest", ctypes.c_long * 12),
+        ]
 
     x = ctypes.CDLL("libX11.so.6")
     x.XOpenDisplay.restype, x.XInternAtom.restype = ctypes.c_void_p, ctypes.c_ulong
@@ -133,7 +139,7 @@ def ask_to_close(window, display):
 
 @pytest.mark.parametrize("how", ["message", "destroyed", "disconnected", "Ctrl-C"])
 def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_path, how):
-    """A hand of 60 N/m lags behind the mouse in clay of 200 N.s/m by 3 s; the window goes while the button is down."""
+    """The window closes while the button is down: 60 N/m lags by 3 s in clay of 200 N.s/m."""
     mouse = Mouse(screen, tmp_path, "view", "--b", "200", "--out", "o", "--no-plots")
     try:
         mouse.drag(200)
@@ -215,16 +221,16 @@ def test_every_key_of_the_page_does_what_it_says():
     window = Window(session)
     press = window._key
     press(SPACE)
-    assert session.paused and not len(session.advance(FRAME))
+    assert session.paused and not len(session.advance(FRAME_TIME))
     press(SPACE)
     session.pull((0.1, 0.0))
     while session.t < 3.0:
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     pane = Pane(session.scenario, session.tool)
     pane.take(window.look([], None))
     assert pane.stage.removal.volume > 1e-6
-    for key, gain, b in ((UP, 1.25, 90.0), (RIGHT, 1.25, 112.5), (RIGHT, 1.25, 140.625), (DOWN, 1.0, 140.625),
-                         (LEFT, 1.0, 112.5)):  # fmt: skip
+    keys, gains = (UP, RIGHT, RIGHT, DOWN, LEFT), (1.25, 1.25, 1.25, 1.0, 1.0)
+    for key, gain, b in zip(keys, gains, (90.0, 112.5, 140.625, 140.625, 112.5), strict=True):
         press(key)
         assert session.scenario.gain == pytest.approx((gain, 0.5 * gain)) and session.b[
             0
@@ -250,7 +256,7 @@ def test_every_key_of_the_page_does_what_it_says():
 
 
 def engine_snaps(low, high):
-    """What mjr_figure makes of the limits of y: the next multiples of the range's power of ten, in floats."""
+    """Limits of y by mjr_figure: the next multiples of the range's power of ten, in floats."""
     low, high = np.float32(low), np.float32(high)
     power = np.float32(10.0) ** np.floor(np.log10(high - low))
     return float(np.floor(low / power) * power), float(np.ceil(high / power) * power)
@@ -287,11 +293,11 @@ def picture(play):
 
 
 def test_both_axes_are_drawn_where_both_are_cut():
-    """The variable cut; against the record, to the thickness of a line (1/160 of the range, and a float's rounding)."""
+    """The curves hold the record to the width of a line, 1/160 of the range."""
     record = hc.simulate(hc.variable_cut(), every=10)
     replay = Replay(record)
     while not replay.ended:
-        replay.advance(FRAME)
+        replay.advance(FRAME_TIME)
     velocity = picture(replay).plots[0]
     assert velocity.figure.title == "velocity [cm/s]: x blue, y red"
     for i in (0, 1):
@@ -302,17 +308,17 @@ def test_both_axes_are_drawn_where_both_are_cut():
             v, np.interp(x, 100 * record.p[:, i], 100 * record.v[:, i]), atol=1e-4
         )
     one = picture(Replay(hc.simulate(hc.constant_cut(t_max=0.1))))
-    assert [len(plot.lines) for plot in one.plots] == [1, 1, 2]
+    assert [len(plot.curves) for plot in one.plots] == [1, 1, 2]
 
 
 def test_a_replay_offers_the_keys_that_act_on_it():
-    from hapticclay.views.window import LIVE, REPLAY, Window
+    from hapticclay.views.window import LIVE_KEYS, REPLAY_KEYS, Window
 
     record = hc.simulate(hc.constant_cut(t_max=0.5), every=10)
     replay = Replay(record)
     window = Window(replay)
     window.look([], None)
-    assert {row[0] for row in LIVE} - {row[0] for row in REPLAY} == {
+    assert {row[0] for row in LIVE_KEYS} - {row[0] for row in REPLAY_KEYS} == {
         "Ctrl + right drag", "up, down", "left, right", "1, 2, 3", "R"
     }  # fmt: skip
     before = dict(vars(replay))
@@ -347,7 +353,7 @@ def test_a_window_that_fails_leaves_the_record(monkeypatch):
 
         def say(sight):
             answers.append(sight)
-            time.sleep(FRAME)
+            time.sleep(FRAME_TIME)
             heard.put(([], (0.1, 0.0)) if len(answers) < 30 else "Traceback\nValueError: no ink")
 
         yield heard, say
@@ -369,8 +375,12 @@ def test_a_display_that_does_not_answer_or_draw_is_named(lack, said, tmp_path):
         name = ":4711" if lack == "display" else stack.enter_context(x_server("-extension", "GLX"))
         out = subprocess.run(
             [sys.executable, "-m", "hapticclay", "view"],
-            cwd=tmp_path, env={**os.environ, "DISPLAY": name}, capture_output=True, text=True, timeout=60,
-        )  # fmt: skip
+            cwd=tmp_path,
+            env={**os.environ, "DISPLAY": name},
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
     assert out.returncode == 2 and out.stderr.count("\n") == 1
     assert all(part in out.stderr for part in (name, said, "--web"))
     assert os.listdir(tmp_path) == []  # no MUJOCO_LOG.TXT

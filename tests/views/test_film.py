@@ -12,7 +12,8 @@ from matplotlib.text import Text
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.views import film
-from hapticclay.views.film import Running, draw, fits
+from hapticclay.views.film import FilmOptions
+from hapticclay.views.run_plots import RunningPlots, plots_fit, running_figure
 from hapticclay.views.stage import Stage
 
 
@@ -35,9 +36,13 @@ def record():
 
 @needs_gl
 def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
-    images = film.frames(record, speed=4.0, size=(640, 480))
+    images = film.frames(record, FilmOptions(speed=4.0, size=(640, 480)))
     shots = [x.copy() for x in images]
-    assert len(shots) == len(film.shots(record, 4.0, 30)) and shots[0].shape == (480, 640, 3)
+    assert len(shots) == len(film.samples_shown(record, 4.0, 30)) and shots[0].shape == (
+        480,
+        640,
+        3,
+    )
     scene, plots = np.s_[:, :400], np.s_[:, 400:]
     for part in (scene, plots):
         changed = [
@@ -55,8 +60,8 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
 
 @needs_gl
 def test_frame_is_quick_in_software(record):
-    """Below 60 ms of processor time at 640x480; wall time says more about the neighbours than about us."""
-    images = film.frames(record, size=(640, 480))
+    """A frame of 640x480 takes less than 60 ms of processor time; wall time depends on load."""
+    images = film.frames(record, FilmOptions(size=(640, 480)))
     next(images)
     spent = []
     for _ in range(40):
@@ -74,7 +79,7 @@ def test_film_can_be_read_back(record, tmp_path, kind):
 
     if kind == "mp4":
         pytest.importorskip("imageio_ffmpeg", reason="pip install 'imageio[ffmpeg]'")
-    out = film.film(record, tmp_path / f"film.{kind}", speed=20.0, size=(320, 240))
+    out = film.film(record, tmp_path / f"film.{kind}", FilmOptions(speed=20.0, size=(320, 240)))
     if kind == "mp4":
         import imageio_ffmpeg
 
@@ -86,15 +91,15 @@ def test_film_can_be_read_back(record, tmp_path, kind):
     else:
         back = iio.imread(out, index=...)
     assert back.shape[1:3] == (240, 320)
-    assert len(back) == len(film.shots(record, 20.0, film.FPS[f".{kind}"]))
+    assert len(back) == len(film.samples_shown(record, 20.0, film.FRAME_RATES[f".{kind}"]))
     assert [p.name for p in tmp_path.iterdir()] == [f"film.{kind}"]
 
 
 def filmed(folder, blocked, out="x.mp4", **env):
-    """What `hapticclay video` says where a module is missing; a simulation would raise."""
+    """Message of `hapticclay video` where a module is missing; a simulation would raise."""
     code = (
         f"import sys; sys.modules[{blocked!r}] = None\n"
-        "from hapticclay.cli import app, view; view.simulate_with_progress = None\n"
+        "from hapticclay.cli import app, video; video.simulate_with_progress = None\n"
         f"sys.exit(app.main(['video', 'constant', '--out', {out!r}]))"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")} | env
@@ -138,7 +143,8 @@ def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
     """MuJoCo itself refuses to be imported with such a setting."""
     code = (
         f"import os, sys; sys.modules[{blocked!r}] = None\n"
-        "import hapticclay as hc; print(hc.simulate(hc.constant_cut(t_max=0.1)).status, os.environ['MUJOCO_GL'])"
+        "import hapticclay as hc; status = hc.simulate(hc.constant_cut(t_max=0.1)).status\n"
+        "print(status, os.environ['MUJOCO_GL'])"
     )
     env = {**os.environ, "MUJOCO_GL": wanted}
     p = subprocess.run(
@@ -185,16 +191,15 @@ def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
 
 
 def test_running_plots_end_as_the_whole_curve(record):
-    """Inked in many pieces or at once: the same picture, and ink only inside the axes."""
-    pieces, whole = Running(record, 300, 480), Running(record, 300, 480)
-    blank = whole.image.copy()
+    """Drawn in many images or in one: the same bytes, with curves inside the axes only."""
+    pieces, whole = RunningPlots(record, 300, 480), RunningPlots(record, 300, 480)
+    blank = whole.draw(0).copy()
     for n in np.linspace(1, len(record.t), 60).astype(int):
-        pieces.upto(n)
-    whole.upto(len(record.t))
-    differ = np.abs(pieces.image.astype(int) - whole.image).max(axis=-1) > 60
-    assert differ.sum() < 0.005 * differ.size  # dabs fall elsewhere by half a pixel
-    inked = (whole.image != blank).any(axis=-1)
-    assert inked.sum() > 1000 and not inked[:, :30].any()
+        pieces.draw(n)
+    np.testing.assert_array_equal(pieces.draw(len(record.t)), whole.draw(len(record.t)))
+    drawn = (whole.draw(len(record.t)) != blank).any(axis=-1)
+    assert drawn.sum() > 1000 and not drawn[:, :30].any()
+    np.testing.assert_array_equal(whole.draw(0), blank)
 
 
 SIZES = [
@@ -216,8 +221,8 @@ SIZES = [
     hc.constant_cut(b=1e6, t_max=2.0),
 ], ids=["constant", "variable", "free", "unstable", "stiff"])  # fmt: skip
 def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario, size):
-    assert fits(*size)
-    figure, _ = draw(hc.simulate(scenario, every=20), *size)
+    assert plots_fit(*size)
+    figure, _ = running_figure(hc.simulate(scenario, every=20), *size)
     boxes = []
     for ax in figure.axes:
         hidden = set()  # ticks out of view, and those of an earlier layout
@@ -251,8 +256,8 @@ def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(scenario,
     "size", [(160, 160), (316, 240), (320, 98), (320, 240), (390, 300)], ids=str
 )
 def test_small_films_have_what_fits_and_whole_titles(record, size):
-    """The title's box is darker than the sky behind it; a clipped one would reach the right edge of the picture."""
-    images = film.frames(record, speed=50.0, size=size)
+    """The title's box is darker than the sky; a clipped one would reach the right edge."""
+    images = film.frames(record, FilmOptions(speed=50.0, size=size))
     image = next(images).astype(int)
     images.close()
     picture = image[:, : size[0] - 120] if size[0] >= 320 and size[1] >= 100 else image

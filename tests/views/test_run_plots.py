@@ -1,8 +1,12 @@
+"""What the plots of a run show is what the record holds."""
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import hapticclay as hc
+from hapticclay.cli import app
 from hapticclay.views import run_plots
 
 
@@ -16,7 +20,7 @@ def lines(figure):
 
 
 def test_velocity_plot_shows_measured_and_expected(run):
-    figure = run_plots.velocity_position(run)
+    figure = run_plots.velocity_plot(run)
     found = lines(figure)
     np.testing.assert_array_equal(found["measured"].get_xdata(), 100 * run.p[:, 0])
     np.testing.assert_array_equal(found["measured"].get_ydata(), run.v[:, 0])
@@ -28,7 +32,7 @@ def test_velocity_plot_shows_measured_and_expected(run):
 
 
 def test_force_plot_shows_b_beside_the_ratios(run):
-    figure = run_plots.force_velocity(run)
+    figure = run_plots.force_ratio_plot(run)
     labels = [t for t in lines(figure) if not t.startswith("_")]
     assert labels == ["operator, f$_h$/v", "clay, f$_e$/v", "10/K + b", "b"]
     b = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
@@ -38,26 +42,34 @@ def test_force_plot_shows_b_beside_the_ratios(run):
 @pytest.mark.parametrize("scenario", [
     hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0)), hc.constant_cut(t_max=1e-5),
     hc.free(force=(0.0, 0.0), t_max=0.1),
-    hc.constant_cut(impedance=True, t_max=1.0),
+    hc.constant_cut(operator=hc.Operator(), t_max=1.0),
 ], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_any_record_can_be_drawn(scenario, axis, tmp_path):
     record = hc.simulate(scenario)
-    for draw in (run_plots.velocity_position, run_plots.force_velocity):
+    for draw in (run_plots.velocity_plot, run_plots.force_ratio_plot):
         draw(record, axis).savefig(tmp_path / "p.png")
         assert (tmp_path / "p.png").stat().st_size > 5000
 
 
-LONG = dict(impedance=True, shaping=True, gain=(1.234, 0.5678), t_max=3.0)
+LONG = dict(operator=hc.Operator(), shaping=True, gain=(1.234, 0.5678), t_max=3.0)
 
 
-@pytest.mark.parametrize("scenario", [
-    hc.variable_cut(), hc.variable_cut(**LONG), hc.constant_cut(**LONG, force=(1.234, -0.5678)), hc.free(**LONG),
-    hc.stability_test(25.0, shaping=True, t_max=3.0), hc.constant_cut(t_max=0.1), hc.constant_cut(gain=(1.0, 1.0)),
-], ids=["variable", "long", "long constant", "long free", "driven", "short", "unstable"])  # fmt: skip
+SCENARIOS = {
+    "variable": hc.variable_cut(),
+    "long": hc.variable_cut(**LONG),
+    "long constant": hc.constant_cut(**LONG, force=(1.234, -0.5678)),
+    "long free": hc.free(**LONG),
+    "driven": hc.stability_test(25.0, shaping=True, t_max=3.0),
+    "short": hc.constant_cut(t_max=0.1),
+    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS.keys())
 def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
     record = hc.simulate(scenario)
-    for name, figure in {**run_plots.figures(record), "map": run_plots.path(record)}.items():
+    for name, figure in {**run_plots.figures(record), "map": run_plots.path_plot(record)}.items():
         figure.draw_without_rendering()
         (legend,) = figure.legends
         key, whole = legend.get_window_extent(), figure.bbox
@@ -73,3 +85,27 @@ def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
                 )
                 assert not box.overlaps(key), (name, said)
         assert figure.axes[0].get_title(loc="left").startswith(scenario.name)
+
+
+def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
+    """`hapticclay run` writes it, and a later run in the same folder without plots removes it."""
+
+    def power(record):
+        figure = Figure()
+        figure.add_subplot().plot(record.t, (record.fh * record.v).sum(axis=1))
+        return figure
+
+    monkeypatch.setitem(run_plots.FIGURES, "power", power)
+    args = ["run", "constant", "--t-max", "0.1", "--out", str(tmp_path)]
+    assert app.main(args) == 0
+    plots = {"velocity.png", "force.png", "power.png"}
+    files = {"record.npz", "summary.json"}
+    assert {path.name for path in tmp_path.iterdir()} == plots | files
+    assert app.main([*args, "--no-plots"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == files
+
+
+def test_a_figure_that_does_not_apply_is_not_drawn(run, monkeypatch):
+    assert set(run_plots.figures(run)) == {"velocity", "force"}
+    monkeypatch.setitem(run_plots.FIGURES, "velocity", lambda record: None)
+    assert set(run_plots.figures(run)) == {"force"}

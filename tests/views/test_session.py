@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.views.session import FRAME, MOST_FORCE, Clock, Player, Replay, Session, played
+from hapticclay.views.session import (
+    FRAME_TIME,
+    LONGEST_SLICE,
+    Clock,
+    Player,
+    Replay,
+    Session,
+    played,
+)
 from hapticclay.views.stage import Stage
 
 
@@ -15,7 +23,7 @@ def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
     end = session.t + seconds
     while session.t < end - 1e-6 and not session.ended:
         session.pull(way(session.t))
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     return session
 
 
@@ -28,7 +36,7 @@ def test_hand_feels_the_clay(scenario):
     moving = (np.abs(record.v) > 1e-3) & (record.b > 0.0)
     assert moving.sum() > 1000
     np.testing.assert_allclose(record.ratio(record.fe)[moving], record.b[moving], rtol=1e-9)
-    assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME)
+    assert record.outcome.code == "finished" and record.t[-1] == pytest.approx(4.0, abs=FRAME_TIME)
     assert (
         abs(record.energy["residual"]) < 1e-4 * record.energy["throughput"]
     )  # second order in the step
@@ -52,9 +60,9 @@ def test_pull_is_the_impedance_towards_the_point():
 
 
 def test_slices_are_no_part_of_the_result():
-    """A still target: slices of 1/60 s, of 1/200 s and one headless run with the same muscle force agree."""
+    """With a still target, slices of two lengths and a headless run with that force agree."""
     ends = []
-    for frame in (FRAME, 0.005, MOST_FORCE):
+    for frame in (FRAME_TIME, 0.005, LONGEST_SLICE):
         session = Session(hc.constant_cut(), stiffness=10.0)
         session.pull((0.0, 0.0))
         session.push((2.0, 0.0))
@@ -87,11 +95,11 @@ def test_gain_and_damping_change_while_it_runs():
 
 
 def test_letting_go_leaves_the_handle_to_itself():
-    """No force of the hand but its mass and damper: 10/K and d slow the handle down, no spring calls it back."""
+    """The hand's mass and damper remain: 10/K and d slow the handle, no spring pulls it back."""
     session = drag(Session(hc.free(), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
     session.pull(None)
     for _ in range(120):
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     p, v = session.frames[-1][1:3]
     assert abs(v[0]) < 1e-4 and p[0] > 0.03
 
@@ -99,14 +107,14 @@ def test_letting_go_leaves_the_handle_to_itself():
 def test_pause_restart_and_record_switch():
     session = drag(Session(hc.constant_cut(), stiffness=10.0), 0.5)
     session.paused = True
-    assert len(session.advance(FRAME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME)
+    assert len(session.advance(FRAME_TIME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME_TIME)
     session.paused, session.recording = False, False
     drag(session, 0.5)
     session.recording = True
     drag(session, 0.5)
     record = session.record()
     gap = np.diff(record.t).max()
-    assert gap == pytest.approx(0.5, abs=2 * FRAME)
+    assert gap == pytest.approx(0.5, abs=2 * FRAME_TIME)
     session.recording = False
     session.restart()
     assert session.t == 0.0 and not session.recorded and not session.recording
@@ -132,7 +140,7 @@ def straight(t):
 
 
 def test_removed_volume_is_width_times_depth_times_length_and_what_the_picture_shows():
-    """In the constant cut, to 1 %: the slab is 10 cm long, and a hand that pulls along x leaves it little."""
+    """To 1 % in the constant cut: the slab is 10 cm long, and the path nearly straight."""
     session = drag(Session(hc.constant_cut(), stiffness=10.0, every=10), 5.0, straight)
     stage = Stage(session.scenario, session.tool)
     stage.carve([f[1] for f in session.frames])
@@ -142,7 +150,7 @@ def test_removed_volume_is_width_times_depth_times_length_and_what_the_picture_s
 
 
 def test_clay_is_removed_while_recording_is_off_too():
-    """A way off the straight, and back, that the record does not hold: the volume is that of the picture."""
+    """The record lacks a detour; its volume is still that of the picture."""
     session = Session(hc.constant_cut(), stiffness=10.0, every=10)
     for recording, y in ((False, 0.0), (True, 0.0), (False, 0.05), (False, 0.0), (True, 0.0)):
         session.recording = recording
@@ -150,7 +158,7 @@ def test_clay_is_removed_while_recording_is_off_too():
     stage = Stage(session.scenario, session.tool)
     stage.carve([f[1] for f in session.frames])
     record = session.record()
-    assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME)
+    assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME_TIME)
     assert stage.removal.volume == pytest.approx(record.extra["removed"][-1], rel=5e-3)
     straight_on = hc.removed(record)[0][-1]
     assert record.extra["removed"][-1] > 1.1 * straight_on
@@ -172,7 +180,7 @@ def test_out_of_reach_ends_it_with_a_reason():
     session = Session(hc.free(), stiffness=1.0)
     session.push((30.0, 0.0))
     for _ in range(600):
-        session.advance(FRAME)
+        session.advance(FRAME_TIME)
     assert "stretched" in session.ended and session.record().outcome.code == "out of reach"
 
 
@@ -206,10 +214,10 @@ def test_slow_machine_slows_the_clock_evenly():
     clock, made = Clock(), []
     for k in range(100):
         made.append(clock.due(0.2 * k))
-    assert clock.slow and set(np.round(made[1:], 12)) == {MOST_FORCE}
+    assert clock.slow and set(np.round(made[1:], 12)) == {LONGEST_SLICE}
     assert clock.factor == pytest.approx(0.25, rel=0.02)
     clock.rest()
-    assert clock.due(1000.0) <= MOST_FORCE  # a pause is not made good
+    assert clock.due(1000.0) <= LONGEST_SLICE  # a pause is not made good
 
 
 def test_player_plays_and_stops():
@@ -237,13 +245,13 @@ def test_replay_follows_the_record():
     record = hc.simulate(hc.constant_cut(), every=10)
     replay, went = Replay(record), [record.p[:1]]
     while not replay.ended:
-        went.append(replay.advance(FRAME))
+        went.append(replay.advance(FRAME_TIME))
     assert replay.ended == record.status
     np.testing.assert_array_equal(np.concatenate(went)[-1], record.p[-1])
 
 
 def test_verdict_follows_the_monitor_and_the_gain():
-    """K_y above, below and again above nothing: the limit is where the poles of Eq. 8 cross, by numpy's roots."""
+    """K_y below its limit, above it, and below again: the verdict names each."""
     session = Session(hc.constant_cut(), stiffness=10.0)
     assert session.verdict().text == "stable; limit of K here: none"
     session.push((0.0, 0.2))
@@ -279,7 +287,7 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     replay, said = Replay(record), []
     while not replay.ended:
         said.append((replay.t, replay.verdict()))
-        replay.advance(FRAME)
+        replay.advance(FRAME_TIME)
     said.append((replay.t, replay.verdict()))
     assert all(v.unstable == (bool(axis) and t >= record.outcome.time) for t, v in said)
     assert said[-1][1].unstable == bool(axis)

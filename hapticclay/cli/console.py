@@ -1,0 +1,192 @@
+"""What commands share: experiments on the command line, bars, tables, numbers, Ctrl-C, files."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import json
+import math
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+import tyro
+
+from ..files import atomic
+
+if TYPE_CHECKING:
+    from ..model.experiments import Experiment
+    from ..model.scenario import Scenario
+
+
+def experiment_words() -> Any:
+    """The experiments as subcommands of a command: the type of its field `scenario`."""
+    from ..model.experiments import EXPERIMENTS
+
+    return Union[  # noqa: UP007
+        tuple(
+            Annotated[Any, tyro.conf.subcommand(name, constructor=_scenario_parser(kind))]
+            for name, kind in EXPERIMENTS.items()
+        )
+    ]
+
+
+def scenario_words() -> Any:
+    """The experiments and saved records as subcommands of a command."""
+    record = Annotated[Any, tyro.conf.subcommand("record", constructor=load_record)]
+    return Union[experiment_words(), record]  # noqa: UP007
+
+
+def load_record(path: tyro.conf.Positional[Path]) -> Any:  # tyro resolves the annotations
+    """A saved record.
+
+    Args:
+        path: its folder, or its record.npz.
+    """
+    from ..simulation.record import Record
+
+    return Record.load(path)
+
+
+def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
+    """A function whose signature tells tyro the parameters of an experiment."""
+    from ..model.experiments import from_words, parameters
+
+    def scenario(**words: Any) -> Scenario:
+        return from_words(kind, words)
+
+    scenario.__doc__ = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
+    scenario.__annotations__ = {
+        name: Annotated[p.kind, tyro.conf.arg(help=p.about[:1].upper() + p.about[1:])]
+        for name, p in parameters(kind).items()
+    }
+    scenario.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=p.default)
+            for name, p in parameters(kind).items()
+        ]
+    )
+    return scenario
+
+
+def progress_bar(items: Any = None, **look: Any) -> Any:
+    """A tqdm bar that shows itself on a terminal after two seconds and vanishes at the end.
+
+    Args:
+        items: what to iterate over; None to update the bar by hand.
+        **look: other arguments of tqdm.
+    """
+    from tqdm import tqdm
+
+    return tqdm(items, **{"delay": 2.0, "disable": None, "leave": False, **look})
+
+
+@contextlib.contextmanager
+def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
+    """Yields show(fraction, title=None), which moves a progress bar to a fraction of the work.
+
+    Args:
+        title: text before the bar.
+    """
+    form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
+    with progress_bar(total=1.0, desc=title, bar_format=form) as bar:
+
+        def show(fraction: float, title: str | None = None) -> None:
+            if title:
+                bar.set_description(title)
+            bar.update(max(0.0, min(1.0, fraction)) - bar.n)
+
+        yield show
+
+
+def text_table(rows: Sequence[Sequence[str]], head: Sequence[str], align: str) -> str:
+    """A table for a terminal.
+
+    Args:
+        rows: its cells.
+        head: its column titles.
+        align: a letter a column, "l" for left, "r" for right.
+    """
+    from tabulate import tabulate
+
+    sides = [{"l": "left", "r": "right"}[a] for a in align]
+    return tabulate(rows, head, colalign=sides if rows else None, disable_numparse=True)
+
+
+def fixed(x: float | None, digits: int) -> str:
+    """x with a number of decimals, without a negative zero; "-" for None.
+
+    Args:
+        x: the number.
+        digits: decimals.
+    """
+    return "-" if x is None else f"{round(x, digits) + 0.0:.{digits}f}"
+
+
+def significant(x: float) -> str:
+    """x with four significant digits; "-" for NaN, "any" for infinity.
+
+    Args:
+        x: the number.
+    """
+    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.4g}"
+
+
+@contextlib.contextmanager
+def ctrl_c() -> Iterator[Callable[[], bool]]:
+    """Yields a function that tells whether Ctrl-C has been pressed; a second one interrupts."""
+    pressed = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed.is_set
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(number: int, frame: object) -> None:
+        pressed.set()
+        signal.signal(signal.SIGINT, before)
+
+    if before is signal.default_int_handler:  # nohup, and shells for jobs behind, ignore Ctrl-C
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield pressed.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def save_figures(figures: Mapping[str, Any], folder: Path) -> None:
+    """Writes figures as folder/NAME.png, each whole or not at all.
+
+    Args:
+        figures: matplotlib figures by name.
+        folder: where to.
+
+    Raises:
+        ParameterError: a file cannot be written.
+    """
+    for name, figure in figures.items():
+        with atomic(folder / f"{name}.png") as f:
+            figure.savefig(f, format="png")
+
+
+def save_json(data: Any, file: Path) -> None:
+    """Writes data as JSON, whole or not at all; null stands for NaN and infinity.
+
+    Args:
+        data: dictionaries, sequences, numbers and texts.
+        file: where to.
+
+    Raises:
+        ParameterError: the file cannot be written.
+    """
+    with atomic(file) as f:
+        f.write((json.dumps(_json_ready(data), indent=2, allow_nan=False) + "\n").encode())
+
+
+def _json_ready(x: Any) -> Any:
+    if isinstance(x, dict):
+        return {k: _json_ready(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [_json_ready(v) for v in x]
+    return None if isinstance(x, float) and not math.isfinite(x) else x

@@ -1,0 +1,167 @@
+"""The cost of extensions: a class and a line an experiment, a module and a line a command."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+from typing import Annotated
+
+import pytest
+
+import hapticclay as hc
+from hapticclay.cli import app
+from hapticclay.errors import Bound, ParameterError
+from hapticclay.model.experiments import EXPERIMENTS, Damping, Gains, PathExperiment
+from hapticclay.studies.sampling import Sweep, parameter_unit, parse_grid
+from hapticclay.studies.sweep import read_sweep
+from hapticclay.views import study_plots
+
+
+@dataclasses.dataclass(frozen=True)
+class Staircase(PathExperiment):
+    """A cut through clay whose damping rises in steps.
+
+    Attributes:
+        b: damping of the first step [N.s/m], 0 to 1e9.
+        steps: number of steps, 1 to 20.
+        gain: K of the compensator on each axis [1/kg], > 0.
+        depth: length of a step along x [m], 1e-3 to 0.1.
+    """
+
+    b: Damping = 20.0
+    steps: Annotated[int, Bound(1, 20)] = 3
+    gain: Gains = (1.0, 0.5)
+    depth: Annotated[float, Bound(1e-3, 0.1, "m")] = 0.01
+
+    def scenario(self):
+        edges = tuple(self.depth * i for i in range(1, self.steps + 1))
+        profile = hc.Profile(edges, (0.0, *(self.b * i for i in range(1, self.steps + 1))))
+        return self.build_scenario("staircase", clay=hc.Clay(profile, profile), force=(1.0, 0.0))
+
+
+COMMAND = '''
+"""`hapticclay greet`: says hello."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class GreetCommand:
+    """Say hello.
+
+    Attributes:
+        name: Person to greet.
+        times: Number of greetings.
+    """
+
+    name: str = "you"
+    times: int = 1
+
+    def __call__(self) -> int:
+        print("\\n".join([f"hello {self.name}"] * self.times))
+        return 0
+'''
+
+
+@pytest.fixture
+def staircase(monkeypatch):
+    monkeypatch.setitem(EXPERIMENTS, "staircase", Staircase)
+
+
+@pytest.fixture
+def greet(monkeypatch, tmp_path):
+    (tmp_path / "greet_command.py").write_text(COMMAND)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(app.COMMANDS, "greet", "greet_command:GreetCommand")
+
+
+def said(capsys, *args):
+    code = app.main(args)
+    out = capsys.readouterr()
+    return code, out.out, out.err
+
+
+def test_a_new_experiment_runs_and_is_drawn(capsys, tmp_path, staircase):
+    words = ["--steps", "4", "--b", "30", "--impedance", "--t-max", "3", "--out", str(tmp_path)]
+    code, out, err = said(capsys, "run", "staircase", *words)
+    assert (code, err) == (0, "") and "border x = 1 cm crossed" in out
+    assert sorted(os.listdir(tmp_path)) == [
+        "force.png",
+        "record.npz",
+        "summary.json",
+        "velocity.png",
+    ]
+    s = hc.Record.load(tmp_path).scenario
+    assert s.clay.x.values == (0.0, 30.0, 60.0, 90.0, 120.0) and s.operator == hc.Operator()
+    assert s == Staircase(30.0, 4, operator=hc.Operator(), t_max=3.0).scenario()
+
+
+def test_a_new_experiment_has_help_and_messages(capsys, staircase):
+    code, out, _ = said(capsys, "run", "staircase", "--help")
+    flat = " ".join(out.replace("│", " ").split())
+    assert code == 0 and "Length of a step along x [m], 1e-3 to 0.1. (default: 0.01)" in flat
+    assert "staircase" in said(capsys, "run", "--help")[1]
+    for words, told in (
+        (["run", "stairs"], "did you mean 'staircase'?"),
+        (["run", "staircase", "--stps", "2"], "did you mean --steps?"),
+        (["run", "staircase", "--steps", "x"], "--steps = 'x': must be a whole number"),
+        (["run", "staircase", "--steps", "21"], "steps = 21: must be a whole number from 1 to 20"),
+        (["run", "staircase", "--depth", "1"], "must be a finite number >= 0.001 and <= 0.1 m"),
+    ):
+        code, out, err = said(capsys, *words)
+        assert (code, out, err.count("\n")) == (2, "", 1) and told in err
+    assert app.ordered(["video", "--steps", "2", "staircase"])[:2] == ["video", "staircase"]
+
+
+def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
+    words = [
+        "sweep",
+        "--experiment",
+        "staircase",
+        "--grid",
+        "depth=0.01,0.02 steps=1,2 gain.x=1,2",
+        "--fixed",
+        "t_max=0.5 impedance=true",
+        "--workers",
+        "1",
+        "--out",
+    ]
+    code, out, _ = said(capsys, *words, str(tmp_path))
+    assert code == 0 and "8 runs in" in out and (tmp_path / "status.png").is_file()
+    assert read_sweep(tmp_path)["steps"].to_pylist() == [1, 1, 2, 2] * 2
+    assert parameter_unit("depth") == "m" and study_plots._label("depth") == "depth [m]"
+    with pytest.raises(ParameterError, match="did you mean 'depth'"):
+        Sweep("staircase", parse_grid("deph=0.01:0.02:2"))
+
+
+def test_a_new_command_runs_and_has_help_and_messages(capsys, greet):
+    assert said(capsys, "greet", "--name", "Ada", "--times", "2") == (0, "hello Ada\n" * 2, "")
+    assert "• greet      Say hello." in said(capsys, "--help")[1]
+    assert "Number of greetings. (default: 1)" in said(capsys, "greet", "--help")[1]
+    for words, told in (
+        (["gret"], "did you mean 'greet'?"),
+        (["greet", "--nme", "x"], "--nme: no option of greet; did you mean --name?"),
+        (["greet", "--times", "x"], "--times = 'x': must be a whole number"),
+    ):
+        code, out, err = said(capsys, *words)
+        assert (code, out, err.count("\n")) == (2, "", 1) and told in err
+
+
+@pytest.mark.parametrize(
+    "words,heavy",
+    [
+        (["version"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
+        (["--help"], ("numpy", "scipy", "mujoco", "matplotlib", "tqdm", "tabulate")),
+        (["run", "constant", "--help"], ("mujoco", "scipy", "matplotlib", "tqdm", "tabulate")),
+        (["sweep", "--help"], ("numpy", "mujoco", "scipy", "matplotlib", "pyarrow")),
+    ],
+)
+def test_a_command_imports_what_it_needs(words, heavy):
+    code = (
+        "import sys; from hapticclay.cli import app; code = app.main(sys.argv[1:]);"
+        f"print([m for m in {heavy!r} if m in sys.modules], file=sys.stderr)"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60
+    )
+    assert out.stderr == "[]\n"

@@ -1,0 +1,46 @@
+"""The palette: stated once, converted exactly, and free of matplotlib."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.colors
+import numpy as np
+import pytest
+
+from hapticclay.views import style
+
+VIEWS = Path(style.__file__).parent
+PALETTE = {name: value for name, value in vars(style).items() if re.fullmatch("#.{6}", str(value))}
+
+
+@pytest.mark.parametrize("name", PALETTE)
+def test_conversions_are_those_of_matplotlib(name):
+    assert style.rgb(PALETTE[name]) == pytest.approx(matplotlib.colors.to_rgb(PALETTE[name]))
+    assert style.rgb_bytes(PALETTE[name]) == tuple(
+        round(255 * x) for x in matplotlib.colors.to_rgb(PALETTE[name])
+    )
+
+
+def test_colours_are_stated_in_style_alone():
+    for path in VIEWS.glob("*.py"):
+        found = re.findall(r"#[0-9A-Fa-f]{6}\b", path.read_text())
+        assert (path.name == "style.py") == bool(found), (path, found)
+
+
+@pytest.mark.parametrize(
+    "module", ["style", "stage", "session", "page", "viewer", "window", "film"]
+)
+def test_what_draws_without_matplotlib_does_not_load_it(module):
+    code = f"import sys, hapticclay.views.{module}; print('matplotlib' in sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout == "False\n"
+
+
+def test_clay_is_darker_where_it_damps_more():
+    colors = style.clay_color(np.linspace(0.0, 1.0, 11))
+    assert colors.shape == (11, 3) and (np.diff(colors, axis=0) < 0.0).all()
+    np.testing.assert_allclose(
+        colors[[0, -1]], [style.rgb(c) for c in (style.CLAY_PALE, style.CLAY_DEEP)]
+    )
