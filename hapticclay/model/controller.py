@@ -40,17 +40,7 @@ def servo_coefficients(
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
-def servo_acceleration(  # noqa: PLR0913  # compiled and inlined: plain numbers
-    after: float,
-    before: float,
-    spring: float,
-    yd1: float,
-    yd0: float,
-    v: float,
-    y: float,
-    p: float,
-    c: float,
-) -> float:
+def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PLR0913  # of one axis
     """Acceleration of one axis in a kick without forces and without the velocity after it [m/s^2].
 
     Args:
@@ -70,123 +60,99 @@ def servo_acceleration(  # noqa: PLR0913  # compiled and inlined: plain numbers
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def solve_velocity(  # noqa: PLR0913  # compiled and inlined: plain numbers
-    nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
-    fx: float, fy: float, dx: float, dy: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Solves n u = a + S (f - d u) for the handle velocity u after a kick.
+def solve_velocity(n, a, W, f, d):
+    """Solves n u = a + W (f - d u) for the handle velocity u after a kick.
 
     Args:
-        nx: weight of u in the servo's law, x [1/s].
-        ny: weight of u, y [1/s].
-        ax: from `servo_acceleration`, x [m/s^2].
-        ay: from `servo_acceleration`, y [m/s^2].
-        sxx: acceleration per unit of net hand force, x from x [1/kg].
-        sxy: acceleration per unit of net hand force, x from y [1/kg].
-        syy: acceleration per unit of net hand force, y from y [1/kg].
-        fx: net hand force without u, x [N].
-        fy: net hand force without u, y [N].
-        dx: resisting force per unit of u, x [N.s/m].
-        dy: resisting force per unit of u, y [N.s/m].
+        n: weight of u in the servo's law, (x, y) [1/s].
+        a: from `servo_acceleration`, (x, y) [m/s^2].
+        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
+        f: net hand force without u, (x, y) [N].
+        d: resisting force per unit of u, (x, y) [N.s/m].
 
     Returns:
         (ux, uy) [m/s].
     """
-    gx = ax + sxx * fx + sxy * fy
-    gy = ay + sxy * fx + syy * fy
+    nx, ny = n
+    ax, ay = a
+    wxx, wxy, wyy = W
+    fx, fy = f
+    dx, dy = d
+    gx = ax + wxx * fx + wxy * fy
+    gy = ay + wxy * fx + wyy * fy
     if dx or dy:
-        a = nx + sxx * dx
-        b = sxy * dy
-        r = sxy * dx / a
-        uy = (gy - r * gx) / (ny + syy * dy - r * b)
-        ux = (gx - b * uy) / a
+        px = nx + wxx * dx
+        py = wxy * dy
+        r = wxy * dx / px
+        uy = (gy - r * gx) / (ny + wyy * dy - r * py)
+        ux = (gx - py * uy) / px
     else:
         ux = gx / nx
         uy = gy / ny
     return ux, uy
 
 
-def velocity_under_torque(  # noqa: PLR0913  # compiled and inlined: plain numbers
-    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
-    t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
-) -> tuple[float, float]:  # fmt: skip
+def velocity_under_torque(H, v, u, tau, f, d):
     """Handle velocity after a kick under given motor torques.
 
     Args:
         H: length of the kick [s].
-        vx: handle velocity before the kick, x [m/s].
-        vy: handle velocity before the kick, y [m/s].
-        u1x: first column of `arm.jacobian`, x [m].
-        u1y: first column, y [m].
-        u2x: second column, x [m].
-        u2y: second column, y [m].
-        t1: torque of the shoulder motor [N.m].
-        t2: torque of the elbow motor [N.m].
-        fx: hand force without the velocity after the kick, x [N].
-        fy: hand force without the velocity after the kick, y [N].
-        dx: resisting force per unit of that velocity, x [N.s/m].
-        dy: resisting force per unit of that velocity, y [N.s/m].
+        v: handle velocity before the kick, (x, y) [m/s].
+        u: from `arm.jacobian` [m].
+        tau: motor torques, (shoulder, elbow) [N.m].
+        f: hand force without the velocity after the kick, (x, y) [N].
+        d: resisting force per unit of that velocity, (x, y) [N.s/m].
 
     Returns:
         (ux, uy) [m/s].
     """
-    a1 = (t1 - t2) / arm.I1
-    a2 = t2 / arm.I2
-    ax, ay = arm.handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
-    sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+    vx, vy = v
+    t1, t2 = tau
+    ax, ay = arm.handle_velocity((t1 - t2) / arm.I1, t2 / arm.I2, u)
     n = 1.0 / H
-    ux, uy = solve_velocity(n, n, n * vx + ax, n * vy + ay, sxx, sxy, syy, fx, fy, dx, dy)
+    W = arm.mobility(u)
+    ux, uy = solve_velocity((n, n), (n * vx + ax, n * vy + ay), W, f, d)
     return ux, uy
 
 
-def saturated_step(  # noqa: PLR0913  # compiled and inlined: plain numbers
-    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
-    nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
-    fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
-) -> tuple[float, float, float, float, float, float, float, float]:  # fmt: skip
+def saturated_step(H, v, u, n, a, W, f, d, limit):  # noqa: PLR0913  # one a quantity of the law
     """The kick that the servo asks for, within the torque limits of the motors.
 
     Args:
         H: length of the kick [s].
-        vx: handle velocity before the kick, x [m/s].
-        vy: handle velocity before the kick, y [m/s].
-        u1x: first column of `arm.jacobian`, x [m].
-        u1y: first column, y [m].
-        u2x: second column, x [m].
-        u2y: second column, y [m].
-        nx: as in `solve_velocity` [1/s].
-        ny: as in `solve_velocity` [1/s].
-        ax: as in `solve_velocity` [m/s^2].
-        ay: as in `solve_velocity` [m/s^2].
-        sxx: as in `solve_velocity` [1/kg].
-        sxy: as in `solve_velocity` [1/kg].
-        syy: as in `solve_velocity` [1/kg].
-        fx: as in `solve_velocity` [N].
-        fy: as in `solve_velocity` [N].
-        dx: as in `solve_velocity` [N.s/m].
-        dy: as in `solve_velocity` [N.s/m].
-        limit1: torque limit of the shoulder motor [N.m].
-        limit2: torque limit of the elbow motor [N.m].
-        square1: square of limit1.
-        square2: square of limit2.
+        v: handle velocity before the kick, (x, y) [m/s].
+        u: from `arm.jacobian` [m].
+        n: as in `solve_velocity` [1/s].
+        a: as in `solve_velocity` [m/s^2].
+        W: as in `solve_velocity` [1/kg].
+        f: as in `solve_velocity` [N].
+        d: as in `solve_velocity` [N.s/m].
+        limit: torque limits of shoulder and elbow [N.m], and their squares.
 
     Returns:
         (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after the kick [m/s], link accelerations
         [rad/s^2], net hand force [N], motor torques [N.m].
     """
-    ux, uy = solve_velocity(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+    vx, vy = v
+    u1x, u1y, u2x, u2y = u
+    fx, fy = f
+    dx, dy = d
+    limit1, limit2, square1, square2 = limit
+    ux, uy = solve_velocity(n, a, W, (fx, fy), (dx, dy))
     ffx = fx - dx * ux
     ffy = fy - dy * uy
-    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
     t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
     t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
     if t1 * t1 > square1 or t2 * t2 > square2:
         t1 = min(max(t1, -limit1), limit1)
         t2 = min(max(t2, -limit2), limit2)
-        ux, uy = velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+        ux, uy = velocity_under_torque(
+            H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
+        )
         ffx = fx - dx * ux
         ffy = fy - dy * uy
-        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
 
 

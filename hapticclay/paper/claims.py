@@ -90,9 +90,7 @@ def machine(runs: Runs) -> Iterator[Row]:
     at(*q)
     engine = np.zeros((3, 2))
     mujoco.mj_jacSite(model, data, engine, None, handle)
-    u1x, u1y, u2x, u2y = arm.jacobian(
-        math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q))
-    )
+    u1x, u1y, u2x, u2y = arm.jacobian(q[0], q[1])
     eq14 = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
     yield Row(
         "Jacobian J(q)",
@@ -176,9 +174,7 @@ def machine(runs: Runs) -> Iterator[Row]:
 
 def _engine_mobility(x: float, y: float) -> np.ndarray:
     q1, q2 = arm.inverse_kinematics(x, y)
-    w = arm.mobility(
-        *arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
-    )
+    w = arm.mobility(arm.jacobian(q1, q2))
     return np.array([[w[0], w[1]], [w[1], w[2]]])
 
 

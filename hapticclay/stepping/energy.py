@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -129,9 +128,8 @@ class EnergyLedger:
         th = self.scenario.operator or NO_HAND
         q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
         v = 0.5 * (before + after)
-        a = q[0] + q[1]
-        columns: Any = arm.jacobian(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
-        r1, r2 = arm.joint_velocity(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
+        u = arm.jacobians(q[0], q[1])
+        r1, r2 = arm.joint_velocity(v[0], v[1], u, 1.0)
         around = before[0], before[1], after[0], after[1]
         self.work += [
             x.sum()
@@ -143,8 +141,7 @@ class EnergyLedger:
             self._memo(H, v, r1, r2)
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
-            u1x, u1y, u2x, u2y = (x[j] for x in columns)
-            r = arm.joint_velocity(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
+            r = arm.joint_velocity(v[0, j], v[1, j], [x[j] for x in u], 1.0)
             return stored_energy(th, r[0], r[1], p[:, j].tolist(), v[:, j].tolist())
 
         if self.first is None:

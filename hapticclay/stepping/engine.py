@@ -153,7 +153,7 @@ class Run:
             scenario.origin[0] + scenario.start[0], scenario.origin[1] + scenario.start[1]
         )
         self.data.qpos[:] = q1, q2
-        r1, r2 = arm.joint_velocity(*scenario.velocity, *arm.jacobian(*_sines(q1, q2)), 1.0)
+        r1, r2 = arm.joint_velocity(*scenario.velocity, arm.jacobian(q1, q2), 1.0)
         self.data.qvel[:] = r1, r2 - r1
         self.muscle, self.command = _build_signal(scenario.muscle), _build_signal(scenario.command)
         self.angles: Any = memoryview(self.data.qpos)  # floats, in the engine's own memory
@@ -352,9 +352,7 @@ class Run:
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
         q, p, v, fh, tau, delta = (rows[j : j + 2].T.copy() for j in range(0, 12, 2))
-        a = q.sum(axis=1)
-        u = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
-        r1, r2 = arm.joint_velocity(v[:, 0], v[:, 1], *u, 1.0)  # type: ignore[arg-type]
+        r1, r2 = arm.joint_velocity(v[:, 0], v[:, 1], arm.jacobians(q[:, 0], q[:, 1]), 1.0)
         qd = np.column_stack((r1, r2 - r1))
         b = b.T.copy()
         fe = np.column_stack(viscous_force(*b.T, *v.T))
@@ -368,10 +366,6 @@ class Run:
             for x in map(arrays.__getitem__, ("p", "v", "fh", "fe", "b"))
         ]
         return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
-
-
-def _sines(q1: float, q2: float) -> tuple[float, float, float, float]:
-    return math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
 
 
 def _build_signal(multisine: Multisine | None) -> Any:

@@ -11,8 +11,6 @@ and error terms: docs/equations.md, section 4.
 # Names for stiff clay alone are bound and read under the same `if stiff`, for speed.
 from __future__ import annotations
 
-from math import cos, sin
-
 from ..model import arm, clay, controller, operator
 from ..model.constants import C_POLE, G, S
 from ..model.operator import NO_HAND
@@ -124,17 +122,16 @@ def measure_handle(q1, q2, w1, w2, d1, d2, ox, noy):
         noy: origin of p, -y [m].
 
     Returns:
-        (u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy): arm.jacobian and position [m], absolute
-        rate of link 2 [rad/s], velocity [m/s], centripetal acceleration c = -J' q' [m/s^2].
+        (u, p, r2, v, c): arm.jacobian and position [m], absolute rate of link 2 [rad/s], velocity
+        [m/s], centripetal acceleration c = -J' q' [m/s^2].
     """
-    a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.jacobian(sin(q1), cos(q1), sin(a), cos(a))
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2)
     px = u1y + u2y - ox
     py = noy - u1x - u2x
     r2 = w1 + w2
-    vx, vy = arm.handle_velocity(w1, r2, u1x, u1y, u2x, u2y)
-    cx, cy = arm.centripetal(w1 + d1, r2 + d2, u1x, u1y, u2x, u2y)
-    return u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy
+    vx, vy = arm.handle_velocity(w1, r2, (u1x, u1y, u2x, u2y))
+    cx, cy = arm.centripetal(w1 + d1, r2 + d2, (u1x, u1y, u2x, u2y))
+    return (u1x, u1y, u2x, u2y), (px, py), r2, (vx, vy), (cx, cy)
 
 
 def step_loop(c, k, q1, q2, w1, w2, state):
@@ -168,17 +165,17 @@ def step_loop(c, k, q1, q2, w1, w2, state):
     bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
-    u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure_handle(
+    (u1x, u1y, u2x, u2y), (px, py), r2, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, half * g1, half * g2, ox, noy
     )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
         cx, cy = arm.centripetal_about_sample(
-            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
         )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
 
     # clay and operator: net force f = (fx - dx ux, fy - dy uy)
     fx = uhx - bx0 * vx
@@ -209,17 +206,16 @@ def step_loop(c, k, q1, q2, w1, w2, state):
         dx += softx
         dy += softy
     ux, uy, g1, g2, ffx, ffy, t1, t2 = controller.saturated_step(
-        H, vx, vy, u1x, u1y, u2x, u2y, nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy,
-        limit1, limit2, square1, square2,
+        H, (vx, vy), (u1x, u1y, u2x, u2y), (nx, ny), (ax, ay), (sxx, sxy, syy), (fx, fy), (dx, dy),
+        (limit1, limit2, square1, square2),
     )  # fmt: skip
     if stiff:
-        if (
-            t1 * t1 >= square1 or t2 * t2 >= square2
-        ):  # what the motors hold against the clay is less
+        # motors at their limits hold less against the clay
+        if t1 * t1 >= square1 or t2 * t2 >= square2:
             gx, gy = arm.handle_acceleration(
-                (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y
+                (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, (u1x, u1y, u2x, u2y)
             )
-            sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+            sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
             gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
             fx -= owedx
             fy -= owedy
@@ -227,11 +223,11 @@ def step_loop(c, k, q1, q2, w1, w2, state):
             fx += owedx
             fy += owedy
             ux, uy = controller.velocity_under_torque(
-                H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy
+                H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
             )
             ffx = fx - dx * ux
             ffy = fy - dy * uy
-            g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+            g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
@@ -249,7 +245,7 @@ def step_loop(c, k, q1, q2, w1, w2, state):
     if held:
         fx -= behind * ux
         fy -= behind * uy
-    p1, p2 = arm.joint_torques(fx, fy, u1x, u1y, u2x, u2y)
+    p1, p2 = arm.joint_torques(fx, fy, (u1x, u1y, u2x, u2y))
     return (
         (
             deltax + step * ex, deltay + step * ey, ex, ey,
@@ -305,13 +301,13 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  
         gainx, gainy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
     ) = c  # fmt: skip
     deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+    (u1x, u1y, u2x, u2y), (px, py), _, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, 0.0, 0.0, ox, noy
     )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
     hx, hy = uhx, uhy
     hx -= operator.operator_force(spring, mass, damper, px, cx, vx)
     hy -= operator.operator_force(spring, mass, damper, py, cy, vy)
@@ -322,12 +318,12 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  
     ax = controller.servo_acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
     ay = controller.servo_acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
     _, _, _, _, ffx, ffy, t1, t2 = controller.saturated_step(
-        1.0, 0.0, 0.0, u1x, u1y, u2x, u2y, 1.0, 1.0, ax, ay, sxx, sxy, syy,
-        hx - fex, hy - fey, mass, mass, limit1, limit2, square1, square2,
+        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (1.0, 1.0), (ax, ay), (sxx, sxy, syy),
+        (hx - fex, hy - fey), (mass, mass), (limit1, limit2, square1, square2),
     )  # fmt: skip
     hx = ffx + fex
     hy = ffy + fey
-    p1, p2 = arm.joint_torques(hx, hy, u1x, u1y, u2x, u2y)
+    p1, p2 = arm.joint_torques(hx, hy, (u1x, u1y, u2x, u2y))
     muscle = uhx * vx + uhy * vy
     motors = t1 * w1 + t2 * w2
     clay_power = fex * vx + fey * vy
@@ -386,12 +382,12 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
     """
     H, step, ox, noy, spring, mass, before, behind = c
     bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+    (u1x, u1y, u2x, u2y), (px, py), _, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, 0.0, 0.0, ox, noy
     )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
         cx, cy = arm.centripetal_about_sample(
-            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
         )
     fx = uhx - bx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
     fy = uhy - by0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
@@ -399,17 +395,10 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        hx, hy = arm.handle_acceleration(
-            (t1 - t2) / arm.I1,
-            t2 / arm.I2,
-            uhx - spring * px,
-            uhy - spring * py,
-            u1x,
-            u1y,
-            u2x,
-            u2y,
-        )
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        a1, a2 = (t1 - t2) / arm.I1, t2 / arm.I2
+        hx, hy = uhx - spring * px, uhy - spring * py
+        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y))
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
         hx, hy = clay.slow_force(
             hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )
@@ -418,13 +407,15 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # 
         fy += owedy - resty
         dx += softx
         dy += softy
-    ux, uy = controller.velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+    ux, uy = controller.velocity_under_torque(
+        H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
+    )
     if stiff:
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
         resty -= owedy
-    g1, g2 = arm.joint_velocity((ux - vx) / H, (uy - vy) / H, u1x, u1y, u2x, u2y, 1.0)
+    g1, g2 = arm.joint_velocity((ux - vx) / H, (uy - vy) / H, (u1x, u1y, u2x, u2y), 1.0)
     return (
         (px, py, vx, vy, fx - dx * ux, fy - dy * uy, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),

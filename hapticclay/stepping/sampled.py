@@ -90,7 +90,7 @@ class Sampled(Leapfrog):
         v = self._velocity(q, w, out)
         if v == out[:2]:
             return out[2:]
-        r1, r2 = arm.joint_velocity(v[0], v[1], *self._measure(q, w)[0], 1.0)
+        r1, r2 = arm.joint_velocity(v[0], v[1], self._measure(q, w)[0], 1.0)
         return r1, r2 - r1
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
@@ -103,10 +103,8 @@ class Sampled(Leapfrog):
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
         """arm.jacobian, position, velocity and centripetal acceleration of the handle."""
         ox, oy = self.scenario.origin
-        u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure_handle(
-            q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy
-        )
-        return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
+        u, p, _, v, c = loop.measure_handle(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
+        return u, p, v, c
 
     def _first(self, q, w) -> Pair:
         """The operator's force on the sensor of a handle that does not accelerate [N]."""
@@ -130,10 +128,8 @@ class Sampled(Leapfrog):
         ]
         # a kick of one second from rest, in which the velocity after it is the acceleration
         fex, fey = viscous_force(*b, *v)
-        fx, fy = rest[0] - fex, rest[1] - fey
-        a = controller.velocity_under_torque(
-            1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass
-        )
+        f = rest[0] - fex, rest[1] - fey
+        a = controller.velocity_under_torque(1.0, ZERO, u, tau, f, (th.mass, th.mass))
         return rest[0] - th.mass * a[0], rest[1] - th.mass * a[1]
 
     def _is_sample(self) -> bool:
@@ -167,12 +163,11 @@ class Sampled(Leapfrog):
                     1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]
                 )
             )
-        sxx, sxy, syy = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(*u)
-        *_, t1, t2 = controller.saturated_step(  # the limits come last, after the clay's share
-            1.0, 0.0, 0.0, *u, 1.0, 1.0, a[0], a[1], sxx, sxy, syy, *f, 0.0, 0.0, inf, inf, inf, inf
-        )  # fmt: skip
+        W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
+        limit = inf, inf, inf, inf  # the limits come last, after the clay's share
+        *_, t1, t2 = controller.saturated_step(1.0, ZERO, u, (1.0, 1.0), a, W, f, ZERO, limit)
         if not self.physical:
-            p1, p2 = arm.joint_torques(*fe, *u)
+            p1, p2 = arm.joint_torques(*fe, u)
             t1, t2 = t1 - p1, t2 - p2
         (l1, l2) = s.torque_limit
         return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
@@ -460,7 +455,7 @@ class HardwareLoop(Sampled):
         f0, f1 = hw.forces[self.whole_delay : self.whole_delay + 2]  # since the last: f1, then f0
         mean = [(1.0 - self.part_delay) * f0[i] + self.part_delay * f1[i] for i in (0, 1)]
         e: Any = tuple(hw.energy[i] + mean[i] * (p[i] - hw.position[i]) for i in (0, 1))
-        W = arm.mobility(*u)[::2]
+        W = arm.mobility(u)[::2]
         safe: Any = tuple(
             hardware.passivity_controller(e[i], fe[i], v[i], self.Ts, W[i]) for i in (0, 1)
         )

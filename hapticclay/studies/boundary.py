@@ -219,9 +219,7 @@ def simulated_damping(loop: Loop, guess: float, most: float = 1e5) -> float:
 def _pose_mobility(loop: Loop) -> np.ndarray:
     """W = Lambda^-1 at the handle's pose [1/kg], shape (2, 2)."""
     q1, q2 = arm.inverse_kinematics(NOMINAL[0] + loop.pose[0], NOMINAL[1] + loop.pose[1])
-    xx, xy, yy = arm.mobility(
-        *arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
-    )
+    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2))
     return np.array([[xx, xy], [xy, yy]])
 
 

@@ -124,9 +124,7 @@ class Identified:
 def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
     """Wxx and Wyy of the arm with its handle at world (x, y) [1/kg]."""
     q1, q2 = arm.inverse_kinematics(x, y)
-    wxx, _, wyy = arm.mobility(
-        *arm.jacobian(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2))
-    )
+    wxx, _, wyy = arm.mobility(arm.jacobians(q1, q2))
     return float(wxx), float(wyy)
 
 
@@ -142,8 +140,7 @@ def measured(
         return record.p, record.fh
     count = 2.0 * np.pi / noise.encoder_counts
     q = count * np.round(record.q / count)
-    a = q[:, 0] + q[:, 1]
-    u1x, u1y, u2x, u2y = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+    u1x, u1y, u2x, u2y = arm.jacobians(q[:, 0], q[:, 1])
     p = np.column_stack((u1y + u2y, -u1x - u2x)) - record.scenario.origin
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 

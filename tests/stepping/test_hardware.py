@@ -360,8 +360,8 @@ def test_a_push_below_the_friction_does_not_move_the_arm_and_one_above_does():
     """At rest, without compensator, the motors give nothing: the hand's torques J'f against the limit."""
     s = replace(hc.free(control="sampled", t_max=0.3), gain=(0.0, 0.0), force=(0.1, 0.0))
     q = arm.inverse_kinematics(*s.origin)
-    u = arm.jacobian(math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q)))
-    tau = arm.joint_torques(0.1, 0.0, *u)
+    u = arm.jacobian(*q)
+    tau = arm.joint_torques(0.1, 0.0, u)
     for factor, moves in ((1.01, False), (0.99, True)):
         parts = hc.Interface(friction=(factor * abs(tau[0]), factor * abs(tau[1])))
         r = hc.simulate(replace(s, interface=parts))
