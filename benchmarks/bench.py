@@ -1,20 +1,19 @@
 """Every benchmark, and the one page that holds their results.
 
-    python benchmarks/bench.py [--quick] [--out DIR] [--readme FILE] [--page-only]
+    python -m benchmarks.bench [--quick] [--out DIR] [--readme FILE] [--page-only]
 
 Each part writes its own data as JSON; bench.md is made from these files and nothing else.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
 
 from hapticclay import files
 
-from . import extremes, hits, parts, scaling, stiffness, throughput, work_precision
+from . import common, extremes, hits, parts, scaling, stiffness, throughput, work_precision
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
@@ -103,13 +102,10 @@ def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument(
         "--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute"
     )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument(
         "--readme", type=Path, help="a README whose table of recommended settings is to be renewed"
     )

@@ -1,13 +1,12 @@
 """Stiff and extreme scenes, each beside the reference solution and the reference's own verdict.
 
-    python benchmarks/extremes.py [--quick] [--only TEXT] [--out DIR]
+    python -m benchmarks.extremes [--quick] [--only TEXT] [--out DIR]
 
-Writes extremes.json; benchmarks/bench.py makes the page. A scene that fails is a row.
+Writes extremes.json; benchmarks.bench makes the page. A scene that fails is a row.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import tempfile
@@ -28,8 +27,7 @@ from hapticclay.model.scenario import Scenario
 from hapticclay.model.signals import Multisine
 from tests.oracles import I1, I2
 
-from . import reference
-from .work_precision import number, write
+from . import common, reference
 
 # Ours is right if the reference says one of these; "diverged" ends a run where the reference may go on into the limits
 AGREE = {"diverged": ("unstable", "limit cycle"), "limit cycle": ("limit cycle",)}
@@ -322,9 +320,9 @@ def sections(data: dict[str, Any]) -> list[str]:
         return "-" if x is None else format(x, form)
 
     cells = [
-        [r["group"], r["name"], r["ours"], r["reference"], "yes" if r["agree"] else "NO", number(r["position"]),
-         cell(r["energy"], ".3f"), number(r["residual"]), r["nan"] or 0, r["warnings"], cell(r["sigma"], ".3g"),
-         number(r["wall"]), r["note"]]
+        [r["group"], r["name"], r["ours"], r["reference"], "yes" if r["agree"] else "NO", common.number(r["position"]),
+         cell(r["energy"], ".3f"), common.number(r["residual"]), r["nan"] or 0, r["warnings"], cell(r["sigma"], ".3g"),
+         common.number(r["wall"]), r["note"]]
         for r in rows
     ]  # fmt: skip
     head = ["group", "scene", "hapticclay", "reference", "agree", "position error [m]", "kinetic peak, ratio",
@@ -349,15 +347,12 @@ def main(out: Path = Path("out/bench"), quick: bool = False, only: str = "") -> 
     rows = []
     for case in tqdm(chosen, delay=2.0, disable=None, leave=False):
         rows.append(run(case))
-    return write(out, "extremes", {"rows": rows})
+    return common.write(out, "extremes", {"rows": rows})
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="half of the scenes")
     parser.add_argument("--only", default="", help="scenes whose 'group: name' holds this text")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, args.quick, args.only))))

@@ -1,6 +1,6 @@
 """Clay of every stiffness: cuts, hits, rebounds, layers and grazing contact, each against an exact solution.
 
-    python benchmarks/hits.py [--quick] [--random N] [--out DIR]
+    python -m benchmarks.hits [--quick] [--random N] [--out DIR]
 
 With inertia shaping and motors that no hit can drive into their limits, the loop is linear between borders: the
 reference is the matrix exponential (tests/oracles.py). --random N compares N random hits, with weak motors, without
@@ -9,7 +9,6 @@ shaping, on both axes, with the reference of benchmarks/reference.py instead. Wr
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import functools
 import math
@@ -29,9 +28,8 @@ from hapticclay.model.scenario import Scenario
 from hapticclay.simulation import simulate
 from tests import oracles
 
-from . import reference
+from . import common, reference
 from .problems import EDGES
-from .work_precision import number, write
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
 STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...
@@ -198,10 +196,10 @@ def sections(data: dict[str, Any]) -> list[str]:
         line = [method, format(dt, "g")]
         for kind in kinds:
             found = [r["crossing"] for r in mine if r["problem"] == kind]
-            line.append("refused" if None in found else number(max(found)))
+            line.append("refused" if None in found else common.number(max(found)))
         for what in ("position", "force"):
             found = [r[what] for r in mine]
-            line.append("refused" if None in found else number(max(found)))
+            line.append("refused" if None in found else common.number(max(found)))
         cells.append(line)
     head = [
         "method",
@@ -235,7 +233,7 @@ def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
         for b in clays
         for kind in jobs(b)
     ]
-    return write(out, "hits", {"clays": clays, "rows": rows})
+    return common.write(out, "hits", {"clays": clays, "rows": rows})
 
 
 def study(n: int) -> None:
@@ -252,14 +250,11 @@ def study(n: int) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer clays and steps")
     parser.add_argument(
         "--random", type=int, metavar="N", help="compare N random hits with the reference instead"
     )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     if args.random:
         study(args.random)

@@ -1,6 +1,6 @@
 """How often the 95 % intervals of `identify` hold the truth: three sensors, every coefficient, many seeds.
 
-    python benchmarks/intervals.py [--seeds 200] [--processes 2] [--out DIR]
+    python -m benchmarks.intervals [--seeds 200] [--processes 2] [--out DIR]
 
 Every seed draws phases and sensor noise anew; its runs are simulated once and measured by each sensor. With a folder,
 writes intervals.md and intervals.json. 200 seeds take about an hour of processor time.
@@ -8,7 +8,6 @@ writes intervals.md and intervals.json. 200 seeds take about an hour of processo
 
 from __future__ import annotations
 
-import argparse
 import functools
 import importlib
 import json
@@ -26,7 +25,7 @@ import hapticclay as hc
 from hapticclay import files
 from hapticclay.studies import identification
 
-from .work_precision import machine
+from . import common
 
 SENSORS = {
     "20000 counts, no force noise": hc.Noise(20_000, 0.0),
@@ -97,7 +96,7 @@ def page(found: list[dict[str, Any]]) -> str:
             tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],
                      tablefmt="github", disable_numparse=True),
             "## Machine",
-            "\n".join(f"- {x}" for x in machine()),
+            "\n".join(f"- {x}" for x in common.machine()),
         ]
     ) + "\n"  # fmt: skip
 
@@ -112,18 +111,18 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
     print(page(found))
     if out:
         with files.atomic(out / "intervals.json") as f:
-            f.write((json.dumps({"machine": machine(), "rows": found}, indent=1) + "\n").encode())
+            f.write(
+                (json.dumps({"machine": common.machine(), "rows": found}, indent=1) + "\n").encode()
+            )
         with files.atomic(out / "intervals.md") as f:
             f.write(page(found).encode())
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", type=Path)
+    parser.set_defaults(out=None)
     args = parser.parse_args()
     main(args.seeds, args.processes, args.out)

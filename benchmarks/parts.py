@@ -1,13 +1,12 @@
 """What each part of a scene costs: of the engine's step, and of the whole loop. A part that is off is not there.
 
-    python benchmarks/parts.py [--out DIR] [--rounds N] [--steps N]
+    python -m benchmarks.parts [--out DIR] [--rounds N] [--steps N]
 
 Every part is measured beside the plain scene, in turns; medians of ratios. Writes parts.json.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import statistics
@@ -27,7 +26,7 @@ from hapticclay.model.signals import Multisine
 from hapticclay.stepping import energy, engine
 from hapticclay.views import stage
 
-from .work_precision import write
+from . import common
 
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:
@@ -184,14 +183,11 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
-    return write(out, "parts", {"rounds": rounds, "steps": steps, **found})
+    return common.write(out, "parts", {"rounds": rounds, "steps": steps, **found})
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
     args = parser.parse_args()

@@ -1,6 +1,6 @@
 """Force over velocity in the clay through real hardware: its error against the resolution of encoder and converters.
 
-    python benchmarks/resolution.py [--out DIR]
+    python -m benchmarks.resolution [--out DIR]
 
 The constant cut with sampling, hold and a delay of one sample; writes resolution.md and resolution.json, whose every
 figure comes from the runs.
@@ -8,7 +8,6 @@ figure comes from the runs.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import math
@@ -23,7 +22,7 @@ from hapticclay import files
 from hapticclay.model.constants import B_CONSTANT, L2, TS
 from hapticclay.theory import linear_loop
 
-from .work_precision import machine, number
+from . import common
 
 FORCE = 5.0  # [N] of the hand: 5 cm/s in the clay
 END = 0.20  # [m] of the cut
@@ -81,7 +80,7 @@ def page(rows: list[dict[str, Any]]) -> str:
             r["bits"] or "exact",
             f"{1e3 * r['delay']:g}",
         ]
-        figures = ["-" if r[k] is None else number(r[k]) for k in ("least", "mean", "rms")]
+        figures = ["-" if r[k] is None else common.number(r[k]) for k in ("least", "mean", "rms")]
         cells.append([str(x) for x in text] + figures + [r["status"]])
     return "\n\n".join(
         [
@@ -93,7 +92,7 @@ def page(rows: list[dict[str, Any]]) -> str:
             "Made by `benchmarks/resolution.py`; do not edit.",
             tabulate(cells, head, tablefmt="github", disable_numparse=True),
             "## Machine",
-            "\n".join(f"- {x}" for x in machine()),
+            "\n".join(f"- {x}" for x in common.machine()),
         ]
     ) + "\n"  # fmt: skip
 
@@ -111,8 +110,6 @@ def main(out: Path | None, **kw: Any) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path)
+    parser = common.parser(__doc__)
+    parser.set_defaults(out=None)
     main(parser.parse_args().out)

@@ -1,15 +1,13 @@
 """How a sweep scales: dask workers on the cores of this machine, and what limits it on many.
 
-    python benchmarks/scaling.py [--out DIR] [--rounds N]
+    python -m benchmarks.scaling [--out DIR] [--rounds N]
 
 A real scheduler and worker processes, as on a cluster; worker counts in turns. Writes scaling.json and scaling.png.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import os
 import statistics
 import tempfile
 import time
@@ -22,9 +20,8 @@ from hapticclay.files import atomic
 from hapticclay.studies import sweep
 from hapticclay.studies.sampling import Sweep, parse_grid
 
-from .work_precision import write
+from . import common
 
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 NEEDS = ("distributed", "pyarrow")
 TASKS = 2000  # empty ones, by which the scheduler is timed
 ASKED = 10.0  # [s] that docs/sweep.md advises for a chunk
@@ -50,10 +47,10 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
     """Seconds of the sweep by number of workers, of a chunk, of a task for the scheduler; bytes of a chunk."""
     from distributed import Client, LocalCluster
 
-    todo, times = job(quick), {n: [] for n in range(1, CORES + 1)}
+    todo, times = job(quick), {n: [] for n in range(1, common.CORES + 1)}
     bytes_ = 0
     with tempfile.TemporaryDirectory() as folder, LocalCluster(
-        n_workers=CORES, threads_per_worker=1, dashboard_address="", local_directory=folder
+        n_workers=common.CORES, threads_per_worker=1, dashboard_address="", local_directory=folder
     ) as cluster, Client(cluster) as client:  # fmt: skip
         crew = sorted(client.scheduler_info(n_workers=-1)["workers"])
         for k in range(rounds + 1):
@@ -159,7 +156,7 @@ def main(
     """Measures, writes the data and the diagram; returns the data."""
     missing = [name for name in NEEDS if not importlib.util.find_spec(name)]
     if missing:
-        return write(
+        return common.write(
             out,
             "scaling",
             {"rows": [], "omissions": [f"scaling: {x} is not installed" for x in missing]},
@@ -167,20 +164,17 @@ def main(
     found = measure(quick, rounds or (1 if quick else 5))
     data = {
         **found,
-        "cores": CORES,
+        "cores": common.CORES,
         "asked_s": ASKED,
         "rows": rows(found),
         "projection": projection(found),
     }
     draw(data, out)
-    return write(out, "scaling", data)
+    return common.write(out, "scaling", data)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, rounds=args.rounds))))

@@ -1,14 +1,13 @@
 """Closed loop against the floor: a bare mj_step loop in C of the same model, in turns, medians.
 
-    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N] [--full]
+    python -m benchmarks.throughput [--out DIR] [--rounds N] [--steps N] [--full]
 
 Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a batch, 100 000 runs
-for linearity, and a stability map. Writes throughput.json; benchmarks/bench.py makes the page.
+for linearity, and a stability map. Writes throughput.json; benchmarks.bench makes the page.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import os
 import statistics
@@ -28,11 +27,10 @@ import hapticclay as hc
 from hapticclay.simulation import simulate
 from hapticclay.stepping import leapfrog
 
-from .work_precision import write
+from . import common
 
 LONG = 5555  # steps of 2 s, as the runs of the map
 OFTEN = 5  # compiled runs to one in Python, which takes as long
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
@@ -162,7 +160,7 @@ def beside(
     """
     from hapticclay.stepping import compiled
 
-    each = max(1, min(100, len(todo) // (8 * CORES)))
+    each = max(1, min(100, len(todo) // (8 * common.CORES)))
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
@@ -178,7 +176,7 @@ def beside(
 
     usual, compiled.BatchPool = compiled.BatchPool, Turns
     try:
-        took = timed(hc.simulate_batch, todo, keep=keep) * (CORES, 1.0)
+        took = timed(hc.simulate_batch, todo, keep=keep) * (common.CORES, 1.0)
     finally:
         compiled.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
@@ -230,7 +228,7 @@ def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
         todo = jobs(n, steps)
         run, bare = np.mean([beside(todo, steps) for _ in range(max(1, 20_000 // n))], axis=0)
         over, over_cpu = (run / (steps * bare)).tolist()
-        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * float(run[0]) / CORES, "over_floor": over,
+        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * float(run[0]) / common.CORES, "over_floor": over,
                      "over_floor_cpu": over_cpu, "peak_MiB": memory()})  # fmt: skip
     return rows
 
@@ -298,14 +296,11 @@ def main(
     if native and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]
-    return write(out, "throughput", data)
+    return common.write(out, "throughput", data)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
     parser.add_argument("--full", action="store_true")

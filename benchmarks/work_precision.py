@@ -1,21 +1,16 @@
 """Error against run time: hapticclay and its peers on the same jobs, in one process, taking turns.
 
-    python benchmarks/work_precision.py [--quick] [--out DIR]
+    python -m benchmarks.work_precision [--quick] [--out DIR]
 
-Writes work_precision.json and one PNG a job; benchmarks/bench.py makes the page.
+Writes work_precision.json and one PNG a job; benchmarks.bench makes the page.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import importlib
-import json
 import math
-import os
-import platform
 import statistics
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +21,7 @@ from tqdm import tqdm
 import hapticclay as hc
 from hapticclay import files
 
+from . import common
 from . import reference as hybrid
 from .problems import EDGES, PROBLEMS, Result, reference
 
@@ -37,17 +33,6 @@ PEERS = (
     "pybullet_peer",
     "drake_peer",
     "pinocchio_peer",
-)
-DISTRIBUTIONS = (
-    "hapticclay",
-    "mujoco",
-    "numpy",
-    "scipy",
-    "numba",
-    "control",
-    "pybullet",
-    "drake",
-    "pin",
 )
 ERRORS = {
     "crossing": "largest error of the three crossing times [s]",
@@ -100,9 +85,12 @@ def errors(problem: str, r: Result) -> dict[str, float | None]:
 
 
 def measure(
-    quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS
+    quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS, rounds: int = 5
 ) -> tuple[list[dict], list[str]]:
-    """All rows, and what was left out. Every setting is run once a round; times are medians over rounds."""
+    """All rows, and what was left out.
+
+    Every setting is run once a round; times are medians over rounds.
+    """
     modules, omissions = [], []
     for name in peers:
         try:
@@ -116,7 +104,6 @@ def measure(
                 jobs += [(problem, m, method, x) for x in (settings[: 3 if quick else None])]
     first: list[Result] = []
     walls: list[list[float]] = [[] for _ in jobs]
-    rounds = 2 if quick else 5
     with tqdm(total=rounds * len(jobs), delay=2.0, disable=None, leave=False) as bar:
         for n in range(rounds):
             for i, (problem, m, method, setting) in enumerate(jobs):
@@ -290,35 +277,6 @@ def draw(rows: list[dict], problem: str):
     return figure
 
 
-def machine() -> list[str]:
-    """Lines that say where and with what the figures were made."""
-    found = []
-    for name in DISTRIBUTIONS:
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            continue
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        names = [
-            x.split(":", 1)[1].strip()
-            for x in info.read_text().splitlines()
-            if x.startswith("model name")
-        ]
-        cpu = names[0] if names else cpu
-    load = f"load average {os.getloadavg()[1]:.1f} at the end; run times are those of a quiet machine only where it is low"
-    return [
-        f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}",
-        ", ".join(found),
-        load,
-    ]
-
-
-def number(x: float | None) -> str:
-    return "-" if x is None else format(x, ".1e")
-
-
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
     rows = data["rows"]
@@ -350,7 +308,7 @@ def sections(data: dict[str, Any]) -> list[str]:
         mine = [r for r in rows if r["problem"] == problem]
         name = problem.replace(" ", "_")
         cells = [
-            [r["package"], r["method"], format(r["setting"], "g"), *(number(r[k]) for k in ERRORS), number(r["wall"]),
+            [r["package"], r["method"], format(r["setting"], "g"), *(common.number(r[k]) for k in ERRORS), common.number(r["wall"]),
              r["note"]]
             for r in mine
         ]  # fmt: skip
@@ -389,7 +347,12 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
 
 def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
     cells = [
-        [x["render"], format(x["Ts"], "g"), number(x["hybrid"]), number(x["continuous"])]
+        [
+            x["render"],
+            format(x["Ts"], "g"),
+            common.number(x["hybrid"]),
+            common.number(x["continuous"]),
+        ]
         for x in rows
     ]
     head = ["render", "Ts [s]", "against the hybrid system [m]", "against continuous time [m]"]
@@ -398,8 +361,8 @@ def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
 
 def table_of_settings(found: list[dict[str, Any]]) -> str:
     cells = [
-        [format(x["asked"], ".0e"), x["package"], x["method"], format(x["setting"], "g"), number(x["error"]),
-         number(x["wall"])]
+        [format(x["asked"], ".0e"), x["package"], x["method"], format(x["setting"], "g"), common.number(x["error"]),
+         common.number(x["wall"])]
         for x in found
     ]  # fmt: skip
     head = ["asked error [s]", "package", "method", "setting", "error [s]", "time per simulated s"]
@@ -409,27 +372,16 @@ def table_of_settings(found: list[dict[str, Any]]) -> str:
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
     """Measures, writes the data and the diagrams; returns the data."""
     problems = list(PROBLEMS)[: 1 if quick else None]
-    rows, omissions = measure(quick, problems)
+    rows, omissions = measure(quick, problems, rounds=2 if quick else 5)
     for problem in problems:
         with files.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
             draw(rows, problem).savefig(f, format="png")
     found = {"omissions": omissions, "rows": rows, "hybrid": against_hybrid(quick)}
-    return write(out, "work_precision", found)
-
-
-def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
-    """Writes out/name.json, with schema and machine; returns what it holds."""
-    data = {"schema": f"hapticclay-{name.replace('_', '-')}-2", "machine": machine(), **found}
-    with files.atomic(out / f"{name}.json") as f:
-        f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
-    return data
+    return common.write(out, "work_precision", found)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="one job, three settings a method")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, args.quick))))

@@ -31,6 +31,7 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "paper_runs": "ledger",
     "ledger_rows": "ledger",
     "rows": "bench",
+    "scaled": "bench",
     "poses": "poses",
     "whole": "sweep",
     "screen": "gui",
