@@ -42,7 +42,8 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     if {"work_precision", "hits"} <= set(data):
         text += [
             "## Which step to take",
-            "hapticclay's fastest setting that keeps an asked error in the times of the border crossings, in every cut "
+            "hapticclay's fastest setting that keeps an asked error in the times of the border "
+            "crossings, in every cut "
             "of the next section and in every clay and job of the section on hits.",
             recommended(data),
         ]
@@ -61,7 +62,10 @@ def page(data: dict[str, dict[str, Any]]) -> str:
 
 
 def recommended(data: dict[str, dict[str, Any]]) -> str:
-    """The table of recommended settings for the README: good for every job of hapticclay's, hits among them."""
+    """The table of recommended settings for the README:
+
+    good for every job of hapticclay's, hits among them.
+    """
     rows = data["work_precision"]["rows"] + data["hits"]["rows"]
     return work_precision.table_of_settings(work_precision.recommend(rows, {"hapticclay"}))
 
@@ -94,7 +98,8 @@ def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None
     )
     rows = data["extremes"]["rows"]
     print(
-        f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of the reference"
+        f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of "
+        "the reference"
     )
     for x in data["work_precision"]["omissions"]:
         print(f"left out: {x}")

@@ -1,10 +1,13 @@
-"""Clay of every stiffness: cuts, hits, rebounds, layers and grazing contact, each against an exact solution.
+"""Hits on clay of any stiffness beside an exact solution.
+
+Cuts, hits, rebounds, layers and grazing contact.
 
     python -m benchmarks.hits [--quick] [--random N] [--out DIR]
 
-With inertia shaping and motors that no hit can drive into their limits, the loop is linear between borders: the
-reference is the matrix exponential (tests/oracles.py). --random N compares N random hits, with weak motors, without
-shaping, on both axes, with the reference of benchmarks/reference.py instead. Writes hits.json.
+With inertia shaping and motors that no hit can drive into their limits, the loop is linear between
+borders: the reference is the matrix exponential (tests/oracles.py). --random N compares N random
+hits, with weak motors, without shaping, on both axes, with the reference of benchmarks/reference.py
+instead. Writes hits.json.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import dataclasses
 import functools
 import math
 import statistics
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +76,10 @@ def jobs(b: float) -> dict[str, Scenario]:
 
 @functools.cache
 def exact(kind: str, b: float) -> tuple[list[tuple[float, float, float]], float, float]:
-    """Crossings of a job, its position at the end [m], and the clay's force FELT after the first of them [N]."""
+    """Return a job's crossings, its last position [m], and the clay's force [N].
+
+    The force is that FELT after the first crossing.
+    """
     s = jobs(b)[kind]
     assert s.clay is not None
     edges, values = s.clay.x.edges, s.clay.x.values
@@ -138,7 +145,10 @@ def methods() -> dict[str, tuple[float, ...]]:
 
 
 def scene(seed: int) -> Scenario:
-    """A random hit: b from 1e2 to 1e7 in one to three layers, 0.05 to 0.5 m/s, with and without a hand, on one axis."""
+    """A random hit:
+
+    b from 1e2 to 1e7 in one to three layers, 0.05 to 0.5 m/s, with and without a hand, on one axis.
+    """
     rng = np.random.default_rng(seed)
     v, axis = rng.uniform(0.05, 0.5), int(rng.integers(2))
     n = int(rng.integers(1, 4))
@@ -163,17 +173,23 @@ def scene(seed: int) -> Scenario:
     )
 
 
-def against_reference(seed: int, dt: float = TS) -> dict[str, Any]:
-    """One random hit beside the reference: largest errors of border times and of positions on the way."""
+def against_reference(
+    seed: int, dt: float = TS, solve: Callable[..., Any] = reference.solve
+) -> dict[str, Any]:
+    """One random hit beside the reference:
+
+    largest errors of border times and of positions on the way.
+    """
     s = dataclasses.replace(scene(seed), dt=dt)
     index = np.arange(1, math.floor(s.t_max / dt), max(1, round(3e-3 / dt)))
-    x = reference.solve(s, index * dt)
+    x = solve(s, index * dt)
     r = hc.simulate(s)
-    # a handle that hardly leaves the clay may pass the border some times more, as slowly: the nearest time counts
+    # a handle that hardly leaves the clay may pass the border some times more, as slowly: the
+    # nearest time counts
     late = [
         (abs(c.speed), min(abs(c.time - e[2]) for e in x.crossings))
         for c in r.crossings
-        if x.crossings
+        if len(x.crossings)
     ]
     n = min(len(x.p), int(np.searchsorted(index, len(r.p))))
     return {
@@ -210,11 +226,16 @@ def sections(data: dict[str, Any]) -> list[str]:
     ]
     return [
         "## Hits",
-        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit at 0.3 m/s and its "
-        "rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, b/10, b), and grazing contact at about "
-        "1 cm/s. Largest error, over all clays, of the times at which a border is passed (faster than "
-        f"{SLOW:g} m/s), of the position at the end, and relative error of the force on the hand {FELT:g} s after "
-        "the hit. The reference is the matrix exponential. Refused: the explicit method would take more than 1000 "
+        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit "
+        "at 0.3 m/s and its "
+        "rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, b/10, b), and grazing "
+        "contact at about "
+        "1 cm/s. Largest error, over all clays, of the times at which a border is passed (faster "
+        "than "
+        f"{SLOW:g} m/s), of the position at the end, and relative error of the force on the hand "
+        f"{FELT:g} s after "
+        "the hit. The reference is the matrix exponential. Refused: the explicit method would take "
+        "more than 1000 "
         "steps a sample.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]

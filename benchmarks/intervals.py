@@ -1,9 +1,12 @@
-"""How often the 95 % intervals of `identify` hold the truth: three sensors, every coefficient, many seeds.
+"""Share of 95 % intervals of `identify` that hold the truth.
+
+Three sensors, every coefficient, many seeds.
 
     python -m benchmarks.intervals [--seeds 200] [--processes 2] [--out DIR]
 
-Every seed draws phases and sensor noise anew; its runs are simulated once and measured by each sensor. With a folder,
-writes intervals.md and intervals.json. 200 seeds take about an hour of processor time.
+Every seed draws phases and sensor noise anew; its runs are simulated once and measured by each
+sensor. With a folder, writes intervals.md and intervals.json. 200 seeds take about an hour of
+processor time.
 """
 
 from __future__ import annotations
@@ -43,7 +46,10 @@ BLOCKS: tuple[tuple[str, bool], ...] = (
 def one(
     seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any
 ) -> list[dict[str, Any]]:
-    """A row for each coefficient of each block and sensor: its share of error, and of half its interval."""
+    """A row for each coefficient of each block and sensor:
+
+    its share of error, and of half its interval.
+    """
     module = importlib.import_module("hapticclay.studies.identification")
     simulate = module.simulate
     runs = kw.get("realisations", 4)
@@ -52,13 +58,22 @@ def one(
     )  # for every sensor
     try:
         return [
-            {"what": what, "shaping": shaping, "axis": axis, "sensors": name, "coefficient": c.name,
-             "error": c.error, "half": 0.5 * (c.high - c.low) / c.printed}
+            {
+                "what": what,
+                "shaping": shaping,
+                "axis": axis,
+                "sensors": name,
+                "coefficient": c.name,
+                "error": c.error,
+                "half": 0.5 * (c.high - c.low) / c.printed,
+            }
             for what, shaping in blocks
             for axis in axes
             for name, noise in SENSORS.items()
-            for c in hc.identify(axis, what, shaping=shaping, noise=noise, seed=seed, **kw).coefficients
-        ]  # fmt: skip
+            for c in hc.identify(
+                axis, what, shaping=shaping, noise=noise, seed=seed, **kw
+            ).coefficients
+        ]
     finally:
         module.simulate = simulate
 
@@ -72,10 +87,13 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         ).append(r)
     return [
         dict(zip(("what", "shaping", "axis", "coefficient", "sensors"), key, strict=True))
-        | {"seeds": len(g), "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
-           "half": statistics.median(r["half"] for r in g)}
+        | {
+            "seeds": len(g),
+            "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
+            "half": statistics.median(r["half"] for r in g),
+        }
         for key, g in groups.items()
-    ]  # fmt: skip
+    ]
 
 
 def page(found: list[dict[str, Any]]) -> str:
@@ -87,18 +105,28 @@ def page(found: list[dict[str, Any]]) -> str:
             f"{x['covered']:.3f}, {x['half']:.1e}"
         )
     n = found[0]["seeds"]
-    return "\n\n".join(
-        [
-            "# Coverage of the intervals of `identify`",
-            f"Share of {n} seeds whose {100 * identification.COVER:g} % interval holds the printed value, and half the "
-            f"median interval as a share of it. By chance alone, two thirds of the shares are within "
-            f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do not edit.",
-            tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],
-                     tablefmt="github", disable_numparse=True),
-            "## Machine",
-            "\n".join(f"- {x}" for x in common.machine()),
-        ]
-    ) + "\n"  # fmt: skip
+    return (
+        "\n\n".join(
+            [
+                "# Coverage of the intervals of `identify`",
+                f"Share of {n} seeds whose {100 * identification.COVER:g} % interval holds the "
+                "printed value, and half the "
+                "median interval as a share of it. By chance alone, two thirds of the shares are "
+                "within "
+                f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do "
+                "not edit.",
+                tabulate(
+                    [[*k, *v] for k, v in cells.items()],
+                    ["block", "axis", "coefficient", *SENSORS],
+                    tablefmt="github",
+                    disable_numparse=True,
+                ),
+                "## Machine",
+                "\n".join(f"- {x}" for x in common.machine()),
+            ]
+        )
+        + "\n"
+    )
 
 
 def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[dict[str, Any]]:

@@ -1,4 +1,6 @@
-"""What each part of a scene costs: of the engine's step, and of the whole loop. A part that is off is not there.
+"""What each part of a scene costs, in the engine's step and in the whole loop.
+
+A part that is off is not there.
 
     python -m benchmarks.parts [--out DIR] [--rounds N] [--steps N]
 
@@ -108,7 +110,10 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
 
 
 def step(model: mujoco.MjModel, steps: int) -> float:
-    """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
+    """Return seconds a step of the engine alone, looping in C.
+
+    It is restarted often enough to stay clear of denormals.
+    """
     data = mujoco.MjData(model)
     spent = 0.0
     for _ in range(max(1, steps // 500)):

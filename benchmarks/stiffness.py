@@ -1,11 +1,12 @@
-"""Stiff clay: from soft to 1e9 N.s/m at one step, the default run beside plain MuJoCo, up to where each breaks down.
+"""Stiff clay up to 1e9 N.s/m at one step, beside plain MuJoCo.
 
-A position can be right whatever the impulse was: a hit and its rebound (hits.py) tell whether the clay gave it in full.
+A position can be right whatever the impulse was: a hit and its rebound (hits.py) tell whether the
+clay gave it in full.
 
     python -m benchmarks.stiffness [--dt 3.6e-4] [--out DIR]
 
-The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks.bench makes the
-page.
+The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks.bench makes
+the page.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ BROKEN = (
 
 
 def row(b: float, dt: float) -> dict[str, Any]:
-    """Final position and peak of v^2 along x for one b: error against, and ratio to, the reference."""
+    """Final position and peak of v^2 along x for one b:
+
+    error against, and ratio to, the reference.
+    """
     name = f"b = {b:g}"
     PROBLEMS[name] = s = hc.constant_cut(b=b, t_max=T, gain=(1.0, 0.1))
     try:
@@ -83,13 +87,17 @@ def sections(data: dict[str, Any]) -> list[str]:
         cells.append(line)
     return [
         "## Stiff clay",
-        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. Position error after "
-        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an "
-        "error above 1 mm, ten times the energy, or not a number. Rebound: error of the time at which a handle that "
-        "has hit the clay at 0.2 m/s leaves it; force: relative error of the clay's force after the hit; both against "
+        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. "
+        "Position error after "
+        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under "
+        "Radau. Broken: an "
+        "error above 1 mm, ten times the energy, or not a number. Rebound: error of the time at "
+        "which a handle that "
+        "has hit the clay at 0.2 m/s leaves it; force: relative error of the clay's force after "
+        "the hit; both against "
         "the matrix exponential.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
-    ]  # fmt: skip
+    ]
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False, dt: float = 3.6e-4) -> dict[str, Any]:

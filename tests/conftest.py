@@ -38,6 +38,14 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "page": "gui",
     "test_page.py": "gui",
 }
+PLAIN = {  # files whose tests are about the Python loop
+    "test_energy.py",
+    "test_engine.py",
+    "test_inline.py",
+    "test_interrupted.py",
+    "test_loop.py",
+    "test_monitor.py",
+}
 AUTO_FROM = simulate.NATIVE_FROM
 
 
@@ -49,6 +57,8 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.xdist_group(group))
         if item.get_closest_marker("perf"):
             item.add_marker(pytest.mark.xdist_group("perf"))
+        if item.path.name in PLAIN:
+            item.add_marker(pytest.mark.plain)
 
 
 @contextlib.contextmanager

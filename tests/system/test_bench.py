@@ -81,7 +81,10 @@ def test_peers_converge_to_the_reference(rows):
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS)
 def test_compiled_right_hand_side_is_the_plain_one(problem):
-    """The same law compiled: rounding of sums in another order; and so the same crossings, at an rtol of 1e-10."""
+    """The same law compiled:
+
+    rounding of sums in another order; and so the same crossings, at an rtol of 1e-10.
+    """
     job = peers.Job.of(problem)
     plain, fast = peers.ode(job), peers.compiled_ode(job)
     rng = np.random.default_rng(0)
@@ -96,8 +99,11 @@ def test_compiled_right_hand_side_is_the_plain_one(problem):
 
 def test_leaders_are_said_by_the_figures():
     times = {"a": {1e-5: 1.0, 1e-9: 4.0}, "b": {1e-7: 6.0, 1e-9: 3.0}}
-    rows = [dict(problem="p", package=k, method="m", setting=e, crossing=e, wall=w)
-            for k, x in times.items() for e, w in x.items()]  # fmt: skip
+    rows = [
+        dict(problem="p", package=k, method="m", setting=e, crossing=e, wall=w)
+        for k, x in times.items()
+        for e, w in x.items()
+    ]
     found = wp.leaders(rows)
     assert [x["package"] for x in found] == ["a"] * 4 + ["b"] * 3  # from 1e-2 to 1e-5, from 1e-6 on
     assert (
@@ -189,9 +195,17 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
     assert files == [
-        "bench.md", "default_cut.png", "extremes.json", "hits.json", "parts.json", "scaling.json", "scaling.png",
-        "stiffness.json", "throughput.json", "work_precision.json",
-    ]  # fmt: skip
+        "bench.md",
+        "default_cut.png",
+        "extremes.json",
+        "hits.json",
+        "parts.json",
+        "scaling.json",
+        "scaling.png",
+        "stiffness.json",
+        "throughput.json",
+        "work_precision.json",
+    ]
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
     assert methods - {"fast, native", "accurate, native"} == {

@@ -54,6 +54,7 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
 
 
 @needs_gl
+@pytest.mark.perf
 def test_frame_is_quick_in_software(record):
     """Below 60 ms of processor time at 640x480; wall time says more about the neighbours than about us."""
     images = film.frames(record, size=(640, 480))
