@@ -12,14 +12,16 @@ import signal
 import pytest
 from hypothesis import settings
 
-from hapticclay.simulation import simulate
+os.environ.setdefault("MPLBACKEND", "agg")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
+
+from hapticclay.simulation import simulate  # noqa: E402
 
 try:
     import fcntl
 except ImportError:  # Windows: no locks, so ratios of run times are disturbed there
     fcntl = None
 
-os.environ.setdefault("MPLBACKEND", "agg")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's and its children's
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
