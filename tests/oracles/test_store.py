@@ -1,8 +1,11 @@
 """A stored solution is taken only for its own case, solved by its own source."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from benchmarks import reference
 from tests.oracles import nonlinear, store
 
 EDGES, PUSH = (0.01, 0.02), (1.0, 0.0)
@@ -36,13 +39,14 @@ def test_a_solution_is_computed_once_and_is_the_oracle_s(solved):
 
 
 @pytest.mark.parametrize("change", ["value", "array", "source", "damage"])
-def test_another_case_source_or_a_damaged_file_is_solved_anew(solved, change, tmp_path, monkeypatch):
+def test_what_changed_is_solved_anew(solved, change, tmp_path, monkeypatch):
+    """Another case, another source, a damaged file."""
     oracle, case = counted(solved), list(CASE)
     store.solution("a", oracle, *CASE)
     if change == "value":
         case[3] = (1.0, 1e-9)
     elif change == "array":
-        case[7] = TIMES * (1.0 + 1e-15)
+        case[7] = TIMES * (1.0 + 1e-9)
     elif change == "source":
         other = tmp_path / "oracle.py"
         other.write_text("# a comment more\n")
@@ -53,6 +57,13 @@ def test_another_case_source_or_a_damaged_file_is_solved_anew(solved, change, tm
     store.solution("a", oracle, *case)
     store.solution("a", oracle, *case)
     assert len(solved) == 2
+
+
+def test_sources_are_those_that_the_oracle_imports():
+    names = {file.name for file in store.sources(Path(reference.__file__))}
+    assert names == {"reference.py", "arm.py"}
+    folder = Path(store.__file__).parent
+    assert store.sources(folder / "nonlinear.py") == {folder / "nonlinear.py", folder / "arm.py"}
 
 
 def test_what_is_stored_is_small():
