@@ -53,7 +53,7 @@ def test_handle_with_a_hand_leaves_stiff_clay_when_it_should():
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_hits_keep_what_the_documents_promise(seed):
-    """benchmarks/hits.py --random does it 300 times."""
+    """`python -m benchmarks.hits --random 300` does it 300 times."""
     r = hits.against_reference(
         seed, solve=lambda *at: store.solution(f"hit-{seed}", reference.solve, *at)
     )
