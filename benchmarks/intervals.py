@@ -109,7 +109,7 @@ def page(found: list[dict[str, Any]]) -> str:
         "\n\n".join(
             [
                 "# Coverage of the intervals of `identify`",
-                f"Share of {n} seeds whose {100 * identification.COVER:g} % interval holds the "
+                f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval holds the "
                 "printed value, and half the "
                 "median interval as a share of it. By chance alone, two thirds of the shares are "
                 "within "

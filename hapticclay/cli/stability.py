@@ -85,7 +85,7 @@ def verdicts(loop: boundary.Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     Margins and transparency are those of continuous time; NaN where the loop is unstable there.
     """
     axis, K, b, Ts = loop.axis, loop.K, loop.b, loop.Ts or TS
-    kw: dict[str, Any] = dict(impedance=loop.operator is not None, operator=loop.operator)
+    kw: dict[str, Any] = dict(operator=loop.operator)
     rows: list[dict[str, Any]] = []
 
     def add(question: str, answer: bool | None, value: float, what: str, omega: float) -> None:

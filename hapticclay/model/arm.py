@@ -1,132 +1,197 @@
-"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced at the elbow.
+"""The direct-drive arm in closed form: two links in a horizontal plane, link 2 balanced.
 
-Angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use the
-absolute angles theta1 = q1, theta2 = q1 + q2, in which the inertia matrix is diag(I1, I2),
-constant, without Coriolis terms. Derivations: docs/equations.md.
+Joint angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14). The formulas use
+the absolute angles theta1 = q1 and theta2 = q1 + q2, in which the inertia matrix is the constant
+diag(I1, I2), without Coriolis terms. Derivations: docs/equations.md.
 """
 
 from __future__ import annotations
 
 import math
 from math import cos, sin
+from typing import Any
+
+import numpy as np
 
 from .constants import L1, L2, S
 
-I1 = (
-    L1 * L1 / S[0].gain
-)  # [kg.m^2]; Sh at high frequency is 1/Lambda, so Lambda_x = 1/0.7919 kg (Eq. 17)
-I2 = L2 * L2 / S[1].gain  # [kg.m^2]; Lambda_y = 1/0.131 kg (Eq. 18)
+Columns = tuple[float, float, float, float]
 
-
+# [kg.m^2]; Sh at high frequency is 1/Lambda: Lambda_x = 1/0.7919 kg, Lambda_y = 1/0.131 kg
+I1 = L1 * L1 / S[0].gain  # Eq. 17
+I2 = L2 * L2 / S[1].gain  # Eq. 18
 TRACE_W = L1 * L1 / I1 + L2 * L2 / I2  # trace of Lambda^-1 [1/kg], the same at every pose
 
 
-def jacobian(s1: float, c1: float, s12: float, c12: float) -> tuple[float, float, float, float]:
+def jacobian(q1: float, q2: float) -> Columns:
     """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14).
 
     Args:
-        s1, c1: sine and cosine of q1. s12, c12: of q1 + q2. Floats, or arrays of one shape.
+        q1: angle of link 1 [rad].
+        q2: angle of link 2 against link 1 [rad].
 
     Returns:
         (u1x, u1y, u2x, u2y) [m]. The handle lies at (u1y + u2y, -u1x - u2x) in the world.
     """
-    return -L1 * s1, L1 * c1, -L2 * s12, L2 * c12
+    a = q1 + q2
+    return -L1 * sin(q1), L1 * cos(q1), -L2 * sin(a), L2 * cos(a)
+
+
+def jacobians(q1: Any, q2: Any) -> tuple[Any, ...]:
+    """As `jacobian`, over arrays.
+
+    Args:
+        q1: angles of link 1 [rad], of any shape.
+        q2: angles of link 2 against link 1 [rad], of the same shape.
+
+    Returns:
+        (u1x, u1y, u2x, u2y) [m], of the same shape.
+    """
+    a = q1 + q2
+    return -L1 * np.sin(q1), L1 * np.cos(q1), -L2 * np.sin(a), L2 * np.cos(a)
 
 
 def handle_position(q1: float, q2: float) -> tuple[float, float]:
-    """World position of the handle [m] at joint angles q1, q2 [rad]."""
-    u1x, u1y, u2x, u2y = jacobian(sin(q1), cos(q1), sin(q1 + q2), cos(q1 + q2))
+    """World position of the handle.
+
+    Args:
+        q1: angle of link 1 [rad].
+        q2: angle of link 2 against link 1 [rad].
+
+    Returns:
+        (x, y) [m].
+    """
+    u1x, u1y, u2x, u2y = jacobian(q1, q2)
     return u1y + u2y, -u1x - u2x
 
 
-def mobility(u1x: float, u1y: float, u2x: float, u2y: float) -> tuple[float, float, float]:
+def mobility(u):
     """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987).
 
     Args:
-        u1x, u1y, u2x, u2y: result of `jacobian` [m].
+        u: from `jacobian` or `jacobians` [m].
 
     Returns:
         (Wxx, Wxy, Wyy) [1/kg].
     """
+    u1x, u1y, u2x, u2y = u
     a = u1x / I1
     b = u2x / I2
     wxx = u1x * a + u2x * b
     return wxx, u1y * a + u2y * b, TRACE_W - wxx
 
 
-def handle_velocity(
-    r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float
-) -> tuple[float, float]:
-    """Handle velocity [m/s] of the absolute link rates r1, r2 [rad/s]; columns as above."""
+def handle_velocity(r1, r2, u):
+    """Handle velocity from the absolute link rates.
+
+    Args:
+        r1: rate of link 1 [rad/s].
+        r2: rate of link 2 [rad/s].
+        u: from `jacobian` or `jacobians` [m].
+
+    Returns:
+        (vx, vy) [m/s].
+    """
+    u1x, u1y, u2x, u2y = u
     return u1x * r1 + u2x * r2, u1y * r1 + u2y * r2
 
 
-def centripetal(
-    r1: float, r2: float, u1x: float, u1y: float, u2x: float, u2y: float
-) -> tuple[float, float]:
-    """c = -J' q', acceleration of the handle towards the joints at link rates r1, r2 [m/s^2]."""
+def centripetal(r1, r2, u):
+    """Centripetal acceleration of the handle, c = -J' q', towards the joints.
+
+    Args:
+        r1: rate of link 1 [rad/s].
+        r2: rate of link 2 [rad/s].
+        u: from `jacobian` [m].
+
+    Returns:
+        (cx, cy) [m/s^2].
+    """
+    u1x, u1y, u2x, u2y = u
     s1 = r1 * r1
     s2 = r2 * r2
     return u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
 
 
-def centripetal_about_sample(
-    L: float,
-    cx: float,
-    cy: float,
-    vx: float,
-    vy: float,
-    u1x: float,
-    u1y: float,
-    u2x: float,
-    u2y: float,
-) -> tuple[float, float]:
-    """Mean of `centripetal` over a kick at whose sample the handle velocity leaps [m/s^2].
+def centripetal_about_sample(L, cx, cy, vx, vy, u):
+    """Mean of `centripetal` over a kick in which the handle velocity jumps at the sample.
 
     Args:
-        L: share of the kick before the sample. cx, cy: centripetal acceleration there [m/s^2].
-        vx, vy: handle velocity after it [m/s]. u1x, u1y, u2x, u2y: result of `jacobian` [m].
+        L: share of the kick before the sample.
+        cx: centripetal acceleration before the sample, x [m/s^2].
+        cy: centripetal acceleration before the sample, y [m/s^2].
+        vx: handle velocity after the sample, x [m/s].
+        vy: handle velocity after the sample, y [m/s].
+        u: from `jacobian` [m].
+
+    Returns:
+        (cx, cy) [m/s^2].
     """
-    r1, r2 = joint_velocity(vx, vy, u1x, u1y, u2x, u2y, 1.0)
-    x, y = centripetal(r1, r2, u1x, u1y, u2x, u2y)
+    r1, r2 = joint_velocity(vx, vy, u, 1.0)
+    x, y = centripetal(r1, r2, u)
     return L * cx + (1.0 - L) * x, L * cy + (1.0 - L) * y
 
 
-def joint_torques(
-    fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
-) -> tuple[float, float]:
-    """Joint torques J' f [N.m] of a force at the handle [N]."""
+def joint_torques(fx, fy, u):
+    """Joint torques J' f of a force at the handle.
+
+    Args:
+        fx: force, x [N].
+        fy: force, y [N].
+        u: from `jacobian` [m].
+
+    Returns:
+        (tau1, tau2) [N.m].
+    """
+    u1x, u1y, u2x, u2y = u
     t2 = u2x * fx + u2y * fy
     return u1x * fx + u1y * fy + t2, t2
 
 
-def handle_acceleration(
-    a1: float, a2: float, fx: float, fy: float, u1x: float, u1y: float, u2x: float, u2y: float
-) -> tuple[float, float]:
-    """Acceleration of a handle that all but rests [m/s^2]: of links a1, a2 [rad/s^2], and of a force on it [N]."""
-    ax, ay = handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
-    wxx, wxy, wyy = mobility(u1x, u1y, u2x, u2y)
+def handle_acceleration(a1, a2, fx, fy, u):
+    """Acceleration of a handle at rest, from link accelerations and a force.
+
+    Args:
+        a1: acceleration of link 1 [rad/s^2].
+        a2: acceleration of link 2 [rad/s^2].
+        fx: force on the handle, x [N].
+        fy: force on the handle, y [N].
+        u: from `jacobian` [m].
+
+    Returns:
+        (ax, ay) [m/s^2].
+    """
+    ax, ay = handle_velocity(a1, a2, u)
+    wxx, wxy, wyy = mobility(u)
     return ax + wxx * fx + wxy * fy, ay + wxy * fx + wyy * fy
 
 
-def joint_velocity(
-    vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float, n: float
-) -> tuple[float, float]:
-    """Absolute link rates that move the handle with (vx, vy), divided by n.
+def joint_velocity(vx, vy, u, n):
+    """Absolute link rates of a handle velocity, divided by n.
 
     Args:
-        vx, vy: handle velocity, or any vector of it. u1x, u1y, u2x, u2y: result of `jacobian` [m].
-        n: divisor; zero at the stretched or folded arm raises ZeroDivisionError.
+        vx: handle velocity, or another handle vector, x.
+        vy: the same, y.
+        u: from `jacobian` or `jacobians` [m].
+        n: divisor; 1 for rates, a time for accelerations.
+
+    Returns:
+        (r1, r2) [rad/s for m/s and n = 1].
+
+    Raises:
+        ZeroDivisionError: the arm is stretched or folded.
     """
+    u1x, u1y, u2x, u2y = u
     det = n * (u1x * u2y - u2x * u1y)
     return (vx * u2y - vy * u2x) / det, (vy * u1x - vx * u1y) / det
 
 
 def inverse_kinematics(x: float, y: float) -> tuple[float, float]:
-    """Joint angles that put the handle at world (x, y), elbow on the left of the line to it (q2 < 0).
+    """Joint angles that put the handle at a world position, elbow to the left (q2 < 0).
 
     Args:
-        x, y: world position [m], within the reach.
+        x: world position [m], within the reach.
+        y: world position [m].
 
     Returns:
         (q1, q2) [rad]; q1 in (-pi, pi].

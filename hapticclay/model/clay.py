@@ -12,26 +12,31 @@ from ..errors import ParameterError, choice, numbers_of
 from .constants import AXES, B_MAX
 
 
-def split_damping(b0, b1, H, L, R, w, damper):
+def split_damping(b0, b1, H, L, R, W, damper):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
-    A step gives half of its clay to the kick before it and half to the one after: Crank-Nicolson, second order.
-    Where the half that acts on the velocity before would overshoot, b h w > 2, it is cut to what just stops the
-    handle, and the kick before the step gets the rest. Both together are b h in any case, so the impulse of a step
-    is exactly b times its distance. What the uneven split does to a slow motion, `slow_force` takes back.
+    A step gives half of its clay to the kick before it and half to the kick after it:
+    Crank-Nicolson, second order. Where the half that acts on the velocity before the kick would
+    overshoot, b h W > 2, it is reduced to the value that just stops the handle, and the kick before
+    the step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times
+    its distance. `slow_force` corrects the effect of the uneven split on slow motion.
 
     Args:
-        b0, b1: damping before and after the sample on each axis [N.s/m].
-        H: length of the kick [s]. L, R: its shares before and after the sample.
-        w: largest acceleration per unit of force over all directions [1/kg].
-        damper: of the operator's arm, which resists beside the clay [N.s/m].
+        b0: damping before the sample, (x, y) [N.s/m].
+        b1: damping after the sample, (x, y) [N.s/m].
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+        W: largest acceleration per unit of force over all directions [1/kg].
+        damper: of the operator's arm, which acts beside the clay [N.s/m].
 
     Returns:
-        (before x, after x, before y, after y [N.s/m]; stiff; share x, y; softness x, y [m/(N.s)]):
-        fe = before v- + after v+, in stiff clay less share times slow_force, which the next kick gets back.
-        stiff: 1.0 where any of this is so, else 0.0. softness: 1/b where both steps are stiff, else 0.0.
+        (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on
+        y [N.s/m]; in stiff clay, fe is less by share times `slow_force`, which the next kick
+        returns.
+        stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
-    most = 1.0 / (H * w)
+    most = 1.0 / (H * W)
     x0, y0 = L * b0[0], L * b0[1]
     x1, y1 = R * b1[0], R * b1[1]
     stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -49,12 +54,22 @@ def split_damping(b0, b1, H, L, R, w, damper):
     return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
 
 
-def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):
-    """Force of stiff clay on a handle that moves slowly through it, held up by nothing else [N].
+def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Force of stiff clay on a handle in slow motion that nothing else supports.
 
     Args:
-        gx, gy: acceleration of the handle without clay [m/s^2]. sxx, sxy, syy: acceleration per force [1/kg].
-        sharex, sharey: from `split_damping`: on which axes the clay is stiff. fx, fy: force of the clay where it is not [N].
+        gx: acceleration of the handle without clay, x [m/s^2].
+        gy: acceleration of the handle without clay, y [m/s^2].
+        sxx: acceleration per unit of force, x from x [1/kg].
+        sxy: acceleration per unit of force, x from y [1/kg].
+        syy: acceleration per unit of force, y from y [1/kg].
+        sharex: from `split_damping`; nonzero where the clay is stiff along x.
+        sharey: from `split_damping`; nonzero where the clay is stiff along y.
+        fx: clay force along x where the clay is not stiff [N].
+        fy: clay force along y where the clay is not stiff [N].
+
+    Returns:
+        (x, y) [N].
     """
     if sharex and sharey:
         det = sxx * syy - sxy * sxy
@@ -66,19 +81,61 @@ def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):
     return x, y
 
 
+def viscous_force(bx, by, vx, vy):
+    """Resisting force of the clay, fe = b v (Eqs. 3, 4). Numbers, or arrays of one shape.
+
+    Args:
+        bx: damping, x [N.s/m].
+        by: damping, y [N.s/m].
+        vx: velocity, x [m/s].
+        vy: velocity, y [m/s].
+
+    Returns:
+        (fex, fey) [N].
+    """
+    return bx * vx, by * vy
+
+
 def constant_profile(b: float, start: float, end: float, along: str = "x") -> Profile:
-    """Damping b [N.s/m] for start <= coordinate < end [m], none elsewhere."""
+    """Constant damping in one interval of a coordinate, none elsewhere.
+
+    Args:
+        b: damping [N.s/m].
+        start: lower border [m].
+        end: upper border [m].
+        along: coordinate that decides, "x" or "y".
+
+    Returns:
+        The profile.
+    """
     return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
 
 
 def slab(b: float, start: float, end: float) -> Clay:
-    """A slab across the x axis that damps both axes alike (the constant cut, Sec. 4.1)."""
+    """A slab across the x axis that damps both axes alike (the constant cut, Sec. 4.1).
+
+    Args:
+        b: damping [N.s/m].
+        start: lower border on x [m].
+        end: upper border on x [m].
+
+    Returns:
+        The clay.
+    """
     profile = constant_profile(b, start, end)
     return Clay(x=profile, y=profile)
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
-    """Where coordinate i alone says that there is clay: disjoint spans of it [m], ascending, perhaps infinite."""
+    """Intervals of coordinate i that contain clay on the evidence of that coordinate alone.
+
+    Args:
+        clay: the clay; None for none.
+        i: coordinate, 0 for x, 1 for y.
+
+    Returns:
+        Disjoint intervals (low, high) [m], ascending, possibly infinite.
+    """
     inf = float("inf")
     out: list[tuple[float, float]] = []
     for profile in (clay.x, clay.y) if clay else ():
@@ -96,15 +153,23 @@ def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
     return merged
 
 
-# Rows of a table, two each: borders on x and y between -inf and inf [m]; damping of the x and y axis and its growth
-# [N.s/m, N.s/m per s], by region of the coordinate that decides; region of the axis's own profile in which that one
-# lies; time at which this was first entered [s], NaN before. Then, in one row: which coordinate decides on the x
-# and on the y axis, and where the path ends [m], inf if nowhere.
+# Rows of a region table, two each (x, y): borders between -inf and inf [m]; damping [N.s/m] and its
+# growth [N.s/m per s], by region of the coordinate that decides; region of the axis's own profile;
+# time of its first entry [s], NaN before. The last row: the coordinate that decides on the x axis,
+# that on the y axis, and the end of the path [m], inf for none.
 EDGE_ROW, VALUE_ROW, RATE_ROW, OWN_ROW, ENTERED_ROW, AXIS_ROWS = 0, 2, 4, 6, 8, 10
 
 
 def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
-    """Tabulates clay and the end of the path, length [m], for `enter_region`: shape (11, n)."""
+    """Tabulates clay and the end of the path for `enter_region`.
+
+    Args:
+        clay: the clay; None for none.
+        length: the run ends when p_x reaches this [m]; None for no end.
+
+    Returns:
+        Array of shape (11, n); its rows are named above.
+    """
     profiles = (clay.x, clay.y) if clay else ()
     end = math.inf if length is None else length
     edges = [sorted({e for f in profiles if f.along == axis for e in f.edges}) for axis in AXES]
@@ -129,10 +194,16 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
 
 
 def enter_region(table, ix, iy, t):
-    """The region with these indices along x and y, which the handle enters at time t [s].
+    """The region that the handle enters.
+
+    Args:
+        table: from `region_table`; notes the time of first entry where the clay grows.
+        ix: index of the region along x.
+        iy: index of the region along y.
+        t: time of entry [s].
 
     Returns:
-        (low, high, base, rate), x and y each: its borders [m] and its clay, see `damping_at`.
+        (low, high, base, rate), a pair (x, y) each: borders [m] and clay, as in `damping_at`.
     """
     basex, ratex = _region_law(table, 0, iy if table[AXIS_ROWS, 0] else ix, t)
     basey, ratey = _region_law(table, 1, iy if table[AXIS_ROWS, 1] else ix, t)
@@ -152,13 +223,22 @@ def _region_law(table, axis, k, t):
 
 
 class Regions:
-    """Which region of the clay the handle is in, and how far that region reaches.
+    """The clay region of the handle and its borders.
+
+    Args:
+        clay: the clay; None for none.
+        length: the run ends when p_x reaches this [m]; None for no end.
+        p: handle position at the start [m], (x, y).
 
     Attributes:
-        table: the clay. index: of the region along x and y.
-        low, high: borders of the present region on each coordinate [m].
-        base, rate: the clay there is b = base + rate t on each axis [N.s/m, N.s/m per s].
-        grows: whether any region's clay grows. stiffest: largest damping of any region, before it grows [N.s/m].
+        table: the clay, from `region_table`.
+        index: of the region along x and along y.
+        low: lower borders of the present region, (x, y) [m].
+        high: upper borders of the present region, (x, y) [m].
+        base: damping of the present region at t = 0, (x, y) [N.s/m].
+        rate: growth of the damping, (x, y) [N.s/m per s].
+        grows: whether the clay of any region grows.
+        stiffest: largest damping of any region before growth [N.s/m].
     """
 
     def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
@@ -175,32 +255,67 @@ class Regions:
         self.low, self.high, self.base, self.rate = ((float(x), float(y)) for x, y in found)
 
     def b(self, t: float) -> tuple[float, float]:
-        """Damping of the present region at time t [s] on each axis [N.s/m]."""
+        """Damping of the present region.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            (x, y) [N.s/m].
+        """
         return damping_at(self.base, self.rate, t)
 
     def change(self, clay: Clay, t: float) -> None:
-        """Puts other damping between the same borders, from time t [s] on."""
+        """Replaces the damping between the same borders.
+
+        Args:
+            clay: the new clay.
+            t: time from which it holds [s].
+        """
         end, entered = self.table[AXIS_ROWS, 2], self.table[ENTERED_ROW : ENTERED_ROW + 2]
         self.table = region_table(clay, float(end) if end < math.inf else None)
         self.table[ENTERED_ROW : ENTERED_ROW + 2] = entered
         self._settle(t)
 
     def cross(self, i: int, up: bool, t: float) -> float:
-        """Steps over the border of coordinate i at time t [s], upwards or downwards; returns its place [m]."""
+        """Enters the neighbouring region.
+
+        Args:
+            i: coordinate, 0 for x, 1 for y.
+            up: True towards larger values.
+            t: time of the crossing [s].
+
+        Returns:
+            The border crossed [m].
+        """
         border = self.high[i] if up else self.low[i]
         self.index[i] += 1 if up else -1
         self._settle(t)
         return border
 
     def at_end(self, i: int, up: bool) -> bool:
-        """True if the border ahead on coordinate i is the end of the path."""
+        """Whether the border ahead is the end of the path.
+
+        Args:
+            i: coordinate, 0 for x, 1 for y.
+            up: True towards larger values.
+        """
         return i == 0 and up and self.high[0] == self.table[AXIS_ROWS, 2]
 
 
 def damping_at(
     base: tuple[float, float], rate: tuple[float, float], t: float
 ) -> tuple[float, float]:
-    """b = base + rate t on each axis [N.s/m]; growth ends at the largest damping there is."""
+    """Damping at a time, b = base + rate t, at most B_MAX.
+
+    Args:
+        base: damping at t = 0, (x, y) [N.s/m].
+        rate: growth, (x, y) [N.s/m per s].
+        t: time [s].
+
+    Returns:
+        (x, y) [N.s/m].
+    """
     x, y = base
     if rate[0] or rate[1]:
         x, y = min(x + rate[0] * t, B_MAX), min(y + rate[1] * t, B_MAX)

@@ -13,153 +13,228 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ..errors import choice, number
 from . import arm
-from .constants import AXES, C_POLE, G, SecondOrder
+from .constants import AXES, C_POLE, G, S, SecondOrder
 
 
 def servo_coefficients(
     g: SecondOrder, s: SecondOrder, H: float, L: float, R: float
 ) -> tuple[float, float, float, float, float]:
-    """Coefficients of one axis in one kick: (keep, take) of the reference model, (after, before,
-    spring) of the handle.
+    """Coefficients of one axis of the servo in one kick.
 
     Args:
-        g, s: closed position loop G (Eqs. 15, 16) and sensitivity Sh (Eqs. 17, 18).
-        H: length of the kick [s]. L, R: its shares before and after the sample.
+        g: closed position loop G (Eqs. 15, 16).
+        s: sensitivity Sh (Eqs. 17, 18).
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        (keep, take, after, before, spring): the first two of the reference model, as in
+        `compensator_coefficients`; the others of the handle, as in `servo_acceleration`.
     """
     keep, take = compensator_coefficients(g.damping, H, L, R)
     return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
 
 
-def servo_acceleration(
-    after: float,
-    before: float,
-    spring: float,
-    yd1: float,
-    yd0: float,
-    v: float,
-    y: float,
-    p: float,
-    c: float,
-) -> float:
-    """Acceleration of one axis in a kick before any force and without its outcome [m/s^2].
+def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PLR0913  # of one axis
+    """Acceleration of one axis in a kick without forces and without the velocity after it [m/s^2].
 
     Args:
-        after, before, spring: from `kick`.
-        yd1, yd0: rate of the reference model after and before [m/s]. v: handle velocity before [m/s].
-        y, p: reference and handle position [m]. c: its centripetal acceleration, towards the
-            centre [m/s^2].
+        after: weight of the rate after the kick [1/s], from `servo_coefficients`.
+        before: weight of the rate before the kick [1/s], from `servo_coefficients`.
+        spring: stiffness of Sh [1/s^2], from `servo_coefficients`.
+        yd1: rate of the reference model after the kick [m/s].
+        yd0: rate of the reference model before the kick [m/s].
+        v: handle velocity before the kick [m/s].
+        y: reference position [m].
+        p: handle position [m].
+        c: centripetal acceleration, towards the centre [m/s^2].
+
+    Returns:
+        The acceleration [m/s^2].
     """
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def solve_velocity(
-    nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
-    fx: float, fy: float, dx: float, dy: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Solves n u = a + S (f - d u) for the handle velocity u after the kick.
+def solve_velocity(n, a, W, f, d):
+    """Solves n u = a + W (f - d u) for the handle velocity u after a kick.
 
     Args:
-        nx, ny: the servo's own weight of u [1/s]. ax, ay: from `servo_acceleration` [m/s^2].
-        sxx, sxy, syy: acceleration per unit of net hand force [1/kg].
-        fx, fy: net hand force without u [N]. dx, dy: force per unit of u, resisting [N.s/m].
+        n: weight of u in the servo's law, (x, y) [1/s].
+        a: from `servo_acceleration`, (x, y) [m/s^2].
+        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
+        f: net hand force without u, (x, y) [N].
+        d: resisting force per unit of u, (x, y) [N.s/m].
 
     Returns:
         (ux, uy) [m/s].
     """
-    gx = ax + sxx * fx + sxy * fy
-    gy = ay + sxy * fx + syy * fy
+    nx, ny = n
+    ax, ay = a
+    wxx, wxy, wyy = W
+    fx, fy = f
+    dx, dy = d
+    gx = ax + wxx * fx + wxy * fy
+    gy = ay + wxy * fx + wyy * fy
     if dx or dy:
-        a = nx + sxx * dx
-        b = sxy * dy
-        r = sxy * dx / a
-        uy = (gy - r * gx) / (ny + syy * dy - r * b)
-        ux = (gx - b * uy) / a
+        px = nx + wxx * dx
+        py = wxy * dy
+        r = wxy * dx / px
+        uy = (gy - r * gx) / (ny + wyy * dy - r * py)
+        ux = (gx - py * uy) / px
     else:
         ux = gx / nx
         uy = gy / ny
     return ux, uy
 
 
-def velocity_under_torque(
-    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
-    t1: float, t2: float, fx: float, fy: float, dx: float, dy: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Handle velocity after a kick of length H under given motor torques t1, t2 [N.m]; the rest as in `solve_velocity`."""
-    a1 = (t1 - t2) / arm.I1
-    a2 = t2 / arm.I2
-    ax, ay = arm.handle_velocity(a1, a2, u1x, u1y, u2x, u2y)
-    sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+def velocity_under_torque(H, v, u, tau, f, d):
+    """Handle velocity after a kick under given motor torques.
+
+    Args:
+        H: length of the kick [s].
+        v: handle velocity before the kick, (x, y) [m/s].
+        u: from `arm.jacobian` [m].
+        tau: motor torques, (shoulder, elbow) [N.m].
+        f: hand force without the velocity after the kick, (x, y) [N].
+        d: resisting force per unit of that velocity, (x, y) [N.s/m].
+
+    Returns:
+        (ux, uy) [m/s].
+    """
+    vx, vy = v
+    t1, t2 = tau
+    ax, ay = arm.handle_velocity((t1 - t2) / arm.I1, t2 / arm.I2, u)
     n = 1.0 / H
-    ux, uy = solve_velocity(n, n, n * vx + ax, n * vy + ay, sxx, sxy, syy, fx, fy, dx, dy)
+    W = arm.mobility(u)
+    ux, uy = solve_velocity((n, n), (n * vx + ax, n * vy + ay), W, f, d)
     return ux, uy
 
 
-def saturated_step(
-    H: float, vx: float, vy: float, u1x: float, u1y: float, u2x: float, u2y: float,
-    nx: float, ny: float, ax: float, ay: float, sxx: float, sxy: float, syy: float,
-    fx: float, fy: float, dx: float, dy: float, limit1: float, limit2: float, square1: float, square2: float,
-) -> tuple[float, float, float, float, float, float, float, float]:  # fmt: skip
-    """The kick that the servo wants, as far as the motors can give it.
+def saturated_step(H, v, u, n, a, W, f, d, limit):  # noqa: PLR0913  # one a quantity of the law
+    """The kick that the servo asks for, within the torque limits of the motors.
 
     Args:
-        H: length of the kick [s]. vx, vy: handle velocity before [m/s]. u1, u2: arm.jacobian [m].
-        nx .. dy: as in `solve_velocity`.
-        limit1, limit2, square1, square2: torque limits [N.m] and their squares.
+        H: length of the kick [s].
+        v: handle velocity before the kick, (x, y) [m/s].
+        u: from `arm.jacobian` [m].
+        n: as in `solve_velocity` [1/s].
+        a: as in `solve_velocity` [m/s^2].
+        W: as in `solve_velocity` [1/kg].
+        f: as in `solve_velocity` [N].
+        d: as in `solve_velocity` [N.s/m].
+        limit: torque limits of shoulder and elbow [N.m], and their squares.
 
     Returns:
-        (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after [m/s], link accelerations [rad/s^2], net
-        hand force [N], motor torques [N.m].
+        (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after the kick [m/s], link accelerations
+        [rad/s^2], net hand force [N], motor torques [N.m].
     """
-    ux, uy = solve_velocity(nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy)
+    vx, vy = v
+    u1x, u1y, u2x, u2y = u
+    fx, fy = f
+    dx, dy = d
+    limit1, limit2, square1, square2 = limit
+    ux, uy = solve_velocity(n, a, W, (fx, fy), (dx, dy))
     ffx = fx - dx * ux
     ffy = fy - dy * uy
-    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
     t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
     t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
     if t1 * t1 > square1 or t2 * t2 > square2:
         t1 = min(max(t1, -limit1), limit1)
         t2 = min(max(t2, -limit2), limit2)
-        ux, uy = velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+        ux, uy = velocity_under_torque(
+            H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
+        )
         ffx = fx - dx * ux
         ffy = fy - dy * uy
-        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
 
 
 def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
     """Coefficients (keep, take) of one kick of v' = -damping v + drive: v+ = keep v- + take drive.
 
-    Trapezoidal in the damping, exact in total impulse: any length, any split.
+    Trapezoidal in the damping and exact in total impulse, for any length and any split.
 
     Args:
-        damping: [1/s]. H: length of the kick [s]. L, R: its shares before and after the sample.
+        damping: rate of decay [1/s].
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        (keep, take): dimensionless, and [s].
     """
     n = 1.0 / H + damping * R
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
-def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample T [s] in which the force f is held: z+ = A z + B f, exactly.
+def feedback_vector(axis: str) -> np.ndarray:
+    """Servo acceleration of the law above, without forces, as a row over the state of one axis.
 
-    z = (delta, delta', y, y'), y = G delta (matrix exponential; Astrom, Wittenmark, Computer-Controlled Systems).
+    Args:
+        axis: "x" or "y".
 
     Returns:
-        A, shape (4, 4), and B, shape (4,).
+        Shape (6,): p'' = feedback @ (p, p', delta, delta', y, y').
+    """
+    i = AXES.index(choice("axis", axis, AXES))
+    g, s = G[i], S[i]
+    reference = [g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
+    return np.array([-s.stiffness, -s.damping, *reference])
+
+
+def controller_matrices(axis: str, K: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
+
+    Args:
+        axis: "x" or "y".
+        K: gain of the compensator.
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,), with z = (delta, delta', y, y') and y = G delta.
     """
     g = G[AXES.index(choice("axis", axis, AXES))]
+    A, B = np.zeros((4, 4)), np.zeros(4)
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, 1], B[1] = -PRINTED.pole, K
+    A[3] = g.gain, 0.0, -g.stiffness, -g.damping
+    return A, B
+
+
+def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample in which the net force is held: z+ = A z + B f.
+
+    Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
+
+    Args:
+        axis: "x" or "y".
+        K: gain of the compensator.
+        T: length of the sample [s].
+
+    Returns:
+        A, shape (4, 4), and B, shape (4,); z as in `controller_matrices`.
+    """
     m = np.zeros((5, 5))
-    m[0, 1] = m[2, 3] = 1.0
-    m[1, 1], m[1, 4] = -C_POLE, K
-    m[3] = [g.stiffness, 0.0, -g.stiffness, -g.damping, 0.0]
+    m[:4, :4], m[:4, 4] = controller_matrices(axis, K)
     e = matrix_exponential(T * m)
     return e[:4, :4], e[:4, 4]
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential of a, shape (n, n)."""
+    """Matrix exponential.
+
+    Args:
+        a: shape (n, n).
+
+    Returns:
+        Shape (n, n).
+    """
     from scipy.linalg import expm
 
     return expm(a)
@@ -167,30 +242,28 @@ def matrix_exponential(a: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Compensator:
-    """Shape of the compensator but its gain: C = K (s + zero)/(s (s + pole)); zero None: K/(s (s + pole)).
+    """Shape of the compensator: C = K (s + zero)/(s (s + pole)), or K/(s (s + pole)) with no zero.
 
     Attributes:
-        pole: [rad/s]; as printed 10 (Eqs. 20, 22, 27). zero: [rad/s], a lead if below the pole; None for none.
+        pole: [rad/s]; 10 as printed (Eqs. 20, 22, 27).
+        zero: [rad/s], a lead if below the pole; None for no zero.
     """
 
     pole: float = C_POLE
     zero: float | None = None
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "pole", number("compensator.pole", self.pole, 0.0, above=True, unit="rad/s")
-        )
-        if self.zero is not None:
-            object.__setattr__(
-                self, "zero", number("compensator.zero", self.zero, 0.0, above=True, unit="rad/s")
-            )
+        for field in ("pole", "zero"):
+            value = getattr(self, field)
+            if value is not None or field == "pole":
+                value = number(f"compensator.{field}", value, 0.0, above=True, unit="rad/s")
+                object.__setattr__(self, field, value)
 
     @property
-    def fraction(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator of C/K."""
-        return np.array([1.0] if self.zero is None else [1.0, self.zero]), np.array(
-            [1.0, self.pole, 0.0]
-        )
+    def fraction(self) -> tuple[Polynomial, Polynomial]:
+        """Numerator and denominator of C/K in s."""
+        numerator = Polynomial([1.0] if self.zero is None else [self.zero, 1.0])
+        return numerator, Polynomial([0.0, self.pole, 1.0])
 
 
 PRINTED = Compensator()

@@ -118,15 +118,28 @@ Pair = tuple[float, float]
 
 
 def round_to_even(x: float, step: float) -> float:
-    """The multiple of step nearest to x, of two the even one."""
+    """The multiple of step nearest to x; the even one of two equally near.
+
+    Args:
+        x: value, in any unit.
+        step: in the unit of x.
+
+    Returns:
+        The multiple.
+    """
     return round(x / step) * step
 
 
 def quantize(x: float, bits: int | None, span: float) -> float:
-    """What a converter of so many bits makes of x, from -span to span: 2^bits levels, the middle one zero.
+    """Output of a converter: 2^bits levels from -span to span, the middle one zero.
 
     Args:
-        x: in any unit. bits: None for an ideal converter without limits. span: the full scale, in the unit of x.
+        x: input, in any unit.
+        bits: resolution; None for an ideal converter without limits.
+        span: full scale, in the unit of x.
+
+    Returns:
+        The output, in the unit of x.
     """
     if bits is None:
         return x
@@ -135,15 +148,29 @@ def quantize(x: float, bits: int | None, span: float) -> float:
 
 
 def encode(q: float, counts: int | None) -> float:
-    """Joint angle q [rad] as an encoder of so many counts per turn shows it; exact for None."""
+    """Joint angle as an encoder reads it.
+
+    Args:
+        q: joint angle [rad].
+        counts: counts per turn; None for an exact reading.
+
+    Returns:
+        The reading [rad].
+    """
     return q if counts is None else round_to_even(q, tau / counts)
 
 
 def velocity_difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float) -> Pair:
-    """Mean rates of two joints [rad/s] since the oldest sample in history.
+    """Mean rates of two joints since the oldest sample in the history.
 
     Args:
-        history: (index, angles [rad]) of earlier samples, oldest first. k, q: of the present one. Ts: [s].
+        history: (index, angles [rad]) of earlier samples, oldest first.
+        k: index of the present sample.
+        q: joint angles of the present sample [rad].
+        Ts: control sample [s].
+
+    Returns:
+        Rates of both joints [rad/s].
     """
     then, old = history[0]
     span = (k - then) * Ts
@@ -151,19 +178,33 @@ def velocity_difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, 
 
 
 def low_pass(y: float, mean: float, cutoff: float, span: float) -> float:
-    """First-order low-pass of a signal whose mean over the past `span` [s] is `mean`; exact if it was constant.
+    """First-order low-pass filter over one interval; exact for a constant signal.
 
     Args:
-        y: output before. mean: in the unit of y. cutoff: [Hz].
+        y: output before, in any unit.
+        mean: mean of the signal over the interval, in the unit of y.
+        cutoff: corner frequency [Hz].
+        span: length of the interval [s].
+
+    Returns:
+        Output after the interval.
     """
     keep = exp(-tau * cutoff * span)
     return keep * y + (1.0 - keep) * mean
 
 
 def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]], list[float]]:
-    """Low-pass of order 1 or 2 and unit gain under an input held for Ts [s]: x+ = A x + B u, y = x[0], exactly.
+    """Butterworth low-pass filter of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
 
-    Poles on a circle of radius 2 pi cutoff (matrix exponential).
+    The poles lie on a circle of radius 2 pi cutoff (matrix exponential).
+
+    Args:
+        cutoff: corner frequency [Hz].
+        order: 1 or 2.
+        Ts: hold of the input [s].
+
+    Returns:
+        A, order rows of order numbers, and B, order numbers.
     """
     from scipy.linalg import expm
 
@@ -180,25 +221,39 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]]
 def filter_step(
     A: list[list[float]], B: list[float], x: tuple[float, ...], u: float
 ) -> tuple[float, ...]:
-    """State of the filter after a sample of input u."""
+    """State of a filter after one sample.
+
+    Args:
+        A: from `butterworth`.
+        B: from `butterworth`.
+        x: state before.
+        u: input.
+
+    Returns:
+        The state after the sample.
+    """
     return tuple(
         sum(a * z for a, z in zip(row, x, strict=True)) + b * u for row, b in zip(A, B, strict=True)
     )
 
 
 def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
-    """Coulomb friction of two joints in one kick, implicit: it stops a joint wherever its limit suffices for that.
+    """Coulomb friction of two joints in one kick, implicit.
 
-    Each joint either rests after the kick, at a torque within its limit, or slides against the limit. The rates after
-    it are w + a phi; with a positive definite one of the nine cases fits (a linear complementarity problem;
-    Stewart, Trinkle, Int. J. Numerical Methods in Engineering 39, 1996).
+    Each joint either rests after the kick, under a torque within its limit, or slides against the
+    limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases
+    fits (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in
+    Engineering 39, 1996).
 
     Args:
-        w: rates after the kick without friction [rad/s]. a11, a12, a22: rate per torque [rad/s per N.m].
-        limit: Coulomb torques [N.m].
+        w: rates after the kick without friction [rad/s].
+        a11: rate of joint 1 per torque on joint 1 [rad/s per N.m].
+        a12: rate of joint 1 per torque on joint 2 [rad/s per N.m].
+        a22: rate of joint 2 per torque on joint 2 [rad/s per N.m].
+        limit: Coulomb torques of both joints [N.m].
 
     Returns:
-        Torques on the joints [N.m].
+        Torques on both joints [N.m].
     """
     best, least = (0.0, 0.0), inf
     for s1, s2 in product((0, 1, -1), repeat=2):
@@ -227,17 +282,24 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
 
 
 def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float) -> float:
-    """The passivity controller of one axis: the resisting force f, changed where the clay would be active.
+    """Passivity controller of one axis: a resisting force, changed where the clay would be active.
 
-    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held force itself causes:
-    over a sample the clay takes Ts f (v - Ts W f/2). A lack of energy is made up for, as Ts W goes to zero by their
-    damping -energy/(Ts v^2). A force that gives energy, because a hold overshoots, becomes the one that takes most,
-    v/(Ts W), which stops the handle; so does one that cannot make up for the lack in a sample. Earlier income is not
-    spent: clay gives nothing back.
+    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held
+    force itself causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
+    lack of energy; as Ts W goes to zero by their damping, -energy/(Ts v^2). A force that gives
+    energy because the hold overshoots is replaced by the force that takes most, v/(Ts W), which
+    stops the handle; so is a force that cannot recover the lack within a sample. Energy taken
+    earlier is not spent: clay gives nothing back.
 
     Args:
-        energy: that the clay took until now [J]. f: force asked for [N]. v: velocity [m/s]. Ts: hold [s].
+        energy: energy that the clay has taken [J].
+        f: force asked for [N].
+        v: handle velocity [m/s].
+        Ts: hold [s].
         W: mobility of the handle [1/kg].
+
+    Returns:
+        The force [N].
     """
     most, lack = v / (Ts * W), min(energy, 0.0)
     left = v * v + 2.0 * W * lack
@@ -253,23 +315,34 @@ def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float)
 def virtual_coupling(
     tool: float, p: float, v: float, b: float, spring: float, damper: float, Ts: float
 ) -> Pair:
-    """Spring and damper between the handle and a massless tool in clay b, implicit over a sample.
+    """Spring and damper between the handle and a massless tool in clay, implicit over a sample.
 
-    b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown, IROS 1995).
+    b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
+    IROS 1995).
 
     Args:
-        tool: position of the tool before [m]. p, v: of the handle [m], [m/s]. b: clay [N.s/m]. Ts: [s].
-        spring: N/m. damper: N.s/m.
+        tool: position of the tool before the sample [m].
+        p: position of the handle [m].
+        v: velocity of the handle [m/s].
+        b: clay at the tool [N.s/m].
+        spring: stiffness of the coupling [N/m].
+        damper: damping of the coupling [N.s/m].
+        Ts: control sample [s].
 
     Returns:
-        (position of the tool after [m], its velocity [m/s]); b times that is the resisting force.
+        (position of the tool after the sample [m], its velocity [m/s]); b times the velocity is the
+        resisting force.
     """
     u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
     return tool + Ts * u, u
 
 
 class SampleNoise:
-    """What chance does to each sample: by index, the same for the same seed, each part from its own stream."""
+    """Random effects on each sample, reproducible by seed and index; one random stream a part.
+
+    Args:
+        parts: the hardware, with its seed.
+    """
 
     def __init__(self, parts: Interface):
         self.parts = parts
@@ -277,9 +350,14 @@ class SampleNoise:
         self._rows: list[Any] = []
 
     def __call__(self, k: int) -> tuple[float, bool, Pair]:
-        """(offset of the sampling instant [s], whether the sample is lost, noise on the force x, y [N]) of sample k.
+        """Random effects on sample k; the first sample is on time and never lost.
 
-        The first is on time and never lost.
+        Args:
+            k: index of the sample.
+
+        Returns:
+            (offset of the sampling instant [s], whether the sample is lost, noise on the force (x,
+            y) [N]).
         """
         while k >= len(self._rows):
             s, (time, loss, noise) = self.parts, self._streams

@@ -11,19 +11,21 @@ from .constants import B_MAX
 def operator_coefficients(
     operator: Operator | None, H: float, L: float, R: float, h: float
 ) -> tuple[float, float, float, float]:
-    """How Th answers in one kick, without a step's delay (docs/equations.md, section 4).
+    """Response of Th in one kick, without the delay of a step (docs/equations.md, section 4).
 
     The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
     mass and keeps any spring stable at any step h (Newmark, beta = 1/4).
 
     Args:
         operator: Th; None for Th = 0.
-        H: length of the kick [s]. L, R: its shares before and after the sample.
-        h: length of the steps [s]; H, unless the kick is but a part of one between them, as at start and end.
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+        h: length of the steps [s]; H, except where the kick is one half of a step at start or end.
 
     Returns:
-        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is
-        -(spring p - mass c + before v- + after v+), c the centripetal acceleration.
+        (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is -(spring p -
+        mass c + before v- + after v+), c the centripetal acceleration.
     """
     mass, damper, spring = 0.0, 0.0, 0.0
     if operator is not None:
@@ -35,11 +37,18 @@ def operator_coefficients(
 def operator_force(
     spring: float, mass: float, before: float, p: float, c: float, v: float
 ) -> float:
-    """Resisting force of the operator's arm in a kick, less the part that depends on its outcome [N].
+    """Resisting force of the operator's arm in a kick, without the velocity after it.
 
     Args:
-        spring, mass, before: from `operator_coefficients`.
-        p: handle position [m]. c: its centripetal acceleration, towards the centre [m/s^2]. v: velocity before [m/s].
+        spring: from `operator_coefficients` [N/m].
+        mass: from `operator_coefficients` [kg].
+        before: from `operator_coefficients` [N.s/m].
+        p: handle position [m].
+        c: centripetal acceleration, towards the centre [m/s^2].
+        v: handle velocity before the kick [m/s].
+
+    Returns:
+        The force [N].
     """
     return spring * p - mass * c + before * v
 

@@ -12,16 +12,30 @@ from ..errors import ParameterError, integer, number, pair
 
 
 def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
-    """Mean over [t - h, t + h] [s] of cos(omega t + phase): numbers, or arrays of them."""
+    """Mean of cos(omega t + phase) over [t - h, t + h]. Numbers, or arrays of one shape.
+
+    Args:
+        omega: angular frequency [rad/s].
+        phase: at t = 0 [rad].
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        The mean; the value at t for h = 0.
+    """
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
 
 class Signal:
-    """A multisine, ready to be evaluated.
+    """A multisine in a form ready for evaluation.
+
+    Args:
+        multisine: the signal.
 
     Attributes:
-        omega: its lines [rad/s], shape (n,). phase: of each line and axis [rad], (n, 2).
-        amplitude: of each line, on each axis, (2,).
+        omega: angular frequency of each line [rad/s], shape (n,).
+        phase: of each line on each axis [rad], shape (n, 2).
+        amplitude: of each line on each axis, shape (2,).
     """
 
     def __init__(self, multisine: Multisine):
@@ -35,14 +49,29 @@ class Signal:
         self.amplitude = np.array(m.rms) * np.sqrt(2.0 / len(k))
 
     def mean(self, begin: Any, end: Any) -> np.ndarray:
-        """Mean over [begin, end] [s], shape (n, 2) for n spans, or (2,) for one; the value where they are equal."""
+        """Mean over intervals; the value where an interval has no length.
+
+        Args:
+            begin: start [s], a number or shape (n,).
+            end: end [s], as begin.
+
+        Returns:
+            Shape (2,) or (n, 2).
+        """
         begin, end = np.asarray(begin), np.asarray(end)
         t, h = 0.5 * (begin + end)[..., None], 0.5 * (end - begin)[..., None]
         lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
         return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
     def __call__(self, t: Any) -> np.ndarray:
-        """Value at t [s], shape (n, 2) or (2,)."""
+        """Value at a time.
+
+        Args:
+            t: time [s], a number or shape (n,).
+
+        Returns:
+            Shape (2,) or (n, 2).
+        """
         return self.mean(t, t)
 
 

@@ -1,7 +1,7 @@
-"""The ledger: what the paper prints or implies beside what the simulator gives, row by row.
+"""The ledger: numbers that the paper prints or implies beside those of the simulator, row by row.
 
-Every figure in a row, those in its reason too, comes from a run or from the loop's own polynomials; the only
-numbers typed are the printed ones of params.py, by name.
+Every figure in a row, and in its reason, comes from a run or from the linear loop; the only numbers
+typed here are the printed ones of model/constants.py, by name.
 """
 
 from __future__ import annotations
@@ -33,156 +33,124 @@ from ..model.constants import (
 from ..model.experiments import GROWTHS, free
 from ..model.operator import Operator
 from ..simulation.record import irregularity
-from ..stepping.engine import build, mujoco
-from ..theory import linear_loop, margins
+from ..stepping.engine import arm_at
+from ..theory import gain_limit, linear_loop, margins
 from .ledger import Row, Runs, rightmost, steady
+
+TH = Operator()  # Eq. 19
 
 
 def ledger_rows(runs: Runs | None = None) -> list[Row]:
     """All rows, in the paper's order.
 
     Args:
-        runs: what they are made from; None for new ones.
+        runs: the runs behind them; None for new ones.
     """
     runs = runs or Runs()
-    parts = (
-        machine, blocks, constant, variable, gain_limits,
-        maneuver,
-    )  # fmt: skip
-    return [row for part in parts for row in part(runs)]
+    parts = (machine, blocks, constant, variable, gain_limits, maneuver)
+    return [each for part in parts for each in part(runs)]
+
+
+def row(
+    cells: str,
+    figures: tuple[float | None, float | None, float | None],
+    status: str,
+    reason: str = "",
+) -> Row:
+    """One row of the table.
+
+    Args:
+        cells: "quantity | place in the paper | as printed | unit".
+        figures: (expected, ours, tolerance), as in `Row`.
+        status: as in `Row`.
+        reason: as in `Row`.
+    """
+    what, where, printed, unit = cells.split(" | ")
+    return Row(what, where, printed, unit, *figures, status, reason)
 
 
 def machine(runs: Runs) -> Iterator[Row]:
+    """The arm and its sampling (Secs. 2, 4, Eq. 14).
 
-    model = build(free())
-    data = mujoco.MjData(model)
-    handle = model.site("handle").id
-
-    def at(q1: float, q2: float) -> np.ndarray:
-        data.qpos[:] = q1, q2
-        mujoco.mj_forward(model, data)
-        return data.site_xpos[handle].copy()
-
-    straight, folded = at(0.0, 0.0)[0], at(0.0, math.pi)[0]
-    yield Row(
-        "l1",
-        "Sec. 4",
-        f"{L1:g} m",
-        "m",
-        L1,
-        0.5 * (straight + folded),
-        1e-12,
+    Args:
+        runs: the runs behind the rows.
+    """
+    straight, folded = (arm_at((0.0, q2))[0][0] for q2 in (0.0, math.pi))
+    yield row(
+        f"l1 | Sec. 4 | {L1:g} m | m",
+        (L1, 0.5 * (straight + folded), 1e-12),
         "given",
-        "half the sum of the handle's distance with the arm stretched and folded, in the engine's model",
+        "half the sum of the handle's distance with the arm stretched and folded, in the engine's "
+        "model",
     )
-    yield Row(
-        "l2",
-        "Sec. 4",
-        f"{L2:g} m",
-        "m",
-        L2,
-        0.5 * (straight - folded),
-        1e-12,
+    yield row(
+        f"l2 | Sec. 4 | {L2:g} m | m",
+        (L2, 0.5 * (straight - folded), 1e-12),
         "given",
         "half the difference",
     )
     q = (1.2, -0.9)
-    at(*q)
-    engine = np.zeros((3, 2))
-    mujoco.mj_jacSite(model, data, engine, None, handle)
-    u1x, u1y, u2x, u2y = arm.jacobian(
-        math.sin(q[0]), math.cos(q[0]), math.sin(sum(q)), math.cos(sum(q))
-    )
+    u1x, u1y, u2x, u2y = arm.jacobian(*q)
     eq14 = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
-    yield Row(
-        "Jacobian J(q)",
-        "Eq. 14",
-        "four entries",
-        "m",
-        0.0,
-        float(np.abs(engine[:2] - eq14).max()),
-        1e-14,
+    yield row(
+        "Jacobian J(q) | Eq. 14 | four entries | m",
+        (0.0, float(np.abs(arm_at(q)[1] - eq14).max()), 1e-14),
         "given",
         "largest difference between the printed formula and the engine's own at q = (1.2, -0.9)",
     )
-    at(*arm.inverse_kinematics(*NOMINAL))
-    mujoco.mj_jacSite(model, data, engine, None, handle)
-    M = np.zeros((2, 2))
-    mujoco.mj_fullM(model, data, M)
-    Lambda = np.linalg.inv(engine[:2] @ np.linalg.inv(M) @ engine[:2].T)
+    _, J, M = arm_at(arm.inverse_kinematics(*NOMINAL))
+    Lambda = np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
     for i, axis in enumerate(AXES):
-        yield Row(
-            f"handle inertia Λ{axis} at the nominal pose",
-            "Eqs. 17, 18",
-            "not printed",
-            "kg",
-            1.0 / S[i].gain,
-            float(Lambda[i, i]),
-            1e-9,
+        yield row(
+            f"handle inertia Λ{axis} at the nominal pose | Eqs. 17, 18 | not printed | kg",
+            (1.0 / S[i].gain, float(Lambda[i, i]), 1e-9),
             "inferred",
-            "Sh at high frequency is 1/(Λ s²): the inertias of both links follow from its numerators",
+            "Sh at high frequency is 1/(Λ s²): the inertias of both links follow from its "
+            "numerators",
         )
-    yield Row(
-        "coupling Λxy at the nominal pose",
-        "Sec. 2",
-        "decoupled in its nominal configuration",
-        "kg",
-        0.0,
-        float(Lambda[0, 1]),
-        1e-9,
+    yield row(
+        "coupling Λxy at the nominal pose | Sec. 2 | decoupled in its nominal configuration | kg",
+        (0.0, float(Lambda[0, 1]), 1e-9),
         "given",
         "elbow square, link 2 balanced about it",
     )
-    w = np.array([1.0 / lam[0, 0] for lam in (Lambda,)])
-    ends = [
-        np.linalg.inv(_engine_mobility(x, NOMINAL[1]))[0, 0]
-        for x in (NOMINAL[0] - 0.1, NOMINAL[0] + 0.1)
-    ]
-    yield Row(
-        "Λx at the ends of a 20 cm path",
-        "Sec. 4",
-        "not said",
-        "kg",
-        None,
-        float(max(ends)),
-        None,
+    ends = [_lambda_x(x, NOMINAL[1]) for x in (NOMINAL[0] - 0.1, NOMINAL[0] + 0.1)]
+    yield row(
+        "Λx at the ends of a 20 cm path | Sec. 4 | not said | kg",
+        (None, float(max(ends)), None),
         "not recoverable",
-        f"the printed Sh holds at one pose: Λx is {1 / w[0]:.4g} kg there and "
+        f"the printed Sh holds at one pose: Λx is {Lambda[0, 0]:.4g} kg there and "
         f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; shaping=True keeps it",
     )
-    yield Row(
-        "sampling period",
-        "Sec. 4",
-        "0.36 ms",
-        "s",
-        TS,
-        float(np.diff(runs.constant().t[:2])[0]),
-        1e-12,
+    yield row(
+        "sampling period | Sec. 4 | 0.36 ms | s",
+        (TS, float(np.diff(runs.constant().t[:2])[0]), 1e-12),
         "given",
     )
-    yield Row(
-        "torque limits",
-        "Sec. 4",
-        "not said",
-        "N.m",
-        None,
-        free().torque_limit[0],
-        None,
+    yield row(
+        "torque limits | Sec. 4 | not said | N.m",
+        (None, free().torque_limit[0], None),
         "not recoverable",
-        "two direct-drive motors of unnamed size; ours is of the class that carries such inertias, and no run "
+        "two direct-drive motors of unnamed size; ours is of the class that carries such inertias, "
+        "and no run "
         "of the cuts meets it",
     )
 
 
-def _engine_mobility(x: float, y: float) -> np.ndarray:
+def _lambda_x(x: float, y: float) -> float:
+    """Inertia of the arm along x with its handle at world (x, y) [kg]."""
     q1, q2 = arm.inverse_kinematics(x, y)
-    w = arm.mobility(
-        *arm.jacobian(math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2))
-    )
-    return np.array([[w[0], w[1]], [w[1], w[2]]])
+    u = arm.jacobian(q1, q2)
+    xx, xy, yy = arm.mobility(u)
+    return float(np.linalg.inv(np.array([[xx, xy], [xy, yy]]))[0, 0])
 
 
 def blocks(runs: Runs) -> Iterator[Row]:
+    """G, Sh and Th as identified on the simulated arm (Eqs. 15 to 19).
+
+    Args:
+        runs: the runs behind the rows.
+    """
     symbols = {"gain": "numerator", "damping": "s", "stiffness": "constant term"}
     for what, places, tolerance, unit in (
         ("G", (15, 16), 5e-3, "m/m"),
@@ -196,58 +164,39 @@ def blocks(runs: Runs) -> Iterator[Row]:
                 term = (
                     f"coefficient of {symbols[c.name]}" if c.name == "damping" else symbols[c.name]
                 )
-                yield Row(
-                    f"{what}{axis}: {term}",
-                    f"Eq. {places[i]}",
-                    f"{value / scale:g}",
-                    c.unit,
-                    value,
-                    c.value,
-                    tolerance,
+                yield row(
+                    f"{what}{axis}: {term} | Eq. {places[i]} | {value / scale:g} | {c.unit}",
+                    (value, c.value, tolerance),
                     "given",
                     f"fitted to the response of the simulated arm at the nominal pose, "
                     f"{unit}" + ("; printed in cm/N" if scale != 1.0 else ""),
                 )
     found = runs.identified("Th", "x")
     for c, power in zip(found.coefficients, ("s²", "s", "constant"), strict=True):
-        yield Row(
-            f"Th: {power} term",
-            "Eq. 19",
-            f"{c.printed:g}",
-            c.unit,
-            c.printed,
-            c.value,
-            5e-3,
+        yield row(
+            f"Th: {power} term | Eq. 19 | {c.printed:g} | {c.unit}",
+            (c.printed, c.value, 5e-3),
             "given",
             "fitted to hand force over position, the handle moved by a command",
         )
-    th = Operator()
-    corner = _corner(th)
-    yield Row(
-        "crossover of Th",
-        "Sec. 4, Fig. 6",
-        "around 3 rad/s",
-        "rad/s",
-        3.0,
-        th.spring / th.damper,
-        1e-9,
+    corner = _corner(TH)
+    yield row(
+        "crossover of Th | Sec. 4, Fig. 6 | around 3 rad/s | rad/s",
+        (3.0, TH.spring / TH.damper, 1e-9),
         "inferred",
-        f"where spring and damper are equal; |Th| has left its static value by 3 dB at {corner:.3g} rad/s",
+        "where spring and damper are equal; |Th| has left its static value by 3 dB at "
+        f"{corner:.3g} rad/s",
     )
     for i, axis in enumerate(AXES):
         ratio = S[i].gain / S[i].stiffness
-        yield Row(
-            f"static S{axis}",
-            "Sec. 3.1",
-            "Sh much smaller than G",
-            "m/N",
-            None,
-            ratio,
-            None,
+        yield row(
+            f"static S{axis} | Sec. 3.1 | Sh much smaller than G | m/N",
+            (None, ratio, None),
             "contradicted",
             f"{ratio:.3g} m/N and 1 m/m cannot be compared; Sec. 4 calls Sh significant beside G; "
-            f"with {G[i].damping:g} and {S[i].damping:g} 1/s they are not even one servo's two answers: "
-            "no plain PD loop gives both, so reference model and feedback are separate here",
+            f"with {G[i].damping:g} and {S[i].damping:g} 1/s they are not even one servo's two "
+            "answers: no plain PD loop gives both, so reference model and feedback are separate "
+            "here",
         )
 
 
@@ -259,63 +208,51 @@ def _corner(th: Operator) -> float:
 
 
 def gain_limits(runs: Runs) -> Iterator[Row]:
+    """The gain limit and the conditions for stability (Secs. 3, 4.3).
+
+    Args:
+        runs: the runs behind the rows.
+    """
     text = "; ".join(
-        f"{axis}, b = {b:g}: {linear_loop.continuous_gain_limit(axis, b, Operator()):.4g} with Th, {linear_loop.continuous_gain_limit(axis, b):.4g} without"
+        f"{axis}, b = {b:g}: {gain_limit.gain_limit(axis, b, TH):.4g} with Th, "
+        f"{gain_limit.gain_limit(axis, b):.4g} without"
         for axis in AXES
         for b in (B_VARIABLE[0], B_CONSTANT, B_STABILITY)
     )
-    yield Row(
-        "limit of K",
-        "Sec. 4.3",
-        "should not exceed 5C",
-        "1",
-        GAIN_LIMIT_PRINTED,
-        linear_loop.continuous_gain_limit("x", B_STABILITY, Operator()),
-        None,
+    yield row(
+        "limit of K | Sec. 4.3 | should not exceed 5C | 1",
+        (GAIN_LIMIT_PRINTED, gain_limit.gain_limit("x", B_STABILITY, TH), None),
         "contradicted",
         f"exact limits of the printed loop: {text}. The printed 5 is nearest x at b = 50",
     )
-    y = linear_loop.continuous_gain_limit("y", B_STABILITY, Operator())
-    yield Row(
-        "limit of K on y, from which the 5C is derived",
-        "Sec. 4.3, Eqs. 16, 19",
-        "should not exceed 5C",
-        "1",
-        GAIN_LIMIT_PRINTED,
-        y,
-        None,
+    y = gain_limit.gain_limit("y", B_STABILITY, TH)
+    yield row(
+        "limit of K on y, from which the 5C is derived | Sec. 4.3, Eqs. 16, 19 | should not exceed "
+        "5C | 1",
+        (GAIN_LIMIT_PRINTED, y, None),
         "contradicted",
         "Eq. 16 is the y axis, whose exact limit is below 1",
     )
     for axis in AXES:
-        verdict = margins.small_gain(axis, 1.0, B_STABILITY, equation=11)
-        tiny = margins.small_gain(axis, 1e-3, B_STABILITY, equation=11)
+        verdict = margins.small_gain(axis, 1.0, B_STABILITY, TH, equation=11)
+        tiny = margins.small_gain(axis, 1e-3, B_STABILITY, TH, equation=11)
         bands = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in verdict.fails)
-        yield Row(
-            f"inequality (11) on {axis}, K = 1",
-            "Eq. 11",
-            "satisfied below 5C",
-            "1",
-            None,
-            verdict.margin,
-            None,
+        yield row(
+            f"inequality (11) on {axis}, K = 1 | Eq. 11 | satisfied below 5C | 1",
+            (None, verdict.margin, None),
             "contradicted",
             f"fails at {bands} rad/s, and at K = 0.001 still below "
-            f"{tiny.fails[0][1]:.3g} rad/s: C integrates and Th(0) = {Operator().spring:g} N/m, so |GC(Te + Th)| has "
+            f"{tiny.fails[0][1]:.3g} rad/s: C integrates and Th(0) = {TH.spring:g} N/m, so |GC(Te "
+            "+ Th)| has "
             "no bound at low frequency, whatever K. The condition is sufficient, not necessary",
         )
     stiff = [
-        linear_loop.continuous_gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
+        gain_limit.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
         for n in (1.0, 10.0, 100.0)
     ]
-    yield Row(
-        "a more rigid operator needs a smaller C",
-        "Sec. 3.2",
-        "said",
-        "1",
-        None,
-        stiff[0],
-        None,
+    yield row(
+        "a more rigid operator needs a smaller C | Sec. 3.2 | said | 1",
+        (None, stiff[0], None),
         "given" if stiff[0] > stiff[1] > stiff[2] else "contradicted",
         "limit of K on x with Th, 10 Th, 100 Th: "
         + ", ".join(f"{k:.4g}" for k in stiff)
@@ -328,190 +265,138 @@ def gain_limits(runs: Runs) -> Iterator[Row]:
 
 
 def constant(runs: Runs) -> Iterator[Row]:
+    """The constant cut (Sec. 4.1, Figs. 7, 8).
+
+    Args:
+        runs: the runs behind the rows.
+    """
     r = runs.constant()
     edges = [c.border for c in r.crossings]
-    yield Row(
-        "clay begins",
-        "Sec. 4.1",
-        "5 cm in front",
-        "m",
-        CLAY_X[0],
-        float(r.p[np.argmax(r.b[:, 0] > 0.0), 0]),
-        5e-4,
+    yield row(
+        "clay begins | Sec. 4.1 | 5 cm in front | m",
+        (CLAY_X[0], float(r.p[np.argmax(r.b[:, 0] > 0.0), 0]), 5e-4),
         "given",
         "first sample in the clay",
     )
-    yield Row(
-        "length of the clay",
-        "Sec. 4.1",
-        "10 cm",
-        "m",
-        CLAY_X[1] - CLAY_X[0],
-        edges[1] - edges[0],
-        1e-9,
+    yield row(
+        "length of the clay | Sec. 4.1 | 10 cm | m",
+        (CLAY_X[1] - CLAY_X[0], edges[1] - edges[0], 1e-9),
         "given",
     )
-    yield Row(
-        "force/velocity in the clay",
-        "Sec. 4.1, Fig. 8",
-        "90 (N-s/m)",
-        "N.s/m",
-        B_CONSTANT,
-        steady(r, "x", 1, "steady_fe_over_v"),
-        1e-3,
+    yield row(
+        "force/velocity in the clay | Sec. 4.1, Fig. 8 | 90 (N-s/m) | N.s/m",
+        (B_CONSTANT, steady(r, "x", 1, "steady_fe_over_v"), 1e-3),
         "given",
         "fe/v where the speed is steady; the results have N·s/m",
     )
     odd = runs.constant(b=B_CONSTANT / CM, t_max=20.0)
-    yield Row(
-        "b2, as the assumptions print it",
-        "Sec. 4.1",
-        "90 N-s/cm",
-        "N.s/m",
-        B_CONSTANT,
-        steady(r, "x", 1, "steady_fe_over_v"),
-        1e-3,
+    yield row(
+        "b2, as the assumptions print it | Sec. 4.1 | 90 N-s/cm | N.s/m",
+        (B_CONSTANT, steady(r, "x", 1, "steady_fe_over_v"), 1e-3),
         "corrected",
-        f"N·s/m taken: with N·s/cm fe/v is {steady(odd, 'x', 1, 'fe_over_v'):.0f} N·s/m, a hundred times what "
-        f"Sec. 4.1 then reports, the cut runs at {steady(odd, 'x', 1, 'steady_speed'):.2g} m/s and has "
+        f"N·s/m taken: with N·s/cm fe/v is {steady(odd, 'x', 1, 'fe_over_v'):.0f} N·s/m, a hundred "
+        "times what "
+        f"Sec. 4.1 then reports, the cut runs at {steady(odd, 'x', 1, 'steady_speed'):.2g} m/s and "
+        "has "
         f"come {100 * odd.p[-1, 0] - 100 * CLAY_X[0]:.2g} cm into the clay after 20 s",
     )
-    yield Row(
-        "b1, damper before the clay",
-        "Sec. 4.1, Eq. 20",
-        "10 N-s/cm",
-        "N.s/m",
-        C_POLE,
-        steady(runs.free(length=0.2, t_max=8.0), "x", 0, "steady_fh_over_v"),
-        1e-2,
+    yield row(
+        "b1, damper before the clay | Sec. 4.1, Eq. 20 | 10 N-s/cm | N.s/m",
+        (C_POLE, steady(runs.free(length=0.2, t_max=8.0), "x", 0, "steady_fh_over_v"), 1e-2),
         "corrected",
         "the compensator's own damper: fh/v in free space is 10/K; N·s/m again",
     )
-    yield Row(
-        "force/velocity outside",
-        "Sec. 4.1, Fig. 8",
-        "approach zero",
-        "N.s/m",
-        0.0,
-        float(np.nanmax(np.abs(r.ratio(r.fe)[r.b[:, 0] == 0.0, 0]))),
-        1e-12,
+    yield row(
+        "force/velocity outside | Sec. 4.1, Fig. 8 | approach zero | N.s/m",
+        (0.0, float(np.nanmax(np.abs(r.ratio(r.fe)[r.b[:, 0] == 0.0, 0]))), 1e-12),
         "given",
         "fe/v; fh/v is 10 there",
     )
     inside = r.steady()[:, 0] & (r.b[:, 0] > 0.0)
     v = r.v[inside, 0]
-    yield Row(
-        "speed in the clay",
-        "Sec. 4.1",
-        "approximately constant",
-        "m/s",
-        linear_loop.steady_speed(1.0, 1.0, B_CONSTANT),
-        float(v.mean()),
-        1e-3,
+    yield row(
+        "speed in the clay | Sec. 4.1 | approximately constant | m/s",
+        (linear_loop.steady_speed(1.0, 1.0, B_CONSTANT), float(v.mean()), 1e-3),
         "inferred",
-        f"K f/(10 + K b) with 1 N; it varies by {100 * np.ptp(v) / v.mean():.1g} % over the steady part",
+        f"K f/(10 + K b) with 1 N; it varies by {100 * np.ptp(v) / v.mean():.1g} % over the steady "
+        "part",
     )
     first = runs.constant(shaping=True)
     exact = linear_loop.crossing_times("x", 1.0, r.scenario.force[0], edges, (0.0, B_CONSTANT, 0.0))
     for c, when, name in zip(first.crossings, exact, ("enters", "leaves", "ends"), strict=True):
         plain = next(x for x in r.crossings if x.border == c.border)
-        yield Row(
-            f"time at which the constant cut {name}",
-            "Sec. 4.1",
-            "not printed",
-            "s",
-            when,
-            c.time,
-            1e-5,
+        yield row(
+            f"time at which the constant cut {name} | Sec. 4.1 | not printed | s",
+            (when, c.time, 1e-5),
             "inferred",
             f"exact solution of the printed blocks; {plain.time:.5f} s on the arm without shaping",
         )
-    yield Row(
-        "fe/fh in the clay",
-        "Eq. 7",
-        "a transfer function",
-        "1",
-        abs(complex(margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
-        steady(r, "x", 1, "steady_fe_over_v") / steady(r, "x", 1, "steady_fh_over_v"),
-        1e-3,
+    yield row(
+        "fe/fh in the clay | Eq. 7 | a transfer function | 1",
+        (
+            abs(complex(margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
+            steady(r, "x", 1, "steady_fe_over_v") / steady(r, "x", 1, "steady_fh_over_v"),
+            1e-3,
+        ),
         "given",
         "Eq. 7 at zero frequency, beside the run",
     )
     double = runs.constant(gain=(2.0, 0.5))
-    yield Row(
-        "influence of C on the response",
-        "Sec. 4.1",
-        "unaffected by the choice of the controller C",
-        "N.s/m",
-        B_CONSTANT,
-        steady(double, "x", 1, "steady_fe_over_v"),
-        1e-3,
+    yield row(
+        "influence of C on the response | Sec. 4.1 | unaffected by the choice of the controller C "
+        "| N.s/m",
+        (B_CONSTANT, steady(double, "x", 1, "steady_fe_over_v"), 1e-3),
         "contradicted",
-        f"fe/v stays at b with K = 2, but the cut takes {double.t[-1]:.2f} s instead of {r.t[-1]:.2f} s, and "
-        f"enters the clay at {double.crossings[0].speed:.4f} instead of {r.crossings[0].speed:.4f} m/s",
+        f"fe/v stays at b with K = 2, but the cut takes {double.t[-1]:.2f} s instead of "
+        f"{r.t[-1]:.2f} s, and "
+        f"enters the clay at {double.crossings[0].speed:.4f} instead of {r.crossings[0].speed:.4f} "
+        "m/s",
     )
-    yield Row(
-        "free region behind the clay",
-        "Sec. 4.1",
-        "18-20 cm",
-        "m",
-        CLAY_X[1],
-        edges[1],
-        1e-9,
+    yield row(
+        "free region behind the clay | Sec. 4.1 | 18-20 cm | m",
+        (CLAY_X[1], edges[1], 1e-9),
         "corrected",
         "the clay ends at 15 cm; 15 to 20 cm is free as well",
     )
-    yield Row(
-        "maneuver of the constant cut",
-        "Sec. 4.1",
-        "not printed",
-        "N",
-        None,
-        r.scenario.force[0],
-        None,
+    yield row(
+        "maneuver of the constant cut | Sec. 4.1 | not printed | N",
+        (None, r.scenario.force[0], None),
         "not recoverable",
         "a constant muscle force of 1 N; the ratios do not depend on it",
     )
 
 
 def variable(runs: Runs) -> Iterator[Row]:
+    """The variable cut (Sec. 4.2, Figs. 9, 10).
+
+    Args:
+        runs: the runs behind the rows.
+    """
     r, shaped = runs.variable("none"), runs.variable("none", shaping=True)
-    yield Row(
-        "input force",
-        "Sec. 4.2",
-        "1 N at 45 degrees",
-        "N",
-        1.0,
-        math.hypot(*r.scenario.force),
-        1e-12,
+    yield row(
+        "input force | Sec. 4.2 | 1 N at 45 degrees | N",
+        (1.0, math.hypot(*r.scenario.force), 1e-12),
         "given",
     )
     for axis in AXES:
         i = AXES.index(axis)
         for k, b in enumerate(B_VARIABLE):
-            yield Row(
-                f"b in {axis}, {'before' if k == 0 else 'beyond'} 5 cm",
-                f"Eqs. {'23, 24' if k == 0 else '25, 26'}",
-                f"{b:g}",
-                "N.s/m",
-                b,
-                steady(r, axis, k, "steady_fe_over_v"),
-                1e-3,
+            yield row(
+                f"b in {axis}, {'before' if k == 0 else 'beyond'} 5 cm | Eqs. "
+                f"{'23, 24' if k == 0 else '25, 26'} | {b:g} | N.s/m",
+                (b, steady(r, axis, k, "steady_fe_over_v"), 1e-3),
                 "given",
                 "fe/v where the speed is steady, without growth",
             )
         for k, b in enumerate(B_VARIABLE):
             speed = linear_loop.steady_speed(r.scenario.gain[i], r.scenario.force[i], b)
-            yield Row(
-                f"speed in {axis}, {'before' if k == 0 else 'beyond'} 5 cm",
-                "Fig. 10",
-                "not printed",
-                "m/s",
-                speed,
-                steady(r, axis, k, "steady_speed"),
-                1e-3,
+            yield row(
+                f"speed in {axis}, {'before' if k == 0 else 'beyond'} 5 cm | Fig. 10 | not printed "
+                "| m/s",
+                (speed, steady(r, axis, k, "steady_speed"), 1e-3),
                 "inferred",
-                f"K f/(10 + K b), K = {r.scenario.gain[i]:g}; {steady(shaped, axis, k, 'steady_speed'):.6f} m/s "
+                f"K f/(10 + K b), K = {r.scenario.gain[i]:g}; "
+                f"{steady(shaped, axis, k, 'steady_speed'):.6f} m/s "
                 "with shaping",
             )
     for i, axis in enumerate(AXES):
@@ -522,52 +407,40 @@ def variable(runs: Runs) -> Iterator[Row]:
             next(c.time for c in x.crossings if (c.axis, c.border) == (axis, BORDER))
             for x in (r, shaped)
         )
-        yield Row(
-            f"time at which {axis} passes 5 cm",
-            "Fig. 10",
-            "not printed",
-            "s",
-            exact,
-            mine,
-            1e-3,
+        yield row(
+            f"time at which {axis} passes 5 cm | Fig. 10 | not printed | s",
+            (exact, mine, 1e-3),
             "inferred",
-            f"exact solution of the printed blocks; {other:.5f} s with shaping: both axes at once couple through Λ(q)",
+            f"exact solution of the printed blocks; {other:.5f} s with shaping: both axes at once "
+            "couple through Λ(q)",
         )
     grown = runs.variable()
     t0 = next(c.time for c in grown.crossings if (c.axis, c.border) == ("x", BORDER))
     late = grown.t > t0 + 2.0
     v, b = grown.v[late, 0], grown.b[late, 0]
     quasi = linear_loop.steady_speed(1.0, grown.scenario.force[0], b)
-    yield Row(
-        "speed in x beyond 5 cm, with growth",
-        "Sec. 4.2, Fig. 10",
-        "drops abruptly and decreases slowly",
-        "1",
-        1.0,
-        float((v / quasi).mean()),
-        1e-2,
+    yield row(
+        "speed in x beyond 5 cm, with growth | Sec. 4.2, Fig. 10 | drops abruptly and decreases "
+        "slowly | 1",
+        (1.0, float((v / quasi).mean()), 1e-2),
         "given",
         f"speed over K f/(10 + K b(t)), its mean; it falls "
-        f"{'monotonically' if np.all(np.diff(v) < 0.0) else 'not monotonically'} from {v[0]:.5f} to {v[-1]:.5f} m/s; "
+        f"{'monotonically' if np.all(np.diff(v) < 0.0) else 'not monotonically'} from {v[0]:.5f} "
+        f"to {v[-1]:.5f} m/s; "
         f"{grown.v[np.searchsorted(grown.t, t0), 0]:.5f} m/s at the border",
     )
-    said = {
+    readings = {
         "30/s": '"100 + 30t", t in s since entry',
         "0.15/s": '"100 + 0.15t", t in s (Eq. 25)',
         "0.15/sample": '"100 + 0.15t", t in samples',
     }
-    for reading, words in said.items():
+    for reading, words in readings.items():
         rate = GROWTHS[reading]
         x = runs.variable(reading)
         rate_found = float((x.b[-1, 0] - B_VARIABLE[1]) / (x.t[-1] - t0))
-        yield Row(
-            f"growth of the clay, reading {reading}",
-            "Sec. 4.2, Eq. 25",
-            words,
-            "N.s/m per s",
-            rate,
-            rate_found,
-            1e-3,
+        yield row(
+            f"growth of the clay, reading {reading} | Sec. 4.2, Eq. 25 | {words} | N.s/m per s",
+            (rate, rate_found, 1e-3),
             "corrected" if reading == "30/s" else "contradicted",
             f"b = {x.b[-1, 0]:.1f} N·s/m and {x.v[-1, 0]:.5f} m/s in x at the end, {x.status}"
             + (
@@ -578,28 +451,19 @@ def variable(runs: Runs) -> Iterator[Row]:
         )
     bad = runs.variable(as_printed=True)
     pole = rightmost("y", 1.0, B_STABILITY, None)
-    held = rightmost("y", 1.0, B_STABILITY, Operator())
-    yield Row(
-        "y with K = 1 and b = 100",
-        "Sec. 4.2, Eqs. 22, 26",
-        "a steady cut",
-        "1/s",
-        None,
-        pole.real,
-        None,
+    held = rightmost("y", 1.0, B_STABILITY, TH)
+    yield row(
+        "y with K = 1 and b = 100 | Sec. 4.2, Eqs. 22, 26 | a steady cut | 1/s",
+        (None, pole.real, None),
         "contradicted",
         f"unstable in the printed model: poles {pole.real:+.3g} ± {pole.imag:.3g}j 1/s "
-        f"({held.real:+.3g} ± {held.imag:.3g}j with Th), and the run says: {bad.status}. K = 0.5 on y is taken",
+        f"({held.real:+.3g} ± {held.imag:.3g}j with Th), and the run says: {bad.status}. K = 0.5 "
+        "on y is taken",
     )
     cm = runs.variable("none", b=tuple(x / CM for x in B_VARIABLE), t_max=20.0)
-    yield Row(
-        "variable cut in N-s/cm",
-        "Sec. 4.1 beside 4.2",
-        "N-s/cm in one, N-s/m in the other",
-        "m/s",
-        None,
-        float(cm.v[-1, 0]),
-        None,
+    yield row(
+        "variable cut in N-s/cm | Sec. 4.1 beside 4.2 | N-s/cm in one, N-s/m in the other | m/s",
+        (None, float(cm.v[-1, 0]), None),
         "corrected",
         f"N·s/m taken; with N·s/cm x is at {100 * cm.p[-1, 0]:.2g} cm after "
         f"20 s and never meets the border: {cm.status}",
@@ -607,63 +471,47 @@ def variable(runs: Runs) -> Iterator[Row]:
 
 
 def maneuver(runs: Runs) -> Iterator[Row]:
+    """The maneuver of the stability test (Sec. 4.3, Fig. 11).
+
+    Args:
+        runs: the runs behind the rows.
+    """
     where = {
         GAINS_FIG11[0]: "2 in the caption, 3 in the text",
         GAINS_FIG11[1]: "3 in the text, 2 in the caption",
         GAINS_FIG11[2]: "25",
     }
     for K in GAINS_FIG11:
-        r, stable = (
-            runs.stability(K),
-            K < linear_loop.continuous_gain_limit("x", B_STABILITY, Operator()),
-        )
-        pole = rightmost("x", K, B_STABILITY, Operator())
+        r, stable = runs.stability(K), K < gain_limit.gain_limit("x", B_STABILITY, TH)
+        pole = rightmost("x", K, B_STABILITY, TH)
         rms = float(np.sqrt(np.mean(r.fh[:, 0] ** 2)))
-        yield Row(
-            f"irregularity of the force, K = {K:g}",
-            "Sec. 4.3, Fig. 11",
-            where[K],
-            "1",
-            0.0 if stable else 1.0,
-            irregularity(r),
-            0.05,
+        yield row(
+            f"irregularity of the force, K = {K:g} | Sec. 4.3, Fig. 11 | {where[K]} | 1",
+            (0.0 if stable else 1.0, irregularity(r), 0.05),
             "given",
             f"0 is a force in the band of the maneuver, 1 one wholly outside; "
-            f"rms {rms:.3g} N; rightmost pole {pole.real:+.3g} ± {abs(pole.imag):.3g}j 1/s; {r.status}",
+            f"rms {rms:.3g} N; rightmost pole {pole.real:+.3g} ± {abs(pole.imag):.3g}j 1/s; "
+            f"{r.status}",
         )
     small, large = (runs.stability(K) for K in (GAINS_FIG11[1], GAINS_FIG11[2]))
     ratio = float(np.abs(large.fh[:, 0]).max() / np.abs(small.fh[:, 0]).max())
-    yield Row(
-        "largest force, K = 25 over K = 3",
-        "Sec. 4.3",
-        "much smaller in magnitude",
-        "1",
-        None,
-        ratio,
-        None,
+    yield row(
+        "largest force, K = 25 over K = 3 | Sec. 4.3 | much smaller in magnitude | 1",
+        (None, ratio, None),
         "given",
         "bounded by the torque limits alone, which are not printed",
     )
     other = runs.stability(GAINS_FIG11[1], axis="y", shaping=True)
-    yield Row(
-        "axis of Fig. 11",
-        "Fig. 11",
-        "force in x, position y",
-        "1",
-        None,
-        irregularity(other, "y"),
-        None,
+    yield row(
+        "axis of Fig. 11 | Fig. 11 | force in x, position y | 1",
+        (None, irregularity(other, "y"), None),
         "contradicted",
-        f"run in x; in y K = 3 is unstable as well ({other.status}), so the figure's two cases tell apart in x only",
+        f"run in x; in y K = 3 is unstable as well ({other.status}), so the figure's two cases "
+        "tell apart in x only",
     )
-    yield Row(
-        "maneuver of the stability test",
-        "Sec. 4.3",
-        "arbitrary, random",
-        "N",
-        None,
-        small.scenario.muscle.rms[0] if small.scenario.muscle else 0.0,
-        None,
+    yield row(
+        "maneuver of the stability test | Sec. 4.3 | arbitrary, random | N",
+        (None, small.scenario.muscle.rms[0] if small.scenario.muscle else 0.0, None),
         "not recoverable",
         "a seeded multisine of 0.1 to 2 Hz; rms of the muscle force",
     )

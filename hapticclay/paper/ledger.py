@@ -1,4 +1,4 @@
-"""What the ledger is made of: rows, and the runs behind them."""
+"""Rows of the ledger, and the runs behind them."""
 
 from __future__ import annotations
 
@@ -28,11 +28,15 @@ class Row:
     """One row.
 
     Attributes:
-        what: the quantity. where: its place in the paper. printed: as the paper has it.
-        unit: of expected and ours. expected: what the reading says, None if there is nothing to compare.
-        ours: what we found, None if there is nothing to find.
+        what: the quantity.
+        where: its place in the paper.
+        printed: as the paper has it.
+        unit: of expected and ours.
+        expected: value by our reading of the paper; None if there is nothing to compare.
+        ours: value found by the simulator; None if there is nothing to find.
         tolerance: relative to expected (absolute where that is 0); None if the row need not agree.
-        status: one of STATUSES. reason: why, with the evidence.
+        status: one of STATUSES.
+        reason: why, with the evidence.
     """
 
     what: str
@@ -46,7 +50,7 @@ class Row:
     reason: str = ""
 
     def __post_init__(self):
-        for field in ("expected", "ours"):  # NumPy's numbers become plain ones
+        for field in ("expected", "ours"):  # plain numbers, not those of NumPy
             value = getattr(self, field)
             object.__setattr__(self, field, None if value is None else float(value))
 
@@ -66,9 +70,18 @@ class Row:
 
 
 class Runs:
-    """The runs that rows and figures are made from, each made once, when it is first asked for."""
+    """The runs behind rows and figures, each made once, on first use.
+
+    Attributes:
+        progress: called with the name of each run before it is made.
+    """
 
     def __init__(self, progress: Callable[[str], None] | None = None):
+        """Keep no runs yet.
+
+        Args:
+            progress: called with the name of each run before it is made.
+        """
         self.progress = progress or (lambda name: None)
         self._kept: dict[str, Any] = {}
 
@@ -79,41 +92,86 @@ class Runs:
         return self._kept[name]
 
     def constant(self, **kw) -> Record:
-        return self._get(f"constant cut {_first_words(kw)}", lambda: simulate(constant_cut(**kw)))
+        """A constant cut.
+
+        Args:
+            **kw: as `constant_cut`.
+        """
+        return self._get(f"constant cut {_keywords(kw)}", lambda: simulate(constant_cut(**kw)))
 
     def variable(self, growth: Any = "30/s", **kw) -> Record:
+        """A variable cut.
+
+        Args:
+            growth: as `variable_cut`.
+            **kw: as `variable_cut`.
+        """
         return self._get(
-            f"variable cut, growth {growth} {_first_words(kw)}",
+            f"variable cut, growth {growth} {_keywords(kw)}",
             lambda: simulate(variable_cut(growth, **kw)),
         )
 
     def stability(self, gain: float, **kw) -> Record:
+        """A stability test.
+
+        Args:
+            gain: as `stability_test`.
+            **kw: as `stability_test`.
+        """
         return self._get(
-            f"stability test, K = {gain:g} {_first_words(kw)}",
+            f"stability test, K = {gain:g} {_keywords(kw)}",
             lambda: simulate(stability_test(gain, **kw)),
         )
 
     def free(self, **kw) -> Record:
-        return self._get(f"free {_first_words(kw)}", lambda: simulate(free(**kw)))
+        """A motion in free space.
+
+        Args:
+            **kw: as `free`.
+        """
+        return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
 
     def identified(self, what: str, axis: str) -> Identified:
+        """An identification from a single run.
+
+        Args:
+            what: "G", "S" (Sh) or "Th".
+            axis: "x" or "y".
+        """
         return self._get(
             f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1)
         )
 
 
-def _first_words(kw: dict) -> str:
+def _keywords(kw: dict) -> str:
     return " ".join(f"{k}={v}" for k, v in kw.items())
 
 
 def steady(r: Record, axis: str, k: int, name: str) -> float:
-    """A steady figure of the k-th stretch; NaN where the speed never settled."""
+    """A steady figure of one region of the path.
+
+    Args:
+        r: the record.
+        axis: "x" or "y".
+        k: index of the region along the path.
+        name: of the figure, as in `Record.regions`.
+
+    Returns:
+        The figure, its mean if it is a statistic; NaN where the speed never settled.
+    """
     value = r.regions(axis)[k][axis][name]
     value = value["mean"] if isinstance(value, dict) else value
     return math.nan if value is None else value
 
 
 def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
-    """The rightmost pole of the loop at the nominal pose [1/s], of a pair the one above the axis."""
+    """The rightmost pole of the loop at the nominal pose [1/s], of a pair the one above the axis.
+
+    Args:
+        axis: "x" or "y".
+        K: compensator gain.
+        b: clay [N.s/m].
+        th: Th; None for Th = 0.
+    """
     poles = linear_loop.closed_loop_poles(axis, K, b, th)
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
+from ..model.operator import Operator
 from . import claims
 from .ledger import STATUSES, Row, Runs
 
@@ -92,13 +93,13 @@ PICTURES = (
     Picture("fig11b", "Fig. 11: force during a maneuver, against position", "The same runs.",
             lambda r: _plot("force_maneuver", [r.stability(K) for K in GAINS_FIG11], "x", "position")),
     Picture("nyquist_x", "Nyquist diagram of x", "The loop (GC + Sh)(Te + Th) for the gains of Fig. 11.",
-            lambda r: _theory("nyquist", "x", B_STABILITY, gains=GAINS_FIG11)),
+            lambda r: _theory("nyquist", "x", B_STABILITY, gains=GAINS_FIG11, operator=Operator())),
     Picture("nyquist_y", "Nyquist diagram of y", "K = 1, as printed, encloses -1; K = 0.5 does not.",
-            lambda r: _theory("nyquist", "y", B_STABILITY, gains=(0.5, 1.0), impedance=False)),
+            lambda r: _theory("nyquist", "y", B_STABILITY, gains=(0.5, 1.0))),
     Picture("bode_x", "Bode diagram of x", "Margins of the constant cut, K = 1.",
-            lambda r: _theory("bode", "x", 1.0, B_CONSTANT)),
+            lambda r: _theory("bode", "x", 1.0, B_CONSTANT, operator=Operator())),
     Picture("small_gain_y", "Inequality (13) on y", "Where the paper's sufficient condition fails, whatever K.",
-            lambda r: _theory("small_gain", "y", 1.0, B_STABILITY)),
+            lambda r: _theory("small_gain", "y", 1.0, B_STABILITY, operator=Operator())),
     Picture("map", "Drift of Sh over the workspace",
             "Without shaping the printed Sh holds at the nominal pose only.", _map, quick=False),
 )  # fmt: skip

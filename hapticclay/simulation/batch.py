@@ -1,4 +1,4 @@
-"""Many runs at once: on all cores, each as it would be alone."""
+"""Many runs at once, on all cores, each with the result it has alone."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
@@ -62,22 +63,23 @@ def simulate_batch(
     every: int = 1,
     keep: str = "records",
 ) -> Any:
-    """Runs scenarios, which may differ in anything, side by side; each comes out as simulate(engine="native") has it.
+    """Runs scenarios in parallel; each gives the record of simulate(engine="native"), bit for bit.
 
-    Bit for bit, at any number of threads and in any order. Accurate runs, scenes that native cannot run, and all where
-    numba is not installed, run one after the other. A record takes 160 bytes a sample kept, a summary 500 bytes.
+    The number of threads and the order do not matter. Accurate runs, scenes that the compiled loop
+    cannot run, and all scenes without numba run one after the other. A record takes 160 bytes a
+    sample, a summary 500 bytes.
 
     Args:
-        scenarios: what to run.
-        threads: how many at a time; None for one a core.
+        scenarios: what to run; they may differ in anything.
+        threads: number of parallel runs; None for one a core.
         every: keep each every-th sample, and the last.
-        keep: "records" or "summaries", which keeps no samples.
+        keep: "records", or "summaries" without samples.
 
     Returns:
         A list of records in the order of the scenarios; or an array of SUMMARY, shape (n,).
 
     Raises:
-        ParameterError: one of scenarios, or another argument, is of the wrong kind.
+        ParameterError: a scenario, or another argument, is of the wrong kind.
     """
     jobs = list(scenarios)
     for i, s in enumerate(jobs):
@@ -113,39 +115,27 @@ def simulate_batch(
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _on_threads(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
-    """run(job) for each, on so many threads; the first exception ends them all and is raised."""
-    todo = iter(jobs)
-    lock = threading.Lock()
-    failed: list[BaseException] = []
+    """run(job) for each job, on so many threads; the first exception ends them all and is raised."""
+    todo, stop = iter(jobs), threading.Event()
 
-    def labour() -> None:
-        while not failed:
-            with lock:
-                job = next(todo, None)
-            if job is None:
+    def work() -> None:
+        for job in todo:
+            if stop.is_set():
                 return
-            try:
-                run(job)
-            except BaseException as error:
-                failed.append(error)
+            run(job)
 
-    crew = [threading.Thread(target=labour) for _ in range(threads)]
-    try:
-        for thread in crew:
-            thread.start()
-        for thread in crew:
-            thread.join()
-    except BaseException as error:  # Ctrl-C
-        failed.append(error)
-        for thread in crew:
-            thread.join()
-    if failed:
-        raise failed[0]
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for worker in as_completed([pool.submit(work) for _ in range(threads)]):
+                worker.result()
+        except BaseException:  # Ctrl-C too
+            stop.set()
+            raise
 
 
 def summary_entry(
@@ -155,11 +145,17 @@ def summary_entry(
     last: Sequence[Any],
     energy: dict[str, float],
 ) -> tuple[Any, ...]:
-    """A run's entry among summaries; of a record, entry(*record.brief(r)).
+    """Entry of a run among summaries.
 
     Args:
-        o: how it ended. steps: of the engine. crossings: of borders. last: p, v, fh, fe, b at the last good sample.
+        o: how it ended.
+        steps: of the engine.
+        crossings: of borders.
+        last: p, v, fh, fe, b at the last good sample, (x, y) each.
         energy: as Record.energy.
+
+    Returns:
+        The fields of SUMMARY.
     """
     first = crossings[:SUMMARY_CROSSINGS]
     rest = SUMMARY_CROSSINGS - len(first)

@@ -1,4 +1,4 @@
-"""What a run leaves behind: arrays over time, how it ended, and files that outlive the session."""
+"""The result of a run: arrays over time, the outcome, and files that keep them."""
 
 from __future__ import annotations
 
@@ -59,19 +59,28 @@ class Record:
     """Arrays of one run, all over the same n samples; axes ordered (x, y).
 
     Attributes:
-        t: time [s], shape (n,); steps of dt, the last one shorter if the run ended between two.
-        p, v: handle position [m] and velocity [m/s], shape (n, 2).
-        fh, fe: force of the operator on the handle, resisting force of the clay [N], (n, 2).
-        b: damping of the clay at p [N.s/m], (n, 2).
-        q, qd: joint angles [rad] and rates [rad/s], (n, 2).
-        tau: motor torques [N.m], (n, 2). delta: compensator output [m], (n, 2).
-        scenario: what was run. outcome: how it ended. crossings: borders, in order.
+        t: time [s], shape (n,); in steps of dt, the last one shorter if the run ended between two.
+        p: handle position [m], shape (n, 2).
+        v: handle velocity [m/s], shape (n, 2).
+        fh: force of the operator on the handle [N], shape (n, 2).
+        fe: resisting force of the clay [N], shape (n, 2).
+        b: damping of the clay at p [N.s/m], shape (n, 2).
+        q: joint angles [rad], shape (n, 2).
+        qd: joint rates [rad/s], shape (n, 2).
+        tau: motor torques [N.m], shape (n, 2).
+        delta: compensator output [m], shape (n, 2).
+        scenario: what was run.
+        outcome: how it ended.
+        crossings: of borders, in order.
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
-            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored); what is
-            left over (residual) and what went through (throughput) [J].
-        extra: of runs that asked for them, by name: removed clay (n,) and its rate (n,); of sessions, the point that
-            the hand pulled to (n, 2) and the gain K (n, 2). notes: of sessions, how well they kept real time.
-        steps: engine steps made. wall_time: seconds they took. versions: of the packages used.
+            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
+            what is left over (residual) and what went through (throughput) [J].
+        steps: engine steps made.
+        wall_time: run time [s].
+        versions: of the packages used.
+        extra: further arrays by name: removed clay and its rate, shape (n,); of sessions, the
+            target of the hand and the gain K, shape (n, 2).
+        notes: of sessions, how well they kept real time.
     """
 
     t: np.ndarray
@@ -96,7 +105,12 @@ class Record:
 
     @classmethod
     def of(cls, run: Run, wall: float) -> Record:
-        """The record of a run that is over and took wall seconds."""
+        """The record of a run that is over.
+
+        Args:
+            run: the run.
+            wall: run time [s].
+        """
         assert run.outcome is not None
         arrays: Any = run.arrays()
         return cls(
@@ -115,12 +129,19 @@ class Record:
         return str(self.outcome)
 
     def ratio(self, force: np.ndarray) -> np.ndarray:
-        """force / v along each axis [N.s/m], shape (n, 2); NaN where the handle stands still."""
+        """force / v along each axis; NaN where the handle is at rest.
+
+        Args:
+            force: [N], shape (n, 2).
+
+        Returns:
+            [N.s/m], shape (n, 2).
+        """
         out = np.full(self.v.shape, np.nan)
         return np.divide(force, self.v, out=out, where=np.abs(self.v) > 1e-12)
 
     def steady(self) -> np.ndarray:
-        """Which samples have a steady speed, shape (n, 2): less than 1 % of change in 1 s, for 0.1 s."""
+        """Samples of steady speed, shape (n, 2): less than 1 % of change in 1 s, for 0.1 s."""
         n = len(self.t)
         if n < 3:
             return np.zeros(self.v.shape, dtype=bool)
@@ -132,7 +153,14 @@ class Record:
         return count[high] == count[low]
 
     def stretches(self, axis: str | None = None) -> list[np.ndarray]:
-        """Indices of the samples, split wherever the handle entered another clay; of one axis, or of either."""
+        """Indices of the samples, split wherever the handle entered another clay.
+
+        Args:
+            axis: "x" or "y" for the clay of that axis; None for both.
+
+        Returns:
+            Arrays of indices, in order.
+        """
         s = self.scenario
         if s.clay and (s.clay.x.growth or s.clay.y.growth):
             along = {getattr(s.clay, a).along for a in ([axis] if axis else AXES)}
@@ -144,13 +172,16 @@ class Record:
         return np.split(np.arange(len(self.t)), change)
 
     def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
-        """One entry for each of the `stretches` in one clay, in order of time.
+        """Means over each of the `stretches`, in order of time.
 
-        For each axis: fe/v against b over the stretch (mean, spread), and where the speed is steady,
-        the speed, fe/v and fh/v there, beside K f/(10 + K b) where force and clay are constant.
+        For each axis: fe/v against b over the stretch (mean and deviation); where the speed is
+        steady, the speed, fe/v and fh/v, beside K f/(10 + K b) where force and clay are constant.
 
         Args:
-            axis: "x" or "y" for that axis and its own stretches alone.
+            axis: "x" or "y" for that axis and its stretches alone; None for both.
+
+        Returns:
+            One dictionary a stretch.
         """
         if not len(self.t):
             return []
@@ -217,7 +248,10 @@ class Record:
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes record.npz and summary.json into the folder path, each whole or not at all.
+        """Writes record.npz and summary.json, each whole or not at all.
+
+        Args:
+            path: the folder.
 
         Returns:
             The folder.
@@ -236,10 +270,13 @@ class Record:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Record:
-        """Reads what `save` wrote; path is the folder or its record.npz.
+        """Reads what `save` wrote.
+
+        Args:
+            path: the folder, or its record.npz.
 
         Raises:
-            ParameterError: no record there, or not one of this schema.
+            ParameterError: there is no record, or it has another schema.
         """
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
@@ -280,7 +317,7 @@ class Record:
 
 
 def _check(arrays: dict[str, np.ndarray]) -> None:
-    """Raises ValueError, which names the array, unless all are finite, of their shapes, and time does not go back."""
+    """Raises ValueError unless arrays are finite, have their shapes, and time does not go back."""
     t = arrays["t"]
     for name, x in arrays.items():
         shape = (t.size,) if name in SCALAR else (t.size, 2)
@@ -295,7 +332,14 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
-    """What is left of a record without its samples: outcome, steps, crossings, the last p, v, fh, fe, b, energy."""
+    """The end of a record, without its samples.
+
+    Args:
+        r: the record.
+
+    Returns:
+        Outcome, steps, crossings, the last (p, v, fh, fe, b), energy.
+    """
     last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
     return r.outcome, r.steps, r.crossings, last, r.energy
 
@@ -322,9 +366,16 @@ def _scenario(d: dict[str, Any]) -> Scenario:
 
 
 def port_energy(record: Record) -> np.ndarray:
-    """Energy that the hand has put into the handle since the start, along each axis [J], shape (n, 2).
+    """Energy that the hand has put into the handle along each axis.
 
-    The observer of Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002): the integral of fh v.
+    The observer of Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002): the integral of
+    fh v.
+
+    Args:
+        record: of a run.
+
+    Returns:
+        [J], shape (n, 2).
     """
     power = record.fh * record.v
     steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
@@ -332,13 +383,20 @@ def port_energy(record: Record) -> np.ndarray:
 
 
 def observed_passivity(record: Record) -> Verdict:
-    """Whether a recorded run took more energy from the hand than it gave back, at every instant.
+    """Whether a recorded run took more energy from the hand than it returned, at every instant.
 
-    Active on one record proves that the device is not passive; passive on one proves nothing about others.
+    Activity on one record proves that the device is not passive; passivity on one record proves
+    nothing about others.
+
+    Args:
+        record: of a run, three samples or more.
 
     Returns:
-        Verdict with the least energy [J]. An energy within what the quadrature leaves open (the
+        Verdict with the least energy [J]. An energy within the uncertainty of the quadrature (the
         integral over every other sample against that over all) counts as passive.
+
+    Raises:
+        ParameterError: fewer than three samples.
     """
     if len(record.t) < 3:
         raise ParameterError("record", len(record.t), "must have three samples or more")
@@ -349,7 +407,8 @@ def observed_passivity(record: Record) -> Verdict:
     )
     open_ = float(np.max(np.abs(coarse - energy[::2])))
     i = int(np.argmin(energy))
-    how = f"energy observer on the record, trapezoidal, to {open_:.1e} J; least at {record.t[i]:.4g} s"
+    to, at = f"{open_:.1e} J", f"{record.t[i]:.4g} s"
+    how = f"energy observer on the record, trapezoidal, to {to}; least at {at}"
     assumptions = ("the run started at rest", "this motion only")
     return Verdict(
         bool(energy[i] >= -open_),
@@ -362,16 +421,21 @@ def observed_passivity(record: Record) -> Verdict:
 
 
 def irregularity(record: Record, axis: str = "x") -> float:
-    """How irregular the operator's force is: the share of its rms that lies above the band of the maneuver.
+    """Share of the rms of the operator's force above the band of the maneuver.
 
-    A linear stable loop answers a maneuver within its own band, and gives 0; white noise gives nearly 1.
+    A stable linear loop answers a maneuver within its band and gives 0; white noise gives nearly 1.
     The second half of the record counts, under a Hann window.
 
     Args:
-        record: of a run with a varying muscle force. axis: "x" or "y".
+        record: of a run with a varying muscle force.
+        axis: "x" or "y".
+
+    Returns:
+        The share, 0 to 1.
 
     Raises:
-        ParameterError: the run's muscle force does not vary, or it kept fewer than 16 samples.
+        ParameterError: the muscle force of the run does not vary, or fewer than 32 samples were
+            kept.
     """
     i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
     if muscle is None or len(record.t) < 32:

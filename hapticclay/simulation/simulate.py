@@ -1,4 +1,4 @@
-"""One run: the engine steps the arm, the loop closes around it, the record keeps what happened."""
+"""One run: the engine steps the arm, the loop closes around it, the record keeps the result."""
 
 from __future__ import annotations
 
@@ -44,16 +44,18 @@ def simulate(
     Args:
         scenario: what to run.
         every: keep each every-th sample, and the last.
-        engine: "python", "native" (compiled, needs hapticclay[fast]; what it cannot do, Python does, and says so) or
-            "auto": native where it is installed and the run may take 300000 steps or more (20000 of "accurate").
-        progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as "interrupted".
+        progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as
+            "interrupted".
+        engine: "python"; "native", compiled (needs hapticclay[fast]; scenes that it cannot run are
+            run by Python, with a notice); or "auto", native where it is installed and the run may
+            take 300000 steps or more (20000 of "accurate").
 
     Returns:
         The record. Instability and its like are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: scenario, every or engine is of the wrong kind, numba is not installed, the scene is too
-            stiff for its integrator, or its record might not fit into memory.
+        ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
+            stiff for its integrator, or the record may not fit into memory.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
@@ -69,7 +71,7 @@ def simulate(
 
 
 def _check_memory(scenario: Scenario, every: int) -> None:
-    """Refuses a run whose record, should it last for t_max, does not fit into memory."""
+    """Refuses a run whose record would not fit into memory if it lasted for t_max."""
     steps = scenario.t_max / scenario.dt
     fixed = WIRE * steps if scenario.interface else 0.0
     samples = math.floor(steps / every) + 2
@@ -77,7 +79,8 @@ def _check_memory(scenario: Scenario, every: int) -> None:
         room := memory_left()
     ):
         return
-    need = f"{(fixed + SAMPLE * samples) / 1e9:.3g} GB of memory, and {max(room, 0.0) / 1e9:.3g} GB are left"
+    took, left = (fixed + SAMPLE * samples) / 1e9, max(room, 0.0) / 1e9
+    need = f"{took:.3g} GB of memory, and {left:.3g} GB are left"
     if (
         room > 2.0 * fixed
         and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000
@@ -90,7 +93,7 @@ def _check_memory(scenario: Scenario, every: int) -> None:
 
 
 def _stepper(scenario: Scenario, engine: str) -> type[Run]:
-    """What runs this scenario."""
+    """The class that runs this scenario."""
     if not native_fits(scenario) and not native_marches(scenario):
         if engine == "native":
             print(
@@ -113,7 +116,7 @@ def _stepper(scenario: Scenario, engine: str) -> type[Run]:
 
 
 def _not_native(scenario: Scenario) -> str:
-    """What native cannot do of this scenario."""
+    """The feature of a scenario that native does not have."""
     return (
         "sampled control"
         if scenario.control == "sampled"
@@ -122,10 +125,13 @@ def _not_native(scenario: Scenario) -> str:
 
 
 def load_compiled(accurate: bool = False) -> Any:
-    """The module native, which only a run that takes it pays for; None, and a line that says why, where it fails.
+    """Imports the compiled loop; prints a line that says why, where this fails.
 
     Args:
         accurate: whether for an accurate run.
+
+    Returns:
+        The module stepping.compiled; None where it fails.
     """
     try:
         from ..stepping import compiled
@@ -146,12 +152,20 @@ def load_compiled(accurate: bool = False) -> Any:
 
 
 def native_fits(scenario: Scenario) -> bool:
-    """Whether native's leapfrog can run this: continuous control, the fast integrator."""
+    """Whether the compiled leapfrog can run a scenario: continuous control, fast integrator.
+
+    Args:
+        scenario: the scenario.
+    """
     return scenario.control == "continuous" and scenario.integrator == "fast"
 
 
 def native_marches(scenario: Scenario) -> bool:
-    """Whether native can run this accurately: nothing in it may change with time."""
+    """Whether the compiled Runge-Kutta can run a scenario: accurate, and nothing changes with time.
+
+    Args:
+        scenario: the scenario.
+    """
     clay = scenario.clay
     grows = clay is not None and any((*(clay.x.growth or ()), *(clay.y.growth or ())))
     driven = scenario.muscle is not None or scenario.command is not None
@@ -166,21 +180,21 @@ NUMBA = "needs numba: pip install hapticclay[fast]"
 
 
 def has_numba() -> bool:
-    """Whether the compiled loop can be had."""
+    """Whether the compiled loop is available."""
     return importlib.util.find_spec("numba") is not None
 
 
-GROUPS = (  # limit of a control group and what it has taken, as containers have; version 2, version 1
+GROUPS = (  # limit and use of a control group (of containers), version 2 and version 1
     ("sys/fs/cgroup/memory.max", "sys/fs/cgroup/memory.current"),
     ("sys/fs/cgroup/memory/memory.limit_in_bytes", "sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 
 
 def memory_left(root: Path = Path("/")) -> float:
-    """Bytes that this process may still take: the least of machine, container and ulimit; inf where nobody says.
+    """Bytes that this process may still take, by machine, container and ulimit; inf if unknown.
 
     Args:
-        root: where the system's files are looked for.
+        root: root of the file system.
     """
     return min(
         _machine(root),

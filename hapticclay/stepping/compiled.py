@@ -1,7 +1,7 @@
-"""Runs compiled: `stride` and `march` and the laws they call, by numba, into functions that step whole runs.
+"""Compiled runs: `stride`, `march` and the laws they call, compiled by numba for whole runs.
 
-They call the engine's own functions at their addresses and hold no lock, so runs go on side by side in threads. The
-compiled code is kept on disk, in a folder named after the sources it was made from.
+They call the engine's own functions at their addresses and hold no lock, so runs go on in parallel
+threads. The machine code is kept on disk, in a folder named after the sources it was made from.
 """
 
 from __future__ import annotations
@@ -36,14 +36,23 @@ from .inline import inline
 from .runge_kutta import RungeKutta
 
 FLAT = (  # laws that are compiled with their own laws written into them
-    arm.handle_position, clay.damping_at, clay.enter_region, loop.velocity_at_sample, loop.loop_coefficients, loop.vector_field, loop.whole_kick, loop.step_loop,
-    stride.kick_inputs, stride.add_work, stride.position_after,
-)  # fmt: skip
+    *stride.INLINED,
+    arm.handle_position,
+    clay.damping_at,
+    clay.enter_region,
+    loop.loop_coefficients,
+    loop.step_loop,
+    loop.vector_field,
+    loop.velocity_at_sample,
+    loop.whole_kick,
+)
 PLAIN = (
-    runge_kutta.one_step, runge_kutta.stage_derivative, engine.next_sample, engine.find_root, signals.multisine_line,
-    stride.write_command, stride.first_step_of_hit, stride.region_exit, stride.kick_loop, stride.locate_event, stride.motors_limited,
-    stride.mean_signal, stride.distance_beyond, stride.step_engine, stride.record_crossing, stride.border_side, stride.step_many, stride.velocity_at_border, stride.write_row,
-)  # fmt: skip
+    *stride.COMPILED,
+    *runge_kutta.COMPILED_STAGES,
+    engine.find_root,
+    engine.next_sample,
+    signals.multisine_line,
+)
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
 NOTICE = "hapticclay: compiling, this once"
@@ -105,13 +114,13 @@ def _compiled(*functions: Any) -> list[Any]:
         numba.config.CACHE_DIR = before
 
 
-def _whole(g, muscle, commanded, table, engine, run, rows, crossings, most, room):
-    """stride.step_many, compiled as the laws are: each law once, for it and for the others."""
+def _whole(g, muscle, commanded, table, engine, run, rows, crossings, most, room):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """stride.step_many, compiled like the laws."""
     return stride.step_many(g, muscle, commanded, table, engine, run, rows, crossings, most, room)
 
 
 def cache_folder() -> Path:
-    """Where compiled code is kept: NUMBA_CACHE_DIR or the user's cache folder, by the sources it is made from."""
+    """Folder of the machine code, in NUMBA_CACHE_DIR or the user's cache, named by the sources."""
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(__file__).resolve().parents[1]
     for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
@@ -140,10 +149,10 @@ MJ_STEP, MJ_FORWARD = _addresses("mj_step", "mj_forward")
 
 
 class EngineStore:
-    """Engines of one thread, used again by run after run: one with clay, one without.
+    """Engines of one thread, used by run after run: one with clay, one without.
 
     Args:
-        models: to copy, by whether there is clay; those that lack are built when needed.
+        models: to copy, by whether there is clay; missing ones are built when needed.
     """
 
     def __init__(self, models: dict[bool, mujoco.MjModel]):
@@ -159,7 +168,14 @@ class EngineStore:
         self.engines[with_clay] = model, data, stride.StrideEngine(*at)
 
     def engine(self, s: Scenario) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """The engine as scene.build(s) would make it, at rest."""
+        """The engine as engine.build would make it, at rest.
+
+        Args:
+            s: the scenario.
+
+        Returns:
+            (model, data).
+        """
         if (s.clay is not None) not in self.engines:
             self._take(s.clay is not None, engine.build(s))
         model, data, _ = self.engines[s.clay is not None]
@@ -174,8 +190,10 @@ class NativeLeapfrog(Run):
     """The leapfrog, compiled: a chunk of steps at a time, borders included.
 
     Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
         bench: engines to use; None for its own.
-        quiet: keep no samples, for `brief` only; raise Suspicious where outcome.Watch would have to look.
+        quiet: keep no samples, for `brief` alone; raise NeedsMonitor where the monitor would look.
     """
 
     def __init__(
@@ -244,7 +262,11 @@ class NativeLeapfrog(Run):
             _stride(*self.given, CHUNK - 1, good)
 
     def look(self, rows: np.ndarray) -> tuple[int, monitor.Outcome | None]:
-        """As Run.look, which sees the rows of a calm run only once that has ceased to be calm."""
+        """As Run.look; the monitor sees the rows of a quiet run only once it is no longer quiet.
+
+        Args:
+            rows: shape (12, n).
+        """
         if self.calm:
             if self._still_calm(rows.shape[1]):
                 return rows.shape[1], None
@@ -254,7 +276,7 @@ class NativeLeapfrog(Run):
         return super().look(rows)
 
     def _still_calm(self, n: int) -> bool:
-        """Whether n more rows hold nothing that Watch could have to say anything of but its counts, which it gets."""
+        """Whether n more rows give the monitor nothing to report; at the end it gets the counts."""
         if not _calm(self.rows, n, *self.scenario.torque_limit, self.swings, self.seen):
             return False
         if self.outcome is not None:
@@ -266,7 +288,7 @@ class NativeLeapfrog(Run):
         if not self.quiet:
             return super().brief()
         px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.end
-        last = (px, py), (vx, vy), (fx, fy), (bx * vx, by * vy), (bx, by)
+        last = (px, py), (vx, vy), (fx, fy), clay.viscous_force(bx, by, vx, vy), (bx, by)
         return self.outcome, self.steps, self.crossings, last, self.balance()
 
     def balance(self) -> dict[str, float]:
@@ -281,7 +303,12 @@ class NativeLeapfrog(Run):
 
 
 class NativeRungeKutta(RungeKutta):
-    """The accurate run, compiled: many samples at a time, and each step on the way to a border."""
+    """The accurate run, compiled: many samples at a time, and each step on the way to a border.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+    """
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
@@ -298,6 +325,11 @@ class NativeRungeKutta(RungeKutta):
         self.room = np.empty((CHUNK, runge_kutta.MARCH_ROW))
 
     def go(self, progress: Any) -> None:
+        """As Run.go, without the callback.
+
+        Args:
+            progress: as in Run.go.
+        """
         Run.go(self, progress)
 
     def _given(self) -> tuple[Any, ...]:
@@ -341,7 +373,7 @@ class NativeRungeKutta(RungeKutta):
 
 
 class NeedsMonitor(Exception):
-    """A run to be made again, and watched."""
+    """A run to repeat under the monitor."""
 
 
 class BatchPool:
@@ -369,11 +401,25 @@ class BatchPool:
         return run, time.perf_counter() - begin
 
     def run(self, scenario: Scenario) -> tuple[NativeLeapfrog, float]:
-        """A run that native can make, and the seconds it took."""
+        """Makes a run.
+
+        Args:
+            scenario: one that `NativeLeapfrog` can run.
+
+        Returns:
+            The run, and the seconds it took.
+        """
         return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
-        """What batch.summary_entry takes, of a run that native can make."""
+        """The end of a run, without its samples.
+
+        Args:
+            scenario: one that `NativeLeapfrog` can run.
+
+        Returns:
+            As Run.brief.
+        """
         if scenario.stop:
             with contextlib.suppress(NeedsMonitor):
                 return self._go(scenario, LAST_ONLY, True)[0].brief()
@@ -394,7 +440,7 @@ def _timestep(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _signal_lines(signal: Any) -> np.ndarray:
-    """A signals.Signal, one row a line: omega [rad/s], phase x, y [rad], amplitude x, y; none for None."""
+    """A signals.Signal, one row a line: omega [rad/s], phase x, y [rad], amplitude x, y."""
     if signal is None:
         return np.zeros((0, 5))
     return np.column_stack(
@@ -404,7 +450,11 @@ def _signal_lines(signal: Any) -> np.ndarray:
 
 @functools.cache
 def warm(accurate: bool) -> None:
-    """Compiles, or fetches what was compiled, before the first run; Ctrl-C, which numba may lose, waits for it."""
+    """Compiles, or loads the machine code, before the first run; Ctrl-C waits for the end of it.
+
+    Args:
+        accurate: whether for accurate runs.
+    """
     entry = "runge_kutta.march" if accurate else "compiled._whole"
     told = (
         NOTICE

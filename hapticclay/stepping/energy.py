@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,18 @@ HARDWARE_WORK = (
 def stored_energy(
     th: Operator, r1: float, r2: float, p: Sequence[float], v: Sequence[float]
 ) -> tuple[float, float]:
-    """Energy [J] of the arm at link rates r1, r2 [rad/s], and of mass and spring of the hand at p [m], v [m/s]."""
+    """Energy of the arm, and of mass and spring of the operator's arm.
+
+    Args:
+        th: the operator's arm.
+        r1: rate of link 1 [rad/s].
+        r2: absolute rate of link 2 [rad/s].
+        p: handle position, (x, y) [m].
+        v: handle velocity, (x, y) [m/s].
+
+    Returns:
+        (arm, operator) [J].
+    """
     at_hand = 0.5 * (
         th.mass * (v[0] * v[0] + v[1] * v[1]) + th.spring * (p[0] * p[0] + p[1] * p[1])
     )
@@ -34,7 +44,12 @@ def energy_balance(
     """muscle + motors = clay + hand_damper + kinetic + hand_stored + residual [J].
 
     Args:
-        work: of muscle, motors, clay, hand's damper, and throughput [J]. first, last: from `stored_energy`.
+        work: of muscle, motors, clay and damper of the hand, and throughput [J].
+        first: from `stored_energy`, at the start.
+        last: from `stored_energy`, at the end.
+
+    Returns:
+        Record.energy.
     """
     muscle, motors, clay, hand, through = work
     kinetic, at_hand = last[0] - first[0], last[1] - first[1]
@@ -50,28 +65,45 @@ def energy_balance(
     }
 
 
-def kick_work(H, k, restx, resty, bx, by, ax, ay, t1, t2, w1, w2, damper):
-    """Work done in a kick [J]: of muscle, motors, clay, hand's damper, and throughput. Floats, or arrays over kicks.
+def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damper):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Work done in a kick. Floats, or arrays over kicks.
 
     Args:
-        H: length of the kick [s]. k: from loop.step_inputs. restx, resty: of the clay, beside its dampers [N].
-        bx, by, ax, ay: handle velocity before and after it [m/s].
-        t1, t2: motor torques [N.m]. w1, w2: mean joint rates [rad/s]. damper: of the hand [N.s/m].
+        H: length of the kick [s].
+        k: from loop.step_inputs.
+        restx: clay force beside its dampers, x [N].
+        resty: clay force beside its dampers, y [N].
+        v0x: handle velocity before the kick, x [m/s].
+        v0y: handle velocity before the kick, y [m/s].
+        v1x: handle velocity after the kick, x [m/s].
+        v1y: handle velocity after the kick, y [m/s].
+        t1: torque of the shoulder motor [N.m].
+        t2: torque of the elbow motor [N.m].
+        w1: mean rate of joint 1 [rad/s].
+        w2: mean rate of joint 2 [rad/s].
+        damper: of the operator's arm [N.s/m].
+
+    Returns:
+        (muscle, motors, clay, damper of the hand, throughput) [J].
     """
-    vx = 0.5 * (bx + ax)
-    vy = 0.5 * (by + ay)
+    vx = 0.5 * (v0x + v1x)
+    vy = 0.5 * (v0y + v1y)
     muscle = H * (k[5] * vx + k[6] * vy)
     motors = H * (t1 * w1 + t2 * w2)
-    clay = H * ((k[0] * bx + k[1] * ax + restx) * vx + (k[2] * by + k[3] * ay + resty) * vy)
+    clay = H * ((k[0] * v0x + k[1] * v1x + restx) * vx + (k[2] * v0y + k[3] * v1y + resty) * vy)
     hand = H * damper * (vx * vx + vy * vy)
     return muscle, motors, clay, hand, abs(muscle) + abs(motors)
 
 
 class EnergyLedger:
-    """Adds up the work done in the kicks of a run; each force times the mean of the velocities around it.
+    """Sums the work done in the kicks of a run: force times the mean of the velocities around it.
 
-    The arm's kinetic energy is read from the engine's own rates, so the balance also tells whether
-    the engine did what the loop reckoned with.
+    The kinetic energy of the arm comes from the rates of the engine, so the balance also shows
+    whether the engine did what the loop computed.
+
+    Args:
+        scenario: the scenario.
+        extra: list that gets the forces of the hardware in each kick; None for an ideal loop.
     """
 
     def __init__(self, scenario: Scenario, extra: list[tuple[float, ...]] | None = None):
@@ -86,17 +118,18 @@ class EnergyLedger:
         """Enters kicks.
 
         Args:
-            raw: shape (14, n), as glide.advance keeps them. k: loop.step_inputs of each, (12, n) or (12, 1).
-            rest: of the clay, beside its dampers [N], (2, n) or (2, 1). H: length of each kick [s], (n,) or (1,).
+            raw: shape (14, n), as leapfrog.glide_constant keeps them.
+            k: loop.step_inputs of each kick, shape (12, n) or (12, 1).
+            rest: clay force beside its dampers [N], shape (2, n) or (2, 1).
+            H: length of each kick [s], shape (n,) or (1,).
         """
         if not raw.shape[1]:
             return
         th = self.scenario.operator or NO_HAND
         q, p, before, after, tau = raw[0:2], raw[2:4], raw[4:6], raw[6:8], raw[10:12]
         v = 0.5 * (before + after)
-        a = q[0] + q[1]
-        columns: Any = arm.jacobian(np.sin(q[0]), np.cos(q[0]), np.sin(a), np.cos(a))  # type: ignore[arg-type]
-        r1, r2 = arm.joint_velocity(v[0], v[1], *columns, 1.0)  # type: ignore[arg-type]
+        u = arm.jacobians(q[0], q[1])
+        r1, r2 = arm.joint_velocity(v[0], v[1], u, 1.0)
         around = before[0], before[1], after[0], after[1]
         self.work += [
             x.sum()
@@ -108,8 +141,7 @@ class EnergyLedger:
             self._memo(H, v, r1, r2)
 
         def held(v: np.ndarray, j: int) -> tuple[float, float]:
-            u1x, u1y, u2x, u2y = (x[j] for x in columns)
-            r = arm.joint_velocity(v[0, j], v[1, j], u1x, u1y, u2x, u2y, 1.0)
+            r = arm.joint_velocity(v[0, j], v[1, j], [x[j] for x in u], 1.0)
             return stored_energy(th, r[0], r[1], p[:, j].tolist(), v[:, j].tolist())
 
         if self.first is None:
@@ -119,7 +151,7 @@ class EnergyLedger:
     def _memo(self, H: np.ndarray, v: np.ndarray, r1: np.ndarray, r2: np.ndarray) -> None:
         """Enters what an interface takes in each kick.
 
-        Its extra row: torques of the friction [N.m], what the passivity controller adds to the resisting force [N],
+        Its extra row: torques of the friction [N.m], force added by the passivity controller [N],
         force of the coupling [N], velocity of its tool [m/s]; two axes each.
         """
         assert self.extra is not None

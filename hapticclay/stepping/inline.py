@@ -1,9 +1,9 @@
-"""Inlines the laws into a loop: the same source lines, without Python's calls and tuples.
+"""Inlines the laws into a loop: the same source lines, without calls and tuples.
 
-A law is a module-level function of this package that assigns names, branches with `if`, and ends
-in its only `return`. `inline` rewrites a function so that each statement `targets = law(...)`
-becomes the law's own lines. The result computes the same floating-point operations in the same
-order, so it agrees bit for bit with the function it was made from.
+A law is a module-level function of this package that assigns names, branches with `if`, and ends in
+its only `return`. `inline` rewrites a function so that each statement `targets = law(...)` becomes
+the law's own lines. The result does the same floating-point operations in the same order, so it
+agrees bit for bit with the original.
 """
 
 from __future__ import annotations
@@ -21,10 +21,14 @@ PACKAGE = __name__.partition(".")[0]
 
 
 def inline(function: FunctionType, never: frozenset[str] = frozenset()) -> Callable[..., Any]:
-    """Returns function with every law inlined; function itself where its source is not at hand.
+    """A function with every law inlined; the function itself where its source is missing.
 
     Args:
-        never: names that are false whenever function is called; what stands under `if` one of them is left out.
+        function: the loop.
+        never: names that are false in every call; code under `if` one of them is left out.
+
+    Returns:
+        The new function.
     """
     try:
         tree = _parse(function)
@@ -231,7 +235,7 @@ def _flatten(body: list[ast.stmt]) -> list[ast.stmt]:
 
 
 def _hoist(body: list[ast.stmt], targets: set[str]) -> tuple[list[ast.stmt], list[ast.stmt]]:
-    """Takes the unpacking of names that the loop, by its targets or in its body, never assigns out of the loop."""
+    """Moves the unpacking of names that the loop never assigns out of the loop."""
     assigned = targets.union(*(_assigned(s) for s in body))
     head: list[ast.stmt] = [
         s
@@ -280,7 +284,7 @@ class _Line:
 
 
 def _prune(body: list[ast.stmt]) -> list[ast.stmt]:
-    """Drops, in a loop's body, the plain copies that can be read at their source, and what nobody reads."""
+    """Drops plain copies that can be read at their source, and values that are never read."""
     lines = [_Line(s) for s in body]
     i = 0
     while i < len(lines):

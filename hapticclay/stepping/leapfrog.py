@@ -1,4 +1,4 @@
-"""The default run: a leapfrog of one engine step a sample, second order, in pure Python at speed."""
+"""The default run: a leapfrog of one engine step a sample, second order, in plain Python."""
 
 from __future__ import annotations
 
@@ -18,21 +18,27 @@ from . import energy, loop
 from .engine import CHUNK, TOUCH, Run, command_view, find_root, mujoco, shared_view
 from .inline import inline
 
-LANDINGS = 4  # on borders in one step; a handle that slides along a border then completes the step beside it
-FIRST_OF_HIT, HIT_GROWTH = (
-    0.02,
-    1.01,
-)  # first step of such a hit, in decay times of the speed; each step over the one before
+LANDINGS = 4  # on borders in one step; a handle that slides along one then completes the step
+FIRST_OF_HIT = 0.02  # first step of a hit that saturates the motors, in decay times of the speed
+HIT_GROWTH = 1.01  # of each step of it over the one before
 INPUTS = 12  # numbers in loop.step_inputs
-NONE = (0.0, 0.0)
+ZERO = (0.0, 0.0)
 FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
 
 _row = struct.Struct("14d")
 _fused: dict[Callable[..., Any], Callable[..., Any]] = {}  # loops that have been inlined
 
 
-def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
-    """The loop with its laws inlined, where so many steps are worth it or it has been done before."""
+def written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
+    """The loop with its laws inlined, where that many steps repay the effort or it is done already.
+
+    Args:
+        law: `glide_constant` or `glide_varying`.
+        steps: steps to come.
+
+    Returns:
+        A function of the same arguments.
+    """
     if law not in _fused:
         if steps < FUSE_FROM:
             return law
@@ -41,18 +47,18 @@ def _written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
 
 
 class _Stretch(NamedTuple):
-    """Rows in a row that have this in common."""
+    """Consecutive rows with these values in common."""
 
     n: int
     is_sample: bool  # False at a border between two samples
-    b: Any  # clay at the sample [N.s/m], (2, n), or (2, 1) where it is the same for all; of one row a tuple
+    b: Any  # clay at the sample [N.s/m], (2, n), (2, 1) or a tuple
     k: Any  # loop.step_inputs, (INPUTS, n), (INPUTS, 1) or a tuple
     H: float  # length of the kick [s]
-    rest: Any = NONE  # clay's force beside its dampers [N], (2, n) or a tuple
+    rest: Any = ZERO  # clay's force beside its dampers [N], (2, n) or a tuple
 
 
 def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
-    """Columns side by side, those of one column repeated to its count; a tuple is a column of its own."""
+    """Columns side by side, each repeated to its count; a tuple is one column."""
     out: list[np.ndarray] = []
     pairs = zip(columns, counts, strict=True)
     for single, some in itertools.groupby(pairs, key=lambda pair: isinstance(pair[0], tuple)):
@@ -63,11 +69,16 @@ def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
     return np.concatenate(out, axis=1) if out else np.empty((2, 0))
 
 
-def _sampled(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario) -> np.ndarray:
-    """What each kick did, shape (14, n), to (q, p, v, fh, tau, delta) at its sample, shape (12, n).
+def _rows_at_samples(
+    raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario
+) -> np.ndarray:
+    """Converts kicks, shape (14, n), to (q, p, v, fh, tau, delta) at their samples, shape (12, n).
 
-    k is loop.step_inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) where they are the same for all; rest the clay's
-    force beside its dampers [N], (2, n) or (2, 1).
+    Args:
+        raw: the kicks.
+        k: loop.step_inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) for all.
+        rest: clay force beside its dampers [N], shape (2, n) or (2, 1).
+        scenario: the scenario.
     """
     out = np.empty((12, raw.shape[1]))
     before, after = raw[4:6], raw[6:8]
@@ -85,7 +96,12 @@ def _sampled(raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenari
 
 
 class Leapfrog(Run):
-    """One engine step a sample; a step that would cross a border ends on it, and another completes it."""
+    """One engine step a sample; a step that would cross a border ends on it, another completes it.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+    """
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
@@ -94,12 +110,10 @@ class Leapfrog(Run):
         self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
         self.whole = loop.loop_coefficients(scenario, scenario.dt, scenario.dt)
         self.hand = scenario.operator or NO_HAND
-        if (
-            scenario.control == "continuous"
-        ):  # what `_glide` will need is written out before the run is timed
-            _written_out(glide_varying if self.varies else glide_constant, self.last)
+        if scenario.control == "continuous":  # `_glide` needs these, before the run is timed
+            written_out(glide_varying if self.varies else glide_constant, self.last)
             if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-                _written_out(glide_varying, self.last)
+                written_out(glide_varying, self.last)
         self.landings = 0  # on borders since the last sample
         self.struck = True  # the handle has just come into this clay
         self.fine = math.inf  # longest step on the way from a hit [s]
@@ -117,15 +131,12 @@ class Leapfrog(Run):
         return self.filled >= CHUNK - 1
 
     def _glide(self) -> bool:
-        """Whole steps in one go; undone from the first that a border lies in. False if there is none to make."""
+        """Makes whole steps, up to the first that crosses a border; False if there is none."""
         dt = self.scenario.dt
         n = min(self.last - self.i, CHUNK - 1 - self.filled)
         if self.before != dt or self.clay != (self.regions.base, self.regions.rate) or n < 1:
             return False
-        p, ahead = (
-            self.position(self.angles, self.rates, 0.0),
-            self.position(self.angles, self.rates, dt),
-        )
+        p, ahead = (self.position(self.angles, self.rates, h) for h in (0.0, dt))
         for i in (0, 1):  # do not run far beyond the border that lies ahead
             d = ahead[i] - p[i]
             if d:
@@ -140,13 +151,10 @@ class Leapfrog(Run):
         else:
             b = self.regions.b(self.t)
             inputs = loop.step_inputs(b, b, self.scenario.force, dt, dt, self.hand)
-            b, k, shift = (
-                np.reshape(b, (2, 1)),
-                np.reshape(inputs, (INPUTS, 1)),
-                ([0.0] * n, [0.0] * n),
-            )
+            shift = [0.0] * n, [0.0] * n
+            b, k = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1))
         simple = not self.varies and not k[7, 0]
-        many = _written_out(glide_constant if simple else glide_varying, self.last)
+        many = written_out(glide_constant if simple else glide_varying, self.last)
         if simple:
             steps, given = rows, (self.whole, inputs)
         else:
@@ -168,7 +176,7 @@ class Leapfrog(Run):
             if n < 1:
                 self.state = state
                 return False
-        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [NONE]).T))
+        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [ZERO]).T))
         self.filled += n
         self.steps += n
         self.i += n
@@ -176,7 +184,7 @@ class Leapfrog(Run):
         return True
 
     def _ahead(self, n: int) -> tuple[list, list, list]:
-        """Clay at each of the next n samples, loop.step_inputs there, and the change of the command after it, x and y."""
+        """Clay at the next n samples, loop.step_inputs there, change of the command (x, y)."""
         dt = self.scenario.dt
         t = (self.i + np.arange(n + 1)) * dt
         now = t[:n].tolist()
@@ -189,12 +197,12 @@ class Leapfrog(Run):
                 for (b0, b1), u in zip(halves, uh, strict=True)
             ]
         else:
-            same = loop.step_inputs(b[0], b[0], NONE, dt, dt, self.hand)
+            same = loop.step_inputs(b[0], b[0], ZERO, dt, dt, self.hand)
             k = [(*same[:5], *u, *same[7:]) for u in uh]
         return b, k, self.shift(t[:n], t[1:]).T.tolist()
 
     def _good(self, first: int, n: int) -> int:
-        """How many of n steps from row first stay in the region, the position after the last included."""
+        """Number of the n steps from row first that stay in the region."""
         rows = np.frombuffer(self.rows, dtype=float, count=14 * (first + n)).reshape(-1, 14)
         end = self.position(self.angles, self.rates, 0.0)
         out = np.zeros(n + 1, dtype=bool)
@@ -206,7 +214,7 @@ class Leapfrog(Run):
         return int(out.argmax()) - 1 if out.any() else n
 
     def _careful(self) -> None:
-        """One step that looks where it ends, and ends on a border if one is in its way."""
+        """One step with a look at its end, which lies on a border if one is in the way."""
         target, after, on_grid = self.target()
         if not after:
             return self._close("time limit")
@@ -225,9 +233,8 @@ class Leapfrog(Run):
             ups = {
                 i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])
             }
-            hit = [
-                i for i in ups if crossed.get(i, ups[i]) == ups[i]
-            ]  # no way back: a border must not hold the run
+            # no way back over a border: it must not hold the run
+            hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]
             if not hit:
                 landing = None
                 break
@@ -250,9 +257,7 @@ class Leapfrog(Run):
         self._engine(w, command, out, after)
         self.state, self.clay = new, (self.regions.base, self.regions.rate)
         self.before = after
-        self.fine = (
-            self.fine * HIT_GROWTH if self.fine < math.inf and self._limited(command) else math.inf
-        )
+        self.fine *= HIT_GROWTH if self._limited(command) else math.inf
         self.t += after
         if target - self.t <= 1e-9 * self.scenario.dt:
             self._arrive(target)
@@ -262,9 +267,10 @@ class Leapfrog(Run):
         return None
 
     def _velocity(self, q, w, out) -> tuple[float, float]:
-        """Velocity of the handle at this time [m/s], to which half a kick has brought it, on the near side of a border.
+        """Handle velocity now [m/s], on the near side of a border.
 
-        In stiff clay that half holds too little; there it is what the clay would feel in a whole one.
+        Half a kick has led to `out`. In stiff clay that half holds too little of the clay; the
+        velocity is then that of a whole kick.
         """
         k = self._inputs(self.before, self.before)
         if not (k[10] or k[11]):
@@ -277,11 +283,11 @@ class Leapfrog(Run):
         return x, y
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
-        """Sample and end of a kick here, if the step before it were made once more, as loop.step_loop returns them."""
+        """Sample and end of a kick here, with the step before it repeated; see loop.step_loop."""
         return self._tick(q, w, self.before)[2:]
 
     def _halve(self, q: tuple[float, ...], w: tuple[float, ...]) -> tuple[float, ...]:
-        """Ends the step that led here by the kick's own half; returns the rates at this time, from which to go on."""
+        """Ends the step that led here with its half of the kick; returns the joint rates now."""
         if self.before:
             self.state, command, sample, out = self._tick(q, w, 0.0)
             self._keep(False, q, sample, command, out, 0.0)
@@ -290,7 +296,7 @@ class Leapfrog(Run):
         return w
 
     def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
-        """Length of the first of the steps that resolve a hit which drives motors into their limits [s]; else inf."""
+        """First of the steps that resolve a hit which saturates the motors [s]; else inf."""
         b = max(self.regions.b(self.t))
         first = FIRST_OF_HIT / (b * arm.TRACE_W) if b else math.inf
         if first >= after:
@@ -304,25 +310,21 @@ class Leapfrog(Run):
         return first if self._limited(command) else math.inf
 
     def _limited(self, command: tuple[float, ...]) -> bool:
-        """Whether a motor gives all it can in this kick."""
+        """Whether a motor is at its limit in this kick."""
         limit = self.scenario.torque_limit
         return abs(command[0]) >= limit[0] or abs(command[1]) >= limit[1]
 
     def _arrive(self, target: float) -> None:
-        """The time that `target` gave has come [s]."""
+        """Moves the clock to the time of `target` [s]."""
         self.i += 1
         self.t = target
 
     def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
         s = self.scenario
-        c = (
-            self.whole
-            if self.before == after == s.dt
-            else loop.loop_coefficients(s, self.before, after)
-        )
-        state, *rest = loop.step_loop(
-            c, self._inputs(self.before, after), q[0], q[1], w[0], w[1], self.state
-        )
+        whole = self.before == after == s.dt
+        c = self.whole if whole else loop.loop_coefficients(s, self.before, after)
+        k = self._inputs(self.before, after)
+        state, *rest = loop.step_loop(c, k, q[0], q[1], w[0], w[1], self.state)
         if self.command and after:
             cx, cy = self.shift(self.t, self.t + after).tolist()
             state = (state[0] + cx, state[1] + cy, *state[2:])
@@ -355,7 +357,7 @@ class Leapfrog(Run):
         return end
 
     def _close(self, code: str) -> None:
-        """The last sample: half a kick brings the rates to it, nothing is stepped."""
+        """Takes the last sample: half a kick brings the rates to it, nothing is stepped."""
         q = tuple(self.angles)
         if self.before > 0.0:
             w = tuple(self.rates)
@@ -372,14 +374,14 @@ class Leapfrog(Run):
     def _put(
         self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool
     ) -> None:
-        """Keeps the row of one kick; the clay it shows is that of the region the run goes on in, or of the last."""
+        """Keeps the row of one kick, with the clay of the region in which the run continues."""
         _row.pack_into(self.rows, self.filled * GLIDE_ROW, *row[:14])
         b = self.regions.b(self.t) if goes_on else damping_at(*self.clay, self.t)
         self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
         self.filled += 1
 
     def _engine(self, w, command, out, after: float) -> None:
-        """Steps the engine by after. If that differs from the length of the kick, the kick goes in whole."""
+        """Steps the engine by after; the kick goes in whole if it has another length."""
         model, data, dt = self.model, self.data, self.scenario.dt
         self.steps += 1
         if after == self.before == dt:
@@ -389,12 +391,9 @@ class Leapfrog(Run):
             self._whole(w, command, out, after)
 
     def _whole(self, w, command, out, after: float) -> None:
-        """Steps the engine by after, from joint rates w to those of out, whatever the length of the kick."""
-        self.write(
-            self.drive,
-            0,
-            *loop.whole_kick(w[0], w[1], out[2], out[3], command[0], command[1], after),
-        )
+        """Steps the engine by after, from joint rates w to those of out."""
+        t1, t2, *_ = command
+        self.write(self.drive, 0, *loop.whole_kick(w[0], w[1], out[2], out[3], t1, t2, after))
         self.model.opt.timestep = after
         mujoco.mj_step(self.model, self.data)
         self.model.opt.timestep = self.scenario.dt
@@ -414,7 +413,7 @@ class Leapfrog(Run):
             if not all(x.is_sample for x in pieces):
                 which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
         samples = [x for x in pieces if x.is_sample]
-        rows = _sampled(raw, k, rest, self.scenario)
+        rows = _rows_at_samples(raw, k, rest, self.scenario)
         if self.final and n:
             rows[4:6, -1] = self.final
         good = self.judge(
@@ -429,21 +428,26 @@ class Leapfrog(Run):
         return self.ledger.close()
 
 
-GLIDE_ROW = (
-    14 * 8
-)  # bytes of one row: q, p, v before and after the kick, f, tau, delta, two axes each
+GLIDE_ROW = 14 * 8  # bytes of a row: q, p, v before and after, f, tau, delta, two axes each
 
 
-def glide_constant(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):
-    """Whole steps within one region of the clay, which is not stiff.
+def glide_constant(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Whole steps within one region of clay that is not stiff.
 
     Args:
-        rows: range of offsets into the record, one for each step [bytes].
-        c, k: from `loop.loop_coefficients` and `loop.step_inputs`, for whole steps before and after.
+        rows: range of offsets into the record, one a step [bytes].
+        c: from `loop.loop_coefficients`, for whole steps.
+        k: from `loop.step_inputs`, for whole steps.
         state: see `loop.step_loop`.
-        read: unpacks q1, q2, w1, w2 from the engine's memory, motion.
-        write: packs a command into the engine's memory, drive.
-        keep: packs one row into the record, buffer. step, model, data: the engine.
+        read: unpacks q1, q2, w1, w2 from `motion`.
+        write: packs a command into `drive`.
+        keep: packs one row into `buffer`.
+        motion: the engine's memory.
+        drive: the engine's memory.
+        buffer: the record.
+        step: mj_step.
+        model: the engine's model.
+        data: the engine's data.
 
     Returns:
         The state after the last step.
@@ -463,14 +467,29 @@ def glide_constant(rows, c, k, state, read, write, keep, motion, drive, buffer, 
     return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
 
 
-def glide_varying(
+def glide_varying(  # noqa: PLR0913  # compiled and inlined: plain numbers
     steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data
 ):
-    """As `glide_constant`, where the clay is stiff, or the clay, the muscle force or the command change from step to step.
+    """As `glide_constant`, where the clay is stiff or anything changes from step to step.
 
     Args:
-        steps: for each step its offset into the record [bytes], `loop.step_inputs`, change of the command x, y over it [m].
-        rest: list that gets the clay's force beside its dampers x, y in each kick [N].
+        steps: a step each: offset into the record [bytes], `loop.step_inputs`, change of the
+            command over it x, y [m].
+        rest: list that gets the clay force beside its dampers in each kick, (x, y) [N].
+        c: as in `glide_constant`.
+        state: as in `glide_constant`.
+        read: as in `glide_constant`.
+        write: as in `glide_constant`.
+        keep: as in `glide_constant`.
+        motion: as in `glide_constant`.
+        drive: as in `glide_constant`.
+        buffer: as in `glide_constant`.
+        step: as in `glide_constant`.
+        model: as in `glide_constant`.
+        data: as in `glide_constant`.
+
+    Returns:
+        The state after the last step.
     """
     s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
     for row, k, cx, cy in steps:

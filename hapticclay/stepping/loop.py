@@ -1,17 +1,15 @@
-"""One tick of the closed loop: measure -> clay -> operator -> compensator -> servo -> engine.
+"""One step of the closed loop: measure -> clay -> operator -> compensator -> servo -> engine.
 
-The loop is stepped as a leapfrog: angles at the samples t(k), rates halfway between them, so that
-a plain step of the engine (rates first, then angles with the new rates) is of second order. A kick
-carries the rates across sample k; it lasts from the middle of the step before it to the middle
-of the step after it, and either step may be short, to end on a border of the clay.
-Derivation and error terms: docs/equations.md, section 4.
+The loop is stepped as a leapfrog: angles at the samples t(k), rates halfway between them, so that a
+plain step of the engine (rates first, then angles with the new rates) is of second order. A kick
+carries the rates across sample k; it lasts from the middle of the step before the sample to the
+middle of the step after it. Either step may be short, to end on a border of the clay. Derivation
+and error terms: docs/equations.md, section 4.
 """
 
 # pyright: reportPossiblyUnboundVariable=false
-# What only stiff clay needs is bound and read under the same `if stiff`: the loop has no time to bind it otherwise.
+# Names for stiff clay alone are bound and read under the same `if stiff`, for speed.
 from __future__ import annotations
-
-from math import cos, sin
 
 from ..model import arm, clay, controller, operator
 from ..model.constants import C_POLE, G, S
@@ -22,18 +20,31 @@ SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
 
 
 def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float, ...]:
-    """State of a loop whose handle is at p [m] and moves with v [m/s], as if it had done so for long; see `step_loop`.
+    """State of a loop whose handle has moved with a constant velocity for long; see `step_loop`.
 
     The compensator leads by the lag of G at constant speed.
+
+    Args:
+        p: handle position, (x, y) [m].
+        v: handle velocity, (x, y) [m/s].
+
+    Returns:
+        12 numbers.
     """
     ahead = (p[i] + G[i].damping / G[i].stiffness * v[i] for i in (0, 1))
     return (*ahead, *v, *p, *v, 0.0, 0.0, 0.0, 0.0)
 
 
 def loop_coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
-    """What a tick needs of the scenario and of the two steps around its sample.
+    """Numbers that `step_loop` takes from the scenario and from the steps around its sample.
 
-    before, after: lengths of the steps [s]; before = 0 at the start, after = 0 at the end.
+    Args:
+        scenario: the scenario, or its fields in numbers.
+        before: length of the step before the sample [s]; 0 at the start.
+        after: length of the step after the sample [s]; 0 at the end.
+
+    Returns:
+        28 numbers.
     """
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
@@ -56,95 +67,120 @@ def loop_coefficients(scenario: Scenario, before: float, after: float) -> tuple[
 
 
 def step_inputs(b0, b1, uh, before, after, hand):
-    """What a tick needs of its surroundings.
+    """Numbers that `step_loop` takes from clay and operator around its sample.
 
     Args:
-        b0, b1: clay before and after the sample [N.s/m]. uh: muscle force [N]. before, after: as above [s].
-        hand: the operator, or zeros.
+        b0: clay before the sample, (x, y) [N.s/m].
+        b1: clay after the sample, (x, y) [N.s/m].
+        uh: muscle force, (x, y) [N].
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+        hand: the operator's arm; zeros for none.
+
+    Returns:
+        12 numbers.
     """
     span = before + after
     L = before / span
-    w = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
-    cx0, cx1, cy0, cy1, stiff, sharex, sharey, softx, softy = clay.split_damping(
-        b0, b1, 0.5 * span, L, after / span, w, hand.damper
+    W = arm.TRACE_W / (1.0 + hand.mass * arm.TRACE_W)
+    bx0, bx1, by0, by1, stiff, sharex, sharey, softx, softy = clay.split_damping(
+        b0, b1, 0.5 * span, L, after / span, W, hand.damper
     )
     uhx, uhy = uh
-    return cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
+    return bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
 
 
 def owed_impulse(step, H, spring, sharex, sharey, hx, hy):
-    """What stiff clay leaves to the next kick: (force x, y [N], less so much per velocity after x, y [N.s/m]).
+    """Force of stiff clay in this kick that the next kick returns.
 
     Args:
-        step, H: lengths of the step after the sample and of the kick [s]. spring: of the hand [N/m].
-        sharex, sharey: from clay.split_damping. hx, hy: clay.slow_force at the sample [N].
+        step: length of the step after the sample [s].
+        H: length of the kick [s].
+        spring: of the operator's arm [N/m].
+        sharex: from clay.split_damping [s].
+        sharey: from clay.split_damping [s].
+        hx: clay.slow_force at the sample, x [N].
+        hy: clay.slow_force at the sample, y [N].
+
+    Returns:
+        (x, y [N]; reduction per unit of the velocity after the kick, x, y [N.s/m]).
     """
     return sharex * hx, sharey * hy, 0.5 * step * spring * sharex, 0.5 * step * spring * sharey
 
 
 def measure_handle(q1, q2, w1, w2, d1, d2, ox, noy):
-    """What there is to know of the handle.
+    """Kinematics of the handle.
 
     Args:
-        q1, q2: joint angles [rad]. w1, w2: joint rates [rad/s].
-        d1, d2: what the absolute link rates have gained since, for the centripetal acceleration alone [rad/s].
-        ox, noy: origin of p, x and -y [m].
+        q1: angle of link 1 [rad].
+        q2: angle of link 2 against link 1 [rad].
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+        d1: change of the rate of link 1 since, for the centripetal acceleration alone [rad/s].
+        d2: change of the absolute rate of link 2 since, likewise [rad/s].
+        ox: origin of p, x [m].
+        noy: origin of p, -y [m].
 
     Returns:
-        (u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy): arm.jacobian and position [m], absolute rate of
-        link 2 [rad/s], velocity [m/s], centripetal acceleration c = -J' q' [m/s^2].
+        (u, p, r2, v, c): arm.jacobian and position [m], absolute rate of link 2 [rad/s], velocity
+        [m/s], centripetal acceleration c = -J' q' [m/s^2].
     """
-    a = q1 + q2
-    u1x, u1y, u2x, u2y = arm.jacobian(sin(q1), cos(q1), sin(a), cos(a))
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2)
     px = u1y + u2y - ox
     py = noy - u1x - u2x
     r2 = w1 + w2
-    vx, vy = arm.handle_velocity(w1, r2, u1x, u1y, u2x, u2y)
-    cx, cy = arm.centripetal(w1 + d1, r2 + d2, u1x, u1y, u2x, u2y)
-    return u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy
+    vx, vy = arm.handle_velocity(w1, r2, (u1x, u1y, u2x, u2y))
+    cx, cy = arm.centripetal(w1 + d1, r2 + d2, (u1x, u1y, u2x, u2y))
+    return (u1x, u1y, u2x, u2y), (px, py), r2, (vx, vy), (cx, cy)
 
 
 def step_loop(c, k, q1, q2, w1, w2, state):
     """Carries the loop across one sample.
 
     Args:
-        c: from `loop_coefficients`. k: from `step_inputs`.
-        q1, q2: joint angles at the sample [rad]. w1, w2: joint rates half a step before it [rad/s].
+        c: from `loop_coefficients`.
+        k: from `step_inputs`.
+        q1: angle of joint 1 at the sample [rad].
+        q2: angle of joint 2 at the sample [rad].
+        w1: rate of joint 1 half a step before the sample [rad/s].
+        w2: rate of joint 2 half a step before the sample [rad/s].
         state: (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2
-            [rad/s^2], owedx, owedy [N.s]): compensator output and rate, reference model y = G delta and its rate,
-            link accelerations, impulse that stiff clay owes; positions at the sample, rates half a step before it.
+            [rad/s^2], owedx, owedy [N.s]): compensator output and rate, reference model y = G delta
+            and its rate, link accelerations, impulse owed by stiff clay; positions at the sample,
+            rates half a step before it.
 
     Returns:
         (state, command, sample, after):
         state: for the next sample.
-        command: (tau1, tau2 of the motors [N.m], implicit clay bx, by [N.s/m], further torques 1, 2 [N.m]).
-        sample: (position x, y [m], velocity half a step before [m/s], net hand force f of the kick [N], delta [m],
-            clay's force beside its dampers [N]), x and y each.
+        command: (tau1, tau2 of the motors [N.m], implicit clay bx, by [N.s/m], further torques 1, 2
+            [N.m]).
+        sample: (position x, y [m], velocity half a step before [m/s], net hand force f of the kick
+            [N], delta [m], clay force beside its dampers [N]), x and y each.
         after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) half a step after the sample.
     """
     (
         H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
         ox, noy, limit1, limit2, square1, square2, spring, mass, before, behind, held, shaped,
     ) = c  # fmt: skip
-    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = state
 
-    u1x, u1y, u2x, u2y, px, py, r2, vx, vy, cx, cy = measure_handle(
+    (u1x, u1y, u2x, u2y), (px, py), r2, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, half * g1, half * g2, ox, noy
     )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
         cx, cy = arm.centripetal_about_sample(
-            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
         )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
 
     # clay and operator: net force f = (fx - dx ux, fy - dy uy)
-    fx = uhx - cx0 * vx
-    fy = uhy - cy0 * vy
-    dx, dy = cx1, cy1
+    fx = uhx - bx0 * vx
+    fy = uhy - by0 * vy
+    dx, dy = bx1, by1
     if held:
         fx -= operator.operator_force(spring, mass, before, px, cx, vx)
         fy -= operator.operator_force(spring, mass, before, py, cy, vy)
@@ -159,40 +195,39 @@ def step_loop(c, k, q1, q2, w1, w2, state):
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        bx, by = (cx0 + cx1) * vx, (cy0 + cy1) * vy
+        fex, fey = (bx0 + bx1) * vx, (by0 + by1) * vy
         hx, hy = uhx - spring * px, uhy - spring * py
         gx = ax - mx * vx + sxx * hx + sxy * hy
         gy = ay - my * vy + sxy * hx + syy * hy
-        gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+        gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
         owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
         fx += owedx - restx
         fy += owedy - resty
         dx += softx
         dy += softy
     ux, uy, g1, g2, ffx, ffy, t1, t2 = controller.saturated_step(
-        H, vx, vy, u1x, u1y, u2x, u2y, nx, ny, ax, ay, sxx, sxy, syy, fx, fy, dx, dy,
-        limit1, limit2, square1, square2,
+        H, (vx, vy), (u1x, u1y, u2x, u2y), (nx, ny), (ax, ay), (sxx, sxy, syy), (fx, fy), (dx, dy),
+        (limit1, limit2, square1, square2),
     )  # fmt: skip
     if stiff:
-        if (
-            t1 * t1 >= square1 or t2 * t2 >= square2
-        ):  # what the motors hold against the clay is less
+        # motors at their limits hold less against the clay
+        if t1 * t1 >= square1 or t2 * t2 >= square2:
             gx, gy = arm.handle_acceleration(
-                (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, u1x, u1y, u2x, u2y
+                (t1 - t2) / arm.I1, t2 / arm.I2, hx, hy, (u1x, u1y, u2x, u2y)
             )
-            sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
-            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, bx, by)
+            sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
+            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
             fx -= owedx
             fy -= owedy
             owedx, owedy, _, _ = owed_impulse(step, H, spring, sharex, sharey, gx, gy)
             fx += owedx
             fy += owedy
             ux, uy = controller.velocity_under_torque(
-                H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy
+                H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
             )
             ffx = fx - dx * ux
             ffy = fy - dy * uy
-            g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u1x, u1y, u2x, u2y, H)
+            g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
@@ -210,20 +245,27 @@ def step_loop(c, k, q1, q2, w1, w2, state):
     if held:
         fx -= behind * ux
         fy -= behind * uy
-    p1, p2 = arm.joint_torques(fx, fy, u1x, u1y, u2x, u2y)
+    p1, p2 = arm.joint_torques(fx, fy, (u1x, u1y, u2x, u2y))
     return (
         (
             deltax + step * ex, deltay + step * ey, ex, ey,
             yx + step * vrx, yy + step * vry, vrx, vry, g1, g2, owedx, owedy,
         ),
-        (t1, t2, cx1, cy1, p1, p2),
+        (t1, t2, bx1, by1, p1, p2),
         (px, py, vx, vy, ffx, ffy, deltax, deltay, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
     )  # fmt: skip
 
 
 def ode_parameters(scenario: Scenario) -> tuple[float, ...]:
-    """What `vector_field` needs of the scenario."""
+    """Numbers that `vector_field` takes from the scenario.
+
+    Args:
+        scenario: the scenario.
+
+    Returns:
+        12 numbers.
+    """
     th = scenario.operator or NO_HAND
     return (
         *scenario.gain, scenario.origin[0], -scenario.origin[1],
@@ -232,49 +274,59 @@ def ode_parameters(scenario: Scenario) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
+def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  # compiled and inlined: plain numbers
     """The same loop as a differential equation, at one instant.
 
     Args:
-        c: from `ode_parameters`. bx, by: clay [N.s/m]. uhx, uhy: muscle force [N].
-        q1, q2, w1, w2: joint angles [rad] and rates [rad/s].
-        state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `step_loop`, all at this instant.
+        c: from `ode_parameters`.
+        bx: clay, x [N.s/m].
+        by: clay, y [N.s/m].
+        uhx: muscle force, x [N].
+        uhy: muscle force, y [N].
+        q1: angle of joint 1 [rad].
+        q2: angle of joint 2 [rad].
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+        state: (deltax, deltay, deltax', deltay', yx, yy, yx', yy') as in `step_loop`, at this
+            instant.
 
     Returns:
         (command, rates, sample):
         command: (tau1, tau2, torques of the hand 1, 2) [N.m].
-        rates: derivative of state, and of the work of muscle, motors, clay, hand's damper, throughput [W].
+        rates: derivative of state, and power of muscle, motors, clay, damper of the hand,
+            throughput [W].
         sample: (position x, y [m], velocity x, y [m/s], fh x, y [N]).
     """
     (
         gainx, gainy, ox, noy, limit1, limit2, square1, square2, spring, mass, damper, shaped,
     ) = c  # fmt: skip
     deltax, deltay, ex, ey, yx, yy, ydx, ydy = state
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+    (u1x, u1y, u2x, u2y), (px, py), _, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, 0.0, 0.0, ox, noy
     )
     if shaped:
         sxx, sxy, syy = SXX, 0.0, SYY
     else:
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
     hx, hy = uhx, uhy
     hx -= operator.operator_force(spring, mass, damper, px, cx, vx)
     hy -= operator.operator_force(spring, mass, damper, py, cy, vy)
+    fex, fey = clay.viscous_force(bx, by, vx, vy)
     y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
     y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
     # a kick of one second from rest, in which u is the acceleration
     ax = controller.servo_acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
     ay = controller.servo_acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
     _, _, _, _, ffx, ffy, t1, t2 = controller.saturated_step(
-        1.0, 0.0, 0.0, u1x, u1y, u2x, u2y, 1.0, 1.0, ax, ay, sxx, sxy, syy,
-        hx - bx * vx, hy - by * vy, mass, mass, limit1, limit2, square1, square2,
+        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (1.0, 1.0), (ax, ay), (sxx, sxy, syy),
+        (hx - fex, hy - fey), (mass, mass), (limit1, limit2, square1, square2),
     )  # fmt: skip
-    hx = ffx + bx * vx
-    hy = ffy + by * vy
-    p1, p2 = arm.joint_torques(hx, hy, u1x, u1y, u2x, u2y)
+    hx = ffx + fex
+    hy = ffy + fey
+    p1, p2 = arm.joint_torques(hx, hy, (u1x, u1y, u2x, u2y))
     muscle = uhx * vx + uhy * vy
     motors = t1 * w1 + t2 * w2
-    clay_power = bx * vx * vx + by * vy * vy
+    clay_power = fex * vx + fey * vy
     hand = damper * (vx * vx + vy * vy)
     return (
         (t1, t2, p1, p2),
@@ -287,67 +339,83 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):
 
 
 def plant_coefficients(scenario: Scenario, before: float, after: float) -> tuple[float, ...]:
-    """What `step_plant` needs of the scenario and of the two steps around its kick [s]."""
+    """Numbers that `step_plant` takes from the scenario and from the steps around its kick.
+
+    Args:
+        scenario: the scenario.
+        before: length of the step before the kick's sample [s].
+        after: length of the step after it [s].
+
+    Returns:
+        8 numbers.
+    """
     H, span = 0.5 * (before + after), before + after
     return (
         H, after, scenario.origin[0], -scenario.origin[1],
-        *operator.operator_coefficients(scenario.operator, H, before / span, after / span, max(before, after)),
+        *operator.operator_coefficients(
+            scenario.operator, H, before / span, after / span, max(before, after)
+        ),
     )  # fmt: skip
 
 
-def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
-    """One kick of the arm and the hand alone, under given motor torques.
+def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """One kick of the arm and the operator alone, under given motor torques.
 
     Args:
-        c: from `plant_coefficients`. k: from `step_inputs`. q1, q2, w1, w2: as in `step_loop`. t1, t2: motor torques [N.m].
-        owedx, owedy: what stiff clay owes of its impulse in the step before [N.s].
+        c: from `plant_coefficients`.
+        k: from `step_inputs`.
+        q1: angle of joint 1 [rad].
+        q2: angle of joint 2 [rad].
+        w1: rate of joint 1 before the kick [rad/s].
+        w2: rate of joint 2 before the kick [rad/s].
+        t1: torque of the shoulder motor [N.m].
+        t2: torque of the elbow motor [N.m].
+        owedx: impulse that stiff clay owes from the step before, x [N.s].
+        owedy: the same, y [N.s].
 
     Returns:
-        (sample, after, owed): (position x, y [m], velocity before x, y [m/s], net hand force x, y [N],
-        clay's force beside its dampers x, y [N]); (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick; and
-        what the clay owes after it x, y [N.s].
+        (sample, after, owed):
+        sample: (position x, y [m], velocity before x, y [m/s], net hand force x, y [N], clay force
+            beside its dampers x, y [N]).
+        after: (ux, uy [m/s], joint rates 1, 2 [rad/s]) after the kick.
+        owed: impulse that the clay owes after the kick, x, y [N.s].
     """
     H, step, ox, noy, spring, mass, before, behind = c
-    cx0, cx1, cy0, cy1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
-    u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = measure_handle(
+    bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = k
+    (u1x, u1y, u2x, u2y), (px, py), _, (vx, vy), (cx, cy) = measure_handle(
         q1, q2, w1, w2, 0.0, 0.0, ox, noy
     )
     if stiff:  # after the sample the handle stands still on the axes on which the clay is stiff
         cx, cy = arm.centripetal_about_sample(
-            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, u1x, u1y, u2x, u2y
+            L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
         )
-    fx = uhx - cx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
-    fy = uhy - cy0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
-    dx, dy = cx1 + behind, cy1 + behind
+    fx = uhx - bx0 * vx - operator.operator_force(spring, mass, before, px, cx, vx)
+    fy = uhy - by0 * vy - operator.operator_force(spring, mass, before, py, cy, vy)
+    dx, dy = bx1 + behind, by1 + behind
     restx, resty = 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        hx, hy = arm.handle_acceleration(
-            (t1 - t2) / arm.I1,
-            t2 / arm.I2,
-            uhx - spring * px,
-            uhy - spring * py,
-            u1x,
-            u1y,
-            u2x,
-            u2y,
-        )
-        sxx, sxy, syy = arm.mobility(u1x, u1y, u2x, u2y)
+        a1, a2 = (t1 - t2) / arm.I1, t2 / arm.I2
+        hx, hy = uhx - spring * px, uhy - spring * py
+        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y))
+        sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
         hx, hy = clay.slow_force(
-            hx, hy, sxx, sxy, syy, sharex, sharey, (cx0 + cx1) * vx, (cy0 + cy1) * vy
+            hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )
         owedx, owedy, softx, softy = owed_impulse(step, H, spring, sharex, sharey, hx, hy)
         fx += owedx - restx
         fy += owedy - resty
         dx += softx
         dy += softy
-    ux, uy = controller.velocity_under_torque(H, vx, vy, u1x, u1y, u2x, u2y, t1, t2, fx, fy, dx, dy)
+    ux, uy = controller.velocity_under_torque(
+        H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
+    )
     if stiff:
         owedx -= softx * ux
         owedy -= softy * uy
         restx -= owedx
         resty -= owedy
-    g1, g2 = arm.joint_velocity((ux - vx) / H, (uy - vy) / H, u1x, u1y, u2x, u2y, 1.0)
+    g1, g2 = arm.joint_velocity((ux - vx) / H, (uy - vy) / H, (u1x, u1y, u2x, u2y), 1.0)
     return (
         (px, py, vx, vy, fx - dx * ux, fy - dy * uy, restx, resty),
         (ux, uy, w1 + H * g1, w2 + H * (g2 - g1)),
@@ -356,10 +424,17 @@ def step_plant(c, k, q1, q2, w1, w2, t1, t2, owedx, owedy):
 
 
 def velocity_at_sample(k, i, before, after, rest):
-    """Velocity of coordinate i at a sample [m/s].
+    """Velocity of one coordinate at a sample.
 
     Args:
-        k: from `step_inputs`. before, after: velocities around the sample [m/s]. rest: clay's force beside its dampers [N].
+        k: from `step_inputs`.
+        i: coordinate, 0 for x, 1 for y.
+        before: velocity before the sample [m/s].
+        after: velocity after the sample [m/s].
+        rest: clay force beside its dampers [N].
+
+    Returns:
+        The velocity [m/s].
     """
     if k[
         10 + i
@@ -371,10 +446,19 @@ def velocity_at_sample(k, i, before, after, rest):
 
 
 def whole_kick(w1, w2, n1, n2, t1, t2, step):
-    """Command that takes the engine from joint rates w to n [rad/s] in one step [s], however long the kick was.
+    """Command that gives the engine the rates after a kick in one step of another length.
 
     Args:
-        t1, t2: torques of it that the motors give [N.m].
+        w1: rate of joint 1 before [rad/s].
+        w2: rate of joint 2 before [rad/s].
+        n1: rate of joint 1 after [rad/s].
+        n2: rate of joint 2 after [rad/s].
+        t1: torque of the shoulder motor [N.m].
+        t2: torque of the elbow motor [N.m].
+        step: length of the step [s].
+
+    Returns:
+        The command, as `step_loop` returns it, without implicit clay.
     """
     a1, a2 = (n1 - w1) / step, (n1 + n2 - w1 - w2) / step
     return t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2

@@ -1,4 +1,4 @@
-"""Judges a run while it goes on: is it still a run, or has an axis gone unstable?"""
+"""Judges a run while it goes on: whether it is still good, whether an axis is unstable."""
 
 from __future__ import annotations
 
@@ -11,37 +11,36 @@ import numpy as np
 from ..model.clay import Profile
 from ..model.constants import AXES
 from ..model.scenario import Scenario
-from ..theory import linear_loop
+from ..theory import gain_limit
 
 LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
 SPEED = 20.0  # [m/s] beyond any hand
 FLOOR = 1e-9  # [m/s] swings below this are rounding
 SWING_GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
-STEP_GROWTH = (
-    2.0  # growth of one swing counts to this factor at most: a border crossed is no instability
-)
+STEP_GROWTH = 2.0  # growth of one swing counts to this factor: a crossed border is no instability
 SWINGS = 6  # consecutive swings that a verdict of growth needs
-SWING_SPACING = (
-    5.0  # samples a swing must last for that: faster is chatter over a border, not the loop
-)
-TRANSFER = 3.0  # so much further may an axis swing than the other whose energy it takes: sqrt(Lambda_y/Lambda_x) and more
+SWING_SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border
+TRANSFER = 3.0  # swing over that of the other axis whose energy it takes: > sqrt(Lambda_y/Lambda_x)
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
-WHILE = 1.0  # ... for so long at the time limit is stalled; motors in their limits for so long are saturated [s]
-OFTEN = 0.1  # share of its last WHILE that an unstable run which goes on spends in the torque limits, if it cycles
+WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
+OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
 class StabilityMonitor:
-    """Looks at the rows of a run, chunk by chunk, for the end of its good part.
+    """Searches the rows of a run, chunk by chunk, for the end of its good part.
 
-    An axis is unstable if the swings of its velocity (from one turning point to the next) grow one by
-    one, SWINGS of them at least and by GROWTH together; or if CYCLE of them in a row drive a motor into
-    its torque limit and do not decay; or if the handle swings out of reach while its gain is above the limit
-    of its loop in some clay that it has been in. Under a muscle force or a command that varies, growth counts only
-    above that limit: the handle may swing as it is driven. Below it, the axis must outgrow what the other may have
-    lent it.
+    An axis is unstable if the swings of its velocity (from one turning point to the next) grow one
+    by one, SWINGS of them at least and by SWING_GROWTH together; or if CYCLE of them in a row drive
+    a motor into its torque limit without decay; or if the handle swings out of reach while its gain
+    is above the limit of its loop in some clay that it has been in. Under a muscle force or a
+    command that varies, growth counts only above that limit: the handle may swing as it is driven.
+    Below the limit, the axis must grow beyond what the other axis may have passed to it.
+
+    Args:
+        scenario: the scenario of the run.
     """
 
     def __init__(self, scenario: Scenario):
@@ -51,13 +50,10 @@ class StabilityMonitor:
         self.hits = [0, 0]  # samples since then with a motor in its limit
         self.since = [0, 0]  # samples since then
         self.seen = 0  # samples
-        self.least, self.most = (
-            [math.inf, math.inf],
-            [-math.inf, -math.inf],
-        )  # where the handle has been [m]
-        self.moved = (
-            self.unbound
-        ) = -1  # last sample with the handle faster than STILL; with no motor in its limit
+        # where the handle has been [m]
+        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]
+        self.moved = -1  # last sample with the handle faster than STILL
+        self.unbound = -1  # last sample with no motor at its limit
         self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
         self.often = 0  # samples with a motor in its limit
         self.onset: Outcome | None = None  # of an instability through which the run went on
@@ -69,7 +65,8 @@ class StabilityMonitor:
         """Judges the next rows.
 
         Args:
-            rows: (q, p, v, fh, tau, delta), shape (12, n). first: index of the first.
+            rows: (q, p, v, fh, tau, delta), shape (12, n).
+            first: index of the first row.
 
         Returns:
             (number of good rows, outcome that ends the run there or None).
@@ -110,7 +107,8 @@ class StabilityMonitor:
         if abs(math.sin(q2[good])) < FOLD:
             stretched = math.cos(q2[good]) > 0.0
             code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
-            advice = "choose a force, start or origin that keeps the handle within 0.11 to 0.59 m of the shoulder"
+            reach = "within 0.11 to 0.59 m of the shoulder"
+            advice = f"choose a force, start or origin that keeps the handle {reach}"
             return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
         axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
         return good, Outcome(
@@ -118,7 +116,14 @@ class StabilityMonitor:
         )
 
     def end(self, outcome: Outcome) -> Outcome:
-        """What there is to say of a run that came to this end, now that all its rows have been seen."""
+        """The final outcome of a run, after all its rows.
+
+        Args:
+            outcome: how the run came to its end.
+
+        Returns:
+            The outcome, with code, cause and advice from the whole run.
+        """
         s = self.scenario
         if outcome.code == "interrupted":
             since = self.onset
@@ -133,7 +138,7 @@ class StabilityMonitor:
         if outcome.code == "time limit":
             if self.seen - 1 - self.unbound >= recent:
                 least = "rms" if s.muscle else "the force"
-                advice = f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m, or lower {least}"
+                advice = f"{self._raise_limit()}, or lower {least}"
                 return replace(
                     outcome, code="saturated", cause="a motor stays in its limit", advice=advice
                 )
@@ -156,11 +161,12 @@ class StabilityMonitor:
         if s.muscle:
             return "raise rms"
         if s.operator and s.operator.spring:
-            return "the spring of the hand holds the muscle's force: raise force, or lower operator.spring"
+            holds = "the spring of the hand holds the muscle's force"
+            return f"{holds}: raise force, or lower operator.spring"
         return "raise force, or lower b" if any(s.force) else "give a force"
 
     def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
-        """Notes when the handle last moved, and when the motors were in their limits."""
+        """Notes when the handle last moved, and when the motors were at their limits."""
         last = len(bound) - 1
         fast = np.abs(v).max(axis=0) > STILL
         if fast.any():
@@ -170,9 +176,8 @@ class StabilityMonitor:
         self.often += int(bound.sum())
         self.seen += last + 1
         if not self.scenario.stop:
-            self.bound = np.concatenate((self.bound, bound))[
-                -max(1, round(WHILE / self.scenario.dt)) :
-            ]
+            last = max(1, round(WHILE / self.scenario.dt))
+            self.bound = np.concatenate((self.bound, bound))[-last:]
 
     def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
         verdicts = {}
@@ -239,10 +244,8 @@ class StabilityMonitor:
         sizes = [x[0] for x in swings]
         if sum(x[2] for x in swings[-SWINGS:]) < SWING_SPACING * SWINGS:
             return ""
-        if (
-            math.prod(min(b / a, STEP_GROWTH) for a, b in zip(sizes, sizes[1:], strict=False))
-            <= SWING_GROWTH
-        ):
+        steps = zip(sizes, sizes[1:], strict=False)
+        if math.prod(min(b / a, STEP_GROWTH) for a, b in steps) <= SWING_GROWTH:
             return ""
         driven = self.scenario.muscle or self.scenario.command
         if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
@@ -253,12 +256,9 @@ class StabilityMonitor:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
     def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
-        """Of these values of clay, that with the least gain limit of the linear loop of axis i, and this limit."""
+        """The clay with the least gain limit of the linear loop of axis i, and this limit."""
         return min(
-            (
-                (b, linear_loop.continuous_gain_limit(AXES[i], b, self.scenario.operator))
-                for b in values
-            ),
+            ((b, gain_limit.gain_limit(AXES[i], b, self.scenario.operator)) for b in values),
             key=lambda x: x[1],
         )
 
@@ -272,6 +272,10 @@ class StabilityMonitor:
         first, last = (bisect.bisect_right(profile.edges, x) for x in (self.least[k], self.most[k]))
         return self.scenario.gain[i] > self._limit(i, profile.values[first : last + 1])[1]
 
+    def _raise_limit(self) -> str:
+        shoulder, elbow = self.scenario.torque_limit
+        return f"raise torque_limit from {shoulder:g}, {elbow:g} N.m"
+
     def _advice(self, axis: str) -> str:
         s = self.scenario
         i = AXES.index(axis)
@@ -282,21 +286,28 @@ class StabilityMonitor:
                 f"the limit of the linear loop at b = {b:g} N.s/m"
             )
         if any(x[1] for x in self.swings[i]):
-            return f"raise torque_limit from {s.torque_limit[0]:g}, {s.torque_limit[1]:g} N.m: the motors saturate"
+            return f"{self._raise_limit()}: the motors saturate"
         if not s.shaping:
-            return "turn shaping on: the loop is stable at the nominal pose, the arm's inertia changes along the path"
+            changes = "the arm's inertia changes along the path"
+            return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
 
 
 def is_quiet(rows, n, limit1, limit2, swings, seen):
-    """Whether Watch can have nothing to say of the next n rows of a run: an easier question than its own.
+    """Whether the monitor can have nothing to report on the next n rows: a cheaper test.
 
-    It is not calm where a row is no longer a run's, or where as many swings in a row did not shrink as a verdict takes.
+    False where a row is no longer good, or where as many swings in a row did not shrink as an
+    unstable run takes.
 
     Args:
-        swings: of each axis, (2, 6): last two velocities, that at the last turning point [m/s], size of the last
-            swing [m/s], number of swings that did not shrink, samples since the turn with a motor in its limit.
-        seen: as Watch has them, (4,): seen, moved, unbound, often.
+        rows: shape (m, 14), m >= n.
+        n: number of rows.
+        limit1: torque limit of the shoulder [N.m].
+        limit2: torque limit of the elbow [N.m].
+        swings: of each axis, shape (2, 6): last two velocities, velocity at the last turning point
+            [m/s], size of the last swing [m/s], number of swings that did not shrink, samples since
+            the turn with a motor at its limit.
+        seen: counts of the monitor, shape (4,): seen, moved, unbound, often.
     """
     for j in range(n):
         row = rows[j]
@@ -332,13 +343,15 @@ class Outcome:
     """How a run ended.
 
     Attributes:
-        code: "finished", "time limit"; "stalled" (stands still at the time limit), "saturated" (so do its motors, in
-            their limits); "diverged", "limit cycle" (an unstable axis, bounded by the torque limits);
-            "out of reach" (the arm is stretched), "singular" (it is folded); "interrupted" (progress said so).
-        time: simulated time of the end, or of the verdict where an unstable run went on [s].
+        code: "finished", "time limit"; "stalled" (at rest at the time limit), "saturated" (at rest
+            with a motor at its limit); "diverged", "limit cycle" (an unstable axis, bounded by the
+            torque limits); "out of reach" (the arm is stretched), "singular" (it is folded);
+            "interrupted" (on request of progress).
+        time: simulated time of the end, or of the verdict on an unstable run that went on [s].
         step: index of the last good sample.
-        axis: the axis that is to blame, "" if none.
-        cause: what happened, in words. advice: what to change, in words.
+        axis: the unstable axis, "" if none.
+        cause: what happened, in words.
+        advice: what to change, in words.
     """
 
     code: str

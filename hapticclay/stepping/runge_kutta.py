@@ -1,4 +1,8 @@
-"""The accurate run: the engine's fourth-order Runge-Kutta, with the controller's states among the engine's."""
+"""The accurate run: the engine's fourth-order Runge-Kutta, with the controller among its states.
+
+`march` is the same method on numbers alone, for many steps at a time; `compiled` compiles it. There
+the engine gives the acceleration of the arm at each stage, and the states are integrated here.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,11 @@ SUBSTEPS = 1000  # most of them for one sample
 
 
 class RungeKutta(Run):
-    """The loop as a differential equation; steps end on borders. Explicit: stiff scenes take more steps.
+    """The loop as a differential equation; steps end on borders. Explicit.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
 
     Raises:
         ParameterError: the scene is so stiff that a sample would take more than 1000 steps.
@@ -33,7 +41,8 @@ class RungeKutta(Run):
         fastest = (b + th.damper) * arm.TRACE_W + math.sqrt(th.spring * arm.TRACE_W)
         self.substeps = max(1, math.ceil(scenario.dt * fastest / STABLE_STEP))
         if self.substeps > SUBSTEPS:
-            bound = f"explicit: would take {self.substeps} steps a sample in so stiff a scene; choose 'fast'"
+            bound = f"explicit: would take {self.substeps} steps a sample in so stiff a scene"
+            bound += "; choose 'fast'"
             raise ParameterError("integrator", scenario.integrator, bound)
         data = self.data
         self.c = loop.ode_parameters(scenario)
@@ -47,7 +56,7 @@ class RungeKutta(Run):
         self.start = self._stored()
 
     def _derivative(self, t: float):
-        """The loop's derivative at time t [s], for the state that the engine holds."""
+        """loop.vector_field at time t [s], at the state of the engine."""
         (q1, q2), (w1, w2) = self.angles, self.rates
         state = tuple(self.act[:8])
         if self.command:
@@ -66,6 +75,11 @@ class RungeKutta(Run):
             drive[i] = x
 
     def go(self, progress) -> None:
+        """As Run.go, with the controller in the engine's callback.
+
+        Args:
+            progress: as in Run.go.
+        """
         mujoco.set_mjcb_control(self._control)
         try:
             super().go(progress)
@@ -162,7 +176,18 @@ MARCH_ROW = 12  # floats of a row, as Run.judge takes them
 
 
 class MarchEngine(NamedTuple):
-    """Addresses in the engine: of mj_forward, the model and the data, and of what it reads and gives."""
+    """Addresses in the engine.
+
+    Attributes:
+        forward: of mj_forward.
+        model: of the model.
+        data: of the data.
+        q: of the joint angles.
+        w: of the joint rates.
+        acceleration: of the joint accelerations.
+        ctrl: of the controls.
+        push: of the applied joint torques.
+    """
 
     forward: int
     model: int
@@ -174,15 +199,8 @@ class MarchEngine(NamedTuple):
     push: int
 
 
-def stage_derivative(c, b, uh, dampers, engine, y, dy):
-    """Writes the derivative of all states y into dy, both (STATES,).
-
-    Args:
-        c: from loop.ode_parameters. b: clay [N.s/m]. uh: muscle force [N]. dampers: whether the engine has clay.
-
-    Returns:
-        (command, sample) as loop.vector_field.
-    """
+def _stage_derivative(c, b, uh, dampers, engine, y, dy):
+    """Writes the derivative of all states y into dy, shape (STATES,); returns (command, sample)."""
     state = (y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
     command, rates, sample = loop.vector_field(
         c, b[0], b[1], uh[0], uh[1], y[0], y[1], y[2], y[3], state
@@ -200,40 +218,51 @@ def stage_derivative(c, b, uh, dampers, engine, y, dy):
     return command, sample
 
 
-def one_step(c, b, uh, dampers, engine, h, y, k):
-    """Carries y over one step of h [s]. k: (5, STATES), to work in; its first row is the slope at y."""
+def _one_step(c, b, uh, dampers, engine, h, y, k):
+    """Carries y over one step of h [s]. k: (5, STATES), workspace; k[0] is the slope at y."""
     for stage in range(1, 4):
         ahead = h if stage == 3 else 0.5 * h
         for j in range(STATES):
             k[4, j] = y[j] + ahead * k[stage - 1, j]
-        stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
+        _stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
     for j in range(STATES):
         y[j] += h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
 
 
-def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows):
-    """Steps from sample to sample, until as many as there are rows, or before the one that would end elsewhere.
+def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows):  # noqa: PLR0913  # compiled and inlined: plain numbers
+    """Steps from sample to sample until rows is full, or before a step that leaves the region.
 
     Args:
-        dt: from sample to sample [s], in so many substeps. low, high: borders of the present region [m].
-        origin: as in Scenario. y: state, which is advanced. k: (6, STATES), to work in. rows: (n, ROW), to be filled.
+        c: from loop.ode_parameters.
+        b: clay, (x, y) [N.s/m].
+        uh: muscle force, (x, y) [N].
+        dampers: whether the engine has clay.
+        engine: addresses in the engine.
+        dt: from sample to sample [s].
+        substeps: steps a sample.
+        low: lower borders of the region, (x, y) [m].
+        high: upper borders of the region, (x, y) [m].
+        origin: as in Scenario [m].
+        y: state, shape (STATES,), which is advanced.
+        k: workspace, shape (6, STATES).
+        rows: to fill, shape (n, MARCH_ROW).
 
     Returns:
-        Number of samples passed, and of rows filled.
+        Number of samples passed and rows filled.
     """
     h = dt / substeps
     for i in range(len(rows)):
         for j in range(STATES):
             k[5, j] = y[j]
         for part in range(substeps):
-            command, sample = stage_derivative(c, b, uh, dampers, engine, y, k[0])
+            command, sample = _stage_derivative(c, b, uh, dampers, engine, y, k[0])
             if part == 0:
                 row = rows[i]
                 row[0], row[1] = y[0], y[1]
                 for j in range(6):
                     row[2 + j] = sample[j]
                 row[8], row[9], row[10], row[11] = command[0], command[1], y[4], y[5]
-            one_step(c, b, uh, dampers, engine, h, y, k)
+            _one_step(c, b, uh, dampers, engine, h, y, k)
             px, py = arm.handle_position(y[0], y[1])
             px, py = px - origin[0], py - origin[1]
             inside = (
@@ -247,6 +276,20 @@ def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows
 
 
 def march_once(c, b, uh, dampers, engine, h, y, k):
-    """One step of h [s] from y."""
-    stage_derivative(c, b, uh, dampers, engine, y, k[0])
-    one_step(c, b, uh, dampers, engine, h, y, k)
+    """One step.
+
+    Args:
+        c: from loop.ode_parameters.
+        b: clay, (x, y) [N.s/m].
+        uh: muscle force, (x, y) [N].
+        dampers: whether the engine has clay.
+        engine: addresses in the engine.
+        h: length of the step [s].
+        y: state, shape (STATES,), which is advanced.
+        k: workspace, shape (6, STATES).
+    """
+    _stage_derivative(c, b, uh, dampers, engine, y, k[0])
+    _one_step(c, b, uh, dampers, engine, h, y, k)
+
+
+COMPILED_STAGES = (_one_step, _stage_derivative)  # by `compiled`, beside `march` and `march_once`

@@ -1,4 +1,7 @@
-"""The sampled run: what hardware does. Measured, computed and held every Ts, between which only the arm moves."""
+"""The sampled run, as on hardware: measured, computed and held every Ts; the arm moves in between.
+
+`HardwareLoop` adds the hardware: jitter, encoders, converters, delay, friction, passivity control.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import arm, controller, hardware, operator
-from ..model.clay import damping_at
+from ..model.clay import damping_at, viscous_force
 from ..model.constants import AXES, G, S
+from ..model.hardware import Pair
 from ..model.scenario import Scenario
 from . import energy, loop
-from .leapfrog import CHUNK, Leapfrog
-
-NONE = (0.0, 0.0)
-Pair = tuple[float, float]
+from .leapfrog import CHUNK, ZERO, Leapfrog
 
 
 class Sampled(Leapfrog):
-    """Leapfrog of the arm and the hand under torques that change at samples; the controller is exact between them.
+    """Leapfrog under torques that change at samples; the controller is exact in between.
 
-    At a sample the kick falls into two: one under the old torques, which brings the velocity to the sample, where it
-    is measured, and one under the new. Steps end on borders as they do in continuous time.
+    At a sample the kick falls into two: one under the old torques, which brings the velocity to the
+    sample, where it is measured, and one under the new torques. Steps end on borders as in
+    continuous time.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
     """
 
     def __init__(self, scenario: Scenario, every: int):
@@ -36,12 +42,12 @@ class Sampled(Leapfrog):
             for axis, K in zip(AXES, scenario.gain, strict=True)
         ]
         s = self.state
-        # (delta, delta', y, y') of each axis, the torques held, and what stiff clay owes, see loop.step_plant
-        self.state = (s[0:8:2], s[1:8:2], NONE, NONE)
+        # (delta, delta', y, y') of each axis, the torques held, the impulse that stiff clay owes
+        self.state = (s[0:8:2], s[1:8:2], ZERO, ZERO)
         self.fresh = -1  # index of the last sample that was acted upon
         self.physical = scenario.render == "implicit"
         self.row: tuple[float, ...] | None = None
-        # of each sample kept since the last look: fh over the kick before the torques change [N], and its weight
+        # a sample each since the last look: fh before the torques change [N], its weight
         self.early: list[tuple[float, float, float]] = []
 
     def advance(self) -> bool:
@@ -52,7 +58,7 @@ class Sampled(Leapfrog):
         if self.physical:
             return super()._inputs(before, after)
         uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
-        return loop.step_inputs(NONE, NONE, uh, before, after, self.hand)
+        return loop.step_inputs(ZERO, ZERO, uh, before, after, self.hand)
 
     def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
         return inf  # torques that are held do not follow a hit
@@ -72,19 +78,11 @@ class Sampled(Leapfrog):
             else:
                 force = self._first(q, w)
             tau, f = self._control(q, seen, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else NONE
+            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else ZERO
             x, y = map(self._hold, (x, y), self.blocks, f, shift)
             before = 0.0
-        at, out, owed = loop.step_plant(
-            loop.plant_coefficients(s, before, after),
-            self._inputs(before, after),
-            q[0],
-            q[1],
-            w[0],
-            w[1],
-            *tau,
-            *owed,
-        )
+        c, k = loop.plant_coefficients(s, before, after), self._inputs(before, after)
+        at, out, owed = loop.step_plant(c, k, *q, *w, *tau, *owed)
         return (x, y, tau, owed), (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
 
     def _seen(self, q, w, out) -> Any:
@@ -92,68 +90,56 @@ class Sampled(Leapfrog):
         v = self._velocity(q, w, out)
         if v == out[:2]:
             return out[2:]
-        r1, r2 = arm.joint_velocity(v[0], v[1], *self._measure(q, w)[0], 1.0)
+        r1, r2 = arm.joint_velocity(v[0], v[1], self._measure(q, w)[0], 1.0)
         return r1, r2 - r1
 
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
         _, _, tau, owed = self.state
         h = self.before
-        at, out, _ = loop.step_plant(
-            loop.plant_coefficients(self.scenario, h, h),
-            self._inputs(h, h),
-            q[0],
-            q[1],
-            w[0],
-            w[1],
-            *tau,
-            *owed,
-        )
-        return (*at[:6], *NONE, *at[6:]), out
+        c, k = loop.plant_coefficients(self.scenario, h, h), self._inputs(h, h)
+        at, out, _ = loop.step_plant(c, k, *q, *w, *tau, *owed)
+        return (*at[:6], *ZERO, *at[6:]), out
 
     def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
         """arm.jacobian, position, velocity and centripetal acceleration of the handle."""
         ox, oy = self.scenario.origin
-        u1x, u1y, u2x, u2y, px, py, _, vx, vy, cx, cy = loop.measure_handle(
-            q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy
-        )
-        return (u1x, u1y, u2x, u2y), (px, py), (vx, vy), (cx, cy)
+        u, p, _, v, c = loop.measure_handle(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
+        return u, p, v, c
 
     def _first(self, q, w) -> Pair:
-        """The operator's force that the sensor shows while the handle does not accelerate [N], as before the start."""
+        """The operator's force on the sensor of a handle that does not accelerate [N]."""
         uh, th = self.uh(self.t, self.t), self.scenario.operator
         if th is None:
             return uh
         _, p, v, _ = self._measure(q, w)
-        return uh[0] - th.spring * p[0] - th.damper * v[0], uh[1] - th.spring * p[
-            1
-        ] - th.damper * v[1]
+        x, y = (uh[i] - th.spring * p[i] - th.damper * v[i] for i in (0, 1))
+        return x, y
 
     def _felt(self, q, w, tau) -> Pair:
-        """The operator's force that the sensor shows at the sample, before the torques change [N]."""
+        """The operator's force on the sensor at the sample, before the torques change [N]."""
         uh, th = self.uh(self.t, self.t), self.scenario.operator
         if th is None:
             return uh
         u, p, v, c = self._measure(q, w)
-        b = damping_at(*self.clay, self.t) if self.physical else NONE
+        b = damping_at(*self.clay, self.t) if self.physical else ZERO
         rest = [
             uh[i] - operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
             for i in (0, 1)
         ]
         # a kick of one second from rest, in which the velocity after it is the acceleration
-        fx, fy = rest[0] - b[0] * v[0], rest[1] - b[1] * v[1]
-        a = controller.velocity_under_torque(
-            1.0, 0.0, 0.0, *u, tau[0], tau[1], fx, fy, th.mass, th.mass
-        )
+        fex, fey = viscous_force(*b, *v)
+        f = rest[0] - fex, rest[1] - fey
+        a = controller.velocity_under_torque(1.0, ZERO, u, tau, f, (th.mass, th.mass))
         return rest[0] - th.mass * a[0], rest[1] - th.mass * a[1]
 
     def _is_sample(self) -> bool:
         return self.i % self.n == 0 and self.t == self.i * self.scenario.dt and self.fresh != self.i
 
     def _control(self, q, w, x, y, force):
-        """Torques to hold and the net force that the compensator is given, from what is measured now."""
+        """Torques to hold, and the net force for the compensator, from the present measurements."""
         u, p, v, c = self._measure(q, w)
-        bx, by = self.regions.b(self.t)
-        return self._torques(u, p, v, c, x, y, force, (bx * v[0], by * v[1]))
+        fe = viscous_force(*self.regions.b(self.t), *v)
+        return self._torques(u, p, v, c, x, y, force, fe)
 
     def _torques(
         self,
@@ -166,7 +152,7 @@ class Sampled(Leapfrog):
         force: Pair,
         fe: Pair,
     ):
-        """The same from handle position [m], velocity, acceleration, hand force and the clay's force [N]."""
+        """`_control` from the state of the handle, the hand force and the force of the clay [N]."""
         s = self.scenario
         f = (force[0] - fe[0], force[1] - fe[1])
         a = []
@@ -177,12 +163,11 @@ class Sampled(Leapfrog):
                     1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]
                 )
             )
-        sxx, sxy, syy = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(*u)
-        *_, t1, t2 = controller.saturated_step(  # the limits come last, after the clay's share
-            1.0, 0.0, 0.0, *u, 1.0, 1.0, a[0], a[1], sxx, sxy, syy, *f, 0.0, 0.0, inf, inf, inf, inf
-        )  # fmt: skip
+        W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
+        limit = inf, inf, inf, inf  # the limits come last, after the clay's share
+        *_, t1, t2 = controller.saturated_step(1.0, ZERO, u, (1.0, 1.0), a, W, f, ZERO, limit)
         if not self.physical:
-            p1, p2 = arm.joint_torques(*fe, *u)
+            p1, p2 = arm.joint_torques(*fe, u)
             t1, t2 = t1 - p1, t2 - p2
         (l1, l2) = s.torque_limit
         return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
@@ -202,7 +187,7 @@ class Sampled(Leapfrog):
             self._put(False, self.row, k, 0.5 * before, False)
             _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_, restx, resty = self.row
             fx, fy = fx + k[0] * v0x + k[1] * v1x + restx, fy + k[2] * v0y + k[3] * v1y + resty
-            # the means of both kicks, half of the step before and half of the one after, interpolated at the sample
+            # the means of both kicks, half of each step, interpolated at the sample
             early = fx, fy, after / (before + after)
             before = 0.0
             self.fresh = self.i
@@ -215,6 +200,12 @@ class Sampled(Leapfrog):
             self.early.append(early)
 
     def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
+        """As Run.judge, with the hand force of both kicks at a sample.
+
+        Args:
+            rows: as in Run.judge.
+            b: as in Run.judge.
+        """
         early = np.array(self.early).T
         self.early.clear()
         rows[6:8] += early[2] * (early[:2] - rows[6:8])
@@ -229,26 +220,37 @@ TIME_SLACK = 1e-9  # of dt: events so close are one
 
 
 class HeldForce(NamedTuple):
-    """What the motors hold, and of what it is made: torques [N.m]; forces on the handle, resisting [N].
+    """What the motors hold, and its parts; all (x, y) or (shoulder, elbow).
 
-    clay: as rendered, with what the passivity controller adds, `guard`. coupling, tool: force of the virtual
-    coupling and velocity of its tool [m/s].
+    Attributes:
+        torque: of the motors [N.m].
+        clay: force as rendered, with that of the passivity controller [N].
+        guard: force added by the passivity controller [N].
+        coupling: force of the virtual coupling [N].
+        tool: velocity of the tool of the coupling [m/s].
     """
 
-    torque: Pair = NONE
-    clay: Pair = NONE
-    guard: Pair = NONE
-    coupling: Pair = NONE
-    tool: Pair = NONE
+    torque: Pair = ZERO
+    clay: Pair = ZERO
+    guard: Pair = ZERO
+    coupling: Pair = ZERO
+    tool: Pair = ZERO
 
 
 class HardwareState(NamedTuple):
     """State of the hardware between two samples.
 
-    k: index of the next sample. queue: (time [s], Held) still to come. history: of the angles, see
-    interface.difference. rates: behind their filter [rad/s]. filters: of the force, x and y. force: net force last
-    given to the compensator [N]. energy: that the clay took on each axis [J], up to position [m]. forces: of the clay,
-    the last ones, newest first [N]. tool: of the coupling [m].
+    Attributes:
+        k: index of the next sample.
+        queue: (time [s], force to hold) still to come.
+        history: (index, angles [rad]) of past samples, see hardware.velocity_difference.
+        rates: joint rates behind their filter [rad/s].
+        filters: states of the filters of the force, x and y.
+        force: net force last given to the compensator [N].
+        energy: energy that the clay has taken on each axis [J], up to `position`.
+        position: of the handle at the last sample [m].
+        forces: last forces of the clay, newest first [N].
+        tool: position of the tool of the coupling [m].
     """
 
     k: int
@@ -264,7 +266,14 @@ class HardwareState(NamedTuple):
 
 
 class HardwareLoop(Sampled):
-    """Samples and changes of torque come at their own times; a step ends on each, as it does on borders."""
+    """The sampled loop with hardware: samples and changes of torque come at their own times.
+
+    A step ends on each, as it does on borders.
+
+    Args:
+        scenario: what to run; it has an interface.
+        every: keep each every-th sample, and the last.
+    """
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
@@ -283,14 +292,12 @@ class HardwareLoop(Sampled):
         start: Pair = scenario.start
         rest = (0.0,) * order
         hw = HardwareState(
-            0, (), past, w, (rest, rest), NONE, NONE, start, (NONE,) * (self.whole_delay + 2), start
+            0, (), past, w, (rest, rest), ZERO, ZERO, start, (ZERO,) * (self.whole_delay + 2), start
         )
-        self.state = (*self.state[:2], HeldForce(), hw, NONE)
+        self.state = (*self.state[:2], HeldForce(), hw, ZERO)
         self.extra: list[tuple[float, ...]] = []
-        self.extras: tuple[tuple[float, ...], tuple[float, ...]] = (
-            (),
-            (),
-        )  # of the row at an event, and after it
+        # of the row at an event, and after it
+        self.extras: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
         self.acting = HeldForce()
         self.rendered: list[tuple[float, float, float]] = []  # time [s], clay as rendered [N]
         self.ledger = energy.EnergyLedger(scenario, self.extra)
@@ -355,21 +362,18 @@ class HardwareLoop(Sampled):
     def _whole_kick(self, q, w) -> tuple[Any, Any]:
         _, _, held, _, owed = self.state
         at, out, _, _ = self._push(self.before, self.before, q, w, held, owed)
-        return (*at[:6], *NONE, *at[6:]), out
+        return (*at[:6], *ZERO, *at[6:]), out
 
     def _push(
         self, before: float, after: float, q, w, held: HeldForce, owed: Pair
     ) -> tuple[Any, Any, Any, Pair]:
-        """loop.step_plant under the held torques and the friction, and the torques of the latter [N.m]."""
-        c, k, (t1, t2) = (
-            loop.plant_coefficients(self.scenario, before, after),
-            self._inputs(before, after),
-            held.torque,
-        )
+        """loop.step_plant under held torques and friction, and the friction torques [N.m]."""
+        c, k = loop.plant_coefficients(self.scenario, before, after), self._inputs(before, after)
+        t1, t2 = held.torque
         at, out, left = loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
         limit: Any = self.parts.friction
-        if limit == NONE:
-            return at, out, left, NONE
+        if limit == ZERO:
+            return at, out, left, ZERO
         one, two = (
             loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1]
             for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
@@ -382,7 +386,7 @@ class HardwareLoop(Sampled):
         return hardware.encode(q[0], self.parts.encoder), hardware.encode(q[1], self.parts.encoder)
 
     def _sample(self, q, w, x, y, force, hw: HardwareState):
-        """One sample: what is measured, the torques to come, and compensator and reference model up to the next."""
+        """One sample: the measurement, the torques to come, the controller's states at the next."""
         s, parts, k = self.scenario, self.parts, hw.k
         _, lost, noise = self.chance(k)
         force, filters = self._sensed(force, noise, hw)
@@ -398,16 +402,15 @@ class HardwareLoop(Sampled):
             )
             due = self._when(k) + parts.delay
             hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
-        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else NONE
+        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else ZERO
         x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
         return x, y, hw
 
     def _sensed(self, force, noise: Pair, hw: HardwareState):
-        """The hand's force behind noise, filter and converter [N], and the state of the filters after it."""
-        force, filters = (
-            (force[0] + noise[0], force[1] + noise[1]) if any(noise) else force,
-            hw.filters,
-        )
+        """The hand force behind noise, filter and converter [N], and the states of the filters."""
+        filters = hw.filters
+        if any(noise):
+            force = force[0] + noise[0], force[1] + noise[1]
         if self.filter:
             shown = filters[0][0], filters[1][0]
             filters = tuple(
@@ -416,10 +419,8 @@ class HardwareLoop(Sampled):
             )
             force = shown
         bits, span = self.parts.adc_bits, self.parts.adc_range
-        return (
-            hardware.quantize(force[0], bits, span),
-            hardware.quantize(force[1], bits, span),
-        ), filters
+        x, y = (hardware.quantize(f, bits, span) for f in force)
+        return (x, y), filters
 
     def _turned(self, k: int, q, w, hw: HardwareState):
         """Joint angles [rad] and rates [rad/s] as they are measured."""
@@ -437,9 +438,9 @@ class HardwareLoop(Sampled):
         return q, w, hw._replace(history=(*old, (k, q))[-parts.window :], rates=w)
 
     def _render(self, u, p: Pair, v: Pair, hw: HardwareState) -> tuple[HeldForce, HardwareState]:
-        """The clay's force on the handle at p [m] and v [m/s], by coupling and passivity controller."""
+        """Force of the clay on the handle, by coupling and passivity controller [N]."""
         parts, b = self.parts, self.regions.b(self.t)
-        fe, held = (b[0] * v[0], b[1] * v[1]), HeldForce()
+        fe, held = viscous_force(*b, *v), HeldForce()
         if parts.coupling:
             k, d = parts.coupling.spring, parts.coupling.damper
             tool = [
@@ -447,17 +448,14 @@ class HardwareLoop(Sampled):
                 for i in (0, 1)
             ]
             hw = hw._replace(tool=(tool[0][0], tool[1][0]))
-            fe = b[0] * tool[0][1], b[1] * tool[1][1]
+            fe = viscous_force(*b, tool[0][1], tool[1][1])
             held = held._replace(coupling=fe, tool=(tool[0][1], tool[1][1]))
         if not parts.passivity:
             return held._replace(clay=fe), hw
-        f0, f1 = (
-            hw.forces[self.whole_delay],
-            hw.forces[self.whole_delay + 1],
-        )  # acting since the last sample: f1, then f0
+        f0, f1 = hw.forces[self.whole_delay : self.whole_delay + 2]  # since the last: f1, then f0
         mean = [(1.0 - self.part_delay) * f0[i] + self.part_delay * f1[i] for i in (0, 1)]
         e: Any = tuple(hw.energy[i] + mean[i] * (p[i] - hw.position[i]) for i in (0, 1))
-        W = arm.mobility(*u)[::2]
+        W = arm.mobility(u)[::2]
         safe: Any = tuple(
             hardware.passivity_controller(e[i], fe[i], v[i], self.Ts, W[i]) for i in (0, 1)
         )
@@ -476,9 +474,8 @@ class HardwareLoop(Sampled):
         if not self.physical and self.rendered:
             held = np.array(self.rendered)
             near = TIME_SLACK * self.scenario.dt
-            arrays["fe"] = held[
-                np.searchsorted(held[:, 0], arrays["t"] + near, side="right") - 1, 1:
-            ]
+            last = np.searchsorted(held[:, 0], arrays["t"] + near, side="right") - 1
+            arrays["fe"] = held[last, 1:]
         return arrays
 
 

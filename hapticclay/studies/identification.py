@@ -1,7 +1,9 @@
-"""Identification of G, Sh and Th on the simulated arm, as the paper did it on the real one (Sec. 4, Figs. 4-6).
+"""Identification of G, Sh and Th on the simulated arm, as in the paper (Sec. 4, Figs. 4-6).
 
-A multisine drives the handle, input and output are recorded every sample, the frequency response is estimated over
-whole periods, and the printed form is fitted to it. Method and what limits it: docs/identify.md.
+A multisine drives the handle, input and output are recorded at every sample, the frequency response
+is estimated over whole periods (R. Pintelon, J. Schoukens, System Identification: A Frequency
+Domain Approach, 2nd ed., Wiley 2012), and the printed form is fitted to it by weighted least
+squares. Method and limits: docs/identify.md.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,57 +27,109 @@ from ..simulation.simulate import simulate
 
 IDENTIFICATION_SCHEMA = "hapticclay-identify-1"
 NOMINAL_POSE = (L2, L1)  # world position of the handle where the elbow is square [m]
-IDENTIFICATION_BAND = {
-    "G": (0.15, 20.0),
-    "S": (0.15, 20.0),
-    "Th": (0.08, 3.0),
-}  # [Hz], either side of the corner
+BLOCK_KINDS = ("G", "S", "Th")
+COEFFICIENT_NAMES = {
+    "G": ("gain", "damping", "stiffness"),
+    "S": ("gain", "damping", "stiffness"),
+    "Th": ("mass", "damper", "spring"),
+}
+COEFFICIENT_UNITS = {
+    "G": ("1/s^2", "1/s", "1/s^2"),
+    "S": ("1/kg", "1/s", "1/s^2"),
+    "Th": ("kg", "N.s/m", "N/m"),
+}
+IDENTIFICATION_BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz]
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
-AMPLITUDE = {
-    "G": 2e-3,
-    "S": 2e-3,
-    "Th": 1e-2,
-}  # [m]: small, so that the pose stays; Th is the same at every pose
+AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; Th has none
 MULTISINE_LINES = 40
-SETTLING = {
-    "G": 5e-9,
-    "S": 5e-5,
-    "Th": 2e-7,
-}  # between loop and fitted form at AMPLITUDE, by runs without noise ...
-SHAPED = 5e-9  # ... of Sh where it holds at every pose
+# Relative difference of the loop from the fitted form at AMPLITUDE, by runs without noise; SHAPED
+# for Sh where it holds at every pose.
+SETTLING = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}
+SHAPED = 5e-9
+LINE_FLOOR = 1e-6  # least relative deviation of a line in the fit
+SMOOTHED_LINES = 5  # lines over which the scatter of the response is averaged
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Noise:
-    """What the sensors add. The paper prints no figure; these are ours.
+    """Noise of the sensors. The paper prints no figure; these are ours.
 
     Attributes:
-        encoder_counts: of each joint's quadrature encoder, a turn. force: rms of the force sensor, white [N].
+        encoder_counts: of each joint's quadrature encoder, a turn.
+        force: rms of the force sensor, white [N].
     """
 
     encoder_counts: int = 65_536
     force: float = 0.02
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "encoder_counts", integer("noise.encoder_counts", self.encoder_counts, 100, 2**40)
-        )
+        counts = integer("noise.encoder_counts", self.encoder_counts, 100, 2**40)
+        object.__setattr__(self, "encoder_counts", counts)
         object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One coefficient of a fit.
+
+    Attributes:
+        name: one of COEFFICIENT_NAMES.
+        unit: its unit.
+        printed: value in the paper.
+        value: fitted value.
+        low: lower end of the 95 % confidence interval.
+        high: upper end of the 95 % confidence interval.
+    """
+
+    name: str
+    unit: str
+    printed: float
+    value: float
+    low: float
+    high: float
+
+    @property
+    def error(self) -> float:
+        """Relative error of the fit against the printed value."""
+        return self.value / self.printed - 1.0
+
+
+class Estimate(NamedTuple):
+    """A frequency response estimated from runs.
+
+    Attributes:
+        response: complex, shape (lines,).
+        deviation: standard deviation of response, shape (lines,).
+        coherence: of measured input and output, shape (lines,).
+        errors: contribution of each run to the response, shape (runs, lines); None for a single
+            run.
+    """
+
+    response: np.ndarray
+    deviation: np.ndarray
+    coherence: np.ndarray
+    errors: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """A frequency response and what was fitted to it.
+    """A frequency response and the coefficients fitted to it.
 
     Attributes:
-        what, axis: "G" [m/m], "S" (Sh) [m/N] or "Th" [N/m], of "x" or "y".
-        frequency: lines of the multisine [Hz], (n,). response: complex, (n,), in the unit of what.
+        what: "G" [m/m], "S" (Sh) [m/N] or "Th" [N/m].
+        axis: "x" or "y".
+        frequency: lines of the multisine [Hz], (n,).
+        response: complex, (n,), in the unit of what.
         deviation: standard deviation of response, by its scatter over the runs, (n,).
         coherence: of measured input and output over all periods, (n,).
-        coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring, with 95 % intervals
-            from the scatter of the runs.
-        scenario: of the first run. noise: what was added to the records. seed: of phases and noise.
-        periods: kept of each run. realisations: number of runs.
+        coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring,
+            with 95 % intervals from the scatter of the runs.
+        scenario: of the first run.
+        noise: added to the records; None for none.
+        seed: of phases and noise.
+        periods: kept of each run.
+        realisations: number of runs.
     """
 
     what: str
@@ -97,7 +151,7 @@ class Identified:
         return tuple(c.value for c in self.coefficients)
 
     def summary(self) -> dict[str, Any]:
-        """Everything there is, ready for JSON."""
+        """Return everything, ready for JSON."""
         return {
             "schema": IDENTIFICATION_SCHEMA,
             "what": self.what,
@@ -122,33 +176,41 @@ class Identified:
 
 
 def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
-    """Wxx and Wyy of the arm with its handle at world (x, y) [1/kg]."""
+    """Diagonal of the arm's mobility, Wxx and Wyy [1/kg].
+
+    Args:
+        x: world position of the handle [m].
+        y: world position of the handle [m].
+    """
     q1, q2 = arm.inverse_kinematics(x, y)
-    wxx, _, wyy = arm.mobility(
-        *arm.jacobian(np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2))
-    )
+    u = arm.jacobians(q1, q2)
+    wxx, _, wyy = arm.mobility(u)
     return float(wxx), float(wyy)
 
 
 def measured(
     record: Record, noise: Noise | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Handle position [m] and hand force [N] as the sensors show them, each (n, 2).
+    """Handle position [m] and hand force [N] as the sensors show them.
 
     Args:
-        record: what was. noise: None for sensors without fault. rng: of the force sensor.
+        record: of a run.
+        noise: of the sensors; None for none.
+        rng: of the force sensor.
+
+    Returns:
+        p and fh, shape (n, 2) each.
     """
     if noise is None:
         return record.p, record.fh
     count = 2.0 * np.pi / noise.encoder_counts
     q = count * np.round(record.q / count)
-    a = q[:, 0] + q[:, 1]
-    u1x, u1y, u2x, u2y = arm.jacobian(*(f(x) for x in (q[:, 0], a) for f in (np.sin, np.cos)))  # type: ignore[arg-type]
+    u1x, u1y, u2x, u2y = arm.jacobians(q[:, 0], q[:, 1])
     p = np.column_stack((u1y + u2y, -u1x - u2x)) - record.scenario.origin
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
 
-def identify(
+def identify(  # noqa: PLR0913  # the settings of one experiment, each by its name
     axis: str = "x",
     what: str = "G",
     *,
@@ -166,28 +228,33 @@ def identify(
     dt: float = TS,
     progress: Callable[[int, int], None] | None = None,
 ) -> Identified:
-    """Identifies one block of the loop on one axis; the compensator is off (K = 0).
+    """Identify one block of the loop on one axis; the compensator is off (K = 0).
 
-    A command drives G and a muscle force Sh; for Th the operator's arm holds a handle that a command moves.
+    A command drives G and a muscle force Sh; for Th the operator's arm holds a handle that a
+    command moves.
 
     Args:
-        axis: "x" or "y". what: "G", "S" (Sh) or "Th".
+        axis: "x" or "y".
+        what: "G", "S" (Sh) or "Th".
         origin: world position about which the handle moves [m].
         shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
         noise: of the sensors; None for none.
         seed: of the phases and of the noise.
         band: lowest and highest frequency [Hz], to 0.1/dt; None for (0.15, 20), Th (0.08, 3).
-        period: of the multisine [s], rounded up to a number of samples that is quick to transform; None for 5, Th 10.
+        period: of the multisine [s], rounded up to a number of samples that is quick to transform;
+            None for 5, Th 10.
         periods: kept of each run, after one that is discarded.
-        realisations: number of runs, each with phases of its own.
-        lines: of the multisine, spread over the logarithm of frequency; fewer where the period is too short for them.
-        amplitude: rms of the handle's motion that is aimed at [m]; None for 2e-3, Th 1e-2.
-        control: "continuous", or "sampled" (slow, about real time). dt: physics and control step [s].
+        realisations: number of runs, each with its own phases.
+        lines: of the multisine, spread over the logarithm of frequency; fewer where the period is
+            too short for them.
+        amplitude: rms of the handle's motion to aim at [m]; None for 2e-3, Th 1e-2.
+        control: "continuous", or "sampled" (slow, about real time).
+        dt: physics and control step [s].
         progress: called after each run with (runs made, runs in all).
 
     Raises:
-        ParameterError: a value is out of its bounds, the handle cannot be there, or a run did not last or met the
-            limits of the motors.
+        ParameterError: a value is out of its bounds, the handle cannot be there, or a run ended
+            early or met the limits of the motors.
     """
     from scipy.fft import next_fast_len
 
@@ -198,44 +265,36 @@ def identify(
     seed = integer("seed", seed, 0, 2**32 - 1)
     realisations = integer("realisations", realisations, 1, 1000)
     periods = integer("periods", periods, 1 if realisations > 1 else 2, 1000)
-    size = number(
-        "amplitude",
-        AMPLITUDE[what] if amplitude is None else amplitude,
-        0.0,
-        1.0,
-        above=True,
-        unit="m",
-    )
+    size = AMPLITUDE[what] if amplitude is None else amplitude
+    size = number("amplitude", size, 0.0, 1.0, above=True, unit="m")
     length = number("period", PERIOD[what] if period is None else period, 0.1, 1000.0, unit="s")
     base = Scenario(
-        name=f"identify {what} {axis}", gain=(0.0, 0.0), force=(0.0, 0.0), origin=pair("origin", origin, unit="m"),
-        operator=Operator() if what == "Th" else None, shaping=flag("shaping", shaping), control=control, dt=dt,
+        name=f"identify {what} {axis}",
+        gain=(0.0, 0.0),
+        force=(0.0, 0.0),
+        origin=pair("origin", origin, unit="m"),
+        operator=Operator() if what == "Th" else None,
+        shaping=flag("shaping", shaping),
+        control=control,
+        dt=dt,
         length=None,
-    )  # fmt: skip
+    )
     n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
     gain = S[i].gain if shaping or what != "S" else endpoint_mobility(*base.origin)[i]
     rms = size * S[i].stiffness / gain if what == "S" else size
-    wave = _multisine(
-        (rms, 0.0) if i == 0 else (0.0, rms),
-        band or IDENTIFICATION_BAND[what],
-        n * base.dt,
-        lines,
-        0.1 / base.dt,
-    )
+    along = (rms, 0.0) if i == 0 else (0.0, rms)
+    band = band or IDENTIFICATION_BAND[what]
+    wave = _multisine(along, band, n * base.dt, lines, 0.1 / base.dt)
     base = replace(base, t_max=(1 + periods) * wave.period)
-    phases, noises = (
-        np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1).tolist()
-    )
-    scenarios = [
-        replace(base, **{"muscle" if what == "S" else "command": replace(wave, seed=x)})
-        for x in phases
-    ]
+    seeds = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1)
+    drive = "muscle" if what == "S" else "command"
+    scenarios = [replace(base, **{drive: replace(wave, seed=x)}) for x in seeds[0].tolist()]
     signals = []
-    for made, (scenario, x) in enumerate(zip(scenarios, noises, strict=True), 1):
+    for made, (scenario, x) in enumerate(zip(scenarios, seeds[1].tolist(), strict=True), 1):
         record = simulate(scenario)
         if record.outcome.code != "time limit" or record.outcome.cause:
-            bound = f"the handle must move for all of the run, its motors within their limits: {record.status}"
-            raise ParameterError("amplitude", size, bound)
+            bound = "the handle must move for all of the run, its motors within their limits"
+            raise ParameterError("amplitude", size, f"{bound}: {record.status}")
         shown = measured(record, noise, np.random.default_rng(x))
         signals.append(_signals(what, i, record, *shown, slice(n, (1 + periods) * n)))
         if progress:
@@ -243,27 +302,25 @@ def identify(
     bins = np.round(Signal(wave).omega / (2.0 * np.pi) * wave.period).astype(int)
     frequency = bins / wave.period
     found = estimate_response(np.array(signals), n, bins)
-    step = (
-        base.dt if control == "continuous" else None
-    )  # no difference equation of second order holds the hold
-    least = (SHAPED if what == "S" and shaping else SETTLING[what]) * (size / AMPLITUDE[what]) ** 2
-    fitted = fitted_coefficients(what, axis, frequency, found, step, least)
+    # The difference equation of the continuous loop; none of second order describes a hold.
+    step = base.dt if control == "continuous" else None
+    floor = (SHAPED if what == "S" and shaping else SETTLING[what]) * (size / AMPLITUDE[what]) ** 2
+    fitted = fitted_coefficients(what, axis, frequency, found, step, floor)
     return Identified(
         what, axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods, realisations
     )
 
 
-def _multisine(rms, band: object, period: float, lines: int, limit: float) -> Multisine:
-    """A multisine in band, of so many lines or as many as the period has room for, three at least."""
+def _multisine(
+    rms: tuple[float, float], band: object, period: float, lines: int, limit: float
+) -> Multisine:
+    """A multisine of as many lines as requested or as fit into the period, three at least."""
     low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
     lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
-        raise ParameterError(
-            "band",
-            (low, high),
-            f"must hold 3 multiples of 1/period = {1.0 / period:.4g} Hz or more",
-        )
+        bound = f"must hold 3 multiples of 1/period = {1.0 / period:.4g} Hz or more"
+        raise ParameterError("band", (low, high), bound)
     return Multisine(rms, low, high, period, min(lines, most))
 
 
@@ -277,48 +334,27 @@ def _signals(
     return np.array((Signal(wave)(record.t[part])[:, i], given[part, i], out[part, i]))
 
 
-BLOCK_KINDS = ("G", "S", "Th")
-COEFFICIENT_NAMES = {
-    "G": ("gain", "damping", "stiffness"),
-    "S": ("gain", "damping", "stiffness"),
-    "Th": ("mass", "damper", "spring"),
-}
-COEFFICIENT_UNITS = {
-    "G": ("1/s^2", "1/s", "1/s^2"),
-    "S": ("1/kg", "1/s", "1/s^2"),
-    "Th": ("kg", "N.s/m", "N/m"),
-}
-TRUST = 1e-6  # no line counts as known to better than this share of itself
-NEIGHBOURS = 5  # lines over which the scatter of the response is averaged
-COVER = 0.95  # of the confidence intervals
+def format_coefficient(c: Coefficient) -> str:
+    """Fitted value and half its interval, to two figures of the latter: "41.793 +- 0.012".
 
-
-@dataclass(frozen=True)
-class Coefficient:
-    """One coefficient: as printed, as fitted, and the 95 % confidence interval of the fit."""
-
-    name: str
-    unit: str
-    printed: float
-    value: float
-    low: float
-    high: float
-
-    @property
-    def error(self) -> float:
-        """Relative error of the fit against the printed value."""
-        return self.value / self.printed - 1.0
-
-
-def transfer_function(c: Coefficient) -> str:
-    """Fitted value and half its interval, to two figures of the latter: "41.793 +- 0.012"."""
+    Args:
+        c: the coefficient.
+    """
     half = 0.5 * (c.high - c.low)
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
     return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"
 
 
 def printed_form(what: str, axis: str) -> tuple[float, ...]:
-    """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19), in the order of NAMES."""
+    """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19).
+
+    Args:
+        what: "G", "S" (Sh) or "Th".
+        axis: "x" or "y".
+
+    Returns:
+        In the order of COEFFICIENT_NAMES.
+    """
     i = AXES.index(axis)
     block = {"G": G[i], "S": S[i], "Th": Operator()}[what]
     return tuple(getattr(block, name) for name in COEFFICIENT_NAMES[what])
@@ -329,22 +365,25 @@ def response(
     coefficients: tuple[float, ...] | np.ndarray,
     frequency: np.ndarray,
     dt: float | None = None,
-):
-    """Complex response of what with these coefficients at frequency [Hz], both (n,).
+) -> np.ndarray:
+    """Complex response of a block, shape (n,).
 
     Args:
-        dt: step of the loop [s], which differentiates by central differences and lets a spring act on (1, 2, 1)/4 of
-            three positions; None for the printed form in continuous time.
+        what: "G", "S" (Sh) or "Th".
+        coefficients: in the order of COEFFICIENT_NAMES.
+        frequency: [Hz], shape (n,).
+        dt: step of the loop [s], which differentiates by central differences and lets a spring act
+            on (1, 2, 1)/4 of three positions; None for the printed form in continuous time.
     """
-    s2, s, one = _operators(frequency, dt)
+    s2, s, one = _derivatives(frequency, dt)
     a, b, c = coefficients
     return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
 
 
-def _operators(
+def _derivatives(
     frequency: np.ndarray, dt: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What stands for s^2, s and 1 at frequency [Hz]."""
+    """Responses of the loop's second derivative, first derivative and mean at frequency [Hz]."""
     omega = 2.0 * np.pi * frequency
     if dt is None:
         return -(omega**2), 1j * omega, np.ones_like(omega)
@@ -352,27 +391,22 @@ def _operators(
     return -((2.0 * np.sin(half) / dt) ** 2), 1j * np.sin(2.0 * half) / dt, np.cos(half) ** 2
 
 
-def estimate_response(
-    signals: np.ndarray, n: int, bins: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
-    """Response, its standard deviation and the coherence at the lines of a multisine, each (lines,), and the runs' own.
+def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate:
+    """Response at the lines of a multisine.
 
-    The reference is free of noise, so S_ry/S_ru is free of bias, with noise on the input and in a closed loop too
-    (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
+    The reference is free of noise, so S_ry/S_ru is free of bias, with noise on the input and in a
+    closed loop too (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
 
     Args:
         signals: reference, input and output, (runs, 3, periods n); more than one run, or period.
-        n: samples in a period. bins: multiples of 1/period that the lines are, (lines,).
-
-    Returns:
-        (response, deviation, coherence, errors): errors, what each run adds to the response, (runs, lines); None for
-        a single run.
+        n: samples in a period.
+        bins: the lines, as multiples of 1/period, (lines,).
     """
     from scipy.signal import csd
 
     r, u, y = np.moveaxis(signals, 1, 0)
     single = len(r) == 1
-    if single:  # scatter over its periods then
+    if single:  # the scatter is that over its periods
         r, u, y = (x.reshape(-1, n) for x in (r, u, y))
 
     keep: Any = False
@@ -387,17 +421,14 @@ def estimate_response(
     share = _smooth(scatter / np.abs(H) ** 2)
     uu, yy, uy = (spectrum(a, b).mean(axis=0) for a, b in ((u, u), (y, y), (u, y)))
     coherence = np.minimum(np.abs(uy) ** 2 / (uu.real * yy.real), 1.0)
-    return H, np.sqrt(share) * np.abs(H), coherence, None if single else errors
+    return Estimate(H, np.sqrt(share) * np.abs(H), coherence, None if single else errors)
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
-    """Mean of each value and its NEIGHBOURS - 1 nearest, of those that exist."""
-    half = NEIGHBOURS // 2
+    """Mean of each value and its SMOOTHED_LINES - 1 nearest, of those that exist."""
+    half, at = SMOOTHED_LINES // 2, np.arange(len(x))
     total = np.cumsum(np.concatenate(([0.0], x)))
-    low, high = (
-        np.maximum(np.arange(len(x)) - half, 0),
-        np.minimum(np.arange(len(x)) + half + 1, len(x)),
-    )
+    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))
     return (total[high] - total[low]) / (high - low)
 
 
@@ -409,21 +440,28 @@ def fit(
     errors: np.ndarray | None = None,
     dt: float | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients that fit a response best, and half of their 95 % confidence intervals, each (3,), order of NAMES.
+    """Fit the coefficients of a block to a response.
 
-    Least squares of the complex misfit, each line weighted by its deviation. The intervals come from how far each run
-    alone would move the coefficients (Student's t, of as many degrees of freedom as runs but one): the count of an
-    encoder makes errors that lines share, and an error that all share leaves no misfit. A single run has but that
-    misfit.
+    Least squares of the complex misfit, each line weighted by its deviation. The 95 % intervals
+    come from how far each run alone would move the coefficients (Student's t, of one degree of
+    freedom fewer than runs): the count of an encoder makes errors that lines share, and an error
+    that all share leaves no misfit. For a single run they come from that misfit.
 
     Args:
-        what: which form. frequency: [Hz], (n,), n >= 3. H: response, complex, (n,). deviation: of H, (n,).
-        errors: of each run, (runs, n), as `estimate_response` gives them; None for a single run. dt: as `response`.
+        what: "G", "S" (Sh) or "Th".
+        frequency: [Hz], (n,), n >= 3.
+        H: response, complex, (n,).
+        deviation: of H, (n,).
+        errors: of each run, (runs, n), as in `Estimate`; None for a single run.
+        dt: as in `response`.
+
+    Returns:
+        Coefficients and half of their intervals, (3,) each, in the order of COEFFICIENT_NAMES.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
 
-    sigma = np.hypot(deviation, TRUST * np.abs(H))
+    sigma = np.hypot(deviation, LINE_FLOOR * np.abs(H))
     start = _linear(what, frequency, H, dt)
 
     def parts(e: np.ndarray) -> np.ndarray:
@@ -439,47 +477,47 @@ def fit(
     else:
         runs = len(errors)
         freedom = runs - 1
-        variance = np.sum((np.linalg.pinv(found.jac) @ parts(errors / sigma).T) ** 2, axis=1) / (
-            runs * freedom
-        )
-    half = stdtrit(freedom, 0.5 + 0.5 * COVER) * np.sqrt(variance)
+        moves = np.linalg.pinv(found.jac) @ parts(errors / sigma).T
+        variance = np.sum(moves**2, axis=1) / (runs * freedom)
+    half = stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
     return found.x * start, half * np.abs(start)
 
 
 def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -> np.ndarray:
-    """Where the fit starts: the form made linear in its coefficients (Levy 1959), of relative misfit."""
-    s2, s, one = _operators(frequency, dt)
+    """Start of the fit: the form made linear in its coefficients (Levy 1959), relative misfit."""
+    s2, s, one = _derivatives(frequency, dt)
     if what == "Th":
         A, b = np.stack((s2, s, one), axis=1) / H[:, None], np.ones_like(H)
     else:
-        A, b = (
-            np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / np.abs(s2[:, None]),
-            s2 / np.abs(s2) + 0j,
-        )
+        size = np.abs(s2)
+        A = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / size[:, None]
+        b = s2 / size + 0j
     both = np.concatenate((A.real, A.imag)), np.concatenate((b.real, b.imag))
     return np.linalg.lstsq(*both, rcond=None)[0]
 
 
 def fitted_coefficients(
-    what: str, axis: str, frequency: np.ndarray, found: tuple, dt: float | None, least: float
-):
-    """`fit` beside the printed coefficients of what on axis: three of Coefficient.
+    what: str,
+    axis: str,
+    frequency: np.ndarray,
+    found: Estimate,
+    dt: float | None,
+    floor: float,
+) -> tuple[Coefficient, ...]:
+    """Fit a block and put the coefficients beside the printed ones.
 
     Args:
-        found: H, deviation, coherence, errors, as `estimate_response` returns them. dt: as `response`.
-        least: share of a coefficient that the fitted form is wrong by, part of the interval.
+        what: "G", "S" (Sh) or "Th".
+        axis: "x" or "y".
+        frequency: [Hz], (n,).
+        found: the response.
+        dt: as in `response`.
+        floor: relative error of the fitted form itself, part of the interval.
     """
-    H, deviation, _, errors = found
-    value, half = fit(what, frequency, H, deviation, errors, dt)
-    half = np.hypot(half, least * np.abs(value))
-    rows = zip(
-        COEFFICIENT_NAMES[what],
-        COEFFICIENT_UNITS[what],
-        printed_form(what, axis),
-        value.tolist(),
-        half.tolist(),
-        strict=True,
-    )
+    value, half = fit(what, frequency, found.response, found.deviation, found.errors, dt)
+    half = np.hypot(half, floor * np.abs(value))
+    names, units = COEFFICIENT_NAMES[what], COEFFICIENT_UNITS[what]
+    rows = zip(names, units, printed_form(what, axis), value.tolist(), half.tolist(), strict=True)
     return tuple(
         Coefficient(name, unit, known, x, x - h, x + h) for name, unit, known, x, h in rows
     )

@@ -1,8 +1,8 @@
-"""What the tool takes out of the clay: a map of heights over the block, and the volume removed.
+"""Clay removed by the tool: a map of heights over the block, and the volume.
 
-The tool is a round cutter of `width` that stands `depth` deep in the block and is led by the handle; clay is
-where some damping is. Nothing here needs graphics: the scene draws this map, a headless run computes it
-from the record.
+The tool is a round cutter of `width` that stands `depth` deep in the block and moves with the
+handle; clay is any region with damping. Nothing here needs graphics: the scene draws this map, a
+headless run computes it from the record.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from ..model.clay import extent
 from ..model.scenario import Scenario
 from ..simulation.record import Record
 
-CELL_SIZE = 2e-3  # [m] of a picture's map, at most
-SEEN, COUNTED = 10, 32  # cells, at least, in the tool's width: in a picture, where volume counts
-BEND = 5e-4  # of the width: so far may a piece of the path be from the straight line that stands for it
-MAP_MARGIN = 0.02  # of a block without borders, before the start and beyond the end of the path [m]
-HALF = 0.08  # half the breadth of a block without borders, where the path has none [m]
+CELL_SIZE = 2e-3  # [m] largest cell of a picture's map
+PICTURE_CELLS, VOLUME_CELLS = 10, 32  # least number of cells in the tool's width
+PATH_TOLERANCE = 5e-4  # of the width: largest distance of the path from its straight pieces
+MAP_MARGIN = 0.02  # [m] of a block without borders, before the start and beyond the end of the path
+HALF_BREADTH = 0.08  # [m] of a block without borders, across the path
 
 
 @dataclass(frozen=True)
@@ -30,38 +30,43 @@ class Tool:
     """The cutter at the handle.
 
     Attributes:
-        width: of its round footprint [m]. depth: of the cut [m].
+        width: of its round footprint [m].
+        depth: of the cut [m].
     """
 
     width: float = 0.02
     depth: float = 0.01
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "width", number("tool.width", self.width, 2.0 * CELL_SIZE, 0.1, unit="m")
-        )
-        object.__setattr__(self, "depth", number("tool.depth", self.depth, 1e-4, 0.025, unit="m"))
+        for field, low, high in (("width", 2.0 * CELL_SIZE, 0.1), ("depth", 1e-4, 0.025)):
+            value = number(f"tool.{field}", getattr(self, field), low, high, unit="m")
+            object.__setattr__(self, field, value)
 
 
 TOOL = Tool()
 
 
 def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner of the block of clay to be seen, shape (2,) each [m]; without clay, of the work area.
+    """Extent of the block of clay in a picture; without clay, of the work area.
 
-    Where the clay has borders they are the block's; where it has none, the block reaches a little beyond the path.
+    The clay's borders are the block's; where it has none, the block reaches a little beyond the
+    path.
+
+    Args:
+        scenario: whose clay.
+
+    Returns:
+        Lowest and highest corner [m], shape (2,) each.
     """
     start, length = np.array(scenario.start), scenario.length
-    low, high = start - HALF, start + HALF
+    low, high = start - HALF_BREADTH, start + HALF_BREADTH
     if length is not None:
         across = scenario.clay is not None and scenario.clay.y.along == "y"
         low, high[0] = low.copy(), length + MAP_MARGIN
         low[0] = start[0] - MAP_MARGIN
         if across:
-            low[1], high[1] = (
-                start[1] - MAP_MARGIN,
-                start[1] + 2.1 * (length - start[0]) + MAP_MARGIN,
-            )
+            low[1] = start[1] - MAP_MARGIN
+            high[1] = start[1] + 2.1 * (length - start[0]) + MAP_MARGIN
     for i in (0, 1):
         spans = extent(scenario.clay, i)
         if scenario.clay and spans and all(f != math.inf for span in spans for f in map(abs, span)):
@@ -70,14 +75,20 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Removal:
-    """How much of the clay is left: coverage of each cell of a grid by what the tool has passed over.
+    """Clay removed so far: the share of each cell of a grid that the tool has covered.
 
-    A cell that the edge of the tool passes through is covered in part, in proportion; so a straight cut has its exact
-    area whatever the cell. Along a path, no cell straddles a border of the clay.
+    A cell that the edge of the tool passes through is covered in proportion; so a straight cut has
+    its exact area whatever the cell. Along a path, no cell straddles a border of the clay.
 
     Attributes:
-        x, y: centres of the cells [m], shape (nx,), (ny,). wide, high: sizes of the cells [m], shape (nx,), (ny,).
-        cell: the largest size. cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
+        tool: the cutter.
+        x: centres of the cells [m], shape (nx,).
+        y: centres of the cells [m], shape (ny,).
+        wide: sizes of the cells along x [m], shape (nx,).
+        high: sizes of the cells along y [m], shape (ny,).
+        cell: the largest size [m].
+        clay: share of each cell that is clay, 0 to 1, shape (ny, nx).
+        cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
         volume: removed so far [m^3].
     """
 
@@ -88,16 +99,21 @@ class Removal:
         cell: float | None = None,
         path: np.ndarray | None = None,
     ):
-        """For the block of the scenario, and as far beyond as the tool goes along path [m], shape (n, 2).
+        """Lay the grid over the block, or over the path where one is given.
 
         Args:
-            cell: largest size of a cell [m]; None for what the tool's width asks for.
+            scenario: whose clay.
+            tool: the cutter.
+            cell: largest size of a cell [m]; None for one that suits the tool's width.
+            path: of the handle [m], shape (n, 2); None for the block of a picture.
         """
-        fit = min(CELL_SIZE, tool.width / SEEN) if path is None else tool.width / COUNTED
-        self.tool, self.cell = (
-            tool,
-            number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m"),
+        fit = (
+            min(CELL_SIZE, tool.width / PICTURE_CELLS)
+            if path is None
+            else tool.width / VOLUME_CELLS
         )
+        self.tool = tool
+        self.cell = number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m")
         low, high = block_of_clay(scenario)
         spans = [extent(scenario.clay, i) for i in (0, 1)]
         borders: list[list[float]] = [[], []]
@@ -108,27 +124,34 @@ class Removal:
                 [e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)
             ]
         if np.max((high - low) / self.cell) > 20_000:
-            raise ParameterError(
-                "record", scenario.name, "the path is too long for a map of the clay"
-            )
+            bound = "the path is too long for a map of the clay"
+            raise ParameterError("record", scenario.name, bound)
         lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
         self.wide, self.high = (np.diff(at) for at in lines)
         left = [1.0 - _share(spans[i], lines[i]) for i in (0, 1)]
-        self.clay = 1.0 - left[1][:, None] * left[0][None, :]  # share of each cell that is clay
+        self.clay = 1.0 - left[1][:, None] * left[0][None, :]
         self.cut = np.zeros(self.clay.shape)
         self.volume = 0.0
 
-    def sweep(self, a: Any, b: Any) -> float:
-        """Leads the tool from a to b [m], each (2,); returns the volume that this removes [m^3]."""
-        r, h = 0.5 * self.tool.width, self.cell
-        (ax, ay), (bx, by) = a, b
-        i = _window(self.x, min(ax, bx) - r - h, max(ax, bx) + r + h)
-        j = _window(self.y, min(ay, by) - r - h, max(ay, by) + r + h)
+    def sweep(self, begin: Any, end: Any) -> float:
+        """Move the tool in a straight line.
+
+        Args:
+            begin: its place before [m], (2,).
+            end: its place after [m], (2,).
+
+        Returns:
+            The volume that this removes [m^3].
+        """
+        r, reach = 0.5 * self.tool.width, 0.5 * self.tool.width + self.cell
+        (x0, y0), (x1, y1) = begin, end
+        i = _window(self.x, min(x0, x1) - reach, max(x0, x1) + reach)
+        j = _window(self.y, min(y0, y1) - reach, max(y0, y1) + reach)
         if i.start >= i.stop or j.start >= j.stop:
             return 0.0
-        x, y = self.x[i] - ax, self.y[j] - ay
-        dx, dy = bx - ax, by - ay
+        x, y = self.x[i] - x0, self.y[j] - y0
+        dx, dy = x1 - x0, y1 - y0
         square = dx * dx + dy * dy
         x, y = x[None, :], y[:, None]
         if square > 0.0:
@@ -148,7 +171,11 @@ class Removal:
         return gained
 
     def heights(self, thickness: float) -> np.ndarray:
-        """Height of the clay over the ground, where its block is so thick [m], at the cells, shape (ny, nx)."""
+        """Height of the clay over the ground at the cells [m], shape (ny, nx).
+
+        Args:
+            thickness: of the block [m].
+        """
         return np.where(self.clay > 0.5, thickness - self.tool.depth * self.cut, 0.0)
 
 
@@ -158,8 +185,10 @@ def removed(
     """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
 
     Args:
-        record: of the run. width, depth: of the tool [m].
-        cell: largest of the map [m]; None for 1/32 of the width, as the accuracy asks for.
+        record: of the run.
+        width: of the tool [m].
+        depth: of the cut [m].
+        cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
 
     Returns:
         (volume [m^3], rate [m^3/s]), at the samples of the record, shape (n,) each.
@@ -175,7 +204,7 @@ def removed(
     grid = Removal(record.scenario, tool, cell, p)
     way = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(p, axis=0).T))))
     moving = np.concatenate(((True,), np.diff(way) > 0.0))
-    bends = way[moving][_bends(p[moving], BEND * tool.width)]
+    bends = way[moving][_bends(p[moving], PATH_TOLERANCE * tool.width)]
     knots = np.union1d(np.arange(0.0, way[-1], grid.cell), bends)
     at = np.column_stack([np.interp(knots, way[moving], p[moving, i]) for i in (0, 1)]).tolist()
     gained = [
@@ -191,7 +220,7 @@ def removed(
 
 
 def _bends(p: np.ndarray, tolerance: float) -> np.ndarray:
-    """Which points of a path (n, 2) stand for all: none is that far from the lines between them (Douglas, Peucker)."""
+    """Mask of the points whose connection keeps within tolerance of a path (Douglas, Peucker)."""
     keep = np.zeros(len(p), dtype=bool)
     keep[[0, -1]] = True
     spans = [(0, len(p) - 1)]
@@ -212,7 +241,7 @@ def _bends(p: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _border_lines(low: float, high: float, borders: list[float], cell: float) -> np.ndarray:
-    """Edges of the cells from low to high or a little beyond, one at each of the borders between them [m]."""
+    """Edges of the cells from low to high or a little beyond [m], one of them at each border."""
     if not borders:
         return low + cell * np.arange(max(math.ceil((high - low) / cell - 1e-9), 2) + 1)
     ends = np.unique([low, *borders, high])

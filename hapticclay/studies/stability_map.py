@@ -1,4 +1,4 @@
-"""Maps of stability: analytic boundaries, the one that runs find, and the cells where theory and run disagree."""
+"""Maps of stability: analytic boundaries, boundaries found by runs, and where the two disagree."""
 
 from __future__ import annotations
 
@@ -11,22 +11,31 @@ import numpy as np
 from ..errors import choice
 from ..model.constants import TS
 from ..theory import gain_limit, margins, passivity
+from ..theory.bisection import bisect, first_failure
 from . import boundary
-from .boundary import Loop
+from .boundary import Loop, nominal_limit
 
 MAP_KINDS = ("gain-damping", "delay-damping", "gain-pose")
 MAP_POSES = 0.10  # [m] the handle's path, either way from the nominal pose
 DAMPINGS = (1.0, 3000.0)  # [N.s/m] of the map of gains
-FINE = 61  # points of an analytic line
+LINE_POINTS = 61  # of an analytic line
 UNDAMPED = "held clay is never passive without a damper behind it (Colgate, Schenkel)"
-MOST_CELLS = 1e5  # [N.s/m] clay is looked for up to here
+MOST_DAMPING = 1e5  # [N.s/m] clay is looked for up to here
+
+Line = tuple[list[float], list[float]]
+Progress = Callable[[Iterable], Iterable]
 
 
 @dataclass(frozen=True)
 class MapCell:
-    """One point of a map: whether the linear continuous loop at the nominal pose is stable there, and what a run does.
+    """One point of a map.
 
-    x, y: as the map's axes. simulated: as boundary.classify_run. cause: why the two differ, "" if they do not.
+    Attributes:
+        x: place on the map's first axis.
+        y: place on the map's second axis.
+        theory: whether the linear loop is stable, in continuous time at the nominal pose.
+        simulated: class of a run, as boundary.classify_run.
+        cause: why the two differ, "" if they do not.
     """
 
     x: float
@@ -38,27 +47,32 @@ class MapCell:
 
 @dataclass(frozen=True)
 class StabilityMap:
-    """Boundaries over a plane; stable below them.
+    """Boundaries over a plane; the loop is stable below them.
 
     Attributes:
-        kind: one of KINDS. loop: what is kept fixed. x_name, y_name: quantity and unit of the axes.
-        lines: analytic boundaries by name: (x, y) of each, inf where there is none.
-        found: boundaries from runs, likewise. exact: what theory says of those very loops, by name: y of each.
-        cells: see Cell. notes: what has no line, and why.
+        kind: one of MAP_KINDS.
+        loop: what is kept fixed.
+        x_name: quantity and unit of the first axis.
+        y_name: quantity and unit of the second axis.
+        lines: analytic boundaries by name: x and y of each, inf where there is none.
+        found: boundaries from runs, likewise.
+        exact: boundaries of the linear loop of those very runs, by name: y of each.
+        cells: points at which theory and a run are compared.
+        notes: lines that are missing, and why.
     """
 
     kind: str
     loop: Loop
     x_name: str
     y_name: str
-    lines: dict[str, tuple[list[float], list[float]]]
-    found: dict[str, tuple[list[float], list[float]]]
+    lines: dict[str, Line]
+    found: dict[str, Line]
     exact: dict[str, list[float]]
     cells: tuple[MapCell, ...]
     notes: tuple[str, ...] = ()
 
     def gap(self) -> float:
-        """Largest relative difference between the runs and the exact line of the same loop; NaN if there is none."""
+        """Largest relative gap between the runs and the exact line of their loop; NaN for none."""
         pairs = [
             (a, b)
             for name, (_, y) in self.found.items()
@@ -71,14 +85,15 @@ class StabilityMap:
 
 
 def stability_map(
-    kind: str, loop: Loop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter
+    kind: str, loop: Loop, quick: bool = False, progress: Progress = iter
 ) -> StabilityMap:
-    """Makes a map.
+    """Make a map.
 
     Args:
-        kind: "gain-damping", "delay-damping" (the loop's own K; sampled every 0.36 ms if it is continuous) or
-            "gain-pose" (without shaping, and with it).
-        loop: what is kept fixed. quick: four columns of three cells instead of eight of five.
+        kind: "gain-damping", "delay-damping" (the loop's own K; sampled every 0.36 ms if it is
+            continuous) or "gain-pose" (without shaping, and with it).
+        loop: what is kept fixed.
+        quick: four columns of three cells instead of eight of five.
         progress: wraps the iterable of the columns.
     """
     columns, rows = (4, 3) if quick else (8, 5)
@@ -86,129 +101,138 @@ def stability_map(
     return make[choice("map", kind, MAP_KINDS)](loop, columns, rows, progress)
 
 
-def _gain_damping(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
-    fine, x = np.geomspace(*DAMPINGS, FINE).tolist(), np.geomspace(*DAMPINGS, columns).tolist()
-    at = lambda b: replace(loop, b=b)  # noqa: E731
-    lines = {"continuous time": (fine, [_limit(replace(at(b), Ts=None, delay=0.0)) for b in fine])}
+def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+    fine = np.geomspace(*DAMPINGS, LINE_POINTS).tolist()
+    x = np.geomspace(*DAMPINGS, columns).tolist()
+    continuous = replace(loop, Ts=None, delay=0.0)
+
+    def line(law: Callable[[float], float]) -> Line:
+        return fine, [law(b) for b in fine]
+
+    def small_gain(b: float, K: float) -> bool:
+        return bool(margins.small_gain(loop.axis, K, b, loop.operator))
+
+    def passive(b: float, K: float) -> bool:
+        return bool(passivity.passivity(loop.axis, K, b))
+
+    lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
-        lines[f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"] = (
-            fine,
-            [_limit(at(b)) for b in fine],
-        )
+        name = f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"
+        lines[name] = line(lambda b: nominal_limit(replace(loop, b=b)))
     notes = []
-    for name, law in (
-        ("small gain (Eq. 13)", lambda b: _largest(lambda K: bool(_small_gain(at(b), K)))),
-        (
-            "passive: stable with every hand",
-            lambda b: _largest(lambda K: bool(passivity.passivity(loop.axis, K, b))),
-        ),
+    for name, holds in (
+        ("small gain (Eq. 13)", small_gain),
+        ("passive: stable with every hand", passive),
     ):
-        y = [law(b) for b in fine]
+        y = [_largest_gain(lambda K, b=b, holds=holds: holds(b, K)) for b in fine]
         if any(y):
             lines[name] = (fine, [v or math.nan for v in y])
         else:
             notes.append(f"{name}: holds for no K in this range")
-    damper = loop.operator.damper if loop.operator else 0.0
-    middle = _limit(replace(loop, Ts=None, delay=0.0))
+    middle = nominal_limit(continuous)
     ys = np.geomspace(0.25 * middle, 4.0 * middle, rows).tolist()
+    damper = loop.operator.damper if loop.operator else 0.0
     if loop.Ts and damper:
-        lines["held clay passive left of it (Colgate, Schenkel)"] = (
-            [damper, damper],
-            [ys[0], ys[-1]],
-        )
+        name = "held clay passive left of it (Colgate, Schenkel)"
+        lines[name] = ([damper, damper], [ys[0], ys[-1]])
     elif loop.Ts:
         notes.append(UNDAMPED)
-    found = {"runs": (x, [boundary.simulated_gain(at(b)) for b in progress(x)])}
-    exact = {"runs": [_limit(at(b)) for b in x]}
-    cells = _map_cells([at(b) for b in x], x, lambda c, K: replace(c, K=K), ys, progress)
+    loops = [replace(loop, b=b) for b in x]
+    found = {"runs": (x, [boundary.simulated_gain(each) for each in progress(loops)])}
+    exact = {"runs": [nominal_limit(each) for each in loops]}
+    cells = _map_cells(loops, x, "K", ys, progress)
     names = "damping b of the clay [N.s/m]", "gain K [1/kg]"
     return StabilityMap("gain-damping", loop, *names, lines, found, exact, cells, tuple(notes))
 
 
-def _delay_damping(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
-    loop = loop if loop.Ts else replace(loop, Ts=TS)
-    assert loop.Ts
-    low, high = 0.5 * loop.Ts, 16.0 * loop.Ts
-    fine, x = np.geomspace(low, high, FINE // 2).tolist(), np.geomspace(low, high, columns).tolist()
-    at = lambda d: replace(loop, delay=d)  # noqa: E731
+def _delay_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+    Ts = loop.Ts or TS
+    loop = replace(loop, Ts=Ts)
+    low, high = 0.5 * Ts, 16.0 * Ts
+    fine = np.geomspace(low, high, LINE_POINTS // 2).tolist()
+    x = np.geomspace(low, high, columns).tolist()
     lines = {
-        "continuous time, late": (
+        "continuous time, late": (fine, [_unstable_damping(loop, None, d) for d in fine]),
+        f"sampled every {1e3 * Ts:g} ms and late": (
             fine,
-            [_damping(replace(at(d), Ts=None, delay=0.0), d) for d in fine],
+            [_unstable_damping(loop, Ts, d) for d in fine],
         ),
-        f"sampled every {1e3 * loop.Ts:g} ms and late": (fine, [_damping(at(d), d) for d in fine]),
     }
     notes = []
     damper = loop.operator.damper if loop.operator else 0.0
     if damper:
         name = "held clay passive (Colgate, Schenkel)"
-        lines[name] = (fine, [_passive_damping(loop.Ts, d, damper) for d in fine])
+        lines[name] = (fine, [_passive_damping(Ts, d, damper) for d in fine])
     else:
         notes.append(UNDAMPED)
-    exact = [_damping(at(d), d) for d in x]
+    exact = [_unstable_damping(loop, Ts, d) for d in x]
+    loops = [replace(loop, delay=d) for d in x]
     runs = [
-        boundary.simulated_damping(at(d), min(b, MOST_CELLS) or 1.0)
-        for d, b in zip(progress(x), exact, strict=True)
+        boundary.simulated_damping(each, min(b, MOST_DAMPING) or 1.0)
+        for each, b in zip(progress(loops), exact, strict=True)
     ]
-    found = {"runs": (x, runs)}
     finite = [b for b in exact if 0.0 < b < math.inf] or [1000.0]
     ys = np.geomspace(0.5 * min(finite), 2.0 * max(finite), rows).tolist()
-    cells = _map_cells([at(d) for d in x], x, lambda c, b: replace(c, b=b), ys, progress)
+    cells = _map_cells(loops, x, "b", ys, progress)
     names = "delay of the motors [s]", "damping b of the clay [N.s/m]"
     return StabilityMap(
-        "delay-damping", loop, *names, lines, found, {"runs": exact}, cells, tuple(notes)
+        "delay-damping",
+        loop,
+        *names,
+        lines,
+        {"runs": (x, runs)},
+        {"runs": exact},
+        cells,
+        tuple(notes),
     )
 
 
-def _gain_pose(loop: Loop, columns: int, rows: int, progress) -> StabilityMap:
-    fine, x = (
-        np.linspace(-MAP_POSES, MAP_POSES, FINE).tolist(),
-        np.linspace(-MAP_POSES, MAP_POSES, columns).tolist(),
-    )
-    at = lambda dx, shaping: replace(loop, pose=(dx, 0.0), shaping=shaping)  # noqa: E731
-    nominal = _limit(loop)
+def _gain_pose(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+    fine = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
+    x = np.linspace(-MAP_POSES, MAP_POSES, columns).tolist()
+    loop_at = replace(loop, shaping=False)
+    plain = [replace(loop_at, pose=(dx, 0.0)) for dx in x]
+    shaped = [replace(each, shaping=True) for each in plain]
+    nominal = nominal_limit(loop)
     how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
         f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
         f"linear loop at this pose, {how}": (
             fine,
-            [boundary.pose_limit(at(dx, False)) for dx in fine],
+            [boundary.pose_limit(replace(loop_at, pose=(dx, 0.0))) for dx in fine],
         ),
     }
-    here = [boundary.pose_limit(at(dx, False)) for dx in x]
+    exact = {
+        "runs": [boundary.pose_limit(each) for each in plain],
+        "runs, shaped": [boundary.pose_limit(each) for each in shaped],
+    }
+    runs = [
+        boundary.simulated_gain(each, K)
+        for each, K in zip(progress(plain), exact["runs"], strict=True)
+    ]
     found = {
-        "runs": (
-            x,
-            [
-                boundary.simulated_gain(at(dx, False), g)
-                for dx, g in zip(progress(x), here, strict=True)
-            ],
-        ),
-        "runs, shaped": (x, [boundary.simulated_gain(at(dx, True)) for dx in x]),
+        "runs": (x, runs),
+        "runs, shaped": (x, [boundary.simulated_gain(each) for each in shaped]),
     }
-    exact = {"runs": here, "runs, shaped": [boundary.pose_limit(at(dx, True)) for dx in x]}
     ys = np.geomspace(0.4 * nominal, 1.2 * nominal, rows).tolist()
-    cells = _map_cells([at(dx, False) for dx in x], x, lambda c, K: replace(c, K=K), ys, progress)
+    cells = _map_cells(plain, x, "K", ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
     return StabilityMap("gain-pose", loop, *names, lines, found, exact, cells)
 
 
-def _map_cells(loops, x, put, ys, progress) -> tuple[MapCell, ...]:
+def _map_cells(
+    loops: list[Loop], x: list[float], field: str, ys: list[float], progress: Progress
+) -> tuple[MapCell, ...]:
+    """Theory beside a run for each loop, with each of ys as its field."""
     out = []
     for loop, at in zip(progress(loops), x, strict=True):
         for y in ys:
-            tried = replace(put(loop, y), push=boundary.LARGE_PUSH)
-            theory, run = boundary.linear_rate(tried), boundary.classify_run(tried)
-            agree = theory == (run == "stable")
-            out.append(
-                MapCell(
-                    at,
-                    y,
-                    theory,
-                    run,
-                    "" if agree else boundary.explain_disagreement(tried, run == "stable"),
-                )
-            )
+            tried = replace(loop, **{field: y}, push=boundary.LARGE_PUSH)
+            theory, run = boundary.continuous_stable(tried), boundary.classify_run(tried)
+            cause = ""
+            if theory != (run == "stable"):
+                cause = boundary.explain_disagreement(tried, run == "stable")
+            out.append(MapCell(at, y, theory, run, cause))
     return tuple(out)
 
 
@@ -216,49 +240,30 @@ def _late(loop: Loop) -> str:
     return f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
 
 
-def _other_hand(loop: Loop) -> dict:
-    return dict(impedance=loop.operator is not None, operator=loop.operator)
-
-
-def _limit(loop: Loop) -> float:
-    return gain_limit.gain_limit(
-        loop.axis, loop.b, Ts=loop.Ts, delay=loop.delay, **_other_hand(loop)
-    )
-
-
-def _small_gain(loop: Loop, K: float) -> margins.Verdict:
-    return margins.small_gain(loop.axis, K, loop.b, **_other_hand(loop))
-
-
-def _largest(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e3) -> float:
-    """Largest K from `low` on up to which a property holds; 0 if not even there, inf if up to `high`."""
+def _largest_gain(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e3) -> float:
+    """Largest K from low on up to which a property holds; 0 if not at low, inf if up to high."""
     if not holds(low):
         return 0.0
-    if holds(high):
-        return math.inf
-    while high / low > 1.0 + 1e-4:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    return math.inf if holds(high) else bisect(holds, low, high)[0]
 
 
-def _damping(loop: Loop, delay: float) -> float:
-    """Smallest b at which the late linear loop is unstable [N.s/m]; inf if there is none up to MOST, 0 if from 1 on."""
-    stable = lambda b: gain_limit.is_stable(loop.axis, loop.K, b, loop.operator, loop.Ts, delay)  # noqa: E731
-    grid = np.geomspace(1.0, MOST_CELLS, 60)
-    bad = next((i for i, b in enumerate(grid) if not stable(float(b))), None)
-    if bad is None:
-        return math.inf
-    if bad == 0:
-        return 0.0
-    low, high = float(grid[bad - 1]), float(grid[bad])
-    while high / low > 1.0 + 1e-6:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return high
+def _unstable_damping(loop: Loop, Ts: float | None, delay: float) -> float:
+    """Smallest b at which the late linear loop is unstable [N.s/m]; inf for none, 0 if below 1."""
+
+    def stable(b: float) -> bool:
+        return gain_limit.is_stable(loop.axis, loop.K, b, loop.operator, Ts, delay)
+
+    low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
+    return high if low else 0.0
 
 
 def _passive_damping(Ts: float, delay: float, damper: float) -> float:
-    """Largest held clay, late, that is passive behind a damper [N.s/m]: what it needs is in proportion to it."""
-    late = lambda z: (1.0 - 1.0 / z) / Ts * z ** (-delay / Ts)  # noqa: E731
+    """Largest held clay, late, that is passive behind a damper [N.s/m].
+
+    The damper that clay needs is proportional to it, so one test tells.
+    """
+
+    def late(z: np.ndarray) -> np.ndarray:
+        return (1.0 - 1.0 / z) / Ts * z ** (-delay / Ts)
+
     return damper / (damper - passivity.colgate_schenkel(late, Ts, damper, 2001).margin)

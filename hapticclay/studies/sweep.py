@@ -67,10 +67,7 @@ def result_row(
         if r and r.scenario.gain[i] > 0.0:
             b = entry.get("b", 0.0)
             th = r.scenario.operator
-            margin = (
-                gain_limit.gain_limit(axis, b, impedance=th is not None, operator=th)
-                / r.scenario.gain[i]
-            )
+            margin = gain_limit.gain_limit(axis, b, th) / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0
     out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan

@@ -19,13 +19,10 @@ from .identification import (
 )
 
 DRIFT_BLOCKS = ("G", "S")
-REACH_SHARE = (
-    0.04  # [m] from the stretched and the folded arm: nearer, joint rates grow without bound
-)
-DRIFT_SETTINGS: dict[str, Any] = (
-    dict(  # a mm of motion would let the pose change; without noise, a hundredth will do
-        band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
-    )
+MAP_REACH_MARGIN = 0.04  # [m] to the stretched and the folded arm: nearer, joint rates grow
+# A millimetre of motion would change the pose; without noise, a hundredth of that is enough.
+DRIFT_SETTINGS: dict[str, Any] = dict(
+    band=(1.0, 15.0), period=1.0, periods=2, realisations=1, lines=8, amplitude=2e-5
 )
 
 
@@ -34,10 +31,13 @@ class Drift:
     """Coefficients fitted over the workspace.
 
     Attributes:
-        x, y: where [m], (m,), points of a square grid. y >= 0: turning the arm by 180 degrees changes none of it.
+        x: world positions [m], (m,), points of a square grid.
+        y: world positions [m], (m,), all >= 0: turning the arm by 180 degrees changes no
+            coefficient.
         spacing: of the grid [m].
-        coefficients: (m, 2, 2, 2, 3): without and with shaping; G and Sh; axis x and y; gain, damping, stiffness.
-        mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2), which Sh's gain should be without shaping.
+        coefficients: (m, 2, 2, 2, 3): without and with shaping; G and Sh; axis x and y; gain,
+            damping, stiffness.
+        mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2): the gain of Sh without shaping.
     """
 
     x: np.ndarray
@@ -47,7 +47,7 @@ class Drift:
     mobility: np.ndarray
 
     def ranges(self) -> list[dict[str, Any]]:
-        """Lowest and highest value of each coefficient over the poses, beside the printed one."""
+        """Return the range of each coefficient over the poses, beside the printed value."""
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
             what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
@@ -65,7 +65,7 @@ class Drift:
         return out
 
     def summary(self) -> dict[str, Any]:
-        """Everything there is, ready for JSON."""
+        """Return everything, ready for JSON."""
         return {
             "x": self.x.tolist(),
             "y": self.y.tolist(),
@@ -85,27 +85,37 @@ class Drift:
 
 
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """World x and y [m] of the points of a square grid through the nominal pose that lie within reach, y >= 0."""
+    """Points of a square grid through the nominal pose that lie within reach, y >= 0.
+
+    Args:
+        spacing: of the grid [m].
+
+    Returns:
+        World x and y [m], shape (m,) each.
+    """
     reach = L1 + L2
-    x = NOMINAL_POSE[0] + spacing * np.arange(
-        -np.floor((reach + NOMINAL_POSE[0]) / spacing), np.ceil((reach - NOMINAL_POSE[0]) / spacing)
-    )
-    y = NOMINAL_POSE[1] + spacing * np.arange(
-        -np.floor(NOMINAL_POSE[1] / spacing), np.ceil((reach - NOMINAL_POSE[1]) / spacing)
-    )
-    x, y = (z.ravel() for z in np.meshgrid(x, y))
+
+    def along(nominal: float, lowest: float) -> np.ndarray:
+        first, last = -np.floor((nominal - lowest) / spacing), np.ceil((reach - nominal) / spacing)
+        return nominal + spacing * np.arange(first, last)
+
+    grid = np.meshgrid(along(NOMINAL_POSE[0], -reach), along(NOMINAL_POSE[1], 0.0))
+    x, y = (z.ravel() for z in grid)
     r = np.hypot(x, y)
-    inside = (r >= abs(L2 - L1) + REACH_SHARE) & (r <= L1 + L2 - REACH_SHARE)
+    inside = (r >= abs(L2 - L1) + MAP_REACH_MARGIN) & (r <= reach - MAP_REACH_MARGIN)
     return x[inside], y[inside]
 
 
 def drift_map(
     spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None
 ) -> Drift:
-    """Identifies G and Sh on both axes over the workspace, without and with inertia shaping; a few minutes.
+    """Identify G and Sh on both axes over the workspace, without and with inertia shaping.
+
+    It takes a few minutes.
 
     Args:
-        spacing: of the grid of poses [m], 0.01 to 0.3. seed: of the phases.
+        spacing: of the grid of poses [m], 0.01 to 0.3.
+        seed: of the phases.
         progress: called after each pose with (poses done, poses in all).
 
     Raises:

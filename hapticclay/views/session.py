@@ -28,10 +28,10 @@ from ..model.signals import Multisine
 from ..simulation import record
 from ..simulation.record import Record
 from ..stepping import leapfrog, loop, monitor
-from ..stepping.leapfrog import Leapfrog, _written_out
+from ..stepping.leapfrog import Leapfrog, written_out
 from ..stepping.monitor import Outcome
 from ..studies.removal import TOOL, Tool, removed
-from ..theory import linear_loop
+from ..theory import gain_limit
 
 FRAME = 1.0 / 60.0  # [s] between two looks at the person
 MOST_FORCE = (
@@ -101,7 +101,7 @@ class _Live(Leapfrog):
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        _written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
+        written_out(leapfrog.glide_varying, self.last)  # now, not while the hand waits
         self.limit = self.last
         # a person moves as they like: growth is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
@@ -574,7 +574,7 @@ def live_verdict(
 def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
     """The gain limit of the linear loop on each axis, with this clay at the handle [N.s/m]; inf for none."""
     x, y = (
-        linear_loop.continuous_gain_limit(axis, damping, operator)
+        gain_limit.gain_limit(axis, damping, operator)
         for axis, damping in zip(AXES, b, strict=True)
     )
     return x, y

@@ -24,9 +24,9 @@ from ..studies.identification import (
     NOMINAL_POSE,
     Identified,
     endpoint_mobility,
+    format_coefficient,
     printed_form,
     response,
-    transfer_function,
 )
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
@@ -244,7 +244,7 @@ def _column(axes: Sequence[Axes], result: Identified) -> None:
         f"{SYMBOLS[what]}, {result.axis} axis ({EQUATIONS[block]})", fontsize=10, loc="left"
     )
     text = "\n".join(
-        f"{c.name} {transfer_function(c)} {_unit(c.unit)}" for c in result.coefficients
+        f"{c.name} {format_coefficient(c)} {_unit(c.unit)}" for c in result.coefficients
     )
     where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
     magnitude.text(

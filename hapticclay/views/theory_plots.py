@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.polynomial import Polynomial
 
 from ..errors import choice
 from ..model import controller
@@ -29,7 +30,6 @@ def bode(
     K: float,
     b: float,
     *,
-    impedance: bool = True,
     operator: Operator | None = None,
     at: str = "compensator",
     compensator: controller.Compensator = controller.PRINTED,
@@ -38,9 +38,9 @@ def bode(
     """Magnitude and phase of the loop, its gain and phase margins marked.
 
     Args:
-        axis, K, b, impedance, operator, at, compensator: as in `stability.loop`. omega: range shown [rad/s].
+        axis, K, b, operator, at, compensator: as in `stability.loop`. omega: range shown [rad/s].
     """
-    kw: Any = dict(impedance=impedance, operator=operator, at=at, compensator=compensator)
+    kw: Any = dict(operator=operator, at=at, compensator=compensator)
     n, d = margins.open_loop(axis, K, b, **kw)
     m = margins.margins(axis, K, b, **kw)
     w = np.geomspace(*omega, 2000)
@@ -81,7 +81,7 @@ def bode(
         low.set_xlabel("angular frequency [rad/s]")
         low.set_xlim(*omega)
         state = "" if m.stable else " (unstable)"
-        _title(top, f"{_name(axis, b, impedance, operator)}, K = {K:g}{state}; broken {AT[at]}")
+        _title(top, f"{_name(axis, b, operator)}, K = {K:g}{state}; broken {AT[at]}")
     return figure
 
 
@@ -90,16 +90,15 @@ def nyquist(
     b: float,
     gains: tuple[float, ...] = (1.0,),
     *,
-    impedance: bool = True,
     operator: Operator | None = None,
     at: str = "compensator",
 ) -> Figure:
     """Nyquist curves for some gains, with the unit circle, -1, and the margins of each.
 
     Args:
-        axis, b, impedance, operator, at: as in `stability.loop`. gains: K of each curve, 5 at most.
+        axis, b, operator, at: as in `stability.loop`. gains: K of each curve, 5 at most.
     """
-    kw: Any = dict(impedance=impedance, operator=operator, at=at)
+    kw: Any = dict(operator=operator, at=at)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 5.8))
         ax = figure.add_subplot()
@@ -129,7 +128,7 @@ def nyquist(
         ax.set_ylabel("imaginary part of L")
         title = "margins of gain (circle) and phase (square); arrows: rising frequency"
         figure.legend(loc="outside upper center", ncols=2, title=title, title_fontsize=9)
-        _title(ax, f"{_name(axis, b, impedance, operator)}; broken {AT[at]}")
+        _title(ax, f"{_name(axis, b, operator)}; broken {AT[at]}")
     return figure
 
 
@@ -138,26 +137,21 @@ def small_gain(
     K: float,
     b: float,
     *,
-    impedance: bool = True,
     operator: Operator | None = None,
     omega: tuple[float, float] = (0.1, 1000.0),
 ) -> Figure:
     """Both sides of the paper's condition (Eq. 13), the frequencies where it fails shaded.
 
     Args:
-        axis, b, K, impedance, operator: as in `stability.small_gain`. omega: range shown [rad/s].
+        axis, b, K, operator: as in `stability.small_gain`. omega: range shown [rad/s].
     """
-    kw: Any = dict(impedance=impedance, operator=operator)
+    kw: Any = dict(operator=operator)
     verdict = margins.small_gain(axis, K, b, **kw)
     good = margins.coupled_stability(axis, K, b, **kw)
     n, d = margins.open_loop(axis, K, b, at="compensator", **kw)
     w = np.geomspace(*omega, 2000)
-    e, blank = (
-        np.polysub(
-            linear_loop.device_admittance(axis, K)[0], linear_loop.device_admittance(axis, 0.0)[0]
-        ),
-        linear_loop.device_admittance(axis, 0.0)[1],
-    )
+    passive, blank = linear_loop.device_admittance(axis, 0.0)
+    e = linear_loop.device_admittance(axis, K)[0] - passive
     left = np.abs(_response(e, blank, w))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 3.8))
@@ -178,7 +172,8 @@ def small_gain(
         said = "holds" if verdict else "fails"
         _title(
             ax,
-            f"{_name(axis, b, impedance, operator)}, K = {K:g}: (13) {said}, the loop is {'' if good else 'un'}stable",
+            f"{_name(axis, b, operator)}, K = {K:g}: (13) {said}, "
+            f"the loop is {'' if good else 'un'}stable",
         )
     return figure
 
@@ -224,12 +219,13 @@ def transparency(
     return figure
 
 
-def _response(n: np.ndarray, d: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    return np.polyval(n, 1j * omega) / np.polyval(d, 1j * omega)
+def _response(n: Polynomial, d: Polynomial, omega: np.ndarray) -> np.ndarray:
+    return n(1j * omega) / d(1j * omega)
 
 
-def _name(axis: str, b: float, impedance: bool, operator: Operator | None) -> str:
-    hand = "given hand" if operator else "nominal hand" if impedance else "no hand"
+def _name(axis: str, b: float, operator: Operator | None) -> str:
+    nominal = operator == Operator()
+    hand = "nominal hand" if nominal else "given hand" if operator else "no hand"
     return f"{axis} axis, b = {b:g} N$\\cdot$s/m, {hand}"
 
 

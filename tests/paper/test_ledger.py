@@ -65,10 +65,21 @@ def test_every_row_that_should_agree_does(ledger_rows):
     assert {r.status for r in ledger_rows} == set(ledger.STATUSES)
 
 
-@pytest.mark.parametrize("words", [  # each disagreement of the paper with itself has a row with evidence
-    "90 N-s/cm", "10 N-s/cm", "approach zero", "100 + 30t", "100 + 0.15t", "18-20 cm", "should not exceed 5C",
-    "a steady cut", "25", "force in x, position y",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [  # each disagreement of the paper with itself has a row with evidence
+        "90 N-s/cm",
+        "10 N-s/cm",
+        "approach zero",
+        "100 + 30t",
+        "100 + 0.15t",
+        "18-20 cm",
+        "should not exceed 5C",
+        "a steady cut",
+        "25",
+        "force in x, position y",
+    ],
+)
 def test_each_contradiction_has_its_row(words, ledger_rows):
     mine = [r for r in ledger_rows if words in r.printed]
     assert mine and all(len(r.reason) > 15 for r in mine)

@@ -140,3 +140,19 @@ def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
             mujoco.mj_step(model, data)
     assert caught == []
     assert model.ngeom > 0 and model.opt.timestep == 0.00036
+
+
+def test_the_arm_of_the_model_is_that_of_the_constants(monkeypatch):
+    """Other lengths and inertias in model.constants and model.arm reach the engine."""
+    monkeypatch.setattr(engine, "L1", 0.3)
+    monkeypatch.setattr(engine, "L2", 0.25)
+    monkeypatch.setattr(engine.arm, "I1", 0.2)
+    monkeypatch.setattr(engine.arm, "I2", 0.5)
+    model = hc.build(hc.free())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    M = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, M)
+    # in absolute angles the inertia is diag(I1, I2): M = T' diag T with T = [[1, 0], [1, 1]]
+    assert M == pytest.approx(np.array([[0.7, 0.5], [0.5, 0.5]]), rel=1e-14)
+    assert data.site("handle").xpos[:2] == pytest.approx([0.55, 0.0], abs=1e-15)

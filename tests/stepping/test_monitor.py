@@ -43,7 +43,7 @@ def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
     assert f"{r.outcome.time:.4f}" in r.status
     assert 0.6 < r.outcome.time < 5.0 and r.t[-1] == pytest.approx(r.outcome.time, abs=1e-9)
     assert "gain[y]" in r.outcome.advice
-    limit = hc.gain_limit("y", 90.0, impedance=impedance)
+    limit = hc.gain_limit("y", 90.0, hc.Operator() if impedance else None)
     assert f"{limit:.4g}" in r.outcome.advice
     assert r.summary()["outcome"]["advice"] == r.outcome.advice
     check_finite(r)

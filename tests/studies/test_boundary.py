@@ -1,5 +1,9 @@
-"""The boundary found by runs against the exact one; the growth that it is read from against known modes."""
+"""The boundary found by runs against the exact one.
 
+The growth that it is read from against known modes.
+"""
+
+import functools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,10 +18,12 @@ from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
-from hapticclay.studies.boundary import Loop
-from hapticclay.theory import gain_limit, linear_loop
+from hapticclay.theory import gain_limit
 from hapticclay.views import study_plots
 from tests.oracles import Linear
+
+TH = Operator()
+Loop = functools.partial(boundary.Loop, operator=TH)
 
 
 @settings(max_examples=10)
@@ -64,20 +70,18 @@ def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
     found = boundary.simulated_gain(
         Loop(axis=axis), guess=3.0 if axis == "x" else 1.0
     )  # not told where
-    assert found == pytest.approx(
-        linear_loop.continuous_gain_limit(axis, 90.0, Operator()), rel=3e-3
-    )  # CLOSE, and the step
+    assert found == pytest.approx(hc.gain_limit(axis, 90.0, TH), rel=3e-3)  # CLOSE, and the step
 
 
 def test_boundary_of_the_sampled_arm():
-    exact = hc.gain_limit("x", 90.0, Ts=2e-3)
+    exact = hc.gain_limit("x", 90.0, TH, Ts=2e-3)
     assert boundary.simulated_gain(Loop(Ts=2e-3)) == pytest.approx(exact, rel=5e-3)
-    assert abs(exact / hc.gain_limit("x", 90.0) - 1.0) > 0.1  # it would tell the two apart
+    assert abs(exact / hc.gain_limit("x", 90.0, TH) - 1.0) > 0.1  # it would tell the two apart
 
 
 def test_boundary_with_a_delay_and_no_hand():
     loop = Loop(axis="y", operator=None, Ts=2e-3, delay=3e-3)
-    exact = hc.gain_limit("y", 90.0, impedance=False, Ts=2e-3, delay=3e-3)
+    exact = hc.gain_limit("y", 90.0, Ts=2e-3, delay=3e-3)
     assert boundary.simulated_gain(loop) == pytest.approx(exact, rel=5e-3)
 
 
@@ -85,7 +89,7 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
     loop = Loop(shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
-    nominal = linear_loop.continuous_gain_limit("x", 90.0, Operator())
+    nominal = hc.gain_limit("x", 90.0, TH)
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
     assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
@@ -94,8 +98,8 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
 @pytest.mark.parametrize("delay", [0.0, 7e-4, 2e-3, 5e-3])
 def test_sampled_loop_at_a_pose(delay):
     loop = Loop(Ts=2e-3, delay=delay, pose=(0.10, 0.0))
-    for operator in (Operator(), None):
-        exact = gain_limit.gain_limit("x", 90.0, impedance=bool(operator), Ts=2e-3, delay=delay)
+    for operator in (TH, None):
+        exact = hc.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
         for shaping in (True, False):
             nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
             assert boundary.pose_limit(nominal) == pytest.approx(
@@ -104,7 +108,7 @@ def test_sampled_loop_at_a_pose(delay):
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
     loop = replace(loop, shaping=False)
     exact = boundary.pose_limit(loop)
-    assert exact < 0.8 * gain_limit.gain_limit("x", 90.0, Ts=2e-3, delay=delay)
+    assert exact < 0.8 * hc.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
     assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
 
 
@@ -135,7 +139,9 @@ def test_a_slow_growth_is_still_a_divergence():
 
 
 def saturating(K, share):
-    """Rightmost pole of the y axis, b = 90 with the hand, whose motors give but a share of what they are asked for."""
+    """Rightmost pole of the y axis, b = 90 with the hand, whose motors give but a share of what
+    they are asked for.
+    """
     s = np.poly1d([1.0, 0.0])
     D, C, T = s**2 + 32.4 * s + 492.46, s * (s + 10.0), 0.25 * s**2 + 92.0 * s + 6.0
     Dg = s**2 + 30.3 * s + 765.5
@@ -147,10 +153,13 @@ SHARES = np.linspace(0.02, 1.0, 99)
 
 
 def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
-    """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it: a large push stays."""
+    """K = 0.84 is stable in the linear loop, but not with motors that give 0.5 to 0.9 of it.
+
+    A large push stays.
+    """
     loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
     assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
-    assert boundary.linear_rate(loop) and boundary.classify_run(loop) == "limit cycle"
+    assert boundary.continuous_stable(loop) and boundary.classify_run(loop) == "limit cycle"
     assert boundary.explain_disagreement(loop, False) == "saturation"
     assert boundary.classify_run(replace(loop, torque_limit=(40.0, 40.0))) == "stable"
     assert boundary.classify_run(replace(loop, push=1e-4)) == "stable"
@@ -169,23 +178,32 @@ def test_causes():
         == "pose-dependent Lambda"
     )
     Ts = 4e-3
-    K = 0.5 * (hc.gain_limit("x", 90.0) + hc.gain_limit("x", 90.0, Ts=Ts))
+    K = 0.5 * (hc.gain_limit("x", 90.0, TH) + hc.gain_limit("x", 90.0, TH, Ts=Ts))
     assert boundary.explain_disagreement(Loop(K=K, Ts=Ts, **push), False) == "sampling"
     both = Loop(K=K, Ts=Ts, shaping=False, pose=(0.1, 0.0), **push)
     assert boundary.explain_disagreement(both, False) == "sampling and pose-dependent Lambda"
-    K = 0.5 * (hc.gain_limit("x", 90.0, Ts=1e-3) + hc.gain_limit("x", 90.0, Ts=1e-3, delay=4e-3))
+    K = 0.5 * sum(hc.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
     assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 
 
-@pytest.mark.parametrize("kw,field", [(dict(axis="z"), "axis"), (dict(K=0.0), "K"), (dict(delay=1e-3), "delay"),
-                                      (dict(b=-1.0), "b"), (dict(pose=(0.0,)), "pose")])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(axis="z"), "axis"),
+        (dict(K=0.0), "K"),
+        (dict(delay=1e-3), "delay"),
+        (dict(b=-1.0), "b"),
+        (dict(pose=(0.0,)), "pose"),
+    ],
+)
 def test_bad_loops_are_refused(kw, field):
     with pytest.raises(ParameterError) as e:
         Loop(**kw)
     assert e.value.field == field
 
 
-# ---- maps --------------------------------------------------------------------------------------------------------
+# ---- maps ----------------------------------------------------------------------------------------
+# ----------------
 
 
 @pytest.fixture(scope="module")
@@ -217,11 +235,11 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
 
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
-    b = stability_map._damping(Loop(K=1.0, Ts=Ts), delay)
-    assert gain_limit.is_stable("x", 1.0, 0.999 * b, Operator(), Ts, delay)
-    assert not gain_limit.is_stable("x", 1.0, 1.001 * b, Operator(), Ts, delay)
+    b = stability_map._unstable_damping(Loop(), Ts, delay)
+    assert gain_limit.is_stable("x", 1.0, 0.999 * b, TH, Ts, delay)
+    assert not gain_limit.is_stable("x", 1.0, 1.001 * b, TH, Ts, delay)
     assert (
-        stability_map._damping(Loop(K=1.0, Ts=2e-3), 0.032) == 0.0
+        stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it
 
 
@@ -246,7 +264,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     )
     monkeypatch.setattr(
         boundary,
-        "behaviour",
+        "classify_run",
         lambda loop: "stable" if loop.K < boundary.pose_limit(loop) else "diverges",
     )
     args = "stability --gain 0.5 --delay 1e-3 --map gain-pose --out".split() + [str(tmp_path / "o")]
@@ -254,20 +272,27 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     out = capsys.readouterr().out
     assert (
         "sampled every 0.36 ms" in out
-        and f" {hc.gain_limit('x', 90.0):.4g}    largest stable K" in out
+        and f" {hc.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
     )
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80
     data = json.loads((tmp_path / "o" / "stability.json").read_text())
     assert data["map"]["kind"] == "gain-pose" and len(data["verdicts"]) > 10
     assert data["asked"] == {
-        "axis": "x", "b": 90.0, "K": 0.5, "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0}, "Ts": 0.36e-3,
-        "delay": 1e-3, "shaping": False, "map": "gain-pose", "quick": False,
-    }  # fmt: skip
+        "axis": "x",
+        "b": 90.0,
+        "K": 0.5,
+        "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0},
+        "Ts": 0.36e-3,
+        "delay": 1e-3,
+        "shaping": False,
+        "map": "gain-pose",
+        "quick": False,
+    }
     limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
     kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
     assert limits == pytest.approx(
-        [hc.gain_limit("x", 90.0, **kw) for kw in kinds], rel=1e-12
+        [hc.gain_limit("x", 90.0, TH, **kw) for kw in kinds], rel=1e-12
     )  # whatever K
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 

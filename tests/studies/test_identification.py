@@ -1,4 +1,4 @@
-"""G, Sh and Th come back from simulated experiments as printed; responses against closed forms; intervals cover.
+"""G, Sh and Th come back from simulated experiments as printed, with intervals that cover them.
 
 Signals are short: 1.5 s (Th 2.5 s) instead of 5 s (10 s), one period of each run, 2 runs.
 """
@@ -38,7 +38,10 @@ def quick(what, axis, **kw):
 
 
 def kick_response(what, axis, f, dt=DT):
-    """What the leapfrog makes of the printed forms: central differences, the spring of Th on (1, 2, 1)/4."""
+    """What the leapfrog makes of the printed forms.
+
+    Central differences, the spring of Th on (1, 2, 1)/4.
+    """
     a, b, c = PRINTED[what + axis]
     s, s2 = 1j * np.sin(2 * np.pi * f * dt) / dt, -((2.0 * np.sin(np.pi * f * dt) / dt) ** 2)
     return (
@@ -48,7 +51,10 @@ def kick_response(what, axis, f, dt=DT):
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
 def test_printed_coefficients_and_response_without_noise(what, axis):
-    """The fitted form is the loop's own difference equation; what is left is 1e-6, and for Sh the pose: (p/l1)^2."""
+    """The fitted form is the loop's own difference equation.
+
+    What is left is 1e-6, and for Sh the pose: (p/l1)^2.
+    """
     r = quick(what, axis)
     left = 1e-4 if what == "S" else 1e-6
     assert [c.name for c in r.coefficients] == list(identification.COEFFICIENT_NAMES[what])
@@ -60,7 +66,8 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
         r.response / exact - 1.0
     )  # of continuous time: (omega dt)^2/12 of s^2, /6 of s, times up to 2
     assert np.all(share < (2.0 * np.pi * r.frequency * DT) ** 2 / 3.0 + 3e-5)
-    # beside the loop's own difference equation there remain the transient, and for Sh the pose: (p/l1)^2 = 4e-4 peak
+    # beside the loop's own difference equation there remain the transient, and for Sh the pose:
+    # (p/l1)^2 = 4e-4 peak
     own = kick_response(what, axis, r.frequency)
     np.testing.assert_allclose(r.response, own, rtol=left)
     np.testing.assert_allclose(
@@ -70,7 +77,10 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
 
 @pytest.mark.parametrize("what,axis", BLOCKS)
 def test_printed_coefficients_from_noisy_data(what, axis):
-    """Encoders of 65536 counts, 0.02 N rms: within 0.5 %, Sh 2 %, and within 4 sigma (2 half-intervals), seeded."""
+    """Encoders of 65536 counts, 0.02 N rms.
+
+    Within 0.5 %, Sh 2 %, and within 4 sigma (2 half-intervals), seeded.
+    """
     short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else {}
     r = quick(what, axis, noise=hc.Noise(), seed=1, realisations=4, **short)
     for c in r.coefficients:
@@ -80,13 +90,23 @@ def test_printed_coefficients_from_noisy_data(what, axis):
 
 
 def test_intervals_cover_the_truth_with_any_encoder():
-    """G, y, whose gain suffers most from rounding, 20 seeds, three encoders; benchmarks/intervals.py is the study.
+    """G, y, whose gain suffers most from rounding, 20 seeds, three encoders.
 
-    Of 60 gains, 95 % are 57; fewer than 51 have a chance of 2e-3 among independent ones. Intervals that know nothing
-    of errors common to all lines hold 60 to 80 % of them, and that of continuous time none of the last 20.
+    benchmarks/intervals.py is the study.
+
+    Of 60 gains, 95 % are 57; fewer than 51 have a chance of 2e-3 among independent ones. Intervals
+    that know nothing of errors common to all lines hold 60 to 80 % of them, and that of continuous
+    time none of the last 20.
     """
-    hits = np.array([row["half"] >= abs(row["error"]) for seed in range(20) for row in intervals.one(
-        seed, (("G", False),), "y", period=1.5, band=(0.6, 15.0), periods=1, lines=20)])  # fmt: skip
+    hits = np.array(
+        [
+            row["half"] >= abs(row["error"])
+            for seed in range(20)
+            for row in intervals.one(
+                seed, (("G", False),), "y", period=1.5, band=(0.6, 15.0), periods=1, lines=20
+            )
+        ]
+    )
     held = hits.reshape(20, len(intervals.SENSORS), 3).sum(axis=0)  # of 20: sensors, coefficients
     assert held[:, 0].sum() >= 51, held
     assert held.min() >= 15  # of one, fewer has a chance of 3e-3 for each of 9
@@ -94,7 +114,10 @@ def test_intervals_cover_the_truth_with_any_encoder():
 
 
 def test_intervals_from_the_scatter_of_runs_cover_at_the_stated_rate():
-    """Four runs, errors that half of them is common to all lines; 400 draws: 95 % +- 4.4 % is 4 sigma of the count."""
+    """Four runs, errors that half of them is common to all lines; 400 draws.
+
+    95 % +- 4.4 % is 4 sigma of the count.
+    """
     rng = np.random.default_rng(8)
     f = np.geomspace(0.2, 15.0, 20)
     exact = response("G", PRINTED["Gx"], f, DT)
@@ -110,7 +133,10 @@ def test_intervals_from_the_scatter_of_runs_cover_at_the_stated_rate():
 
 @pytest.mark.parametrize("what", ["G", "S", "Th"])
 def test_intervals_cover_the_truth_at_the_stated_rate(what):
-    """Gaussian scatter on an exact response, 400 draws: 95 % +- 4.4 % is 4 sigma of the binomial count."""
+    """Gaussian scatter on an exact response, 400 draws.
+
+    95 % +- 4.4 % is 4 sigma of the binomial count.
+    """
     rng = np.random.default_rng(7)
     f = np.geomspace(0.2, 15.0, 20)
     exact = response(what, PRINTED[what + "x"], f)
@@ -140,9 +166,12 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
 
 @settings(max_examples=4, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(
-    st.sampled_from(BLOCKS[:4]), st.integers(0, 2**32 - 1), st.floats(0.9, 2.0), st.floats(6.0, 20.0),
+    st.sampled_from(BLOCKS[:4]),
+    st.integers(0, 2**32 - 1),
+    st.floats(0.9, 2.0),
+    st.floats(6.0, 20.0),
     st.sampled_from([False, True]),
-)  # fmt: skip
+)
 def test_any_seed_and_any_band_about_the_corner(block, seed, low, high, shaping):
     """Corners lie at 3.3 to 4.8 Hz. Tolerance: (omega dt)^2/6 at 20 Hz is 3.4e-4."""
     r = quick(*block, seed=seed, band=(low, high), period=1.2, shaping=shaping)
@@ -150,7 +179,9 @@ def test_any_seed_and_any_band_about_the_corner(block, seed, low, high, shaping)
 
 
 def test_sampled_control_shows_the_hold():
-    """Torques held come half a sample late, kd s e^(-s Ts/2) = kd s - kd Ts/2 s^2: Sh's gain rises by kd Ts/2.
+    """Held torques come half a sample late, so Sh's gain rises by kd Ts/2.
+
+    kd s e^(-s Ts/2) = kd s - kd Ts/2 s^2.
 
     Tolerance: the next term, of the stiffness, kp Ts^2/8 of (omega^2 at 3 Hz), is 1 % of that.
     """
@@ -169,7 +200,7 @@ def test_sampled_control_shows_the_hold():
 
 
 def mobility(x, y):
-    """W = J M^-1 J' with J by central differences of the kinematics and M in relative joint angles."""
+    """W = J M^-1 J' with J by central differences of the kinematics, M in relative joint angles."""
     l1, l2, i1, i2 = 0.24, 0.35, 0.24**2 / 0.7919, 0.35**2 / 0.131
     q2 = -np.arccos((x * x + y * y - l1 * l1 - l2 * l2) / (2 * l1 * l2))
     q1 = np.arctan2(y, x) - np.arctan2(l2 * np.sin(q2), l1 + l2 * np.cos(q2))
@@ -250,14 +281,29 @@ def test_same_seed_same_result():
     )
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(axis="z"), "axis"), (dict(what="C"), "what"), (dict(noise=0.1), "noise"), (dict(seed=-1), "seed"),
-    (dict(origin=(0.5, 0.5)), "start"), (dict(shaping=1), "shaping"), (dict(band=(1.0, 1e4)), "band[high]"),
-    (dict(band=(2.0, 1.0)), "band"), (dict(band=(1.0, 1.1)), "band"), (dict(period=0.0), "period"),
-    (dict(periods=0), "periods"), (dict(periods=1, realisations=1), "periods"), (dict(realisations=0), "realisations"),
-    (dict(lines=2), "lines"), (dict(amplitude=0.0), "amplitude"), (dict(control="held"), "control"),
-    (dict(dt=0.0), "dt"), (dict(period=0.5, band=(2.0, 20.0), amplitude=0.1), "amplitude"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(axis="z"), "axis"),
+        (dict(what="C"), "what"),
+        (dict(noise=0.1), "noise"),
+        (dict(seed=-1), "seed"),
+        (dict(origin=(0.5, 0.5)), "start"),
+        (dict(shaping=1), "shaping"),
+        (dict(band=(1.0, 1e4)), "band[high]"),
+        (dict(band=(2.0, 1.0)), "band"),
+        (dict(band=(1.0, 1.1)), "band"),
+        (dict(period=0.0), "period"),
+        (dict(periods=0), "periods"),
+        (dict(periods=1, realisations=1), "periods"),
+        (dict(realisations=0), "realisations"),
+        (dict(lines=2), "lines"),
+        (dict(amplitude=0.0), "amplitude"),
+        (dict(control="held"), "control"),
+        (dict(dt=0.0), "dt"),
+        (dict(period=0.5, band=(2.0, 20.0), amplitude=0.1), "amplitude"),
+    ],
+)
 def test_bad_input_is_refused(kw, field):
     with pytest.raises(hc.ParameterError) as e:
         hc.identify(**kw)
@@ -286,10 +332,15 @@ def test_command_line(capsys, tmp_path):
             assert abs(c["error"]) < 0.02 and c["low"] < c["high"]
 
 
-@pytest.mark.parametrize("args,words", [
-    (["identify", "--axis", "z"], ["--axis"]), (["identfy"], ["did you mean 'identify'"]),
-    (["identify", "--seed", "-1"], ["seed = -1"]), (["identify", "--out", "/proc/x"], ["out = '/proc/x'"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "args,words",
+    [
+        (["identify", "--axis", "z"], ["--axis"]),
+        (["identfy"], ["did you mean 'identify'"]),
+        (["identify", "--seed", "-1"], ["seed = -1"]),
+        (["identify", "--out", "/proc/x"], ["out = '/proc/x'"]),
+    ],
+)
 def test_command_line_refuses(capsys, tmp_path, monkeypatch, args, words):
     monkeypatch.chdir(tmp_path)
     assert app.main(args) == 2

@@ -1,4 +1,7 @@
-"""Gain limits found another way: roots, Routh, Pade, a period walked step by step, python-control, the simulator."""
+"""Gain limits found another way.
+
+Roots, Routh, Pade, a period walked step by step, python-control, the simulator.
+"""
 
 import itertools
 from decimal import Decimal, localcontext
@@ -17,13 +20,17 @@ from tests.oracles import G0, G1, S0, S1, SG
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}
 PRINTED = {
-    ("x", True): (4.74, 3.84, 3.79), ("y", True): (1.42, 0.86, 0.80),
-    ("x", False): (3.47, 3.23, 3.24), ("y", False): (1.18, 0.77, 0.73),
-}  # fmt: skip
+    ("x", True): (4.74, 3.84, 3.79),
+    ("y", True): (1.42, 0.86, 0.80),
+    ("x", False): (3.47, 3.23, 3.24),
+    ("y", False): (1.18, 0.77, 0.73),
+}
 EXACT = {  # to 4 digits, in the same order: b = 50, 90, 100
-    ("x", True): (4.7358, 3.8443, 3.7938), ("y", True): (1.4195, 0.8605, 0.7979),
-    ("x", False): (3.4731, 3.2312, 3.2424), ("y", False): (1.1771, 0.7748, 0.7256),
-}  # fmt: skip
+    ("x", True): (4.7358, 3.8443, 3.7938),
+    ("y", True): (1.4195, 0.8605, 0.7979),
+    ("x", False): (3.4731, 3.2312, 3.2424),
+    ("y", False): (1.1771, 0.7748, 0.7256),
+}
 
 
 def operator(hand):
@@ -31,11 +38,14 @@ def operator(hand):
 
 
 def limit(axis, b, hand=(0.25, 2.0, 6.0), **kw):
-    return hc.gain_limit(axis, b, operator=operator(hand), impedance=any(hand), **kw)
+    return hc.gain_limit(axis, b, operator(hand), **kw)
 
 
 def polynomial(axis, K, b, hand, now=1.0, then=1.0):
-    """Closed loop spelt out from the differential equations; `now` and `then` weigh what acts at once and late."""
+    """Closed loop spelt out from the differential equations.
+
+    `now` and `then` weigh what acts at once and late.
+    """
     i = "xy".index(axis)
     m, d, k = hand
     c, g, s = [1, 10, 0], [1, G1[i], G0[i]], [1, S1[i], S0[i]]
@@ -56,7 +66,7 @@ def worst(poly):
 @pytest.mark.parametrize("axis,on,j", list(itertools.product("xy", [True, False], [0, 1, 2])))
 def test_continuous_limits(axis, on, j):
     b = (50.0, 90.0, 100.0)[j]
-    found = hc.gain_limit(axis, b, impedance=on)
+    found = hc.gain_limit(axis, b, Operator() if on else None)
     assert found == pytest.approx(
         PRINTED[axis, on][j], abs=0.0051
     )  # half the last digit, and a hair
@@ -90,21 +100,35 @@ def routh(poly):
 
 @pytest.mark.parametrize("axis,b", list(itertools.product("xy", [50.0, 90.0, 100.0])))
 def test_continuous_limits_by_routh_hurwitz(axis, b):
-    found = hc.gain_limit(axis, b)
+    found = limit(axis, b)
     assert np.all(routh(polynomial(axis, found * (1 - 1e-9), b, HANDS["hand"])) > 0)
     assert np.any(routh(polynomial(axis, found * (1 + 1e-9), b, HANDS["hand"])) < 0)
 
 
-def period(axis, K, b, hand, Ts, delay, render, number=float, exponential=expm):
-    """One period of the sampled loop as a matrix: every unit state is walked through the events, one after another."""
+def period(  # noqa: PLR0913  # one loop, in floats or in Decimals
+    axis, K, b, hand, Ts, delay, render, number=float, exponential=expm
+):
+    """One period of the sampled loop as a matrix.
+
+    Every unit state is walked through the events, one after another.
+    """
     n = int(delay / Ts + 1e-9) + 1
     g0, g1, s0, s1, sg = (number(float(x["xy".index(axis)])) for x in (G0, G1, S0, S1, SG))
     K, b, Ts, delay, m, d, k = (number(x) for x in (K, b, Ts, delay, *hand))
     mass = 1 / sg + m
     physical = b if render == "implicit" else 0
-    blocks = exponential(Ts * np.array([
-        [0, 1, 0, 0, 0], [0, -10, 0, 0, K], [0, 0, 0, 1, 0], [g0, 0, -g0, -g1, 0], [0, 0, 0, 0, 0]
-    ]))  # fmt: skip
+    blocks = exponential(
+        Ts
+        * np.array(
+            [
+                [0, 1, 0, 0, 0],
+                [0, -10, 0, 0, K],
+                [0, 0, 0, 1, 0],
+                [g0, 0, -g0, -g1, 0],
+                [0, 0, 0, 0, 0],
+            ]
+        )
+    )
     changes = delay - (n - 1) * Ts  # in a period the oldest gives way to the next then
     plant = np.array([[0, 1, 0], [-k / mass, -(d + physical) / mass, 1 / mass], [0, 0, 0]])
     before, after = exponential(changes * plant), exponential((Ts - changes) * plant)
@@ -157,7 +181,9 @@ def test_sampled_limits_against_the_period_map(axis, hand, timing, render):
 
 
 def test_sampled_limits_of_random_loops():
-    """Clay to 3e4 N.s/m, hands to 30 kg and 1e5 N/m, samples of 10 us to 10 ms, delays to four of them."""
+    """Clay to 3e4 N.s/m, hands to 30 kg and 1e5 N/m, samples of 10 us to 10 ms, delays to four of
+    them.
+    """
     rng = np.random.default_rng(7)
     zero = 0
     for _ in range(40):
@@ -176,7 +202,7 @@ def test_sampled_limits_of_random_loops():
         if found == 0.0:
             zero += 1
             assert beyond(1e-4) > -1e-10
-        else:  # the eigenvalues of a long run of slow samples lie within 1e-10 of the circle, all of them
+        else:  # all eigenvalues of a long run of slow samples lie within 1e-10 of the circle
             assert all(
                 beyond(K) < 1e-10
                 for K in found * np.array([1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 0.99, 1 - 1e-5])
@@ -199,7 +225,7 @@ def exponential(a):
 
 
 def inside(matrix, spring):
-    """Whether all eigenvalues of a matrix of Decimals lie within the unit circle (Schur, Cohn), but the handle's place.
+    """Whether all eigenvalues but the handle's place lie within the unit circle (Schur, Cohn).
 
     The characteristic polynomial is Faddeev's and LeVerrier's.
     """
@@ -234,7 +260,10 @@ def is_inside(axis, K, b, hand, Ts, delay, render):
     "b,Ts,delay", [(1e9, 3.6e-4, 0.0), (1e9, 1e-6, 0.0), (1e8, 1e-3, 1.4e-3), (90.0, 3.6e-4, 0.0)]
 )
 def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, delay):
-    """Implicit clay to 1e9 N.s/m moves poles to within 1e-15 of z = 1; judged with 150 digits, by another criterion."""
+    """Implicit clay to 1e9 N.s/m moves poles to within 1e-15 of z = 1.
+
+    Judged with 150 digits, by another criterion.
+    """
     found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="implicit")
     assert 0.0 < found < np.inf
     for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
@@ -252,7 +281,10 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
 @pytest.mark.parametrize("Ts,delay", [(1e-6, 0.0), (3.6e-4, 0.0), (3.6e-4, 6e-4)])
 @pytest.mark.parametrize("render", ["held", "implicit"])
 def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, delay, render):
-    """The pole that K moves is at -K k/10: z = 1 - 2e-16 at K = 1e-12, and far below rounding at 1e-30 and 5e-324."""
+    """The pole that K moves is at -K k/10.
+
+    Z = 1 - 2e-16 at K = 1e-12, and far below rounding at 1e-30 and 5e-324.
+    """
     for K in (1e-6, 1e-12, 1e-30, 5e-324):
         assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
         assert gain_limit.is_stable(axis, K, 90.0, operator(HANDS[hand]), Ts, delay, render)
@@ -260,7 +292,10 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
 
 @pytest.mark.parametrize("axis,n", list(itertools.product("xy", [0, 1, 3])))
 def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n):
-    """No hand: the loop broken at the sampled net force, from python-control's own discretisations."""
+    """No hand.
+
+    The loop broken at the sampled net force, from python-control's own discretisations.
+    """
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
     K, omega = gain_limit.critical_gain(axis, b, None, Ts, n * Ts)
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
@@ -307,11 +342,8 @@ def test_late_limit_against_pade(axis, hand, delay):
 
 @pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "implicit"])))
 def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
-    exact = hc.gain_limit(axis, 90.0, delay=2e-3, render=render)
-    gap = [
-        exact - hc.gain_limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render)
-        for Ts in (4e-4, 2e-4, 1e-4)
-    ]
+    exact = limit(axis, 90.0, delay=2e-3, render=render)
+    gap = [exact - limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render) for Ts in (4e-4, 2e-4, 1e-4)]
     assert np.polyfit(np.log([4, 2, 1]), np.log(gap), 1)[0] == pytest.approx(1.0, abs=0.1)
     assert 2 * gap[2] - gap[1] == pytest.approx(
         0.0, abs=5e-4 * exact
@@ -321,26 +353,24 @@ def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
 def test_limits_fall_with_delay_and_sample():
     for axis in "xy":
         assert np.all(
-            np.diff([hc.gain_limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0
+            np.diff([limit(axis, 90.0, delay=d) for d in (0, 1e-6, 1e-4, 1e-3, 3e-3)]) < 0
         )
-        assert np.all(
-            np.diff([hc.gain_limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0
-        )
-        assert hc.gain_limit(axis, 90.0, delay=1e-9) == pytest.approx(
-            hc.gain_limit(axis, 90.0), rel=1e-7
-        )
+        assert np.all(np.diff([limit(axis, 90.0, Ts=T) for T in (1e-5, 1e-4, 1e-3, 3e-3)]) < 0)
+        assert limit(axis, 90.0, delay=1e-9) == pytest.approx(limit(axis, 90.0), rel=1e-7)
 
 
 def test_limits_at_the_ends():
     for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
-        assert hc.gain_limit("x", 0.0, impedance=False, **kw) == float("inf")  # nothing to feel
+        assert hc.gain_limit("x", 0.0, **kw) == float("inf")  # nothing to feel
     for kw in (dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-4, delay=2e-3), dict(delay=1.0)):
-        assert hc.gain_limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
-    assert 0.0 < hc.gain_limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
+        assert limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
+    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
 
 
 def test_a_narrow_unstable_window_is_not_missed():
-    """Crossings 2e-4 apart between grid points 0.75 apart (in log omega), and a window of 2e-5 in K between them."""
+    """Crossings 2e-4 apart between grid points 0.75 apart (in log omega), and a window of 2e-5 in K
+    between them.
+    """
 
     def h(w):
         x = np.log(w) - 1.2345
@@ -364,17 +394,29 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
     """Small swings about the nominal pose, 2 % inside and outside the limit, at Ts = 2 ms."""
     Ts, b, i = 2e-3, 90.0, "xy".index(axis)
     th = operator(HANDS[hand])
-    K = factor * hc.gain_limit(axis, b, operator=th, impedance=th is not None, Ts=Ts)
+    K = factor * hc.gain_limit(axis, b, th, Ts=Ts)
     gain = [0.1, 0.1]
     gain[i] = K
     force = [0.0, 0.0]
     force[i] = 1e-4
-    run = hc.simulate(hc.constant_cut(
-        b, tuple(gain), tuple(force), th is not None, shaping=True, dt=Ts / 8, Ts=Ts, control="sampled",
-        clay=(-0.05, 0.05), origin=(0.35, 0.24), length=0.04, t_max=4.0,
-    ))  # fmt: skip
-    M, beta, gamma = gain_limit.sampled_matrices(axis, b, th, Ts)
-    z = np.linalg.eigvals(M + K * np.outer(beta, gamma))
+    run = hc.simulate(
+        hc.constant_cut(
+            b,
+            tuple(gain),
+            tuple(force),
+            th is not None,
+            shaping=True,
+            dt=Ts / 8,
+            Ts=Ts,
+            control="sampled",
+            clay=(-0.05, 0.05),
+            origin=(0.35, 0.24),
+            length=0.04,
+            t_max=4.0,
+        )
+    )
+    less, beta, gamma = linear_loop.sampled_differences(axis, b, th, Ts)
+    z = 1.0 + np.linalg.eigvals(less + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
     assert (rate < 0) == (factor < 1)
@@ -390,20 +432,31 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
     assert abs(rate) > 0.1
 
 
-def test_hand_is_nominal_none_or_given():
-    assert hc.gain_limit("x", 90.0) == hc.gain_limit("x", 90.0, operator=Operator())
-    assert hc.gain_limit("x", 90.0, impedance=False) == linear_loop.continuous_gain_limit("x", 90.0)
+def test_no_operator_is_no_hand():
+    for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
+        none = hc.gain_limit("x", 90.0, **kw)
+        assert none == hc.gain_limit("x", 90.0, operator=None, **kw)
+        assert none == pytest.approx(
+            hc.gain_limit("x", 90.0, Operator(0.0, 0.0, 0.0), **kw), rel=1e-12
+        )
+        assert abs(hc.gain_limit("x", 90.0, Operator(), **kw) / none - 1.0) > 0.1
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: hc.gain_limit("z", 90.0), "axis"), (lambda: hc.gain_limit("x", -1.0), "b"),
-    (lambda: hc.gain_limit("x", 90.0, Ts=0.0), "Ts"), (lambda: hc.gain_limit("x", 90.0, delay=-1.0), "delay"),
-    (lambda: hc.gain_limit("x", 90.0, Ts=1e-4, delay=1.0), "delay"),
-    (lambda: hc.gain_limit("x", 90.0, render="hold"), "render"),
-    (lambda: hc.gain_limit("x", 90.0, impedance=1), "impedance"),
-    (lambda: hc.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
-    (lambda: hc.gain_limit("x", 90.0, operator=Operator(), impedance=False), "operator"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: hc.gain_limit("z", 90.0), "axis"),
+        (lambda: hc.gain_limit("x", -1.0), "b"),
+        (lambda: hc.gain_limit("x", 90.0, Ts=0.0), "Ts"),
+        (lambda: hc.gain_limit("x", 90.0, delay=-1.0), "delay"),
+        (lambda: hc.gain_limit("x", 90.0, Ts=1e-4, delay=1.0), "delay"),
+        (lambda: hc.gain_limit("x", 90.0, render="hold"), "render"),
+        (lambda: hc.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
+        (lambda: hc.gain_limit("x", 90.0, operator=True, Ts=1e-3), "operator"),
+        (lambda: hc.gain_limit("x", 90.0, operator=True, delay=1e-3), "operator"),
+        (lambda: hc.gain_limit("x", 90.0, Ts=1e-3, compensator=hc.Compensator(5.0)), "compensator"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()

@@ -6,7 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.model import controller
+from hapticclay.model.constants import G, S
 from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop
 from tests.oracles import Linear, piecewise_linear
@@ -31,7 +34,7 @@ def test_characteristic_polynomial_is_one_plus_the_loop(axis, operator, K, b, om
     s = 1j * omega
     den = np.prod([np.polyval(np.atleast_1d(x.den[0][0]), s) for x in (C, G, S)])
     expected = (1 + (G(s) * C(s) + S(s)) * T(s)) * den
-    found = np.polyval(linear_loop.characteristic(axis, K, b, operator), s)
+    found = linear_loop.characteristic(axis, K, b, operator)(s)
     assert found == pytest.approx(
         expected, rel=1e-11
     )  # cancellation between the terms costs up to 4 digits
@@ -49,14 +52,25 @@ def test_poles_are_those_of_the_state_space_model(axis):
         )
 
 
-@pytest.mark.parametrize("axis,b,on,printed", [
-    ("x", 50, True, 4.74), ("x", 90, True, 3.84), ("x", 100, True, 3.79),
-    ("y", 50, True, 1.42), ("y", 90, True, 0.86), ("y", 100, True, 0.80),
-    ("x", 50, False, 3.47), ("x", 90, False, 3.23), ("x", 100, False, 3.24),
-    ("y", 50, False, 1.18), ("y", 90, False, 0.77), ("y", 100, False, 0.73),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "axis,b,on,printed",
+    [
+        ("x", 50, True, 4.74),
+        ("x", 90, True, 3.84),
+        ("x", 100, True, 3.79),
+        ("y", 50, True, 1.42),
+        ("y", 90, True, 0.86),
+        ("y", 100, True, 0.80),
+        ("x", 50, False, 3.47),
+        ("x", 90, False, 3.23),
+        ("x", 100, False, 3.24),
+        ("y", 50, False, 1.18),
+        ("y", 90, False, 0.77),
+        ("y", 100, False, 0.73),
+    ],
+)
 def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
-    limit = linear_loop.continuous_gain_limit(axis, b, TH if on else None)
+    limit = hc.gain_limit(axis, b, TH if on else None)
     G, S, C, T = blocks(axis, 1.0, b, on)
     loop = control.minreal(G * C * T / (1 + S * T), tol=1e-8, verbose=False)
     margins = control.stability_margins(loop, returnall=True)[0]
@@ -76,13 +90,16 @@ def test_y_axis_is_unstable_at_unit_gain():
 
 
 def test_gain_limit_without_clay_and_hand_is_infinite():
-    assert linear_loop.continuous_gain_limit("x", 0.0) == float("inf")
+    assert hc.gain_limit("x", 0.0) == float("inf")
 
 
 def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
-    """An undamped hand makes the driven polynomial vanish at its resonance: no K puts a pole there."""
+    """An undamped hand makes the driven polynomial vanish at its resonance.
+
+    No K puts a pole there.
+    """
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
-        limit = linear_loop.continuous_gain_limit("y", 0.0, th)
+        limit = hc.gain_limit("y", 0.0, th)
         assert limit > 0.0
         assert limit == float("inf") or not linear_loop.stable("y", 1.001 * limit, 0.0, th)
 
@@ -96,11 +113,14 @@ def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
     assert linear_loop.steady_speed(K, f, b) == pytest.approx(s * H / (1 + H * b * s) * f, rel=1e-6)
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: linear_loop.stable("z", 1, 1), "axis"),
-    (lambda: linear_loop.stable("x", -1, 1), "K"),
-    (lambda: linear_loop.stable("x", 1, float("nan")), "b"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: linear_loop.stable("z", 1, 1), "axis"),
+        (lambda: linear_loop.stable("x", -1, 1), "K"),
+        (lambda: linear_loop.stable("x", 1, float("nan")), "b"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()
@@ -126,3 +146,53 @@ def test_crossing_times_beside_the_oracle():
         "x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
     ) == pytest.approx(exact, abs=1e-10)  # eleven thousand products
     assert linear_loop.crossing_times("x", 1.0, -1.0, (0.05,), (0.0,), t_max=0.5) == []
+
+
+@pytest.mark.parametrize("axis", "xy")
+@given(st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6), st.floats(1e-5, 1e-2))
+def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
+    """A kick whose sample lies at its end sees the state before it.
+
+    The explicit form of the law.
+    """
+    i = "xy".index(axis)
+    g, s = G[i], S[i]
+    p, v, delta, _, y, yd = state
+    keep, take, after, before, spring = controller.servo_coefficients(g, s, H, 1.0, 0.0)
+    ahead = keep * yd + take * (delta - y)
+    law = controller.servo_acceleration(after, before, spring, ahead, yd, v, y, p, 0.0) - v / H
+    size = np.abs(state) @ np.abs(controller.feedback_vector(axis))
+    assert law == pytest.approx(
+        controller.feedback_vector(axis) @ state, abs=1e-14 * (size + 4.0 / H)
+    )
+    A = linear_loop.state_space(axis, 1.0, 0.0)[0]  # without clay and hand the law is all there is
+    assert np.array_equal(A[1], controller.feedback_vector(axis))
+
+
+@pytest.mark.parametrize("delay", [0.0, 4e-4, 1e-3, 2.3e-3])
+@pytest.mark.parametrize("render", ["held", "implicit"])
+def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(delay, render):
+    less, beta, gamma = linear_loop.sampled_differences("xy", 90.0, TH, 1e-3, delay, render)
+    n = len(less) // 2
+    for j, axis in enumerate("xy"):
+        mine = [*range(6 * j, 6 * j + 6), *range(12 + j, 2 * n, 2)]
+        one = linear_loop.sampled_differences(axis, 90.0, TH, 1e-3, delay, render)
+        both = less[np.ix_(mine, mine)], beta[mine, j : j + 1], gamma[j : j + 1, mine]
+        for a, b in zip(both, one, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14 * np.abs(b).max())
+        others = [k for k in range(2 * n) if k not in mine]
+        assert np.abs(less[np.ix_(mine, others)]).max() <= 1e-14 * np.abs(less).max()
+
+
+def test_sampled_loop_tends_to_the_continuous_one_at_any_mobility():
+    """Both axes coupled: (M - 1)/Ts of slow states is A, to first order in Ts."""
+    W = np.array([[0.6, 0.2], [0.2, 0.3]])
+    A = linear_loop.state_space("xy", (0.7, 0.3), 20.0, TH, W)[0]
+    poles = np.linalg.eigvals(A)
+    gaps = []
+    for Ts in (4e-5, 2e-5):
+        less, beta, gamma = linear_loop.sampled_differences("xy", 20.0, TH, Ts, pose=(W, False))
+        z = np.linalg.eigvals(less + beta @ np.diag([0.7, 0.3]) @ gamma)
+        found = np.log1p(z[np.abs(1.0 + z) > 0.5]) / Ts
+        gaps.append(max(np.min(np.abs(found - x)) / abs(x) for x in poles if abs(x) > 1e-3))
+    assert gaps[1] < 5e-3 and gaps[0] / gaps[1] == pytest.approx(2.0, rel=0.1)

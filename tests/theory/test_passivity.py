@@ -1,4 +1,6 @@
-"""Passivity against dense frequencies, against hands that would prove it wrong, and against records."""
+"""Passivity against dense frequencies, against hands that would prove it wrong, and against
+records.
+"""
 
 import dataclasses
 
@@ -39,9 +41,13 @@ def test_passivity_against_dense_frequencies(axis, K, b):
 
 @settings(max_examples=60)
 @given(
-    axis=st.sampled_from("xy"), K=st.floats(0.005, 3.0), b=st.floats(1.0, 500.0),
-    m=st.floats(0.0, 10.0), d=st.floats(0.0, 10.0), k=st.just(0.0) | st.floats(0.1, 1e4),
-)  # fmt: skip
+    axis=st.sampled_from("xy"),
+    K=st.floats(0.005, 3.0),
+    b=st.floats(1.0, 500.0),
+    m=st.floats(0.0, 10.0),
+    d=st.floats(0.0, 10.0),
+    k=st.just(0.0) | st.floats(0.1, 1e4),
+)
 def test_a_passive_handle_is_stable_with_every_hand(axis, K, b, m, d, k):
     assume(hc.passivity(axis, K, b).margin > 1e-3 and hc.passivity(axis, K, b))
     assert hc.coupled_stability(axis, K, b, operator=Operator(m, d + 1e-3, k))
@@ -49,13 +55,15 @@ def test_a_passive_handle_is_stable_with_every_hand(axis, K, b, m, d, k):
 
 @pytest.mark.parametrize("axis,K,b", [("x", 3.0, 90.0), ("y", 0.2, 90.0), ("y", 0.5, 90.0)])
 def test_an_active_handle_has_a_passive_hand_that_undoes_it(axis, K, b):
-    """Stable left alone and with the nominal hand, yet a mass or spring that resonates where Re Z < 0 makes it ring."""
+    """Stable left alone and with the nominal hand, yet a mass or spring that resonates where Re Z <
+    0 makes it ring.
+    """
     v = hc.passivity(axis, K, b)
     assert (
         not v
         and v.fails
+        and hc.coupled_stability(axis, K, b, Operator())
         and hc.coupled_stability(axis, K, b)
-        and hc.coupled_stability(axis, K, b, impedance=False)
     )
     X = shown(axis, K, b, np.array([v.omega]))[0].imag
     worst = Operator(0.0, 0.0, v.omega * X) if X > 0.0 else Operator(-X / v.omega, 0.0, 0.0)
@@ -97,10 +105,14 @@ def test_the_observer_sees_an_active_device():
     assert v.margin == pytest.approx(exact, rel=1e-4)  # (omega dt)^2
 
 
-@pytest.mark.parametrize("call,field", [
-    (lambda: hc.passivity("x", 1.0, -1.0), "b"), (lambda: hc.clay_passivity(90.0, 0.0), "Ts"),
-    (lambda: passivity.colgate_schenkel(lambda z: z, 1e-3, -1.0), "damping"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call,field",
+    [
+        (lambda: hc.passivity("x", 1.0, -1.0), "b"),
+        (lambda: hc.clay_passivity(90.0, 0.0), "Ts"),
+        (lambda: passivity.colgate_schenkel(lambda z: z, 1e-3, -1.0), "damping"),
+    ],
+)
 def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()

@@ -251,13 +251,10 @@ def test_verdict_follows_the_monitor_and_the_gain():
     assert session.b == (90.0, 90.0)
     limit = hc.gain_limit("y", 90.0, operator=session.scenario.operator)
     assert session.verdict().text.startswith("stable; limit of K here: ")
-    assert (
-        session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
-    )
+    assert session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
     session.change(gain=(1.0, 3.0 * limit))
     assert (
-        session.verdict().text
-        == f"beyond the limit of K; here Ky {3.0 * limit:.3g} > {limit:.3g}"
+        session.verdict().text == f"beyond the limit of K; here Ky {3.0 * limit:.3g} > {limit:.3g}"
     )
     drag(session, 6.0, lambda t: (0.1, 0.0))
     onset = session.run.watch.onset

@@ -51,19 +51,17 @@ def test_nyquist_shows_one_curve_for_each_gain():
 
 
 def test_small_gain_shades_where_it_fails():
-    figure = plots.small_gain("x", 1.0, 50.0)
+    figure = plots.small_gain("x", 1.0, 50.0, operator=hc.Operator())
     spans = [p for p in figure.axes[0].patches if p.get_label() == "fails"]
     assert spans[0].get_x() + spans[0].get_width() == pytest.approx(
-        hc.small_gain("x", 1.0, 50.0).fails[0][1]
+        hc.small_gain("x", 1.0, 50.0, hc.Operator()).fails[0][1]
     )
     left, right = (line.get_ydata() for line in figure.axes[0].lines)
     w = figure.axes[0].lines[0].get_xdata()
     assert np.all((left >= right) == (w <= spans[0].get_width() + spans[0].get_x()))
     assert "m/N" in figure.axes[0].get_ylabel()
     assert not [
-        p
-        for p in plots.small_gain("y", 0.1, 90.0, impedance=False).axes[0].patches
-        if p.get_label() == "fails"
+        p for p in plots.small_gain("y", 0.1, 90.0).axes[0].patches if p.get_label() == "fails"
     ]
 
 
