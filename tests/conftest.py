@@ -61,6 +61,10 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.xdist_group("perf"))
         if item.path.name in PLAIN:
             item.add_marker(pytest.mark.plain)
+        mark = item.get_closest_marker("xdist_group")
+        # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
+        if mark and "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
+            item._id = type(item._id).parse(f"{item.nodeid}@{mark.args[0]}")
 
 
 @contextlib.contextmanager
