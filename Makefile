@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check bench build clean
+.PHONY: demo test coverage check bench build clean
 .DELETE_ON_ERROR:
 
 .venv/run.done: pyproject.toml
@@ -20,13 +20,17 @@ demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say 
 	$(BIN)/hapticclay reproduce --quick
 	@echo "plots: $(CURDIR)/out/run/constant/velocity.png $(CURDIR)/out/run/constant/force.png"
 
-test: .venv/dev.done  ## set up and run all tests
+test: .venv/dev.done  ## set up and run all tests, on all cores
 	$(BIN)/python -m pytest
 
-check: .venv/dev.done  ## lint and types
+coverage: .venv/dev.done  ## the same, and which lines they reach: out/coverage/index.html
+	$(BIN)/python -m pytest --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
+
+check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+	$(BIN)/lint-imports --no-cache
 
 bench: .venv/dev.done  ## error against run time, stiff and extreme scenes, throughput: one page in out/bench
 	$(BIN)/hapticclay bench --quick

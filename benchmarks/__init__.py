@@ -1,1 +1,4 @@
-"""Error against run time, stiff and extreme scenes, throughput. Each module runs by itself: `python -m benchmarks.hits`."""
+"""Error against run time, stiff and extreme scenes, throughput.
+
+Each module runs by itself: `python -m benchmarks.hits`.
+"""

@@ -1,20 +1,19 @@
 """Every benchmark, and the one page that holds their results.
 
-    python benchmarks/bench.py [--quick] [--out DIR] [--readme FILE] [--page-only]
+    python -m benchmarks.bench [--quick] [--out DIR] [--readme FILE] [--page-only]
 
 Each part writes its own data as JSON; bench.md is made from these files and nothing else.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
 
 from hapticclay import files
 
-from . import extremes, hits, parts, scaling, stiffness, throughput, work_precision
+from . import common, extremes, hits, parts, scaling, stiffness, throughput, work_precision
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
@@ -43,7 +42,8 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     if {"work_precision", "hits"} <= set(data):
         text += [
             "## Which step to take",
-            "hapticclay's fastest setting that keeps an asked error in the times of the border crossings, in every cut "
+            "hapticclay's fastest setting that keeps an asked error in the times of the border "
+            "crossings, in every cut "
             "of the next section and in every clay and job of the section on hits.",
             recommended(data),
         ]
@@ -62,7 +62,10 @@ def page(data: dict[str, dict[str, Any]]) -> str:
 
 
 def recommended(data: dict[str, dict[str, Any]]) -> str:
-    """The table of recommended settings for the README: good for every job of hapticclay's, hits among them."""
+    """The table of recommended settings for the README:
+
+    good for every job of hapticclay's, hits among them.
+    """
     rows = data["work_precision"]["rows"] + data["hits"]["rows"]
     return work_precision.table_of_settings(work_precision.recommend(rows, {"hapticclay"}))
 
@@ -95,7 +98,8 @@ def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None
     )
     rows = data["extremes"]["rows"]
     print(
-        f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of the reference"
+        f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of "
+        "the reference"
     )
     for x in data["work_precision"]["omissions"]:
         print(f"left out: {x}")
@@ -103,13 +107,10 @@ def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument(
         "--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute"
     )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument(
         "--readme", type=Path, help="a README whose table of recommended settings is to be renewed"
     )

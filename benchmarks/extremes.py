@@ -1,18 +1,18 @@
 """Stiff and extreme scenes, each beside the reference solution and the reference's own verdict.
 
-    python benchmarks/extremes.py [--quick] [--only TEXT] [--out DIR]
+    python -m benchmarks.extremes [--quick] [--only TEXT] [--out DIR]
 
-Writes extremes.json; benchmarks/bench.py makes the page. A scene that fails is a row.
+Writes extremes.json; benchmarks.bench makes the page. A scene that fails is a row.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import tempfile
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,10 +28,10 @@ from hapticclay.model.scenario import Scenario
 from hapticclay.model.signals import Multisine
 from tests.oracles import I1, I2
 
-from . import reference
-from .work_precision import number, write
+from . import common, reference
 
-# Ours is right if the reference says one of these; "diverged" ends a run where the reference may go on into the limits
+# Ours is right if the reference says one of these; "diverged" ends a run where the reference may go
+# on into the limits
 AGREE = {"diverged": ("unstable", "limit cycle"), "limit cycle": ("limit cycle",)}
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
 NOTHING = 1e-20  # [J] of rounding
@@ -115,10 +115,16 @@ def cases() -> list[Case]:
         cut(t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)),
     )
     add(g, "spring 1e7 N/m, mass 0, K = (1, 0.5)", cut(t_max=0.5, operator=STRONG))
-    add(g, "spring 1e7 N/m, mass 100 kg, moving at 0.2 m/s",
-        cut((0.2, 0.0), t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)))  # fmt: skip
-    add(g, "spring 1e7 N/m, mass 100 kg, damper 1e3 N.s/m, moving at 2 m/s",
-        cut((2.0, 0.0), t_max=1.0, operator=Operator(100.0, 1e3, 1e7), gain=(1e-3, 1e-3)))  # fmt: skip
+    add(
+        g,
+        "spring 1e7 N/m, mass 100 kg, moving at 0.2 m/s",
+        cut((0.2, 0.0), t_max=1.0, operator=Operator(100.0, 0.0, 1e7), gain=(1e-3, 1e-3)),
+    )
+    add(
+        g,
+        "spring 1e7 N/m, mass 100 kg, damper 1e3 N.s/m, moving at 2 m/s",
+        cut((2.0, 0.0), t_max=1.0, operator=Operator(100.0, 1e3, 1e7), gain=(1e-3, 1e-3)),
+    )
     add(
         g,
         "spring 1e7 N/m, damper 1e5 N.s/m",
@@ -128,16 +134,38 @@ def cases() -> list[Case]:
     g = "gain K"
     add(g, "K = 1e-6", cut(gain=(1e-6, 1e-6), t_max=5.0), True)
     add(g, "K = 1 on y, unstable", cut(gain=(1.0, 1.0)), True)
-    add(g, "K = 1 on y, goes on", cut(gain=(1.0, 1.0), stop=False, t_max=8.0, force=(0.1, 0.02), start=(0.06, 0.0),
-                                    length=None))  # fmt: skip
+    add(
+        g,
+        "K = 1 on y, goes on",
+        cut(
+            gain=(1.0, 1.0),
+            stop=False,
+            t_max=8.0,
+            force=(0.1, 0.02),
+            start=(0.06, 0.0),
+            length=None,
+        ),
+    )
     add(
         g,
         "K = 3 on x, hand, shaped",
         cut(gain=(3.0, 0.3), b=100.0, operator=hc.Operator(), shaping=True, t_max=5.0),
         True,
     )
-    add(g, "K = 25 on x, goes on", cut(gain=(25.0, 0.3), b=100.0, operator=hc.Operator(), stop=False, t_max=4.0, length=None,
-                                     start=(0.1, 0.0), clay=EVERYWHERE))  # fmt: skip
+    add(
+        g,
+        "K = 25 on x, goes on",
+        cut(
+            gain=(25.0, 0.3),
+            b=100.0,
+            operator=hc.Operator(),
+            stop=False,
+            t_max=4.0,
+            length=None,
+            start=(0.1, 0.0),
+            clay=EVERYWHERE,
+        ),
+    )
     add(g, "K = 1e4", cut(gain=(1e4, 1e4)), True)
     add(g, "K = 1e4 in free space", cut(gain=(1e4, 1e4), b=0.0, force=(1e-3, 0.0)))
 
@@ -176,8 +204,12 @@ def cases() -> list[Case]:
     add(
         g, "along the border, from on it", cut(start=(0.05, 0.0), force=(0.0, 1.0), t_max=1.5), True
     )
-    add(g, "along the border, onto it from both sides",
-        cut(clay=WALL, start=(0.0, -1e-4), force=(1.0, 0.05), t_max=3.0), True)  # fmt: skip
+    add(
+        g,
+        "along the border, onto it from both sides",
+        cut(clay=WALL, start=(0.0, -1e-4), force=(1.0, 0.05), t_max=3.0),
+        True,
+    )
     add(
         g,
         "along the border, at a shallow angle",
@@ -193,9 +225,19 @@ def cases() -> list[Case]:
             t_max=2.0,
         ),
     )
-    add(g, "against the border, swinging through it", cut(
-        clay=Clay(Profile((0.0,), (0.0, 500.0)), NONE), start=(0.0, 0.0), force=(0.0, 0.0), t_max=6.0, length=None,
-        muscle=Multisine(rms=(2.0, 0.0), low=1.0, high=3.0, period=4.0, seed=3)), True)  # fmt: skip
+    add(
+        g,
+        "against the border, swinging through it",
+        cut(
+            clay=Clay(Profile((0.0,), (0.0, 500.0)), NONE),
+            start=(0.0, 0.0),
+            force=(0.0, 0.0),
+            t_max=6.0,
+            length=None,
+            muscle=Multisine(rms=(2.0, 0.0), low=1.0, high=3.0, period=4.0, seed=3),
+        ),
+        True,
+    )
     add(g, "grazing a corner", cut(clay=CORNER, force=(1.0, 0.8), t_max=5.0), True)
     add(g, "through the corner itself", cut((0.5, 0.2), clay=CORNER, force=(0.0, 0.0), t_max=1.0))
     add(g, "100 layers of 1 mm", cut(clay=STRIPES, force=(3.0, 0.0)), True)
@@ -239,12 +281,35 @@ def cases() -> list[Case]:
     g = "sampled"
     add(g, "held", cut(control="sampled", t_max=1.5), True)
     add(g, "held, hand", cut(control="sampled", t_max=1.5, operator=hc.Operator(), force=(2.0, 0.0)))
-    add(g, "held, b = 8e3, goes on", cut(
-        control="sampled", b=8e3, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1), stop=False))  # fmt: skip
-    add(g, "implicit, b = 8e3", cut(
-        control="sampled", render="implicit", b=8e3, start=(0.06, 0.0), t_max=0.5, gain=(1.0, 0.1)))  # fmt: skip
-    add(g, "implicit, b = 1e9 hit at 2 m/s", cut(
-        (2.0, 0.0), control="sampled", render="implicit", b=1e9, t_max=0.3, torque_limit=(1e4, 1e4)))  # fmt: skip
+    add(
+        g,
+        "held, b = 8e3, goes on",
+        cut(control="sampled", b=8e3, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1), stop=False),
+    )
+    add(
+        g,
+        "implicit, b = 8e3",
+        cut(
+            control="sampled",
+            render="implicit",
+            b=8e3,
+            start=(0.06, 0.0),
+            t_max=0.5,
+            gain=(1.0, 0.1),
+        ),
+    )
+    add(
+        g,
+        "implicit, b = 1e9 hit at 2 m/s",
+        cut(
+            (2.0, 0.0),
+            control="sampled",
+            render="implicit",
+            b=1e9,
+            t_max=0.3,
+            torque_limit=(1e4, 1e4),
+        ),
+    )
 
     g = "accurate"
     add(g, "cut, dt = 2e-3", cut(integrator="accurate", dt=2e-3), True)
@@ -258,8 +323,13 @@ def cases() -> list[Case]:
     return out
 
 
-def run(case: Case) -> dict[str, Any]:
-    """One row: what became of the scene, here and in the reference."""
+def run(case: Case, solve: Callable[..., Any] = reference.solve) -> dict[str, Any]:
+    """Return one row: what became of the scene, here and in the reference.
+
+    Args:
+        case: the scene.
+        solve: the reference.
+    """
     row: dict[str, Any] = {
         "group": case.group,
         "name": case.name,
@@ -292,10 +362,10 @@ def run(case: Case) -> dict[str, Any]:
         "wall": r.wall_time,
         "note": r.outcome.cause,
     }
-    index = np.unique(np.linspace(0, len(r.t) - 1, SAMPLES).astype(int))
+    index = np.unique(np.linspace(0, len(r.t) - 1, SAMPLES).astype(int))[:-1]
     begin = time.perf_counter()
     try:
-        x = reference.solve(case.scenario, r.t[index])
+        x = solve(case.scenario, r.t[index])
     except Exception as error:  # noqa: BLE001
         return row | {"reference": "raised", "note": f"{type(error).__name__}: {error}"}
     row |= {
@@ -322,23 +392,55 @@ def sections(data: dict[str, Any]) -> list[str]:
         return "-" if x is None else format(x, form)
 
     cells = [
-        [r["group"], r["name"], r["ours"], r["reference"], "yes" if r["agree"] else "NO", number(r["position"]),
-         cell(r["energy"], ".3f"), number(r["residual"]), r["nan"] or 0, r["warnings"], cell(r["sigma"], ".3g"),
-         number(r["wall"]), r["note"]]
+        [
+            r["group"],
+            r["name"],
+            r["ours"],
+            r["reference"],
+            "yes" if r["agree"] else "NO",
+            common.number(r["position"]),
+            cell(r["energy"], ".3f"),
+            common.number(r["residual"]),
+            r["nan"] or 0,
+            r["warnings"],
+            cell(r["sigma"], ".3g"),
+            common.number(r["wall"]),
+            r["note"],
+        ]
         for r in rows
-    ]  # fmt: skip
-    head = ["group", "scene", "hapticclay", "reference", "agree", "position error [m]", "kinetic peak, ratio",
-            "energy residual", "NaN", "warnings", "sigma [1/s]", "time [s]", "note"]  # fmt: skip
+    ]
+    head = [
+        "group",
+        "scene",
+        "hapticclay",
+        "reference",
+        "agree",
+        "position error [m]",
+        "kinetic peak, ratio",
+        "energy residual",
+        "NaN",
+        "warnings",
+        "sigma [1/s]",
+        "time [s]",
+        "note",
+    ]
     agreed = sum(r["agree"] for r in rows)
     return [
         "## Stiff and extreme",
-        f"{agreed} of {len(rows)} verdicts are those of the reference: the arm in joint space under DOP853, or LSODA "
-        "where stiff (1e-10), borders found in both directions, Filippov's sliding motion where a border holds the "
-        "handle, torques clipped; sampled scenes as the hybrid system. Its verdict is its own: the poles of the loop "
-        "linearised along the way (sigma, the largest real part of an oscillating one), speeds and torques of the last "
-        "second. Where hapticclay stops an unstable run as diverged, the reference may say unstable or limit cycle: it "
-        "goes on into the torque limits. Position error and peak of kinetic energy (over the reference's) are of the "
-        "scenes that are stable; the energy residual is that of the run's own balance over what went through it.",
+        f"{agreed} of {len(rows)} verdicts are those of the reference: the arm in joint space "
+        "under DOP853, or LSODA "
+        "where stiff (1e-10), borders found in both directions, Filippov's sliding motion where a "
+        "border holds the "
+        "handle, torques clipped; sampled scenes as the hybrid system. Its verdict is its own: the "
+        "poles of the loop "
+        "linearised along the way (sigma, the largest real part of an oscillating one), speeds and "
+        "torques of the last "
+        "second. Where hapticclay stops an unstable run as diverged, the reference may say "
+        "unstable or limit cycle: it "
+        "goes on into the torque limits. Position error and peak of kinetic energy (over the "
+        "reference's) are of the "
+        "scenes that are stable; the energy residual is that of the run's own balance over what "
+        "went through it.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]
 
@@ -349,15 +451,12 @@ def main(out: Path = Path("out/bench"), quick: bool = False, only: str = "") -> 
     rows = []
     for case in tqdm(chosen, delay=2.0, disable=None, leave=False):
         rows.append(run(case))
-    return write(out, "extremes", {"rows": rows})
+    return common.write(out, "extremes", {"rows": rows})
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="half of the scenes")
     parser.add_argument("--only", default="", help="scenes whose 'group: name' holds this text")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, args.quick, args.only))))

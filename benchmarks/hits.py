@@ -1,19 +1,22 @@
-"""Clay of every stiffness: cuts, hits, rebounds, layers and grazing contact, each against an exact solution.
+"""Hits on clay of any stiffness beside an exact solution.
 
-    python benchmarks/hits.py [--quick] [--random N] [--out DIR]
+Cuts, hits, rebounds, layers and grazing contact.
 
-With inertia shaping and motors that no hit can drive into their limits, the loop is linear between borders: the
-reference is the matrix exponential (tests/oracles.py). --random N compares N random hits, with weak motors, without
-shaping, on both axes, with the reference of benchmarks/reference.py instead. Writes hits.json.
+    python -m benchmarks.hits [--quick] [--random N] [--out DIR]
+
+With inertia shaping and motors that no hit can drive into their limits, the loop is linear between
+borders: the reference is the matrix exponential (tests/oracles.py). --random N compares N random
+hits, with weak motors, without shaping, on both axes, with the reference of benchmarks/reference.py
+instead. Writes hits.json.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import functools
 import math
 import statistics
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +32,8 @@ from hapticclay.model.scenario import Scenario
 from hapticclay.simulation import simulate
 from tests import oracles
 
-from . import reference
+from . import common, reference
 from .problems import EDGES
-from .work_precision import number, write
 
 CLAYS = (1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # [N.s/m]
 STRONG = (1e6, 1e6)  # [N.m] motors that no hit here drives into their limits ...
@@ -74,7 +76,10 @@ def jobs(b: float) -> dict[str, Scenario]:
 
 @functools.cache
 def exact(kind: str, b: float) -> tuple[list[tuple[float, float, float]], float, float]:
-    """Crossings of a job, its position at the end [m], and the clay's force FELT after the first of them [N]."""
+    """Return a job's crossings, its last position [m], and the clay's force [N].
+
+    The force is that FELT after the first crossing.
+    """
     s = jobs(b)[kind]
     assert s.clay is not None
     edges, values = s.clay.x.edges, s.clay.x.values
@@ -140,7 +145,10 @@ def methods() -> dict[str, tuple[float, ...]]:
 
 
 def scene(seed: int) -> Scenario:
-    """A random hit: b from 1e2 to 1e7 in one to three layers, 0.05 to 0.5 m/s, with and without a hand, on one axis."""
+    """A random hit:
+
+    b from 1e2 to 1e7 in one to three layers, 0.05 to 0.5 m/s, with and without a hand, on one axis.
+    """
     rng = np.random.default_rng(seed)
     v, axis = rng.uniform(0.05, 0.5), int(rng.integers(2))
     n = int(rng.integers(1, 4))
@@ -165,17 +173,23 @@ def scene(seed: int) -> Scenario:
     )
 
 
-def against_reference(seed: int, dt: float = TS) -> dict[str, Any]:
-    """One random hit beside the reference: largest errors of border times and of positions on the way."""
+def against_reference(
+    seed: int, dt: float = TS, solve: Callable[..., Any] = reference.solve
+) -> dict[str, Any]:
+    """One random hit beside the reference:
+
+    largest errors of border times and of positions on the way.
+    """
     s = dataclasses.replace(scene(seed), dt=dt)
     index = np.arange(1, math.floor(s.t_max / dt), max(1, round(3e-3 / dt)))
-    x = reference.solve(s, index * dt)
+    x = solve(s, index * dt)
     r = hc.simulate(s)
-    # a handle that hardly leaves the clay may pass the border some times more, as slowly: the nearest time counts
+    # a handle that hardly leaves the clay may pass the border some times more, as slowly: the
+    # nearest time counts
     late = [
         (abs(c.speed), min(abs(c.time - e[2]) for e in x.crossings))
         for c in r.crossings
-        if x.crossings
+        if len(x.crossings)
     ]
     n = min(len(x.p), int(np.searchsorted(index, len(r.p))))
     return {
@@ -198,10 +212,10 @@ def sections(data: dict[str, Any]) -> list[str]:
         line = [method, format(dt, "g")]
         for kind in kinds:
             found = [r["crossing"] for r in mine if r["problem"] == kind]
-            line.append("refused" if None in found else number(max(found)))
+            line.append("refused" if None in found else common.number(max(found)))
         for what in ("position", "force"):
             found = [r[what] for r in mine]
-            line.append("refused" if None in found else number(max(found)))
+            line.append("refused" if None in found else common.number(max(found)))
         cells.append(line)
     head = [
         "method",
@@ -212,11 +226,16 @@ def sections(data: dict[str, Any]) -> list[str]:
     ]
     return [
         "## Hits",
-        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit at 0.3 m/s and its "
-        "rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, b/10, b), and grazing contact at about "
-        "1 cm/s. Largest error, over all clays, of the times at which a border is passed (faster than "
-        f"{SLOW:g} m/s), of the position at the end, and relative error of the force on the hand {FELT:g} s after "
-        "the hit. The reference is the matrix exponential. Refused: the explicit method would take more than 1000 "
+        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit "
+        "at 0.3 m/s and its "
+        "rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, b/10, b), and grazing "
+        "contact at about "
+        "1 cm/s. Largest error, over all clays, of the times at which a border is passed (faster "
+        "than "
+        f"{SLOW:g} m/s), of the position at the end, and relative error of the force on the hand "
+        f"{FELT:g} s after "
+        "the hit. The reference is the matrix exponential. Refused: the explicit method would take "
+        "more than 1000 "
         "steps a sample.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]
@@ -235,7 +254,7 @@ def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
         for b in clays
         for kind in jobs(b)
     ]
-    return write(out, "hits", {"clays": clays, "rows": rows})
+    return common.write(out, "hits", {"clays": clays, "rows": rows})
 
 
 def study(n: int) -> None:
@@ -252,14 +271,11 @@ def study(n: int) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer clays and steps")
     parser.add_argument(
         "--random", type=int, metavar="N", help="compare N random hits with the reference instead"
     )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     if args.random:
         study(args.random)

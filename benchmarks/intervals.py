@@ -1,14 +1,16 @@
-"""How often the 95 % intervals of `identify` hold the truth: three sensors, every coefficient, many seeds.
+"""Share of 95 % intervals of `identify` that hold the truth.
 
-    python benchmarks/intervals.py [--seeds 200] [--processes 2] [--out DIR]
+Three sensors, every coefficient, many seeds.
 
-Every seed draws phases and sensor noise anew; its runs are simulated once and measured by each sensor. With a folder,
-writes intervals.md and intervals.json. 200 seeds take about an hour of processor time.
+    python -m benchmarks.intervals [--seeds 200] [--processes 2] [--out DIR]
+
+Every seed draws phases and sensor noise anew; its runs are simulated once and measured by each
+sensor. With a folder, writes intervals.md and intervals.json. 200 seeds take about an hour of
+processor time.
 """
 
 from __future__ import annotations
 
-import argparse
 import functools
 import importlib
 import json
@@ -26,7 +28,7 @@ import hapticclay as hc
 from hapticclay import files
 from hapticclay.studies import identification
 
-from .work_precision import machine
+from . import common
 
 SENSORS = {
     "20000 counts, no force noise": hc.Noise(20_000, 0.0),
@@ -44,7 +46,10 @@ BLOCKS: tuple[tuple[str, bool], ...] = (
 def one(
     seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any
 ) -> list[dict[str, Any]]:
-    """A row for each coefficient of each block and sensor: its share of error, and of half its interval."""
+    """A row for each coefficient of each block and sensor:
+
+    its share of error, and of half its interval.
+    """
     module = importlib.import_module("hapticclay.studies.identification")
     simulate = module.simulate
     runs = kw.get("realisations", 4)
@@ -53,13 +58,22 @@ def one(
     )  # for every sensor
     try:
         return [
-            {"what": what, "shaping": shaping, "axis": axis, "sensors": name, "coefficient": c.name,
-             "error": c.error, "half": 0.5 * (c.high - c.low) / c.printed}
+            {
+                "what": what,
+                "shaping": shaping,
+                "axis": axis,
+                "sensors": name,
+                "coefficient": c.name,
+                "error": c.error,
+                "half": 0.5 * (c.high - c.low) / c.printed,
+            }
             for what, shaping in blocks
             for axis in axes
             for name, noise in SENSORS.items()
-            for c in hc.identify(axis, what, shaping=shaping, noise=noise, seed=seed, **kw).coefficients
-        ]  # fmt: skip
+            for c in hc.identify(
+                axis, what, shaping=shaping, noise=noise, seed=seed, **kw
+            ).coefficients
+        ]
     finally:
         module.simulate = simulate
 
@@ -73,10 +87,13 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         ).append(r)
     return [
         dict(zip(("what", "shaping", "axis", "coefficient", "sensors"), key, strict=True))
-        | {"seeds": len(g), "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
-           "half": statistics.median(r["half"] for r in g)}
+        | {
+            "seeds": len(g),
+            "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
+            "half": statistics.median(r["half"] for r in g),
+        }
         for key, g in groups.items()
-    ]  # fmt: skip
+    ]
 
 
 def page(found: list[dict[str, Any]]) -> str:
@@ -88,18 +105,28 @@ def page(found: list[dict[str, Any]]) -> str:
             f"{x['covered']:.3f}, {x['half']:.1e}"
         )
     n = found[0]["seeds"]
-    return "\n\n".join(
-        [
-            "# Coverage of the intervals of `identify`",
-            f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval holds the printed value, and half the "
-            f"median interval as a share of it. By chance alone, two thirds of the shares are within "
-            f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do not edit.",
-            tabulate([[*k, *v] for k, v in cells.items()], ["block", "axis", "coefficient", *SENSORS],
-                     tablefmt="github", disable_numparse=True),
-            "## Machine",
-            "\n".join(f"- {x}" for x in machine()),
-        ]
-    ) + "\n"  # fmt: skip
+    return (
+        "\n\n".join(
+            [
+                "# Coverage of the intervals of `identify`",
+                f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval holds "
+                "the printed value, and half the "
+                "median interval as a share of it. By chance alone, two thirds of the shares are "
+                "within "
+                f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do "
+                "not edit.",
+                tabulate(
+                    [[*k, *v] for k, v in cells.items()],
+                    ["block", "axis", "coefficient", *SENSORS],
+                    tablefmt="github",
+                    disable_numparse=True,
+                ),
+                "## Machine",
+                "\n".join(f"- {x}" for x in common.machine()),
+            ]
+        )
+        + "\n"
+    )
 
 
 def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[dict[str, Any]]:
@@ -112,18 +139,18 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
     print(page(found))
     if out:
         with files.atomic(out / "intervals.json") as f:
-            f.write((json.dumps({"machine": machine(), "rows": found}, indent=1) + "\n").encode())
+            f.write(
+                (json.dumps({"machine": common.machine(), "rows": found}, indent=1) + "\n").encode()
+            )
         with files.atomic(out / "intervals.md") as f:
             f.write(page(found).encode())
     return found
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", type=Path)
+    parser.set_defaults(out=None)
     args = parser.parse_args()
     main(args.seeds, args.processes, args.out)

@@ -1,13 +1,14 @@
-"""What each part of a scene costs: of the engine's step, and of the whole loop. A part that is off is not there.
+"""What each part of a scene costs, in the engine's step and in the whole loop.
 
-    python benchmarks/parts.py [--out DIR] [--rounds N] [--steps N]
+A part that is off is not there.
+
+    python -m benchmarks.parts [--out DIR] [--rounds N] [--steps N]
 
 Every part is measured beside the plain scene, in turns; medians of ratios. Writes parts.json.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import statistics
@@ -27,7 +28,7 @@ from hapticclay.model.signals import Multisine
 from hapticclay.stepping import energy, engine
 from hapticclay.views import stage
 
-from .work_precision import write
+from . import common
 
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:
@@ -109,7 +110,10 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
 
 
 def step(model: mujoco.MjModel, steps: int) -> float:
-    """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
+    """Return seconds a step of the engine alone, looping in C.
+
+    It is restarted often enough to stay clear of denormals.
+    """
     data = mujoco.MjData(model)
     spent = 0.0
     for _ in range(max(1, steps // 500)):
@@ -184,14 +188,11 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
-    return write(out, "parts", {"rounds": rounds, "steps": steps, **found})
+    return common.write(out, "parts", {"rounds": rounds, "steps": steps, **found})
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
     args = parser.parse_args()

@@ -1,7 +1,8 @@
 """The jobs that every integrator is given, and their reference solutions.
 
-A job is a constant cut without shaping: the nonlinear arm, the servo, the compensator, the clay between 5 and 15 cm,
-both axes. The reference is the arm in joint space under SciPy's DOP853 at 1e-12, borders as events (tests/oracles.py).
+A job is a constant cut without shaping: the nonlinear arm, the servo, the compensator, the clay
+between 5 and 15 cm, both axes. The reference is the arm in joint space under SciPy's DOP853 at
+1e-12, borders as events (tests/oracles.py).
 """
 
 from __future__ import annotations
@@ -46,7 +47,10 @@ class Result:
 
 @functools.cache
 def reference(name: str) -> Pieces:
-    """The reference solution of a job: its crossings, and p(t), v(t) at any ascending times before the end."""
+    """The reference solution of a job:
+
+    its crossings, and p(t), v(t) at any ascending times before the end.
+    """
     s = PROBLEMS[name]
     assert s.clay is not None
     th = dataclasses.astuple(s.operator) if s.operator else None

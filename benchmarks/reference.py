@@ -1,14 +1,16 @@
 """The reference solution of any scenario, and a verdict on it by its own means.
 
-Nothing of how hapticclay steps, controls or judges is used: the arm is that of tests/oracles.py in relative joint
-angles, with the printed numbers typed again; time is SciPy's (DOP853, or LSODA where the clay is stiff); borders
-are found on the dense solution, in both directions. Torques are clipped, and the hand's mass answers to what is left.
+Nothing of how hapticclay steps, controls or judges is used: the arm is that of tests/oracles.py in
+relative joint angles, with the printed numbers typed again; time is SciPy's (DOP853, or LSODA where
+the clay is stiff); borders are found on the dense solution, in both directions. Torques are
+clipped, and the hand's mass answers to what is left.
 
-On a border that both sides push the handle onto, a solution chatters ever faster. Bounces lower than BOUNCE are
-replaced by Filippov's sliding motion: the mixture of both sides' clay that keeps the handle on the border, until one
-side alone does.
+On a border that both sides push the handle onto, a solution chatters ever faster. Bounces lower
+than BOUNCE are replaced by Filippov's sliding motion: the mixture of both sides' clay that keeps
+the handle on the border, until one side alone does.
 
-Sampled scenes: controller by matrix exponential at the samples, the arm under held torques between them.
+Sampled scenes: controller by matrix exponential at the samples, the arm under held torques between
+them.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from scipy.optimize import brentq
 
 from hapticclay.model.clay import Profile
 from hapticclay.model.scenario import Scenario
-from tests.oracles import G0, G1, I1, I2, L1, L2, S0, S1, SG
+from tests.oracles.arm import G0, G1, I1, I2, L1, L2, S0, S1, SG
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
 STILL, WHILE = (
@@ -51,10 +53,13 @@ class Solution:
     """A reference run.
 
     Attributes:
-        code: the verdict: finished, time limit, stalled, saturated, unstable, limit cycle, out of reach, singular.
-        end: time of the end [s]. sigma: largest real part of the loop's oscillating poles on the way [1/s].
+        code: the verdict: finished, time limit, stalled, saturated, unstable, limit cycle, out of
+            reach, singular.
+        end: time of the end [s]. sigma: largest real part of the loop's oscillating poles on the
+            way [1/s].
         p: handle position [m] at the times asked for that lie before the end, (n, 2).
-        crossings: of borders, (axis, border [m], time [s]). kinetic: largest kinetic energy of the arm [J].
+        crossings: of borders, (axis, border [m], time [s]). kinetic: largest kinetic energy of the
+            arm [J].
         slides: times at which sliding began [s].
     """
 
@@ -68,7 +73,10 @@ class Solution:
 
 
 class Loop:
-    """The closed loop as a differential equation; z = (q, q', delta, delta', y, y'), two axes each."""
+    """The closed loop as a differential equation.
+
+    z = (q, q', delta, delta', y, y'), two axes each.
+    """
 
     def __init__(self, s: Scenario):
         self.s = s
@@ -121,7 +129,7 @@ class Loop:
         return a, (rest[0] - self.m * a[0], rest[1] - self.m * a[1])
 
     def at(self, t: float, z, b, clip: bool = True, uh=None):
-        """(derivative of z, position, velocity, handle acceleration, motor torques, whether one is in its limit)."""
+        """Return (z', position, velocity, handle acceleration, torques, one in its limit?)."""
         z = [float(x) for x in z]
         if self.command:
             now = self.command(t)
@@ -155,9 +163,19 @@ class Loop:
         t1, t2 = tau[0] + J[0] * f[0] + J[2] * f[1], tau[1] + J[1] * f[0] + J[3] * f[1]
         K = self.s.gain
         rate = (
-            z[2], z[3], (t1 - t2) / I1, (-t1 + (1.0 + I1 / I2) * t2) / I1,
-            z[6], z[7], K[0] * f[0] - 10.0 * z[6], K[1] * f[1] - 10.0 * z[7], z[10], z[11], y2[0], y2[1],
-        )  # fmt: skip
+            z[2],
+            z[3],
+            (t1 - t2) / I1,
+            (-t1 + (1.0 + I1 / I2) * t2) / I1,
+            z[6],
+            z[7],
+            K[0] * f[0] - 10.0 * z[6],
+            K[1] * f[1] - 10.0 * z[7],
+            z[10],
+            z[11],
+            y2[0],
+            y2[1],
+        )
         return rate, p, v, a, tau, bound
 
     def start(self) -> np.ndarray:
@@ -175,7 +193,7 @@ class Loop:
         return 0.5 * (I1 * z[2] * z[2] + I2 * (z[2] + z[3]) ** 2)
 
     def at_rest(self, z) -> tuple[np.ndarray, tuple[float, float]]:
-        """The equilibrium at the pose of z, and the muscle force that holds it against the hand's spring."""
+        """Return the equilibrium at the pose of z and the muscle force that holds it."""
         _, p, _, _, _ = self.kinematics(z[0], z[1], 0.0, 0.0)
         out = np.zeros(12)
         out[:2] = z[:2]
@@ -183,7 +201,7 @@ class Loop:
         return out, (self.k * p[0], self.k * p[1])
 
     def growth(self, z, b) -> float:
-        """Largest real part of the poles of the loop, free of torque limits, at the pose of z [1/s]."""
+        """Return the largest real part of the poles at the pose of z [1/s], without limits."""
         rest, uh = self.at_rest(z)
         A = np.empty((12, 12))
         for j in range(12):
@@ -195,7 +213,10 @@ class Loop:
 
 
 def _oscillating(poles: np.ndarray) -> float:
-    """Largest real part; slow drift along the path (the integrators, moved by the pose) does not count."""
+    """Largest real part of the oscillating poles.
+
+    The slow drift along the path (integrators, moved by the pose) does not count.
+    """
     return float(
         np.max(poles.real[(np.abs(poles.imag) > 0.5) | (poles.real > 0.5)], initial=-math.inf)
     )
@@ -241,7 +262,7 @@ class Map:
     def law(
         self, t: float, place: list[int] | None = None
     ) -> Callable[[float], tuple[float, float]]:
-        """b(t) on both axes in the present region, entered now unless it was before; or in that of place."""
+        """Return b(t) on both axes in a region; the present one is entered now unless it was."""
         terms = [(0.0, 0.0, 0.0)] * 2
         where = place or self.place
         for i, f in enumerate(self.profiles):
@@ -299,7 +320,10 @@ class Run:
         return lambda t, z: self.loop.at(t, z, self.mixed(t, z, low, high)[1])[0]
 
     def solver(self, t: float, z: np.ndarray):
-        """SciPy's, of z with angles from here on: in stiff clay, b times the rounding of a whole one is an impulse."""
+        """SciPy's, of z with angles from here on:
+
+        in stiff clay, b times the rounding of a whole one is an impulse.
+        """
         low, high = self.laws(t)
         self.base = np.concatenate((z[:2], np.zeros(10)))
         b = max(*low(t), *high(t))
@@ -422,7 +446,7 @@ class Run:
             self.done += 1
 
     def verdict(self, t: float, z, b) -> bool:
-        """Adds up the growth of the linear loop; True if it is unstable and the run is to end there."""
+        """Add up the growth of the linear loop; True if the run is to end as unstable."""
         where = (*self.map.place, self.slide)
         if t - self.looked >= self.spacing or where != self.where:
             self.sigma, self.looked, self.where = self.loop.growth(z, b), t, where
@@ -440,7 +464,10 @@ class Run:
 
 
 def judged(code: str, trace: np.ndarray, unstable: bool) -> str:
-    """The verdict on a run that ended by `code`; trace: time, speed, motor in its limit, v along x and y, (n, 5)."""
+    """The verdict on a run that ended by `code`; trace:
+
+    time, speed, motor in its limit, v along x and y, (n, 5).
+    """
     last = trace[trace[:, 0] >= trace[-1, 0] - WHILE]
     share = float(np.trapezoid(last[:, 2], last[:, 0]) / max(last[-1, 0] - last[0, 0], 1e-12))
     if unstable:
@@ -455,7 +482,7 @@ def judged(code: str, trace: np.ndarray, unstable: bool) -> str:
 
 
 def _swings_on(last: np.ndarray) -> bool:
-    """Whether the velocity swings to and fro, no less in the second half of the time than in the first."""
+    """Whether the velocity swings on, no less in the second half of the time."""
     half = 0.5 * (last[0, 0] + last[-1, 0])
     v = last[:, 3:] - last[:, 3:].mean(axis=0)
     late = last[:, 0] > half
@@ -465,7 +492,10 @@ def _swings_on(last: np.ndarray) -> bool:
 
 
 class SampledRun:
-    """The hybrid system: z = (q, q') of the arm between samples; controller x = (delta, delta', y, y') an axis."""
+    """The hybrid system:
+
+    z = (q, q') of the arm between samples; controller x = (delta, delta', y, y') an axis.
+    """
 
     def __init__(self, s: Scenario, times: np.ndarray):
         self.s, self.loop, self.map, self.times = s, Loop(s), Map(s), times
@@ -556,9 +586,14 @@ class SampledRun:
                 mark.terminal = abs(p[i] - e) > 1e-12
                 marks.append(mark)
             r = solve_ivp(
-                lambda t, z, b=b: self.arm(z, tau, b, uh)[0], (t, span), z, "LSODA" if stiff else "DOP853",
-                rtol=1e-10 if stiff else 1e-11, atol=1e-14, events=marks or None,
-            )  # fmt: skip
+                lambda t, z, b=b: self.arm(z, tau, b, uh)[0],
+                (t, span),
+                z,
+                "LSODA" if stiff else "DOP853",
+                rtol=1e-10 if stiff else 1e-11,
+                atol=1e-14,
+                events=marks or None,
+            )
             t, z = r.t[-1], r.y[:, -1]
             if (
                 self.s.length is not None
@@ -570,7 +605,7 @@ class SampledRun:
         return z, None
 
     def growth(self, z, b) -> float:
-        """Largest growth rate of the sampled loop, free of torque limits, at the pose of z [1/s]."""
+        """Return the largest growth rate of the sampled loop at the pose of z [1/s]."""
         rest, uh = self.loop.at_rest(z)
         clay = b if self.physical else (0.0, 0.0)
         arm = np.zeros((6, 6))  # of (q, q') and the torques held, over one sample

@@ -1,14 +1,15 @@
-"""Force over velocity in the clay through real hardware: its error against the resolution of encoder and converters.
+"""Force over velocity in the clay through real hardware.
 
-    python benchmarks/resolution.py [--out DIR]
+Its error against the resolution of encoder and converters.
 
-The constant cut with sampling, hold and a delay of one sample; writes resolution.md and resolution.json, whose every
-figure comes from the runs.
+    python -m benchmarks.resolution [--out DIR]
+
+The constant cut with sampling, hold and a delay of one sample; writes resolution.md and
+resolution.json, whose every figure comes from the runs.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import math
@@ -23,7 +24,7 @@ from hapticclay import files
 from hapticclay.model.constants import B_CONSTANT, L2, TS
 from hapticclay.theory import linear_loop
 
-from .work_precision import machine, number
+from . import common
 
 FORCE = 5.0  # [N] of the hand: 5 cm/s in the clay
 END = 0.20  # [m] of the cut
@@ -48,8 +49,16 @@ def run(
     )
     r = hc.simulate(s)
     mine = (r.p[:, 0] > WITHIN[0]) & (r.p[:, 0] < WITHIN[1])
-    out: dict[str, Any] = {"counts": counts, "window": window if counts else None, "bits": bits, "delay": delay,
-                           "status": r.outcome.code, "mean": None, "rms": None, "least": None}  # fmt: skip
+    out: dict[str, Any] = {
+        "counts": counts,
+        "window": window if counts else None,
+        "bits": bits,
+        "delay": delay,
+        "status": r.outcome.code,
+        "mean": None,
+        "rms": None,
+        "least": None,
+    }
     if mine.sum() > 100:
         b = r.b[mine, 0].mean()
         v, fe = r.v[mine, 0], r.fe[mine, 0]
@@ -71,8 +80,16 @@ def measure(
 
 def page(rows: list[dict[str, Any]]) -> str:
     """The Markdown page."""
-    head = ["encoder [counts/turn]", "window [samples]", "A/D, D/A [bits]", "delay [ms]", "a count [share of v]",
-            "mean error of fe/v", "rms error of fe/v", "status"]  # fmt: skip
+    head = [
+        "encoder [counts/turn]",
+        "window [samples]",
+        "A/D, D/A [bits]",
+        "delay [ms]",
+        "a count [share of v]",
+        "mean error of fe/v",
+        "rms error of fe/v",
+        "status",
+    ]
     cells = []
     for r in rows:
         text = [
@@ -81,21 +98,27 @@ def page(rows: list[dict[str, Any]]) -> str:
             r["bits"] or "exact",
             f"{1e3 * r['delay']:g}",
         ]
-        figures = ["-" if r[k] is None else number(r[k]) for k in ("least", "mean", "rms")]
+        figures = ["-" if r[k] is None else common.number(r[k]) for k in ("least", "mean", "rms")]
         cells.append([str(x) for x in text] + figures + [r["status"]])
-    return "\n\n".join(
-        [
-            "# Force over velocity against resolution",
-            f"The constant cut at {FORCE:g} N, shaped, sampled and held every {1e3 * TS:g} ms: fe as the motors hold "
-            f"it over the true velocity, from {100 * WITHIN[0]:g} to {100 * WITHIN[1]:g} cm, against b. Velocity is "
-            "the difference of encoder angles over the window; one count there is, at the handle, the share in the "
-            "fifth column of the speed. The mean error is that of mean fe over mean v. "
-            "Made by `benchmarks/resolution.py`; do not edit.",
-            tabulate(cells, head, tablefmt="github", disable_numparse=True),
-            "## Machine",
-            "\n".join(f"- {x}" for x in machine()),
-        ]
-    ) + "\n"  # fmt: skip
+    return (
+        "\n\n".join(
+            [
+                "# Force over velocity against resolution",
+                f"The constant cut at {FORCE:g} N, shaped, sampled and held every {1e3 * TS:g} ms: "
+                "fe as the motors hold "
+                f"it over the true velocity, from {100 * WITHIN[0]:g} to {100 * WITHIN[1]:g} cm, "
+                "against b. Velocity is "
+                "the difference of encoder angles over the window; one count there is, at the "
+                "handle, the share in the "
+                "fifth column of the speed. The mean error is that of mean fe over mean v. "
+                "Made by `benchmarks/resolution.py`; do not edit.",
+                tabulate(cells, head, tablefmt="github", disable_numparse=True),
+                "## Machine",
+                "\n".join(f"- {x}" for x in common.machine()),
+            ]
+        )
+        + "\n"
+    )
 
 
 def main(out: Path | None, **kw: Any) -> list[dict[str, Any]]:
@@ -111,8 +134,6 @@ def main(out: Path | None, **kw: Any) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path)
+    parser = common.parser(__doc__)
+    parser.set_defaults(out=None)
     main(parser.parse_args().out)

@@ -1,15 +1,14 @@
 """How a sweep scales: dask workers on the cores of this machine, and what limits it on many.
 
-    python benchmarks/scaling.py [--out DIR] [--rounds N]
+    python -m benchmarks.scaling [--out DIR] [--rounds N]
 
-A real scheduler and worker processes, as on a cluster; worker counts in turns. Writes scaling.json and scaling.png.
+A real scheduler and worker processes, as on a cluster; worker counts in turns. Writes scaling.json
+and scaling.png.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import os
 import statistics
 import tempfile
 import time
@@ -22,9 +21,8 @@ from hapticclay.files import atomic
 from hapticclay.studies import sweep
 from hapticclay.studies.sampling import Sweep, parse_grid
 
-from .work_precision import write
+from . import common
 
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 NEEDS = ("distributed", "pyarrow")
 TASKS = 2000  # empty ones, by which the scheduler is timed
 ASKED = 10.0  # [s] that docs/sweep.md advises for a chunk
@@ -47,14 +45,21 @@ def nothing(n: int) -> int:
 
 
 def measure(quick: bool, rounds: int) -> dict[str, Any]:
-    """Seconds of the sweep by number of workers, of a chunk, of a task for the scheduler; bytes of a chunk."""
+    """Time the sweep by number of workers [s], a chunk, and a task of the scheduler."""
     from distributed import Client, LocalCluster
 
-    todo, times = job(quick), {n: [] for n in range(1, CORES + 1)}
+    todo, times = job(quick), {n: [] for n in range(1, common.CORES + 1)}
     bytes_ = 0
-    with tempfile.TemporaryDirectory() as folder, LocalCluster(
-        n_workers=CORES, threads_per_worker=1, dashboard_address="", local_directory=folder
-    ) as cluster, Client(cluster) as client:  # fmt: skip
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        LocalCluster(
+            n_workers=common.CORES,
+            threads_per_worker=1,
+            dashboard_address="",
+            local_directory=folder,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
         crew = sorted(client.scheduler_info(n_workers=-1)["workers"])
         for k in range(rounds + 1):
             for n in times:
@@ -62,9 +67,13 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
                 sweep.begin_sweep(todo, out)
                 begin = time.perf_counter()
                 jobs = client.map(
-                    sweep.run_chunk, [todo] * todo.chunks, range(todo.chunks), [str(out)] * todo.chunks,
-                    workers=crew[:n], pure=False,
-                )  # fmt: skip
+                    sweep.run_chunk,
+                    [todo] * todo.chunks,
+                    range(todo.chunks),
+                    [str(out)] * todo.chunks,
+                    workers=crew[:n],
+                    pure=False,
+                )
                 client.gather(jobs)
                 if k:  # the first time the workers import and compile
                     times[n].append(time.perf_counter() - begin)
@@ -88,13 +97,23 @@ def rows(found: dict[str, Any]) -> list[dict[str, float]]:
     for n, taken in found["times"].items():
         gain = statistics.median(a / b for a, b in zip(alone, taken, strict=True))
         wall = statistics.median(taken)
-        out.append({"workers": n, "wall_s": wall, "runs_per_s": found["runs"] / wall, "speedup": gain,
-                    "efficiency": gain / n})  # fmt: skip
+        out.append(
+            {
+                "workers": n,
+                "wall_s": wall,
+                "runs_per_s": found["runs"] / wall,
+                "speedup": gain,
+                "efficiency": gain / n,
+            }
+        )
     return out
 
 
 def projection(found: dict[str, Any]) -> list[dict[str, float]]:
-    """Upper bounds for many machines: chunks of ASKED seconds, a scheduler that hands out one task at a time."""
+    """Upper bounds for many machines:
+
+    chunks of ASKED seconds, a scheduler that hands out one task at a time.
+    """
     full = ASKED / found["task_s"]
     out = []
     for n in (16, 128, 1024, 8192, 65536):
@@ -122,13 +141,17 @@ def sections(data: dict[str, Any]) -> list[str]:
 
     return [
         "## Scaling",
-        f"A sweep of {data['runs']} runs in {data['chunks']} chunks on dask workers of one thread, up to all "
+        f"A sweep of {data['runs']} runs in {data['chunks']} chunks on dask workers of one thread, "
+        "up to all "
         f"{data['cores']} cores of this machine: measured, medians of ratios.",
         table(data["rows"]),
         "![scaling of a sweep](scaling.png)",
-        "Beyond these cores nothing was measured. Chunks do not talk to each other, so what bounds many machines is "
-        f"the scheduler, {1e3 * data['task_s']:.2f} ms a task here beside busy workers, and the shared folder, "
-        f"{1e-3 * data['chunk_bytes']:.0f} kB a chunk. With chunks of {data['asked_s']:.0f} s that gives, at best:",
+        "Beyond these cores nothing was measured. Chunks do not talk to each other, so what bounds "
+        "many machines is "
+        f"the scheduler, {1e3 * data['task_s']:.2f} ms a task here beside busy workers, and the "
+        "shared folder, "
+        f"{1e-3 * data['chunk_bytes']:.0f} kB a chunk. With chunks of {data['asked_s']:.0f} s that "
+        "gives, at best:",
         table(data["projection"]),
     ]
 
@@ -144,8 +167,13 @@ def draw(data: dict[str, Any], out: Path) -> None:
     ax.plot(many, many, color="0.7", lw=1.0, label="ideal")
     label = f"bound by the scheduler, chunks of {data['asked_s']:.0f} s: projected"
     ax.plot(many, [min(n, full) for n in many], "--", color="#D55E00", label=label)
-    ax.plot([r["workers"] for r in data["rows"]], [r["speedup"] for r in data["rows"]], "o", color="#0072B2",
-            label="measured")  # fmt: skip
+    ax.plot(
+        [r["workers"] for r in data["rows"]],
+        [r["speedup"] for r in data["rows"]],
+        "o",
+        color="#0072B2",
+        label="measured",
+    )
     ax.set(xscale="log", yscale="log", xlabel="workers [1]", ylabel="speed-up over one worker [1]")
     ax.grid(color="0.9")
     ax.legend(frameon=False, fontsize=9)
@@ -159,7 +187,7 @@ def main(
     """Measures, writes the data and the diagram; returns the data."""
     missing = [name for name in NEEDS if not importlib.util.find_spec(name)]
     if missing:
-        return write(
+        return common.write(
             out,
             "scaling",
             {"rows": [], "omissions": [f"scaling: {x} is not installed" for x in missing]},
@@ -167,20 +195,17 @@ def main(
     found = measure(quick, rounds or (1 if quick else 5))
     data = {
         **found,
-        "cores": CORES,
+        "cores": common.CORES,
         "asked_s": ASKED,
         "rows": rows(found),
         "projection": projection(found),
     }
     draw(data, out)
-    return write(out, "scaling", data)
+    return common.write(out, "scaling", data)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, rounds=args.rounds))))

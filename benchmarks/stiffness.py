@@ -1,16 +1,16 @@
-"""Stiff clay: from soft to 1e9 N.s/m at one step, the default run beside plain MuJoCo, up to where each breaks down.
+"""Stiff clay up to 1e9 N.s/m at one step, beside plain MuJoCo.
 
-A position can be right whatever the impulse was: a hit and its rebound (hits.py) tell whether the clay gave it in full.
+A position can be right whatever the impulse was: a hit and its rebound (hits.py) tell whether the
+clay gave it in full.
 
-    python benchmarks/stiffness.py [--dt 3.6e-4] [--out DIR]
+    python -m benchmarks.stiffness [--dt 3.6e-4] [--out DIR]
 
-The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks/bench.py makes the
-page.
+The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks.bench makes
+the page.
 """
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,9 @@ import hapticclay as hc
 from hapticclay.model.constants import S
 from hapticclay.stepping.engine import warnings_caught
 
-from . import hits
+from . import common, hits
 from .peers import mujoco_plain, ours
 from .problems import EDGES, PROBLEMS, nonlinear_pieces
-from .work_precision import number, write
 
 T = 2.0  # [s] simulated
 SWEEP = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
@@ -34,7 +33,10 @@ BROKEN = (
 
 
 def row(b: float, dt: float) -> dict[str, Any]:
-    """Final position and peak of v^2 along x for one b: error against, and ratio to, the reference."""
+    """Final position and peak of v^2 along x for one b:
+
+    error against, and ratio to, the reference.
+    """
     name = f"b = {b:g}"
     PROBLEMS[name] = s = hc.constant_cut(b=b, t_max=T, gain=(1.0, 0.1))
     try:
@@ -79,24 +81,28 @@ def sections(data: dict[str, Any]) -> list[str]:
             line += (
                 ["broken", "broken"]
                 if x["broken"]
-                else [number(x["error"]), format(x["energy"], ".3f")]
+                else [common.number(x["error"]), format(x["energy"], ".3f")]
             )
-        line += [number(r["rebound"]), number(r["felt"])]
+        line += [common.number(r["rebound"]), common.number(r["felt"])]
         cells.append(line)
     return [
         "## Stiff clay",
-        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. Position error after "
-        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under Radau. Broken: an "
-        "error above 1 mm, ten times the energy, or not a number. Rebound: error of the time at which a handle that "
-        "has hit the clay at 0.2 m/s leaves it; force: relative error of the clay's force after the hit; both against "
+        f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. "
+        "Position error after "
+        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under "
+        "Radau. Broken: an "
+        "error above 1 mm, ten times the energy, or not a number. Rebound: error of the time at "
+        "which a handle that "
+        "has hit the clay at 0.2 m/s leaves it; force: relative error of the clay's force after "
+        "the hit; both against "
         "the matrix exponential.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
-    ]  # fmt: skip
+    ]
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False, dt: float = 3.6e-4) -> dict[str, Any]:
     """Measures, writes the data; returns it."""
-    return write(
+    return common.write(
         out,
         "stiffness",
         {"dt": dt, "rows": [row(b, dt) for b in (SWEEP[1::3] if quick else SWEEP)]},
@@ -104,10 +110,7 @@ def main(out: Path = Path("out/bench"), quick: bool = False, dt: float = 3.6e-4)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--dt", type=float, default=3.6e-4)
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, dt=args.dt))))

@@ -1,14 +1,14 @@
 """Closed loop against the floor: a bare mj_step loop in C of the same model, in turns, medians.
 
-    python benchmarks/throughput.py [--out DIR] [--rounds N] [--steps N] [--full]
+    python -m benchmarks.throughput [--out DIR] [--rounds N] [--steps N] [--full]
 
-Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a batch, 100 000 runs
-for linearity, and a stability map. Writes throughput.json; benchmarks/bench.py makes the page.
+Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a
+batch, 100 000 runs for linearity, and a stability map. Writes throughput.json; benchmarks.bench
+makes the page.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import os
 import statistics
@@ -28,11 +28,10 @@ import hapticclay as hc
 from hapticclay.simulation import simulate
 from hapticclay.stepping import leapfrog
 
-from .work_precision import write
+from . import common
 
 LONG = 5555  # steps of 2 s, as the runs of the map
 OFTEN = 5  # compiled runs to one in Python, which takes as long
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
@@ -44,7 +43,10 @@ SCENES = {
 def floor(
     scenario: hc.Scenario, steps: int, clock: Callable[[], float] = time.perf_counter
 ) -> float:
-    """Seconds a step of the engine alone, looping in C; restarted often enough to stay clear of denormals."""
+    """Return seconds a step of the engine alone, looping in C.
+
+    It is restarted often enough to stay clear of denormals.
+    """
     model = hc.build(scenario)
     data = mujoco.MjData(model)
     data.qpos[:] = (1.9, -1.9)
@@ -84,10 +86,9 @@ def timed(function, *args, **kw) -> np.ndarray:
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
-    """The compiled run over the floor just before and after it: one of a batch of summaries; alone, from call to
-    return, all samples recorded.
+    """The compiled run over the floor just before and after it, in processor time.
 
-    In processor time, which others on the machine disturb less.
+    One of a batch of summaries; one alone, from call to return, all samples recorded.
     """
     from hapticclay.stepping.compiled import BatchPool
 
@@ -158,11 +159,12 @@ def beside(
     """A batch whose threads take turns with the floor, so that a drift of the machine moves both.
 
     Returns:
-        (core seconds and processor seconds a run, those of a step of the bare engine on all cores at once).
+        (core seconds and processor seconds a run, those of a step of the bare engine on all cores
+        at once).
     """
     from hapticclay.stepping import compiled
 
-    each = max(1, min(100, len(todo) // (8 * CORES)))
+    each = max(1, min(100, len(todo) // (8 * common.CORES)))
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
@@ -178,7 +180,7 @@ def beside(
 
     usual, compiled.BatchPool = compiled.BatchPool, Turns
     try:
-        took = timed(hc.simulate_batch, todo, keep=keep) * (CORES, 1.0)
+        took = timed(hc.simulate_batch, todo, keep=keep) * (common.CORES, 1.0)
     finally:
         compiled.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
@@ -199,9 +201,13 @@ def batches(sizes: list[tuple[int, int]], rounds: int) -> list[dict[str, Any]]:
 
 
 def first_calls() -> dict[str, float]:
-    """Processor seconds of the first native call of a process, import of numba included: uncached, cached."""
+    """Processor seconds of the first native call of a process, import of numba included:
+
+    uncached, cached.
+    """
     code = (
-        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s); a = time.process_time(); "
+        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s); a = "
+        "time.process_time(); "
         "hc.simulate(s, engine='native'); print(time.process_time() - a)"
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -215,7 +221,7 @@ def first_calls() -> dict[str, float]:
 
 
 def memory() -> float | str:
-    """The most memory that this process has taken [MiB]; "unknown" where the system does not tell."""
+    """The most memory that this process has taken [MiB], or "unknown"."""
     try:
         import resource
     except ImportError:
@@ -224,14 +230,22 @@ def memory() -> float | str:
 
 
 def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
-    """Time a run, from the smallest batch to the largest; a small one is made often, as it is soon over."""
+    """Time a run, from the smallest batch to the largest; small ones are made often."""
     rows: list[dict[str, Any]] = []
     for n in sizes:
         todo = jobs(n, steps)
         run, bare = np.mean([beside(todo, steps) for _ in range(max(1, 20_000 // n))], axis=0)
         over, over_cpu = (run / (steps * bare)).tolist()
-        rows.append({"runs": n, "steps": steps, "us_a_run": 1e6 * float(run[0]) / CORES, "over_floor": over,
-                     "over_floor_cpu": over_cpu, "peak_MiB": memory()})  # fmt: skip
+        rows.append(
+            {
+                "runs": n,
+                "steps": steps,
+                "us_a_run": 1e6 * float(run[0]) / common.CORES,
+                "over_floor": over,
+                "over_floor_cpu": over_cpu,
+                "peak_MiB": memory(),
+            }
+        )
     return rows
 
 
@@ -250,11 +264,15 @@ def stability_map() -> dict[str, float]:
 
 
 TITLES = {
-    "first_call": "The first native call of a process, import of numba included, in processor seconds.",
-    "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` in C over the same "
+    "first_call": "The first native call of a process, import of numba included, in processor "
+    "seconds.",
+    "rows": "The closed loop, every sample recorded, against the floor: a bare loop of "
+    "`mj_step` in C over the same "
     "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
-    "batch": "Batches over the floor on all cores, with which their threads take turns: time, and processor time.",
-    "linearity": "Time a run, from a small batch to a large one, over the floor in the same way; the most memory the "
+    "batch": "Batches over the floor on all cores, with which their threads take turns: time, and "
+    "processor time.",
+    "linearity": "Time a run, from a small batch to a large one, over the floor in the same way; "
+    "the most memory the "
     "process has taken so far.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
@@ -280,9 +298,12 @@ def sections(data: dict[str, Any]) -> list[str]:
 
 
 def main(
-    out: Path = Path("out/bench"), quick: bool = False, rounds: int | None = None, steps: int | None = None,
+    out: Path = Path("out/bench"),
+    quick: bool = False,
+    rounds: int | None = None,
+    steps: int | None = None,
     full: bool = False,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
     data: dict[str, Any] = {"rounds": rounds, "steps": steps}
@@ -298,14 +319,11 @@ def main(
     if native and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]
-    return write(out, "throughput", data)
+    return common.write(out, "throughput", data)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser = common.parser(__doc__)
     parser.add_argument("--rounds", type=int)
     parser.add_argument("--steps", type=int)
     parser.add_argument("--full", action="store_true")

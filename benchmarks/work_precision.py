@@ -1,21 +1,16 @@
 """Error against run time: hapticclay and its peers on the same jobs, in one process, taking turns.
 
-    python benchmarks/work_precision.py [--quick] [--out DIR]
+    python -m benchmarks.work_precision [--quick] [--out DIR]
 
-Writes work_precision.json and one PNG a job; benchmarks/bench.py makes the page.
+Writes work_precision.json and one PNG a job; benchmarks.bench makes the page.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import importlib
-import json
 import math
-import os
-import platform
 import statistics
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +21,7 @@ from tqdm import tqdm
 import hapticclay as hc
 from hapticclay import files
 
+from . import common
 from . import reference as hybrid
 from .problems import EDGES, PROBLEMS, Result, reference
 
@@ -37,17 +33,6 @@ PEERS = (
     "pybullet_peer",
     "drake_peer",
     "pinocchio_peer",
-)
-DISTRIBUTIONS = (
-    "hapticclay",
-    "mujoco",
-    "numpy",
-    "scipy",
-    "numba",
-    "control",
-    "pybullet",
-    "drake",
-    "pin",
 )
 ERRORS = {
     "crossing": "largest error of the three crossing times [s]",
@@ -66,7 +51,8 @@ ASKED = (
 )  # errors in crossing time [s] of the `recommend` table
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
 MARKERS = "osD^v<>P"
-SAMPLED = "sampled"  # methods that model hardware; their error is the hold's, no matter how well they are computed
+# methods that model hardware; their error is the hold's, no matter how well they are computed
+SAMPLED = "sampled"
 HYBRID_END = 0.9  # [s] end of the runs against the hybrid system, beyond the first border
 
 
@@ -100,9 +86,12 @@ def errors(problem: str, r: Result) -> dict[str, float | None]:
 
 
 def measure(
-    quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS
+    quick: bool, problems: list[str], peers: tuple[str, ...] = PEERS, rounds: int = 5
 ) -> tuple[list[dict], list[str]]:
-    """All rows, and what was left out. Every setting is run once a round; times are medians over rounds."""
+    """All rows, and what was left out.
+
+    Every setting is run once a round; times are medians over rounds.
+    """
     modules, omissions = [], []
     for name in peers:
         try:
@@ -116,7 +105,6 @@ def measure(
                 jobs += [(problem, m, method, x) for x in (settings[: 3 if quick else None])]
     first: list[Result] = []
     walls: list[list[float]] = [[] for _ in jobs]
-    rounds = 2 if quick else 5
     with tqdm(total=rounds * len(jobs), delay=2.0, disable=None, leave=False) as bar:
         for n in range(rounds):
             for i, (problem, m, method, setting) in enumerate(jobs):
@@ -149,7 +137,10 @@ def measure(
 
 
 def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[str, Any]]:
-    """For each asked error in crossing time, over all jobs: the fastest setting that keeps it in every one."""
+    """For each asked error in crossing time, over all jobs:
+
+    the fastest setting that keeps it in every one.
+    """
     groups: dict[tuple, list[dict]] = {}
     for r in rows:
         if (packages is None or r["package"] in packages) and not r["method"].startswith(SAMPLED):
@@ -168,13 +159,24 @@ def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[s
         }
         if fit:
             key = min(fit, key=lambda k: fit[k][1])
-            out.append({"asked": asked, "package": key[0], "method": key[1], "setting": key[2],
-                        "error": fit[key][0], "wall": fit[key][1]})  # fmt: skip
+            out.append(
+                {
+                    "asked": asked,
+                    "package": key[0],
+                    "method": key[1],
+                    "setting": key[2],
+                    "error": fit[key][0],
+                    "wall": fit[key][1],
+                }
+            )
     return out
 
 
 def leaders(rows: list[dict]) -> list[dict[str, Any]]:
-    """For each asked error: the package that keeps it in the least time, the next one, and how much longer it takes."""
+    """For each asked error:
+
+    the package that keeps it in the least time, the next one, and how much longer it takes.
+    """
     packages = dict.fromkeys(r["package"] for r in rows)
     best = [x for package in packages for x in recommend(rows, {package})]
     out = []
@@ -182,9 +184,15 @@ def leaders(rows: list[dict]) -> list[dict[str, Any]]:
         order = sorted((x for x in best if x["asked"] == asked), key=lambda x: x["wall"])
         if order:
             named = [f"{x['package']}, {x['method']}" for x in order[:2]]
-            out.append({"asked": asked, "first": named[0], "package": order[0]["package"],
-                        "next": named[1] if len(order) > 1 else "none",
-                        "factor": order[1]["wall"] / order[0]["wall"] if len(order) > 1 else None})  # fmt: skip
+            out.append(
+                {
+                    "asked": asked,
+                    "first": named[0],
+                    "package": order[0]["package"],
+                    "next": named[1] if len(order) > 1 else "none",
+                    "factor": order[1]["wall"] / order[0]["wall"] if len(order) > 1 else None,
+                }
+            )
     return out
 
 
@@ -205,8 +213,15 @@ def who_leads(found: list[dict[str, Any]]) -> str:
 
 
 def table_of_leaders(found: list[dict[str, Any]]) -> str:
-    cells = [[format(x["asked"], ".0e"), x["first"], x["next"], "-" if x["factor"] is None else f"{x['factor']:.1f}"]
-             for x in found]  # fmt: skip
+    cells = [
+        [
+            format(x["asked"], ".0e"),
+            x["first"],
+            x["next"],
+            "-" if x["factor"] is None else f"{x['factor']:.1f}",
+        ]
+        for x in found
+    ]
     head = [
         "asked error [s]",
         "fastest",
@@ -217,7 +232,10 @@ def table_of_leaders(found: list[dict[str, Any]]) -> str:
 
 
 def dominance(rows: list[dict]) -> list[dict[str, Any]]:
-    """For each other package: how many of its points hapticclay beats in both error and time, with one setting."""
+    """For each other package:
+
+    how many of its points hapticclay beats in both error and time, with one setting.
+    """
     ours = [
         r
         for r in rows
@@ -273,11 +291,16 @@ def draw(rows: list[dict], problem: str):
                     continue
                 label = package if len(methods) == 1 else f"{package}, {method}"
                 ax.plot(
-                    [r["wall"] for r in points], [r[kind] for r in points],
-                    color=COLORS[packages.index(package) % len(COLORS)], marker=MARKERS[methods.index(method) % 8],
-                    ls=("-", "--", ":", "-.")[methods.index(method) % 4], ms=4, label=label,
-                    lw=2.6 if package == "hapticclay" else 1.1, zorder=5 if package == "hapticclay" else 2,
-                )  # fmt: skip
+                    [r["wall"] for r in points],
+                    [r[kind] for r in points],
+                    color=COLORS[packages.index(package) % len(COLORS)],
+                    marker=MARKERS[methods.index(method) % 8],
+                    ls=("-", "--", ":", "-.")[methods.index(method) % 4],
+                    ms=4,
+                    label=label,
+                    lw=2.6 if package == "hapticclay" else 1.1,
+                    zorder=5 if package == "hapticclay" else 2,
+                )
             ax.set(xscale="log", yscale="log", xlabel="run time per simulated second [s]")
             ax.set_ylabel(ERRORS[kind].replace(" [", "\n["), fontsize=9)
         for ax in axes[len(kinds) :]:
@@ -290,59 +313,38 @@ def draw(rows: list[dict], problem: str):
     return figure
 
 
-def machine() -> list[str]:
-    """Lines that say where and with what the figures were made."""
-    found = []
-    for name in DISTRIBUTIONS:
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            continue
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        names = [
-            x.split(":", 1)[1].strip()
-            for x in info.read_text().splitlines()
-            if x.startswith("model name")
-        ]
-        cpu = names[0] if names else cpu
-    load = f"load average {os.getloadavg()[1]:.1f} at the end; run times are those of a quiet machine only where it is low"
-    return [
-        f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}",
-        ", ".join(found),
-        load,
-    ]
-
-
-def number(x: float | None) -> str:
-    return "-" if x is None else format(x, ".1e")
-
-
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
     rows = data["rows"]
     parts = [
         "## Error against run time",
-        "Every package steps the same closed loop: the nonlinear arm, servo, compensator and clay on both axes, to the "
-        "end of the path. Errors are against the arm in joint space under DOP853 at 1e-12, borders as events. "
+        "Every package steps the same closed loop: the nonlinear arm, servo, compensator and clay "
+        "on both axes, to the "
+        "end of the path. Errors are against the arm in joint space under DOP853 at 1e-12, borders "
+        "as events. "
         "The setting is a step [s], or a relative tolerance for adaptive methods.",
         "### Recommended settings",
-        "The fastest setting that keeps the asked error in the crossing times on each of the three cuts.",
+        "The fastest setting that keeps the asked error in the crossing times on each of the three "
+        "cuts.",
         table_of_settings(recommend(rows)),
         "With a MuJoCo model in the loop:",
         table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
         "### Who is ahead",
         who_leads(leaders(rows)),
         table_of_leaders(leaders(rows)),
-        "Points of each package that hapticclay, in continuous time, beats or equals in error and run time together, "
+        "Points of each package that hapticclay, in continuous time, beats or equals in error and "
+        "run time together, "
         "with one setting.",
         tabulate(dominance(rows), headers="keys", tablefmt="github"),
         "### Sampled control",
-        "hapticclay's rows `sampled` are another system, the hardware's: measured and held every Ts, here Ts = dt. "
-        "What the diagrams show of them is the delay of the hold, half a sample, and borders noticed up to a sample "
-        "late, both of first order in Ts: a property of the hardware and not of the numbers. How well that system is "
-        "computed is seen against the hybrid system, exact between samples (default cut, largest position error up to "
+        "hapticclay's rows `sampled` are another system, the hardware's: measured and held every "
+        "Ts, here Ts = dt. "
+        "What the diagrams show of them is the delay of the hold, half a sample, and borders "
+        "noticed up to a sample "
+        "late, both of first order in Ts: a property of the hardware and not of the numbers. How "
+        "well that system is "
+        "computed is seen against the hybrid system, exact between samples (default cut, largest "
+        "position error up to "
         f"{HYBRID_END:g} s):",
         table_of_hybrid(data["hybrid"]),
     ]
@@ -350,19 +352,34 @@ def sections(data: dict[str, Any]) -> list[str]:
         mine = [r for r in rows if r["problem"] == problem]
         name = problem.replace(" ", "_")
         cells = [
-            [r["package"], r["method"], format(r["setting"], "g"), *(number(r[k]) for k in ERRORS), number(r["wall"]),
-             r["note"]]
+            [
+                r["package"],
+                r["method"],
+                format(r["setting"], "g"),
+                *(common.number(r[k]) for k in ERRORS),
+                common.number(r["wall"]),
+                r["note"],
+            ]
             for r in mine
-        ]  # fmt: skip
-        head = ["package", "method", "setting", "crossing [s]", "position [m]", "force [N]", "b [N.s/m]",
-                "time per simulated s", "note"]  # fmt: skip
+        ]
+        head = [
+            "package",
+            "method",
+            "setting",
+            "crossing [s]",
+            "position [m]",
+            "force [N]",
+            "b [N.s/m]",
+            "time per simulated s",
+            "note",
+        ]
         parts += [f"### {problem.capitalize()}", f"![work-precision diagrams]({name}.png)"]
         parts.append(tabulate(cells, head, tablefmt="github", disable_numparse=True))
     return parts
 
 
 def against_hybrid(quick: bool) -> list[dict[str, Any]]:
-    """Position error of sampled runs of the default cut, against the hybrid system and the continuous one."""
+    """Position errors of sampled runs against the hybrid and the continuous system."""
     out = []
     exact = reference("default cut")
     for render in ("held", "implicit"):
@@ -389,7 +406,12 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
 
 def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
     cells = [
-        [x["render"], format(x["Ts"], "g"), number(x["hybrid"]), number(x["continuous"])]
+        [
+            x["render"],
+            format(x["Ts"], "g"),
+            common.number(x["hybrid"]),
+            common.number(x["continuous"]),
+        ]
         for x in rows
     ]
     head = ["render", "Ts [s]", "against the hybrid system [m]", "against continuous time [m]"]
@@ -398,10 +420,16 @@ def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
 
 def table_of_settings(found: list[dict[str, Any]]) -> str:
     cells = [
-        [format(x["asked"], ".0e"), x["package"], x["method"], format(x["setting"], "g"), number(x["error"]),
-         number(x["wall"])]
+        [
+            format(x["asked"], ".0e"),
+            x["package"],
+            x["method"],
+            format(x["setting"], "g"),
+            common.number(x["error"]),
+            common.number(x["wall"]),
+        ]
         for x in found
-    ]  # fmt: skip
+    ]
     head = ["asked error [s]", "package", "method", "setting", "error [s]", "time per simulated s"]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
@@ -409,27 +437,16 @@ def table_of_settings(found: list[dict[str, Any]]) -> str:
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
     """Measures, writes the data and the diagrams; returns the data."""
     problems = list(PROBLEMS)[: 1 if quick else None]
-    rows, omissions = measure(quick, problems)
+    rows, omissions = measure(quick, problems, rounds=2 if quick else 5)
     for problem in problems:
         with files.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
             draw(rows, problem).savefig(f, format="png")
     found = {"omissions": omissions, "rows": rows, "hybrid": against_hybrid(quick)}
-    return write(out, "work_precision", found)
-
-
-def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
-    """Writes out/name.json, with schema and machine; returns what it holds."""
-    data = {"schema": f"hapticclay-{name.replace('_', '-')}-2", "machine": machine(), **found}
-    with files.atomic(out / f"{name}.json") as f:
-        f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
-    return data
+    return common.write(out, "work_precision", found)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = common.parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="one job, three settings a method")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     args = parser.parse_args()
     print("\n\n".join(sections(main(args.out, args.quick))))

@@ -1,3 +1,11 @@
+"""The suite in parallel: who shares a worker, what runs alone, and which engine runs.
+
+Workers are processes of pytest-xdist. Tests that share a dear fixture or a scarce resource share a
+worker (GROUPS). A test marked `perf` compares run times: while it runs, the other workers wait.
+`engine="auto"` takes the compiled loop, but in tests marked `plain`, which test the Python one.
+"""
+
+import contextlib
 import os
 import signal
 
@@ -5,14 +13,88 @@ import pytest
 from hypothesis import settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
-if (
-    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-):  # as a background job's, and then its children's
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
+
+from hapticclay.simulation import simulate  # noqa: E402
+
+try:
+    import fcntl
+except ImportError:  # Windows: no locks, so ratios of run times are disturbed there
+    fcntl = None
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's and its children's
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing
 settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)
 settings.load_profile("default")
+
+GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one worker, in turns
+    "paper_runs": "ledger",
+    "ledger_rows": "ledger",
+    "rows": "bench",
+    "scaled": "bench",
+    "poses": "poses",
+    "whole": "sweep",
+    "screen": "gui",
+    "page": "gui",
+    "test_page.py": "gui",
+}
+PLAIN = {  # files whose tests are about the Python loop
+    "test_energy.py",
+    "test_engine.py",
+    "test_inline.py",
+    "test_interrupted.py",
+    "test_loop.py",
+    "test_monitor.py",
+}
+AUTO_FROM = simulate.NATIVE_FROM
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(items):
+    for item in items:
+        names = (*item.fixturenames, item.path.name)
+        for group in {GROUPS[name] for name in names if name in GROUPS}:
+            item.add_marker(pytest.mark.xdist_group(group))
+        if item.get_closest_marker("perf"):
+            item.add_marker(pytest.mark.xdist_group("perf"))
+        if item.path.name in PLAIN:
+            item.add_marker(pytest.mark.plain)
+        mark = item.get_closest_marker("xdist_group")
+        # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
+        if mark and "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
+            item._id = type(item._id).parse(f"{item.nodeid}@{mark.args[0]}")
+
+
+@contextlib.contextmanager
+def locked(file, kind):
+    """Hold a lock of this file among all workers; kind is shared or exclusive."""
+    with open(file) as f:
+        fcntl.flock(f, kind)
+        try:
+            yield
+        finally:
+            fcntl.flock(f, fcntl.LOCK_UN)  # a child may have inherited the file
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """Run a `perf` test while no other one runs: all go through a turnstile, in which it waits."""
+    if not fcntl or "PYTEST_XDIST_WORKER" not in os.environ:
+        return (yield)
+    kind = fcntl.LOCK_EX if item.get_closest_marker("perf") else fcntl.LOCK_SH
+    with contextlib.ExitStack() as held:
+        with locked(__file__, fcntl.LOCK_EX):
+            held.enter_context(locked(item.config.inipath, kind))
+        return (yield)
+
+
+@pytest.fixture(autouse=True)
+def auto_engine(request, monkeypatch):
+    """The compiled loop from the first step on, or the Python one as ever."""
+    plain = request.node.get_closest_marker("plain")
+    monkeypatch.setattr(simulate, "NATIVE_FROM", AUTO_FROM if plain else 0)
 
 
 @pytest.fixture(scope="session")

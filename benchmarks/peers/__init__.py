@@ -1,1 +1,1 @@
-"""Other tools on the jobs of problems.py, one file each; `python -m peers` (from benchmarks/) prints the table."""
+"""Other tools on the jobs of problems.py, one file each; `python -m benchmarks.peers`."""

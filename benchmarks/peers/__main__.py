@@ -1,4 +1,7 @@
-"""Prints every peer against the reference: `python -m peers [file ...] [--problem NAME] [--all]`, from benchmarks/."""
+"""Prints every peer against the reference:
+
+`python -m peers [file ...] [--problem NAME] [--all]`, from benchmarks/.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +37,8 @@ def main() -> None:
                     worst = (
                         f"{max(gaps):9.2e}" if len(gaps) == len(exact) else f"{len(gaps)} of 3  "
                     )
-                    line = f"{problem:16s} {peer.NAME:15s} {method:20s} {setting:8.1e} {worst} {r.wall:8.3f}"
-                    print(line, [f"{g:.1e}" for g in gaps], r.note, flush=True)
+                    line = f"{problem:16s} {peer.NAME:15s} {method:20s} {setting:8.1e} {worst}"
+                    print(line, f"{r.wall:8.3f}", [f"{g:.1e}" for g in gaps], r.note, flush=True)
 
 
 if __name__ == "__main__":

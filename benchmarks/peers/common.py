@@ -1,6 +1,7 @@
-"""What all peers share: the job as numbers, the closed loop as plain floats, crossings, and the shape of a result.
+"""What all peers share: job, closed loop, crossings, result.
 
-The formulas are those of docs/equations.md (sections 2 and 3, without shaping); every constant is hapticclay's.
+The formulas are those of docs/equations.md (sections 2 and 3, without shaping); every constant is
+hapticclay's.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ GRID = 0.01  # [s] samples of solvers with dense output
 
 @dataclass(frozen=True)
 class Job:
-    """One problem as numbers: uh, K per axis, Th = m s^2 + d s + k, b in the three regions between EDGES."""
+    """One problem as numbers:
+
+    uh, K per axis, Th = m s^2 + d s + k, b in the three regions between EDGES.
+    """
 
     uh: tuple[float, float]
     K: tuple[float, float]
@@ -59,8 +63,8 @@ class Job:
 def law(job: Job):
     """The control law and the hand at one instant.
 
-    Returns a function of joint angles and rates (relative), compensator (delta, rate), reference model (y, rate) and,
-    where the caller knows it, the damping b (else b at x). It gives
+    Returns a function of joint angles and rates (relative), compensator (delta, rate), reference
+    model (y, rate) and, where the caller knows it, the damping b (else b at x). It gives
     (p, v, f, y'', motor torques, joint torques of the hand force f), each a pair, flat, then b.
     """
     (m, d, k), (ux, uy), (ox, oy) = job.th, job.uh, job.origin
@@ -69,7 +73,7 @@ def law(job: Job):
     g0x, g1x, g0y, g1y = gx.gain, gx.damping, gy.gain, gy.damping
     s0x, s1x, s0y, s1y = sx.stiffness, sx.damping, sy.stiffness, sy.damping
 
-    def law(q1, q2, w1, w2, dx, dy, ex, ey, yx, yy, rx, ry, b=None):
+    def law(q1, q2, w1, w2, dx, dy, ex, ey, yx, yy, rx, ry, b=None):  # noqa: PLR0913  # flat: fast
         a2, n2 = q1 + q2, w1 + w2  # absolute angle and rate of link 2
         u1x, u1y, u2x, u2y = -L1 * sin(q1), L1 * cos(q1), -L2 * sin(a2), L2 * cos(a2)
         px, py = u1y + u2y - ox, -u1x - u2x - oy
@@ -104,9 +108,12 @@ def torques(fx: float, fy: float, q1: float, q2: float) -> tuple[float, float]:
 
 
 def ode(job: Job):
-    """rhs(t, z, b): the arm in absolute link angles, in which its inertia is diag(I1, I2), as plain floats.
+    """Return rhs(t, z, b) of the arm in absolute link angles, on plain floats.
 
-    z = (theta1, theta2, rates, delta, delta', y, y'), 12 numbers. Raises TimeoutError after WALL_LIMIT.
+    Its inertia there is diag(I1, I2).
+
+    z = (theta1, theta2, rates, delta, delta', y, y'), 12 numbers. Raises TimeoutError after
+    WALL_LIMIT.
     """
     from_arm, (Kx, Ky), clock = law(job), job.K, time.perf_counter
     end = clock() + WALL_LIMIT
@@ -138,7 +145,10 @@ def ode(job: Job):
 
 
 def compiled_ode(job: Job):
-    """`ode` as machine code: numba compiles the same `law`; with its array, and without a limit of wall time."""
+    """`ode` as machine code:
+
+    numba compiles the same `law`; with its array, and without a limit of wall time.
+    """
     from numba import njit
 
     from_arm, (Kx, Ky) = njit(law(job)), job.K
@@ -185,7 +195,10 @@ def of_states(job: Job, z: np.ndarray):
 
 
 def advance(job: Job, h: float):
-    """A semi-implicit Euler step of the controller: list of its eight states, changed in place, from f and y''."""
+    """A semi-implicit Euler step of the controller:
+
+    list of its eight states, changed in place, from f and y''.
+    """
     (Kx, Ky) = job.K
 
     def advance(c, fx, fy, ax, ay):
@@ -233,7 +246,10 @@ def march(job: Job, h: float, step) -> Result:
 
 
 def blown_up(x: np.ndarray) -> str:
-    """A note if x jumps by a quarter of the path within a step, which no run of these jobs does; else empty."""
+    """Return a note if x jumps by a quarter of the path within a step; else "".
+
+    No run of these jobs does.
+    """
     return "blow-up" if len(x) > 1 and np.abs(np.diff(x)).max() > EDGES[-1] / 4 else ""
 
 
@@ -249,7 +265,7 @@ def linear(t: np.ndarray, x: np.ndarray) -> list[float]:
 
 
 def hermite(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> list[float]:
-    """First times at which x passes EDGES, by cubic interpolation of samples with their velocities."""
+    """First times at which x passes EDGES, by cubic interpolation of the samples."""
     from scipy.interpolate import CubicHermiteSpline
     from scipy.optimize import brentq
 

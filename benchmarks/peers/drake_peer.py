@@ -1,8 +1,9 @@
 """Drake: MultibodyPlant and the controller as a LeafSystem in Python, under Simulator.
 
-"runge_kutta3", "runge_kutta5", "radau3": continuous plant, error-controlled; the borders of the clay are witness
-functions, which Drake isolates in time, and b is a discrete state that their events switch.
-"discrete": plant and controller sampled every dt, torques held between samples, crossings interpolated.
+"runge_kutta3", "runge_kutta5", "radau3": continuous plant, error-controlled; the borders of the
+clay are witness functions, which Drake isolates in time, and b is a discrete state that their
+events switch. "discrete": plant and controller sampled every dt, torques held between samples,
+crossings interpolated.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ from . import common
 from .common import C_POLE, EDGES, I2, IZZ1, L1, MASS1, MASS2, Job, Result
 
 NAME = "Drake"
-MAX_STEP = 0.03  # [s]; with the default 0.1 a trial step of runge_kutta5 in clay meets NaN, which Drake does not reject
+# [s]; with the default 0.1 a trial step of runge_kutta5 in clay meets NaN, which Drake does not
+# reject
+MAX_STEP = 0.03
 
 
 def methods() -> dict[str, list[float]]:
@@ -49,10 +52,10 @@ def methods() -> dict[str, list[float]]:
 
 
 class Controller(LeafSystem):
-    """Servo, compensator and hand: plant state to motor torques and to the joint torques of the hand force.
+    """Servo, compensator and hand: plant state to torques of motors and hand.
 
-    States are delta, delta', y, y', a pair each (continuous, or discrete if dt > 0), and for dt == 0 the region of
-    the clay, a discrete state; `crossings` then collects the times of the borders.
+    States are delta, delta', y, y', a pair each (continuous, or discrete if dt > 0), and for dt ==
+    0 the region of the clay, a discrete state; `crossings` then collects the times of the borders.
     """
 
     def __init__(self, job: Job, dt: float):

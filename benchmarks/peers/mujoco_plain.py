@@ -1,7 +1,8 @@
 """MuJoCo as one would use it at first: measure, compute, hold, mj_step; first order.
 
-The clay is a damper actuator that the engine treats implicitly; its force on the controller is that of the measured
-velocity; controller states take semi-implicit Euler steps; borders are noticed at the next sample.
+The clay is a damper actuator that the engine treats implicitly; its force on the controller is that
+of the measured velocity; controller states take semi-implicit Euler steps; borders are noticed at
+the next sample.
 """
 
 from __future__ import annotations

@@ -14,7 +14,10 @@ NAME = "hapticclay"
 
 
 def methods() -> dict[str, list[float]]:
-    """Integrator, its compiled form, or way of rendering under sampled control -> dt [s], coarse to fine."""
+    """Map each method to its dt [s], coarse to fine.
+
+    A method is an integrator, its compiled form, or a rendering under sampled control.
+    """
     fast = [2e-2, 1e-2, 4e-3, 2e-3, 1e-3, 3.6e-4, 1e-4]
     accurate = [4e-3, 2e-3, 1e-3, 5e-4]
     sampled = [4e-3, 2e-3, 1e-3, 3.6e-4, 1e-4]

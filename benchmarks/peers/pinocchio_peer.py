@@ -1,6 +1,7 @@
-"""Pinocchio: pin.aba for the arm, a Python loop for time; the controller's states are integrated alongside.
+"""Pinocchio: pin.aba for the arm, a Python loop for time and controller.
 
-"semi-implicit Euler" is the loop that most robot controllers are simulated with, "RK4" the classical one.
+"semi-implicit Euler" is the loop that most robot controllers are simulated with, "RK4" the
+classical one.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def _rk4(job: Job, h: float, model: pin.Model, data: pin.Data):
         a1, a2 = aba(model, data, z[:2], z[2:4], tau).tolist()
         return np.array(
             (w1, w2, a1, a2, ex, ey, Kx * fx - C_POLE * ex, Ky * fy - C_POLE * ey, rx, ry, ax, ay)
-        ), o  # fmt: skip
+        ), o
 
     def step():
         nonlocal z

@@ -1,7 +1,8 @@
-"""PyBullet: the arm from a URDF in DIRECT mode, torque control every step, the controller stepped alongside.
+"""PyBullet: the arm from a URDF in DIRECT mode, torque control every step.
 
-Clay and hand act as joint torques J' f from the measured state; the controller takes semi-implicit Euler steps.
-PyBullet would otherwise add velocity motors, damping of 0.04 per link and its own guess of the inertias: all off.
+Clay and hand act as joint torques J' f from the measured state; the controller takes semi-implicit
+Euler steps. PyBullet would otherwise add velocity motors, damping of 0.04 per link and its own
+guess of the inertias: all off.
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ URDF = f"""<robot name="ddarm">
   <link name="base"><inertial><mass value="0"/>
     <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="link1"><inertial><mass value="{MASS1}"/>
-    <inertia ixx="{IZZ1!r}" iyy="{IZZ1!r}" izz="{IZZ1!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <inertia ixx="{IZZ1!r}" iyy="{IZZ1!r}" izz="{IZZ1!r}"
+             ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="link2"><inertial><mass value="{MASS2}"/>
     <inertia ixx="{I2!r}" iyy="{I2!r}" izz="{I2!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="shoulder" type="continuous"><parent link="base"/><child link="link1"/><axis xyz="0 0 1"/>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="link1"/>
+    <axis xyz="0 0 1"/>
     <dynamics damping="0" friction="0"/></joint>
-  <joint name="elbow" type="continuous"><parent link="link1"/><child link="link2"/><axis xyz="0 0 1"/>
+  <joint name="elbow" type="continuous"><parent link="link1"/><child link="link2"/>
+    <axis xyz="0 0 1"/>
     <origin xyz="{L1!r} 0 0"/><dynamics damping="0" friction="0"/></joint>
 </robot>"""
 

@@ -1,8 +1,9 @@
-"""python-control: the same ODE as a NonlinearIOSystem from muscle force to state, input_output_response.
+"""python-control: the same ODE as a NonlinearIOSystem, input_output_response.
 
-"RK45", "LSODA": b(x) inside the rhs, the plain use; the error control has to find the borders by rejecting steps.
-"RK45, events", "LSODA, events": input_output_response has no events of its own, but hands solve_ivp_kwargs through, so
-each border can end a call, and with evaluation_times=None the last sample is the border.
+"RK45", "LSODA": b(x) inside the rhs, the plain use; the error control has to find the borders by
+rejecting steps. "RK45, events", "LSODA, events": input_output_response has no events of its own,
+but hands solve_ivp_kwargs through, so each border can end a call, and with evaluation_times=None
+the last sample is the border.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ def solve(problem: str, method: str, setting: float) -> Result:
     job = Job.of(problem)
     name, _, events = method.partition(", ")
     rhs = common.ode(job)
-    # the muscle force is constant and part of the ODE; the one input is there for input_output_response and unused
+    # the muscle force is constant and part of the ODE; the one input is there for
+    # input_output_response and unused
     system = control.nlsys(
         lambda t, z, u, params: rhs(t, z, params["b"]), inputs=1, states=12, params={"b": None}
     )
@@ -55,9 +57,15 @@ def solve(problem: str, method: str, setting: float) -> Result:
             t = 0.0
             for edge, b in zip(EDGES, job.b, strict=True):
                 r = control.input_output_response(
-                    system, [t, job.t_max], 0.0, z, params={"b": b}, evaluation_times=None, solve_ivp_method=name,
+                    system,
+                    [t, job.t_max],
+                    0.0,
+                    z,
+                    params={"b": b},
+                    evaluation_times=None,
+                    solve_ivp_method=name,
                     solve_ivp_kwargs=tolerances | {"events": _border(job.origin[0] + edge)},
-                )  # fmt: skip
+                )
                 T.append(r.time)
                 Z.append(r.states.T)
                 B.append(np.full(len(r.time), b))
@@ -66,7 +74,9 @@ def solve(problem: str, method: str, setting: float) -> Result:
                     note = "t_max"
                     break
                 crossings.append(t)
-        else:  # one call, ended a little behind the path by an event, or it would go on to the end of the reach
+        # one call, ended a little behind the path by an event, or it would go on to the end of the
+        # reach
+        else:
             grid = np.arange(0.0, job.t_max, SAMPLE)
             stop = _border(job.origin[0] + EDGES[-1] + 1e-3)
             r = control.input_output_response(

@@ -1,7 +1,8 @@
-"""SciPy: the arm as a hand-written ODE in absolute link angles (common.ode), solve_ivp, borders as terminal events.
+"""SciPy: the arm as a hand-written ODE (common.ode), borders as terminal events.
 
-What one writes without a robotics engine: steps end on the borders, so the adaptive error control holds everywhere.
-With numba, DOP853 runs with a compiled right-hand side too: what hapticclay's compiled loop is to be measured against.
+What one writes without a robotics engine: steps end on the borders, so the adaptive error control
+holds everywhere. With numba, DOP853 runs with a compiled right-hand side too: what hapticclay's
+compiled loop is to be measured against.
 """
 
 from __future__ import annotations
@@ -60,8 +61,17 @@ def solve(problem: str, method: str, setting: float) -> Result:
     begin = time.perf_counter()
     try:
         for hit, b in zip(events, job.b, strict=True):
-            s = solve_ivp(rhs, (t, job.t_max), z, solver, t_eval=grid[grid >= t], events=hit, args=(b,),
-                          rtol=setting, atol=setting * 1e-2)  # fmt: skip
+            s = solve_ivp(
+                rhs,
+                (t, job.t_max),
+                z,
+                solver,
+                t_eval=grid[grid >= t],
+                events=hit,
+                args=(b,),
+                rtol=setting,
+                atol=setting * 1e-2,
+            )
             T.append(s.t)
             Z.append(s.y.T.reshape(-1, 12))
             B.append(np.full(len(s.t), b))

@@ -97,14 +97,29 @@ def test_load_refuses_a_damaged_record(run, tmp_path):
         hc.Record.load(tmp_path / "a.npy")
 
 
-@pytest.mark.parametrize("name,change", [
-    ("fe", lambda x: x[:-1]), ("p", lambda x: x[:, 0]), ("b", lambda x: x[:, :1]), ("t", lambda x: x[:, None]),
-    ("t", lambda x: x[0]), ("tau", lambda x: np.stack((x, x))), ("t", lambda x: x[::-1]),
-    ("v", lambda x: x.astype(np.float32)), ("q", lambda x: x.astype(int)), ("qd", lambda x: x.astype(complex)),
-    ("delta", lambda x: x.astype("U8")), ("fh", lambda x: np.where(x == x[7], np.nan, x)),
-    ("v", lambda x: x + np.inf), ("removed", lambda x: x[:, None]), ("removal_rate", lambda x: x[1:]),
-    ("target", lambda x: x[:, 0]), ("gain", lambda x: x.astype(int)), ("target", lambda x: np.nan * x),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name,change",
+    [
+        ("fe", lambda x: x[:-1]),
+        ("p", lambda x: x[:, 0]),
+        ("b", lambda x: x[:, :1]),
+        ("t", lambda x: x[:, None]),
+        ("t", lambda x: x[0]),
+        ("tau", lambda x: np.stack((x, x))),
+        ("t", lambda x: x[::-1]),
+        ("v", lambda x: x.astype(np.float32)),
+        ("q", lambda x: x.astype(int)),
+        ("qd", lambda x: x.astype(complex)),
+        ("delta", lambda x: x.astype("U8")),
+        ("fh", lambda x: np.where(x == x[7], np.nan, x)),
+        ("v", lambda x: x + np.inf),
+        ("removed", lambda x: x[:, None]),
+        ("removal_rate", lambda x: x[1:]),
+        ("target", lambda x: x[:, 0]),
+        ("gain", lambda x: x.astype(int)),
+        ("target", lambda x: np.nan * x),
+    ],
+)
 def test_load_refuses_an_array_that_is_not_what_it_must_be_and_names_it(
     run, tmp_path, name, change
 ):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from tests.oracles import Linear, nonlinear, piecewise_linear
+from tests.oracles import Linear, nonlinear, piecewise_linear, store
 
 EDGES = (0.05, 0.15, 0.20)
 TH = (0.25, 2.0, 6.0)
@@ -59,11 +59,26 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_second_order_against_the_nonlinear_arm(name):
-    """Both axes in clay: error at 0.36 ms, and convergence order 2 +- 0.2 fitted over four steps."""
+    """Both axes in clay:
+
+    error at 0.36 ms, and convergence order 2 +- 0.2 fitted over four steps.
+    """
     s = hc.constant_cut(**CASES[name])
     th = TH if s.operator else None
     grid = np.arange(1, 400) * 0.024  # in every dt below
-    exact, t, p, _ = nonlinear((0, 90, 0), EDGES, s.gain, s.force, th, s.shaping, t_eval=grid)
+    x = store.solution(
+        f"second-order-{name}",
+        nonlinear,
+        (0, 90, 0),
+        EDGES,
+        s.gain,
+        s.force,
+        th,
+        s.shaping,
+        60.0,
+        grid,
+    )
+    exact, t, p = x.crossings, x.t, x.p
     assert len(exact) == 3
     r = hc.simulate(s)
     np.testing.assert_allclose(times(r), exact, atol=1e-6)
@@ -296,6 +311,8 @@ def test_runs_are_repeatable_bit_for_bit():
     np.testing.assert_array_equal(a.p, b.p)
 
 
+@pytest.mark.perf
+@pytest.mark.plain
 def test_speed_is_a_small_multiple_of_the_bare_engine():
     """A guard, not the measurement: benchmarks/throughput.py measures 2.5."""
     from benchmarks import throughput

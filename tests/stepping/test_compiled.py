@@ -90,7 +90,10 @@ def close(native, python, times, samples, energy):
 @fast
 @pytest.mark.parametrize("name", ALL)
 def test_native_is_python_within_rounding(name):
-    """The same operations in the same order: equal but for sums of sines, which NumPy adds up pairwise."""
+    """The same operations in the same order:
+
+    equal but for sums of sines, which NumPy adds up pairwise.
+    """
     python, native = (hc.simulate(ALL[name], engine=engine) for engine in ("python", "native"))
     assert native.outcome == python.outcome and native.steps == python.steps
     close(native, python, times=1e-12, samples=1e-12, energy=1e-12)
@@ -114,7 +117,10 @@ STILL = {
 @fast
 @pytest.mark.parametrize("name", STILL)
 def test_accurate_native_is_accurate_python_within_rounding(name):
-    """The engine adds up the stages itself in Python's run: roundings differ, over thousands of steps."""
+    """The engine adds up the stages itself in Python's run:
+
+    roundings differ, over thousands of steps.
+    """
     s = dataclasses.replace(STILL[name], integrator="accurate", dt=2e-3)
     python, native = (hc.simulate(s, engine=engine) for engine in ("python", "native"))
     assert native.outcome.code == python.outcome.code and native.steps == python.steps
@@ -242,6 +248,7 @@ def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
     same(r, b)
 
 
+@pytest.mark.plain
 def test_auto_takes_native_for_long_runs_only():
     assert simulate._stepper(hc.constant_cut(), "auto") is leapfrog.Leapfrog
     long = hc.constant_cut(dt=1e-4)
@@ -281,7 +288,7 @@ def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):
 
 @fast
 def test_engine_hears_nothing_and_keeps_nothing():
-    """No callback is installed, no warning written, and the engine's time step is found where it is."""
+    """No callback, no warning, and the time step is found where it is."""
     import mujoco
 
     from hapticclay.stepping import compiled
@@ -296,11 +303,12 @@ def test_engine_hears_nothing_and_keeps_nothing():
 
 @fast
 def test_compiled_code_is_kept_on_disk(tmp_path):
-    """A second process takes it from there, in a fraction of the time; who waits at a terminal is told why."""
+    """A second process is faster; a terminal is told what takes so long."""
     code = (
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
-        "from hapticclay.stepping import compiled; print(sum(compiled._stride.stats.cache_hits.values()))"
+        "from hapticclay.stepping import compiled; "
+        "print(sum(compiled._stride.stats.cache_hits.values()))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     took, said = [], []
@@ -326,6 +334,7 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
 
 
 @fast
+@pytest.mark.perf
 def test_native_is_faster():
     """A guard, not the measurement, which is in docs/bench."""
     s = hc.constant_cut(start=(0.06, 0.0), t_max=3.0)

@@ -1,7 +1,7 @@
-"""Muscle forces that vary, commands, growing clay and a start at speed, against independent solutions.
+"""Driven runs, growing clay, a start at speed, against independent solutions.
 
-With shaping each axis is linear: p, compensator and reference model under SciPy's DOP853 at 1e-11, the muscle
-force and the clay spelt out as functions of time.
+With shaping each axis is linear: p, compensator and reference model under SciPy's DOP853 at 1e-11,
+the muscle force and the clay spelt out as functions of time.
 """
 
 import dataclasses
@@ -24,7 +24,9 @@ def muscle_of(m, t, i):
     return np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))
 
 
-def axis_solution(i, b, K, uh, th, t_end, command=lambda t: 0.0, z0=None, edge=None):
+def axis_solution(  # noqa: PLR0913  # a case, spelt out
+    i, b, K, uh, th, t_end, command=lambda t: 0.0, z0=None, edge=None
+):
     """One axis under b(t), uh(t), command(t); z = (p, v, delta, delta', y, y')."""
     free, one = Linear(i, 0.0, K, 0.0, th).A, Linear(i, 1.0, K, 0.0, th).A
     forced = Linear(i, 0.0, K, 1.0, th).A[:, 6]
@@ -42,28 +44,52 @@ def axis_solution(i, b, K, uh, th, t_end, command=lambda t: 0.0, z0=None, edge=N
             return z[0] - edge
 
         events.terminal = True
-    return solve_ivp(rhs, (0.0, t_end), np.zeros(6) if z0 is None else z0, "DOP853", rtol=1e-11, atol=1e-13,
-                     dense_output=True, events=events)  # fmt: skip
+    return solve_ivp(
+        rhs,
+        (0.0, t_end),
+        np.zeros(6) if z0 is None else z0,
+        "DOP853",
+        rtol=1e-11,
+        atol=1e-13,
+        dense_output=True,
+        events=events,
+    )
 
 
-@pytest.mark.parametrize("kw,tolerance", [
-    (dict(), 1e-7), (dict(integrator="accurate", dt=2e-3), 1e-9), (dict(dt=2e-3), 4e-6),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,tolerance",
+    [
+        (dict(), 1e-7),
+        (dict(integrator="accurate", dt=2e-3), 1e-9),
+        (dict(dt=2e-3), 4e-6),
+    ],
+)
 def test_varying_muscle_force_and_command(kw, tolerance):
-    """Errors of second order in dt: (omega dt)^2/12 of some cm at 3 Hz is 2e-7 m at 0.36 ms; of fourth, far less."""
+    """Errors of second order in dt:
+
+    (omega dt)^2/12 of some cm at 3 Hz is 2e-7 m at 0.36 ms; of fourth, far less.
+    """
     muscle = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
     command = Multisine(rms=(1e-3, 2e-3), low=0.5, high=3.0, period=5.0, seed=6)
     s = dataclasses.replace(
-        hc.free(shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0), length=None, muscle=muscle, command=command,
+        hc.free(shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0),
+        length=None,
+        muscle=muscle,
+        command=command,
         **kw,
-    )  # fmt: skip
+    )
     r = hc.simulate(s)
     assert r.outcome.code == "time limit"
     for i in (0, 1):
         exact = axis_solution(
-            i, lambda t: 0.0, s.gain[i], lambda t, i=i: s.force[i] + muscle_of(muscle, t, i), TH, 4.0,
+            i,
+            lambda t: 0.0,
+            s.gain[i],
+            lambda t, i=i: s.force[i] + muscle_of(muscle, t, i),
+            TH,
+            4.0,
             lambda t, i=i: muscle_of(command, t, i) - muscle_of(command, 0.0, i),
-        ).sol(r.t)  # fmt: skip
+        ).sol(r.t)
         assert np.max(np.abs(r.p[:, i] - exact[0])) < tolerance
     residual = abs(r.energy["residual"]) / r.energy["throughput"]
     assert residual < (1e-6 if s.integrator == "fast" else 1e-9) * max(1.0, (s.dt / 3.6e-4) ** 2)
@@ -130,7 +156,10 @@ def test_growth_counts_from_the_first_entry():
 @pytest.mark.parametrize("control", ["continuous", "sampled"])
 @pytest.mark.parametrize("b,speed", [(90.0, 0.5), (1e4, 2.0), (1e9, 2.0), (90.0, 0.0)])
 def test_clay_hit_at_speed(b, speed, control):
-    """The loop as if it had moved so for long, delta ahead by G's lag: exact solution by matrix exponential."""
+    """The loop as if it had moved so for long, delta ahead by G's lag:
+
+    exact solution by matrix exponential.
+    """
     s = dataclasses.replace(
         hc.constant_cut(
             b=b,
@@ -159,13 +188,21 @@ def test_clay_hit_at_speed(b, speed, control):
     assert np.max(kinetic) <= 1.1 * np.max(0.5 / 0.7919 * np.gradient(position(t), t) ** 2)
 
 
-@pytest.mark.parametrize("engine,kw", [
-    ("python", dict()), ("native", dict()), ("python", dict(integrator="accurate", dt=1.8e-3)),
-    ("python", dict(control="sampled")),
-    ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "engine,kw",
+    [
+        ("python", dict()),
+        ("native", dict()),
+        ("python", dict(integrator="accurate", dt=1.8e-3)),
+        ("python", dict(control="sampled")),
+        ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
+    ],
+)
 def test_command_is_counted_from_the_start(engine, kw):
-    """K = 0 opens the loop: delta is the command less its value at t = 0, however the run is stepped; p = G delta."""
+    """K = 0 opens the loop:
+
+    delta is the command less its value at t = 0, however the run is stepped; p = G delta.
+    """
     command = Multisine(rms=(1e-3, 0.0), low=1.0, high=2.0, period=1.0, seed=2)
     s = hc.free(force=(0.0, 0.0), shaping=True, t_max=8000 * 3.6e-4)
     s = dataclasses.replace(s, gain=(0.0, 0.0), length=None, command=command, **kw)
@@ -179,7 +216,8 @@ def test_command_is_counted_from_the_start(engine, kw):
         - sig(0.0)[0]
     )
     later = r.t > 1.0  # what the start has left decays at 21/s
-    # (omega dt)^2/6 of 1.4 mm is 5e-9 m; held torques come half a sample late, which the servo's poles double
+    # (omega dt)^2/6 of 1.4 mm is 5e-9 m; held torques come half a sample late, which the servo's
+    # poles double
     tolerance = np.abs(r.v).max() * 3.6e-4 if s.control == "sampled" else 1e-7
     assert np.max(np.abs(r.p[:, 0] - moved)[later]) < tolerance
 
@@ -187,7 +225,12 @@ def test_command_is_counted_from_the_start(engine, kw):
 def test_driven_records_survive_the_disk(tmp_path):
     clay = Clay(Profile((0.01,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
     s = dataclasses.replace(
-        hc.free(t_max=0.1), clay=clay, muscle=Multisine(seed=3), command=Multisine(rms=(1e-3, 0.0)),
-        operator=Operator(), velocity=(0.1, 0.0), stop=False,
-    )  # fmt: skip
+        hc.free(t_max=0.1),
+        clay=clay,
+        muscle=Multisine(seed=3),
+        command=Multisine(rms=(1e-3, 0.0)),
+        operator=Operator(),
+        velocity=(0.1, 0.0),
+        stop=False,
+    )
     assert hc.Record.load(hc.simulate(s).save(tmp_path)).scenario == s

@@ -10,7 +10,10 @@ from tests.oracles import Linear
 
 
 def exact_clay_and_hand(b, K, uh, th):
-    """Energy that clay and hand damper take along x up to 20 cm, shaped: quadrature beside the exact equations."""
+    """Energy that clay and hand damper take along x up to 20 cm, shaped:
+
+    quadrature beside the exact equations.
+    """
     z, t = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0], float), 0.0
     for edge, c in ((0.05, 0.0), (0.15, b), (0.20, 0.0)):
         A = Linear(0, c, K, uh, th).A
@@ -52,8 +55,18 @@ def test_every_entry_converges_to_the_exact_integral_at_second_order(uh, th):
     assert 1.7 < np.polyfit(np.log(steps), np.log(errors), 1)[0] < 2.6, errors
 
 
-@pytest.mark.parametrize("kw", [dict(), dict(shaping=True), dict(b=1e6, t_max=2.0), dict(gain=(1.0, 1.0)),
-                                dict(dt=5e-3), dict(force=(1.0, 0.4)), dict(torque_limit=(0.2, 0.1))])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw",
+    [
+        dict(),
+        dict(shaping=True),
+        dict(b=1e6, t_max=2.0),
+        dict(gain=(1.0, 1.0)),
+        dict(dt=5e-3),
+        dict(force=(1.0, 0.4)),
+        dict(torque_limit=(0.2, 0.1)),
+    ],
+)
 def test_balance_closes_to_rounding_without_a_hand(kw):
     e = hc.simulate(hc.constant_cut(**kw)).energy
     assert abs(e["residual"]) < 1e-12 * e["throughput"]

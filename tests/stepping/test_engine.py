@@ -47,8 +47,24 @@ def test_inertia_matrix_is_the_same_at_every_pose_and_velocity_adds_no_torque():
 )
 def test_headless_scene_holds_nothing_that_it_does_not_need(scenario):
     m = hc.build(scenario)
-    for count in ("ngeom", "nsensor", "npair", "nmesh", "ntex", "nmat", "nlight", "ncam", "nhfield", "ntendon",
-                  "neq", "nflex", "nskin", "na", "nplugin", "nuserdata"):  # fmt: skip
+    for count in (
+        "ngeom",
+        "nsensor",
+        "npair",
+        "nmesh",
+        "ntex",
+        "nmat",
+        "nlight",
+        "ncam",
+        "nhfield",
+        "ntendon",
+        "neq",
+        "nflex",
+        "nskin",
+        "na",
+        "nplugin",
+        "nuserdata",
+    ):
         assert getattr(m, count) == 0, count
     assert (m.nq, m.nv, m.nbody) == (2, 2, 3)
 
@@ -74,7 +90,7 @@ def binary(model):
     ids=lambda part: "-".join(part),
 )
 def test_parts_that_live_in_the_loop_leave_the_model_as_it_is(part):
-    """Whoever leaves them out pays nothing for them, and whoever has them pays nothing in the engine."""
+    """A scene without them pays nothing; with them the engine pays nothing."""
     plain = hc.constant_cut()
     assert binary(hc.build(dataclasses.replace(plain, **part))) == binary(hc.build(plain))
 

@@ -1,7 +1,8 @@
-"""Stiff and extreme scenes beside a reference solution with a verdict of its own (benchmarks/reference.py)."""
+"""Stiff and extreme scenes beside a reference with a verdict of its own."""
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,31 @@ import hapticclay as hc
 from benchmarks import bench, extremes, reference
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.signals import Multisine
-from tests.oracles import piecewise_linear
+from tests.oracles import piecewise_linear, store
 
 CASES = extremes.cases()
-LISTED = ("clay b", "speed", "hand", "gain K", "step dt", "torque limits", "start", "borders", "reach", "force", "time",
-          "sampled", "accurate")  # fmt: skip
+LISTED = (
+    "clay b",
+    "speed",
+    "hand",
+    "gain K",
+    "step dt",
+    "torque limits",
+    "start",
+    "borders",
+    "reach",
+    "force",
+    "time",
+    "sampled",
+    "accurate",
+)
 
 
 def tolerance(case):
-    """[m] At 0.36 ms all but a few um of stiff borders; more where motors go into their limits between two samples."""
+    """Bound of the position error [m].
+
+    A few um beside stiff borders; more where motors reach their limits between samples.
+    """
     s = case.scenario
     if (
         case.group == "reach" or s.gain[0] > 1e3
@@ -28,12 +45,20 @@ def tolerance(case):
     return 5e-5 if s.dt > 1e-3 or min(s.torque_limit) < 1.0 else 1e-5
 
 
+def stored(case, s, times):
+    """The reference solution of a case, from the disk; a signal's phases are in no repr."""
+    if s.muscle or s.command:
+        return reference.solve(s, times)
+    name = re.sub(r"\W+", "-", f"{case.group} {case.name}")
+    return store.solution(f"extremes-{name}", reference.solve, s, times)
+
+
 @pytest.mark.parametrize(
     "case", [c for c in CASES if c.quick], ids=lambda c: f"{c.group}: {c.name}"
 )
 def test_verdict_is_the_reference_s_and_energy_is_bounded(case, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    row = extremes.run(case)
+    row = extremes.run(case, lambda *at: stored(case, *at))
     assert row["agree"], row
     assert row["nan"] == 0 and row["warnings"] == 0 and not list(tmp_path.iterdir())
     if row["reference"] not in ("unstable", "limit cycle"):
@@ -68,8 +93,15 @@ def test_published_verdicts_agree_and_nothing_escaped():
         assert r["nan"] == 0 and r["warnings"] == 0 and r["ours"] != "raised", r
         assert r["energy"] is None or r["energy"] < 1.05, r
     assert {r["ours"] for r in rows} == {
-        "finished", "time limit", "stalled", "saturated", "diverged", "limit cycle", "out of reach", "singular"
-    }  # fmt: skip
+        "finished",
+        "time limit",
+        "stalled",
+        "saturated",
+        "diverged",
+        "limit cycle",
+        "out of reach",
+        "singular",
+    }
 
 
 def test_a_scene_that_raises_is_a_row(monkeypatch):
@@ -119,7 +151,7 @@ def test_reference_crosses_borders_both_ways():
 
 
 def test_sliding_is_where_the_bounces_on_a_border_tend_to(monkeypatch):
-    """Taken to slide from 0.1 um of bounce on, far sooner than usual, the handle stays where it bounces otherwise."""
+    """Said to slide from a bounce of 0.1 um on, the handle stays where it bounces."""
     s = next(c.scenario for c in CASES if c.name == "along the border, from on it")
     s = dataclasses.replace(s, t_max=0.6)
     t = np.linspace(0.0, 0.599, 600)

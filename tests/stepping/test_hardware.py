@@ -26,21 +26,31 @@ EPS = np.finfo(float).eps
 
 
 def ring(axis, K, b, parts=None, **kw):
-    """A push on a handle at the nominal pose, in clay all around; the other axis without compensator."""
+    """A push at the nominal pose in clay all around; no compensator on the other axis."""
     i = "xy".index(axis)
     clay = Profile((), (b,))
     unit = lambda x: (x, 0.0) if i == 0 else (0.0, x)  # noqa: E731
     return hc.Scenario(
-        clay=Clay(clay, clay), gain=unit(K), force=(0.0, 0.0), velocity=unit(1e-4), origin=constants.NOMINAL,
-        operator=Operator(), length=None, control="sampled", interface=parts, stop=False, **kw,
-    )  # fmt: skip
+        clay=Clay(clay, clay),
+        gain=unit(K),
+        force=(0.0, 0.0),
+        velocity=unit(1e-4),
+        origin=constants.NOMINAL,
+        operator=Operator(),
+        length=None,
+        control="sampled",
+        interface=parts,
+        stop=False,
+        **kw,
+    )
 
 
 def cut(parts, **kw):
     return replace(hc.constant_cut(control="sampled", **kw), interface=parts)
 
 
-# ---- nothing, and seeds ------------------------------------------------------------------------------------------
+# ---- nothing, and seeds
+# ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -63,7 +73,8 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
 
 def test_without_an_interface_nothing_of_it_is_loaded():
     code = (
-        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, control='sampled')); "
+        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, "
+        "control='sampled')); "
         "print([m for m in ('interface', 'wired') if 'hapticclay.' + m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -79,23 +90,41 @@ def test_seeds_repeat_and_differ():
 
 
 def test_scenario_survives_the_record(tmp_path):
-    parts = hc.Interface(encoder=4096, velocity="difference", window=3, delay=1e-4, coupling=hc.Coupling(1e3, 10.0),
-                         friction=(0.01, 0.0), dac_bits=12, dac_range=(10.0, 5.0))  # fmt: skip
+    parts = hc.Interface(
+        encoder=4096,
+        velocity="difference",
+        window=3,
+        delay=1e-4,
+        coupling=hc.Coupling(1e3, 10.0),
+        friction=(0.01, 0.0),
+        dac_bits=12,
+        dac_range=(10.0, 5.0),
+    )
     r = hc.simulate(cut(parts, t_max=0.01))
     r.save(tmp_path)
     again = hc.Record.load(tmp_path)
     assert again.scenario == r.scenario and again.energy == r.energy
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(jitter=-1.0), "interface.jitter"), (dict(jitter=0.5 * TS), "interface.jitter"),
-    (dict(lost=1.0), "interface.lost"), (dict(encoder=2.5), "interface.encoder"),
-    (dict(velocity="diff"), "interface.velocity"), (dict(window=2), "interface.velocity"),
-    (dict(adc_bits=1), "interface.adc_bits"), (dict(filter_order=3), "interface.filter_order"),
-    (dict(dac_range=(1.0,)), "interface.dac_range"), (dict(delay=101 * TS), "interface.delay"),
-    (dict(friction=(-0.1, 0.0)), "interface.friction[shoulder]"), (dict(coupling=3.0), "interface.coupling"),
-    (dict(passivity=1), "interface.passivity"), (dict(seed=None), "interface.seed"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(jitter=-1.0), "interface.jitter"),
+        (dict(jitter=0.5 * TS), "interface.jitter"),
+        (dict(lost=1.0), "interface.lost"),
+        (dict(encoder=2.5), "interface.encoder"),
+        (dict(velocity="diff"), "interface.velocity"),
+        (dict(window=2), "interface.velocity"),
+        (dict(adc_bits=1), "interface.adc_bits"),
+        (dict(filter_order=3), "interface.filter_order"),
+        (dict(dac_range=(1.0,)), "interface.dac_range"),
+        (dict(delay=101 * TS), "interface.delay"),
+        (dict(friction=(-0.1, 0.0)), "interface.friction[shoulder]"),
+        (dict(coupling=3.0), "interface.coupling"),
+        (dict(passivity=1), "interface.passivity"),
+        (dict(seed=None), "interface.seed"),
+    ],
+)
 def test_bad_parts_are_refused(kw, field):
     with pytest.raises(ParameterError) as e:
         cut(hc.Interface(**kw))
@@ -111,7 +140,8 @@ def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
         hc.Coupling(0.0, 1.0)
 
 
-# ---- converters and encoder --------------------------------------------------------------------------------------
+# ---- converters and encoder
+# --------------------------------------------------------------------------------------
 
 
 @given(st.floats(-20.0, 20.0), st.integers(2, 24), st.floats(0.1, 100.0))
@@ -158,7 +188,8 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
     assert np.abs(few.tau[:, 0]).max() == 0.1
 
 
-# ---- velocity ----------------------------------------------------------------------------------------------------
+# ---- velocity ------------------------------------------------------------------------------------
+# ----------------
 
 
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
@@ -169,7 +200,10 @@ def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
 
 
 def test_window_divides_the_noise_of_an_encoder():
-    """m samples hold n or n + 1 counts, the latter as often as the fraction f says: rms sqrt(f (1 - f)) of a count."""
+    """m samples hold n or n + 1 counts, the latter as often as the fraction f says:
+
+    rms sqrt(f (1 - f)) of a count.
+    """
     counts, Ts, w = 4096, 1e-3, 0.7391
     for m in (1, 4, 16):
         q = [hardware.encode(w * k * Ts, counts) for k in range(4000)]
@@ -224,7 +258,8 @@ def test_difference_lags_half_its_window_in_a_run():
         )
 
 
-# ---- force -------------------------------------------------------------------------------------------------------
+# ---- force ---------------------------------------------------------------------------------------
+# ----------------
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -258,7 +293,8 @@ def test_noise_has_its_rms_and_each_part_its_own_stream():
     assert [b(k)[2] for k in range(50)] == [a(k)[2] for k in range(50)]
 
 
-# ---- time --------------------------------------------------------------------------------------------------------
+# ---- time ----------------------------------------------------------------------------------------
+# ----------------
 
 
 def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
@@ -334,14 +370,17 @@ def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(a
     assert 0.0 < np.interp(0.0, found, [0.98, 1.02]) - 0.98 < 0.04
 
 
-# ---- friction ----------------------------------------------------------------------------------------------------
+# ---- friction ------------------------------------------------------------------------------------
+# ----------------
 
 
 @given(
     st.tuples(st.floats(-1, 1), st.floats(-1, 1)),
-    st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(-0.95, 0.95),
+    st.floats(0.1, 10.0),
+    st.floats(0.1, 10.0),
+    st.floats(-0.95, 0.95),
     st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)),
-)  # fmt: skip
+)
 def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
     a12 = share * math.sqrt(a11 * a22)
     f = hardware.coulomb_friction(w, a11, a12, a22, limit)
@@ -357,7 +396,10 @@ def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
 
 
 def test_a_push_below_the_friction_does_not_move_the_arm_and_one_above_does():
-    """At rest, without compensator, the motors give nothing: the hand's torques J'f against the limit."""
+    """At rest, without compensator, the motors give nothing:
+
+    the hand's torques J'f against the limit.
+    """
     s = replace(hc.free(control="sampled", t_max=0.3), gain=(0.0, 0.0), force=(0.1, 0.0))
     q = arm.inverse_kinematics(*s.origin)
     u = arm.jacobian(*q)
@@ -379,8 +421,13 @@ def test_friction_takes_its_torque_times_the_travel():
 
 
 def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
-    s = replace(hc.free(control="sampled", t_max=0.2), gain=(0.0, 0.0), force=(0.0, 0.0), velocity=(0.05, 0.0),
-                interface=hc.Interface(friction=(2.0, 2.0)))  # fmt: skip
+    s = replace(
+        hc.free(control="sampled", t_max=0.2),
+        gain=(0.0, 0.0),
+        force=(0.0, 0.0),
+        velocity=(0.05, 0.0),
+        interface=hc.Interface(friction=(2.0, 2.0)),
+    )
     r = hc.simulate(s)
     assert abs(r.qd[0, 1]) > 0.1
     assert np.abs(r.qd[50:, 1]).max() < 1e-14 and np.ptp(r.q[50:, 1]) < 1e-14 < 1e-3 < np.ptp(
@@ -388,7 +435,8 @@ def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
     )
 
 
-# ---- passivity observer and controller, coupling -----------------------------------------------------------------
+# ---- passivity observer and controller, coupling
+# -----------------------------------------------------------------
 
 
 @given(
@@ -483,7 +531,8 @@ def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
     assert hc.simulate(cut(hc.Interface(), **kw)).outcome.code == "limit cycle"
 
 
-# ---- all of it ---------------------------------------------------------------------------------------------------
+# ---- all of it -----------------------------------------------------------------------------------
+# ----------------
 
 
 def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():

@@ -67,8 +67,12 @@ def test_a_function_without_source_is_left_alone():
     assert inline.inline(space["f"]) is space["f"]
 
 
+@pytest.mark.perf
 def test_inlining_the_loop_is_quick():
-    """A ratio: against compiling the module it comes from (20 times that; it is done once per process)."""
+    """A ratio:
+
+    against compiling the module it comes from (20 times that; it is done once per process).
+    """
     import time
     from pathlib import Path
 

@@ -41,7 +41,7 @@ def test_inlined_loop_is_bit_identical_to_the_plain_one(name, monkeypatch):
 
 @pytest.mark.parametrize("name", CASES)
 def test_engine_does_what_the_tick_foretold(name, monkeypatch):
-    """The rates after each engine step, and so the force the compensator saw, are the predicted ones."""
+    """The rates after each engine step are the predicted ones."""
     worst = 0.0
     plain = leapfrog.Leapfrog._engine
 

@@ -98,7 +98,7 @@ def test_clay_that_was_never_touched_makes_no_loop_unstable():
 
 @pytest.mark.parametrize("dt", [3.6e-4, 1e-2])
 def test_a_spring_far_too_stiff_for_the_step_gets_no_more_energy_than_it_is_given(dt):
-    """A step of force F on a spring k alone stores F^2/(2 k) at most in the mass; omega dt is 1, and 28."""
+    """A step of force F on a spring k stores F^2/(2 k) at most; omega dt is 1, and 28."""
     s = hc.constant_cut(gain=(1e-3, 1e-3), t_max=0.5, dt=dt)
     r = hc.simulate(dataclasses.replace(s, operator=Operator(0.0, 0.0, 1e7)))
     kinetic = 0.5 * (arm.I1 * r.qd[:, 0] ** 2 + arm.I2 * r.qd.sum(axis=1) ** 2)
@@ -106,7 +106,10 @@ def test_a_spring_far_too_stiff_for_the_step_gets_no_more_energy_than_it_is_give
 
 
 def test_a_beat_between_the_axes_is_no_instability():
-    """A heavy hand on a stiff spring swings on both axes at nearly one frequency: x lends its energy to y."""
+    """A heavy hand on a stiff spring swings on both axes at nearly one frequency:
+
+    x lends its energy to y.
+    """
     s = hc.constant_cut(gain=(1e-3, 1e-3), t_max=1.0)
     s = dataclasses.replace(s, operator=Operator(100.0, 0.0, 1e7))
     r = hc.simulate(s)
@@ -118,12 +121,24 @@ def test_a_beat_between_the_axes_is_no_instability():
     assert hc.simulate(s).outcome.code == "time limit"
 
 
-@pytest.mark.parametrize("kw", [
-    dict(), dict(shaping=True), dict(operator=hc.Operator(), force=(2.0, 0.0)), dict(gain=(2.5, 0.5)), dict(gain=(1.0, 0.7)),
-    dict(torque_limit=(0.05, 0.05)), dict(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0),
-    dict(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6), dict(b=1.0), dict(b=1000.0, t_max=5.0),
-    dict(b=1e6, t_max=2.0), dict(torque_limit=(0.2, 0.2)), dict(dt=5e-3),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw",
+    [
+        dict(),
+        dict(shaping=True),
+        dict(operator=hc.Operator(), force=(2.0, 0.0)),
+        dict(gain=(2.5, 0.5)),
+        dict(gain=(1.0, 0.7)),
+        dict(torque_limit=(0.05, 0.05)),
+        dict(torque_limit=(0.1, 0.1), force=(3.0, 1.0), t_max=8.0),
+        dict(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.6),
+        dict(b=1.0),
+        dict(b=1000.0, t_max=5.0),
+        dict(b=1e6, t_max=2.0),
+        dict(torque_limit=(0.2, 0.2)),
+        dict(dt=5e-3),
+    ],
+)
 def test_stable_runs_are_not_called_unstable(kw):
     r = hc.simulate(hc.constant_cut(**kw))
     assert r.outcome.code in ("finished", "time limit", "stalled"), r.status
@@ -153,14 +168,21 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
         assert (found.code, found.axis) == ("diverged", "y")
 
 
-@pytest.mark.parametrize("kw,code,word", [
-    (dict(force=(0.0, 0.0), t_max=2.0), "stalled", "give a force"),
-    (dict(b=1e9, t_max=3.0), "stalled", "lower b"),
-    (dict(operator=hc.Operator(), t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01), "stalled", "spring"),
-    (dict(torque_limit=(0.05, 0.05), force=(0.0, 5.0), t_max=1.5, b=1000.0), "saturated", "torque_limit"),
-    (dict(b=1.0, t_max=4.0), "finished", ""),
-    (dict(b=90.0, t_max=1.0), "time limit", ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,code,word",
+    [
+        (dict(force=(0.0, 0.0), t_max=2.0), "stalled", "give a force"),
+        (dict(b=1e9, t_max=3.0), "stalled", "lower b"),
+        (dict(operator=hc.Operator(), t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01), "stalled", "spring"),
+        (
+            dict(torque_limit=(0.05, 0.05), force=(0.0, 5.0), t_max=1.5, b=1000.0),
+            "saturated",
+            "torque_limit",
+        ),
+        (dict(b=1.0, t_max=4.0), "finished", ""),
+        (dict(b=90.0, t_max=1.0), "time limit", ""),
+    ],
+)
 def test_how_a_stable_run_ends(kw, code, word):
     r = hc.simulate(hc.constant_cut(**kw))
     assert r.outcome.code == code, r.status
@@ -218,7 +240,10 @@ def test_no_parameters_make_it_raise_or_record_nan(K, Ky, b, dt):
 
 
 def test_a_command_may_beat_as_it_likes():
-    """Two close lines grow from next to nothing, swing by swing, and shrink again: no instability at K = 0."""
+    """Two close lines grow from next to nothing, swing by swing, and shrink again:
+
+    no instability at K = 0.
+    """
     command = hc.Multisine(rms=(1e-3, 0.0), low=4.9, high=5.1, period=10.0, lines=2, seed=0)
     s = dataclasses.replace(
         hc.free(force=(0.0, 0.0), t_max=3.0),

@@ -9,7 +9,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from tests.oracles import nonlinear_pieces, piecewise_linear
+from tests.oracles import nonlinear, piecewise_linear, store
 
 EDGES = (0.05, 0.15, 0.20)
 CASES = {
@@ -24,12 +24,17 @@ CASES = {
 def test_fourth_order_and_1e_9_s_at_2_ms(name):
     s = hc.constant_cut(integrator="accurate", **CASES[name])
     th = (0.25, 2.0, 6.0) if s.operator else None
-    exact = nonlinear_pieces((0, 90, 0), EDGES, s.gain, s.force, th, s.shaping, 60.0, 1e-13, 1e-15)
+    grid = np.arange(1, 15_000) * 4e-3  # in every dt below
+    exact = store.solution(
+        f"fourth-order-{name}", nonlinear, (0, 90, 0), EDGES, s.gain, s.force, th, s.shaping, 60.0,
+        grid, 1e-13, 1e-15,
+    )  # fmt: skip
     steps, border, place = np.array([4e-3, 2e-3, 1e-3]), [], []
     for dt in steps:
         r = hc.simulate(dataclasses.replace(s, dt=float(dt)))
         border.append(np.max(np.abs(np.array([c.time for c in r.crossings]) - exact.crossings)))
-        place.append(np.max(np.abs(r.p[:-1] - exact(r.t[:-1])[0])))
+        i = np.rint(exact.t / dt).astype(int)
+        place.append(np.max(np.abs(r.p[i] - exact.p)))
     assert border[1] < 1e-9 and place[1] < 1e-8
     for error in (border, place):
         assert 3.6 < np.polyfit(np.log(steps), np.log(error), 1)[0] < 4.6, error

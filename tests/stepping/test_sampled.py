@@ -50,7 +50,10 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     ],
 )
 def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
-    """Spring and damper of the hand act from the start; its mass does not: nothing accelerated before it."""
+    """Spring and damper of the hand act from the start; its mass does not:
+
+    nothing accelerated before it.
+    """
     cut = hc.constant_cut(
         control="sampled",
         force=(0.5, 0.2),
@@ -73,7 +76,10 @@ def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
 
 @pytest.mark.parametrize("operator,late", [(None, 0.0), (Operator(), 0.0), (None, 0.3)])
 def test_the_recorded_force_belongs_to_its_sample(operator, late):
-    """Off by second order in the sample: fh = uh(t) without a hand, uh - Th p with one, by central differences."""
+    """Off by second order in the sample:
+
+    fh = uh(t) without a hand, uh - Th p with one, by central differences.
+    """
     drive = Multisine((1.0, 0.5), low=2.0, high=8.0, period=1.0, seed=2)
     error, lead = [], []
     for Ts in (2e-3, 1e-3):
@@ -162,11 +168,17 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     )
 
 
-@pytest.mark.parametrize("kw,field", [
-    (dict(control="sampeld"), "control"), (dict(control="sampled", render="hold"), "render"),
-    (dict(Ts=1e-3), "Ts"), (dict(control="sampled", Ts=5e-4), "Ts"), (dict(control="sampled", Ts=1e-4), "Ts"),
-    (dict(control="sampled", integrator="accurate"), "integrator"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw,field",
+    [
+        (dict(control="sampeld"), "control"),
+        (dict(control="sampled", render="hold"), "render"),
+        (dict(Ts=1e-3), "Ts"),
+        (dict(control="sampled", Ts=5e-4), "Ts"),
+        (dict(control="sampled", Ts=1e-4), "Ts"),
+        (dict(control="sampled", integrator="accurate"), "integrator"),
+    ],
+)
 def test_bad_choices_are_refused(kw, field):
     with pytest.raises(ParameterError) as e:
         dataclasses.replace(hc.constant_cut(), **kw)

@@ -7,18 +7,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import bench, extremes, hits, parts, problems, scaling, stiffness, throughput
+from benchmarks import (
+    bench,
+    common,
+    extremes,
+    hits,
+    parts,
+    problems,
+    scaling,
+    stiffness,
+    throughput,
+)
 from benchmarks import work_precision as wp
-from benchmarks.peers import common, scipy_ivp
+from benchmarks.peers import common as peers
+from benchmarks.peers import scipy_ivp
 
 
 @pytest.fixture(scope="module")
 def rows():
-    found, omissions = wp.measure(
-        True, ["default cut"], ("ours", "mujoco_plain", "scipy_ivp", "no_such_peer")
-    )
+    names = "ours", "mujoco_plain", "scipy_ivp", "no_such_peer"
+    found, omissions = wp.measure(True, ["default cut"], names, rounds=1)
     assert len(omissions) == 1 and "no_such_peer" in omissions[0]
     return found
+
+
+@pytest.fixture(scope="module")
+def scaled():
+    """What a sweep on worker processes took."""
+    pytest.importorskip("distributed", reason="pip install 'hapticclay[cluster]'")
+    return scaling.measure(True, 1)
 
 
 def of(rows, package, **kw):
@@ -64,12 +81,15 @@ def test_peers_converge_to_the_reference(rows):
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS)
 def test_compiled_right_hand_side_is_the_plain_one(problem):
-    """The same law compiled: rounding of sums in another order; and so the same crossings, at an rtol of 1e-10."""
-    job = common.Job.of(problem)
-    plain, fast = common.ode(job), common.compiled_ode(job)
+    """The same law compiled:
+
+    rounding of sums in another order; and so the same crossings, at an rtol of 1e-10.
+    """
+    job = peers.Job.of(problem)
+    plain, fast = peers.ode(job), peers.compiled_ode(job)
     rng = np.random.default_rng(0)
     for b in job.b:
-        z = common.initial(job) + 0.1 * rng.normal(size=12)
+        z = peers.initial(job) + 0.1 * rng.normal(size=12)
         np.testing.assert_allclose(fast(0.0, z, b), plain(0.0, z, b), rtol=1e-12, atol=1e-12)
     one, other = (
         scipy_ivp.solve(problem, m, 1e-10).crossings for m in ("DOP853", "DOP853, compiled")
@@ -79,8 +99,11 @@ def test_compiled_right_hand_side_is_the_plain_one(problem):
 
 def test_leaders_are_said_by_the_figures():
     times = {"a": {1e-5: 1.0, 1e-9: 4.0}, "b": {1e-7: 6.0, 1e-9: 3.0}}
-    rows = [dict(problem="p", package=k, method="m", setting=e, crossing=e, wall=w)
-            for k, x in times.items() for e, w in x.items()]  # fmt: skip
+    rows = [
+        dict(problem="p", package=k, method="m", setting=e, crossing=e, wall=w)
+        for k, x in times.items()
+        for e, w in x.items()
+    ]
     found = wp.leaders(rows)
     assert [x["package"] for x in found] == ["a"] * 4 + ["b"] * 3  # from 1e-2 to 1e-5, from 1e-6 on
     assert (
@@ -103,7 +126,7 @@ def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):
 
 def test_page_says_what_was_measured_and_nothing_else(rows, tmp_path):
     data = {
-        "machine": wp.machine(),
+        "machine": common.machine(),
         "omissions": ["a peer: not installed"],
         "rows": rows,
         "hybrid": [],
@@ -114,7 +137,7 @@ def test_page_says_what_was_measured_and_nothing_else(rows, tmp_path):
             f"| {r['package']} ",
             f"| {r['method']} ",
             f"| {r['setting']:g} ",
-            f"| {wp.number(r['crossing'])} ",
+            f"| {common.number(r['crossing'])} ",
         )
         assert any(all(c in line for c in cells) for line in text.splitlines())
     assert "- a peer: not installed" in text and "mujoco 4" in text
@@ -155,9 +178,10 @@ def test_sampled_rows_recommend_nothing(rows):
 
 
 def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
-    tmp_path, monkeypatch, capsys
+    tmp_path, monkeypatch, capsys, rows, scaled
 ):
-    monkeypatch.setattr(wp.measure, "__defaults__", (("ours",),))
+    monkeypatch.setattr(wp, "measure", lambda *a, **kw: (of(rows, "hapticclay"), []))
+    monkeypatch.setattr(scaling, "measure", lambda *a: scaled)
     monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
     monkeypatch.setattr(hits, "CLAYS", (1e1, 1e3))
@@ -171,9 +195,17 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     bench.main(tmp_path / "o", True, readme)
     files = sorted(p.name for p in (tmp_path / "o").iterdir())
     assert files == [
-        "bench.md", "default_cut.png", "extremes.json", "hits.json", "parts.json", "scaling.json", "scaling.png",
-        "stiffness.json", "throughput.json", "work_precision.json",
-    ]  # fmt: skip
+        "bench.md",
+        "default_cut.png",
+        "extremes.json",
+        "hits.json",
+        "parts.json",
+        "scaling.json",
+        "scaling.png",
+        "stiffness.json",
+        "throughput.json",
+        "work_precision.json",
+    ]
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
     assert methods - {"fast, native", "accurate, native"} == {
@@ -221,10 +253,10 @@ def test_published_stiff_clay_breaks_nothing_of_ours():
     assert all(r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1 for r in rows)
 
 
-def test_scaling_is_measured_and_its_projection_is_bounded(tmp_path):
-    pytest.importorskip("distributed", reason="pip install 'hapticclay[cluster]'")
+def test_scaling_is_measured_and_its_projection_is_bounded(tmp_path, monkeypatch, scaled):
+    monkeypatch.setattr(scaling, "measure", lambda *a: scaled)
     data = scaling.main(tmp_path, quick=True)
-    assert [r["workers"] for r in data["rows"]] == list(range(1, scaling.CORES + 1))
+    assert [r["workers"] for r in data["rows"]] == list(range(1, common.CORES + 1))
     assert data["rows"][0]["speedup"] == 1.0 and all(r["runs_per_s"] > 0.0 for r in data["rows"])
     bound = data["asked_s"] / data["task_s"]
     assert all(r["speedup"] == min(r["workers"], bound) for r in data["projection"])

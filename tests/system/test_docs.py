@@ -83,7 +83,7 @@ def test_make_targets_named_in_the_documents_exist():
     makefile = (ROOT / "Makefile").read_text()
     for text in (README, (ROOT / "CONTRIBUTING.md").read_text()):
         for names in re.findall(
-            r"^    make ((?:demo|test|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M
+            r"^    make ((?:demo|test|coverage|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M
         ):
             for name in names.split():
                 assert re.search(rf"^{name}:", makefile, re.M), name

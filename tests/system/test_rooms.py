@@ -1,4 +1,4 @@
-"""What `import hapticclay` and a run load, and how long the import takes; import-linter holds who may import whom."""
+"""What `import hapticclay` and a run load, how fast, and who imports whom."""
 
 import subprocess
 import sys
@@ -53,6 +53,7 @@ def test_the_rooms_stand_as_drawn():
     assert out.returncode == 0, out.stdout
 
 
+@pytest.mark.perf
 def test_import_is_quick_beside_mujoco():
     """A ratio: all that a run loads against MuJoCo alone, best of five, in fresh processes."""
     code = (

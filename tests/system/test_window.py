@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import json
 import math
 import os
 import queue
@@ -50,16 +51,43 @@ def screen():
         yield {**os.environ, "DISPLAY": name}
 
 
+# `python -m hapticclay`, which also tells a file what each picture was made of
+TOLD = """
+import json, os, runpy
+from hapticclay.views.window import Window
+
+look, seen = Window.look, {"pictures": 0}
+
+def told(self, keys, hand):
+    sight, play = look(self, keys, hand), self.play
+    if seen.get("name") != play.scenario.name:
+        seen["pictures"] = 0  # of this scenario
+    seen.update(
+        pictures=seen["pictures"] + 1, x=play.frames[-1][1][0], held=hand is not None,
+        frames=play.clock.frames, name=play.scenario.name, help=self.help, gain=play.gain[0],
+        b=play.scenario.clay.x.values[1] if play.scenario.clay else 0.0,
+    )
+    with open(os.environ["TOLD"] + "~", "w") as f:
+        json.dump(seen, f)
+    os.replace(f.name, os.environ["TOLD"])
+    return sight
+
+Window.look = told
+runpy.run_module("hapticclay", run_name="__main__", alter_sys=True)
+"""
+
+
 class Mouse:
-    """A person at the window of one command."""
+    """A person at the window of one command, who waits for what is to be seen, not for a time."""
 
     def __init__(self, screen, folder, *args):
-        self.screen = screen
+        self.screen, self.told = screen, folder.with_name(folder.name + ".told")
         self.program = subprocess.Popen(
-            [sys.executable, "-W", "error", "-X", "faulthandler", "-m", "hapticclay", *args],
-            cwd=folder, env=screen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            [sys.executable, "-W", "error", "-X", "faulthandler", "-c", TOLD, *args],
+            cwd=folder, env={**screen, "TOLD": str(self.told)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True,
         )  # fmt: skip
-        for _ in range(240):
+        for _ in range(600):
             found = subprocess.run(
                 ["xdotool", "search", "--name", "MuJoCo"],
                 env=screen,
@@ -68,23 +96,41 @@ class Mouse:
             )
             if found.stdout or self.program.poll() is not None:
                 break
-            time.sleep(0.25)
+            time.sleep(0.1)
         self.window = (
             found.stdout.split()[0]
             if found.stdout
             else pytest.fail(f"no window: {self.program.communicate()}")
         )
-        time.sleep(5.0)  # for the first pictures
+        self.until(lambda now: now["pictures"] >= 5)
+
+    def seen(self):
+        """What the last picture was made of."""
+        return json.loads(self.told.read_text()) if self.told.exists() else {"pictures": 0}
+
+    def until(self, condition, seconds=60.0):
+        """Wait for a picture of which this is true; fail if none comes."""
+        end = time.monotonic() + seconds
+        while not condition(now := self.seen()):
+            if time.monotonic() > end or self.program.poll() is not None:
+                pytest.fail(f"not within {seconds} s: {now}")
+            time.sleep(0.01)
+
+    def pictures(self, n):
+        """Wait for n more pictures."""
+        before = self.seen()["pictures"]
+        self.until(lambda now: now["pictures"] >= before + n)
 
     def do(self, *words):
         subprocess.run(["xdotool", *map(str, words)], env=self.screen, check=True)
 
-    def drag(self, pixels):
+    def drag(self, pixels, pictures=1):
+        """Pull to the right in 20 moves, each seen for so many pictures."""
         self.do("mousemove", 400, 300, "keydown", "ctrl", "mousedown", 3)
-        time.sleep(1.0)
-        for _ in range(40):
-            self.do("mousemove_relative", "--", pixels // 40, 0)
-            time.sleep(0.1)
+        self.pictures(5)
+        for _ in range(20):
+            self.do("mousemove_relative", "--", pixels // 20, 0)
+            self.pictures(pictures)
 
     def end(self, how):
         """Closes the window and returns exit status and output; fails after a minute."""
@@ -106,7 +152,7 @@ class Mouse:
     def close(self):
         """Lets go and quits; exit status, output."""
         self.do("mouseup", 3, "keyup", "ctrl")
-        time.sleep(1.0)
+        self.pictures(3)
         return self.end("Ctrl-Q")
 
 
@@ -143,6 +189,7 @@ def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_p
     mouse = Mouse(screen, tmp_path, "view", "--b", "200", "--out", "o", "--no-plots")
     try:
         mouse.drag(200)
+        mouse.until(lambda now: now["x"] > 0.06)  # 1 cm inside
         code, out, err = mouse.end(how)
     finally:
         mouse.do("mouseup", 3, "keyup", "ctrl")
@@ -163,8 +210,8 @@ def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
 
 def test_mouse_cuts_through_the_clay(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "--out", "o")
-    mouse.drag(240)
-    time.sleep(8.0)
+    mouse.drag(240, 5)  # slowly, so that the way is straight
+    mouse.until(lambda now: now["x"] > 0.17 and now["frames"] > 100)
     code, out, err = mouse.close()
     assert (code, err) == (0, ""), (out, err)
     record = hc.Record.load(tmp_path / "o")
@@ -188,10 +235,11 @@ def test_mouse_cuts_through_the_clay(screen, tmp_path):
 def test_keys_change_what_runs_and_switch_the_scenario(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "free", "--out", "o", "--no-plots")
     mouse.do("key", "1")
-    time.sleep(6.0)
-    for key in ("Up", "Right", "Right", "h"):
+    mouse.until(lambda now: now["name"] == "constant" and now["pictures"] >= 5)
+    for key, what in (("Up", "gain"), ("Right", "b"), ("Right", "b"), ("h", "help")):
+        before = mouse.seen()[what]
         mouse.do("key", key)
-        time.sleep(1.0)
+        mouse.until(lambda now, what=what, before=before: now[what] != before)
     code, out, err = mouse.close()
     assert (code, err) == (0, ""), (out, err)
     record = hc.Record.load(tmp_path / "o")

@@ -59,6 +59,7 @@ def test_frames_show_the_clay_being_cut_and_the_plots_growing(record):
 
 
 @needs_gl
+@pytest.mark.perf
 def test_frame_is_quick_in_software(record):
     """A frame of 640x480 takes less than 60 ms of processor time; wall time depends on load."""
     images = film.frames(record, FilmOptions(size=(640, 480)))

@@ -1,0 +1,77 @@
+"""What every benchmark writes: its data with schema and machine, its numbers, its command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from hapticclay import files
+
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+DISTRIBUTIONS = (
+    "hapticclay",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "control",
+    "pybullet",
+    "drake",
+    "pin",
+)
+
+
+def machine() -> list[str]:
+    """Return lines on where and with what the figures were made."""
+    found = []
+    for name in DISTRIBUTIONS:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        names = [
+            x.split(":", 1)[1].strip()
+            for x in info.read_text().splitlines()
+            if x.startswith("model name")
+        ]
+        cpu = names[0] if names else cpu
+    return [
+        f"{cpu}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        ", ".join(found),
+        f"load average {os.getloadavg()[1]:.1f} at the end; "
+        "run times are those of a quiet machine only where it is low",
+    ]
+
+
+def number(x: float | None) -> str:
+    """Format a figure of a table; "-" for None."""
+    return "-" if x is None else format(x, ".1e")
+
+
+def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
+    """Write out/name.json with schema and machine; return what it holds."""
+    data = {"schema": f"hapticclay-{name.replace('_', '-')}-2", "machine": machine(), **found}
+    with files.atomic(out / f"{name}.json") as f:
+        f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
+    return data
+
+
+def parser(doc: str | None) -> argparse.ArgumentParser:
+    """Return the command line that all benchmarks share: --out.
+
+    Args:
+        doc: the module's docstring.
+    """
+    made = argparse.ArgumentParser(
+        description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    made.add_argument("--out", type=Path, default=Path("out/bench"))
+    return made
