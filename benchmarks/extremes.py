@@ -280,7 +280,9 @@ def cases() -> list[Case]:
 
     g = "sampled"
     add(g, "held", cut(control="sampled", t_max=1.5), True)
-    add(g, "held, hand", cut(control="sampled", t_max=1.5, operator=hc.Operator(), force=(2.0, 0.0)))
+    add(
+        g, "held, hand", cut(control="sampled", t_max=1.5, operator=hc.Operator(), force=(2.0, 0.0))
+    )
     add(
         g,
         "held, b = 8e3, goes on",

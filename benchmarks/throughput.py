@@ -35,7 +35,9 @@ OFTEN = 5  # compiled runs to one in Python, which takes as long
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
     "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
-    "constant cut, Th": hc.constant_cut(start=(0.06, 0.0), operator=hc.Operator(), force=(2.0, 0.0)),
+    "constant cut, Th": hc.constant_cut(
+        start=(0.06, 0.0), operator=hc.Operator(), force=(2.0, 0.0)
+    ),
     "free space": hc.free(gain=(0.01, 0.01)),
 }
 

@@ -173,7 +173,11 @@ def test_watch_tells_growth_from_decay(ratio, verdict, chunk):
     [
         (dict(force=(0.0, 0.0), t_max=2.0), "stalled", "give a force"),
         (dict(b=1e9, t_max=3.0), "stalled", "lower b"),
-        (dict(operator=hc.Operator(), t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01), "stalled", "spring"),
+        (
+            dict(operator=hc.Operator(), t_max=1000.0, gain=(3.0, 0.3), b=1.0, dt=0.01),
+            "stalled",
+            "spring",
+        ),
         (
             dict(torque_limit=(0.05, 0.05), force=(0.0, 5.0), t_max=1.5, b=1000.0),
             "saturated",

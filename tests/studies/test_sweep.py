@@ -525,7 +525,10 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     )
     table = sweep.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
-        assert study_plots.missing_reasons(table, value) == ["no clay reached", "no clay reached", ""] * 3
+        assert (
+            study_plots.missing_reasons(table, value)
+            == ["no clay reached", "no clay reached", ""] * 3
+        )
         figure = study_plots.sweep_plot(table, value)
         shown = figure.axes[0].collections[0].get_array()
         np.testing.assert_array_equal(
