@@ -1,4 +1,4 @@
-"""The hardware between computer and arm (Fig. 3), as frozen records; the laws are in `interface`."""
+"""The hardware between computer and arm (Fig. 3): its parts as frozen records, and their laws."""
 
 from __future__ import annotations
 
@@ -247,7 +247,7 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
             det = a11 * a22 - a12 * a12
             f1, f2 = (a12 * w[1] - a22 * w[0]) / det, (a12 * w[0] - a11 * w[1]) / det
         v1, v2 = w[0] + a11 * f1 + a12 * f2, w[1] + a12 * f1 + a22 * f2
-        # how far the case is from fitting: a resting joint beyond its limit, a sliding one that goes the other way
+        # distance of the case from a fit: a resting joint beyond its limit, a sliding one reversed
         wrong = max(
             -s1 * v1 / a11 if s1 else abs(f1) - limit[0],
             -s2 * v2 / a22 if s2 else abs(f2) - limit[1],

@@ -79,10 +79,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Multisine:
-    """A periodic signal of random phases: sum of cosines at multiples of 1/period between low and high.
+    """A periodic signal: cosines of random phases at multiples of 1/period between low and high.
 
-    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System Identification,
-    2012, sec. 2.3).
+    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System
+    Identification, 2012, sec. 2.3).
 
     Attributes:
         rms: root mean square on each axis, in the unit of what the signal adds to, 0 to 1e6.

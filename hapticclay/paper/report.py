@@ -17,7 +17,7 @@ from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
 from ..studies import workspace
 from . import claims
-from .ledger import STATUSES, Row, Runs
+from .claims import STATUSES, Row, Runs
 
 LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"

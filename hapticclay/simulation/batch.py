@@ -120,7 +120,7 @@ def cores() -> int:
 
 
 def _on_threads(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
-    """run(job) for each job, on so many threads; the first exception ends them all and is raised."""
+    """run(job) for each job, on several threads; the first exception ends all and is raised."""
     todo, stop = iter(jobs), threading.Event()
 
     def work() -> None:

@@ -125,7 +125,8 @@ def arm_at(q: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         q: joint angles, shoulder and elbow [rad].
 
     Returns:
-        Handle position [m], shape (2,); Jacobian J(q) [m], shape (2, 2); M(q) [kg m^2], shape (2, 2).
+        Handle position [m], shape (2,); Jacobian J(q) [m], shape (2, 2); M(q) [kg.m^2], shape
+        (2, 2).
     """
     with warnings_caught() as caught:
         model = _sound(_compose(["arm.xml"]).compile(), caught)

@@ -19,7 +19,7 @@ from ..model.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limit, linear_loop
-from ..theory.bisection import first_failure
+from ..theory.roots import first_failure
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
 LARGE_PUSH = 0.05  # [m/s] initial velocity that a hand gives

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import choice
 from ..model.constants import TS
 from ..theory import gain_limit, margins, passivity
-from ..theory.bisection import bisect, first_failure
+from ..theory.roots import bisect, first_failure
 from . import boundary
 from .boundary import Loop, nominal_limit
 

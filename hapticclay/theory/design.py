@@ -12,7 +12,7 @@ from ..errors import ParameterError, number, pair
 from ..model.controller import PRINTED, Compensator
 from ..model.operator import Operator
 from . import gain_limit, margins
-from .bisection import first_failure
+from .roots import first_failure
 
 K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain
 DESIGN_BAND = (0.3, 30.0)  # [rad/s]: where a hand moves on purpose, up to about 5 Hz

@@ -24,7 +24,7 @@ from ..model.constants import AXES, B_MAX, S
 from ..model.controller import PRINTED, Compensator
 from ..model.operator import Operator
 from ..model.scenario import RENDERS
-from . import linear_loop, polynomials
+from . import linear_loop, roots
 
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
@@ -94,7 +94,7 @@ def critical_gain(
     if loop:
         return first_instability(loop)
     denominator, passive, driven = linear_loop.loop_polynomials(axis, b, operator, compensator)
-    return polynomials.first_crossing(denominator + passive, driven)
+    return roots.first_crossing(denominator + passive, driven)
 
 
 def is_stable(
@@ -270,11 +270,9 @@ def delayed_loop(
     """
     parts = linear_loop.delayed_polynomials(axis, b, operator, render, compensator)
     if not linear_loop.hand_or_none(operator).spring:  # the integrator that moves the handle
-        parts = tuple(p // polynomials.VARIABLE for p in parts)
+        parts = tuple(p // roots.VARIABLE for p in parts)
     physical, motors, driven = parts
-    resonances = np.concatenate(
-        [polynomials.roots(p) for p in (physical, physical + motors, driven)]
-    )
+    resonances = np.concatenate([roots.roots(p) for p in (physical, physical + motors, driven)])
     resonances = resonances[np.abs(resonances) > 0.0]
     size = np.abs(resonances)
 
@@ -378,7 +376,7 @@ def sampled_loop(
 
     z1 = eigenvalues(free)
     poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    zeros = polynomials.nonzero_roots(linear_loop.environment_polynomial(b, operator))
+    zeros = roots.nonzero_roots(linear_loop.environment_polynomial(b, operator))
     resonances = np.concatenate((poles, zeros))
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)

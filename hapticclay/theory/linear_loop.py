@@ -20,7 +20,7 @@ from ..model.constants import AXES, G, S
 from ..model.controller import PRINTED, Compensator
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import RENDERS
-from . import polynomials
+from . import roots
 
 
 def steady_speed(K: float, f: float, b: Any) -> Any:
@@ -182,7 +182,7 @@ def closed_loop_poles(
         b: clay [N.s/m].
         operator: Th; None for Th = 0.
     """
-    return polynomials.roots(characteristic(axis, K, b, operator))
+    return roots.roots(characteristic(axis, K, b, operator))
 
 
 def stable(
@@ -201,7 +201,7 @@ def stable(
         operator: Th; None for Th = 0.
         compensator: shape of C.
     """
-    return polynomials.hurwitz(characteristic(axis, K, b, operator, compensator))
+    return roots.hurwitz(characteristic(axis, K, b, operator, compensator))
 
 
 # ---- state spaces --------------------------------------------------------------------------------

@@ -17,8 +17,8 @@ from numpy.polynomial import Polynomial
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of
 from ..model.controller import PRINTED, Compensator
 from ..model.operator import Operator
-from . import gain_limit, linear_loop, polynomials
-from .bisection import first_failure
+from . import gain_limit, linear_loop, roots
+from .roots import first_failure
 
 BREAKS = ("force", "compensator")
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
@@ -132,7 +132,7 @@ def open_loop(
         n, d = passive + driven, blank
     else:
         n, d = driven, blank + passive
-    s = polynomials.VARIABLE
+    s = roots.VARIABLE
     return (n // s, d // s) if n.coef[0] == 0.0 == d.coef[0] else (n, d)
 
 
@@ -156,7 +156,7 @@ def nyquist(
         compensator: shape of C.
     """
     n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
-    size = np.abs(np.concatenate((polynomials.nonzero_roots(n), polynomials.nonzero_roots(d))))
+    size = np.abs(np.concatenate((roots.nonzero_roots(n), roots.nonzero_roots(d))))
     omega = gain_limit.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
     return Nyquist(omega, n(1j * omega) / d(1j * omega), *encirclements(n, d))
 
@@ -175,11 +175,11 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
         (N, clockwise encirclements of -1; P, roots of d right of the axis).
     """
     n, d = n.trim(), d.trim()
-    poles, zeros = polynomials.nonzero_roots(d), polynomials.nonzero_roots(n)
+    poles, zeros = roots.nonzero_roots(d), roots.nonzero_roots(n)
     P = int(np.sum(poles.real > 0.0))
     if not np.any(n.coef):
         return 0, P
-    order = polynomials.multiplicity_of_zero(d) - polynomials.multiplicity_of_zero(n)
+    order = roots.multiplicity_of_zero(d) - roots.multiplicity_of_zero(n)
     size = np.abs(np.concatenate((poles, zeros, [] if len(poles) + len(zeros) else [1.0])))
     low, high = 1e-3 * size.min(), 1e6 * size.max()
 
@@ -220,17 +220,17 @@ def margins(
         compensator: shape of C.
     """
     n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
-    if not polynomials.hurwitz(n + d):
+    if not roots.hurwitz(n + d):
         nan = math.nan
         return Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, (nan, nan), nan, nan, nan)
-    nd = polynomials.cross_spectrum(n, d)
-    omega = polynomials.positive_roots(Polynomial(nd.coef.imag))
+    nd = roots.cross_spectrum(n, d)
+    omega = roots.positive_roots(Polynomial(nd.coef.imag))
     with np.errstate(divide="ignore"):
-        factor = -(np.abs(polynomials.on_axis(d)(omega)) ** 2) / nd(omega).real
+        factor = -(np.abs(roots.on_axis(d)(omega)) ** 2) / nd(omega).real
     more, more_at = _extreme(factor, omega, factor > 1.0, np.argmin, math.inf)
     less, less_at = _extreme(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
-    n2, d2 = polynomials.squared_magnitude(n), polynomials.squared_magnitude(d)
-    omega = np.sqrt(polynomials.positive_roots(n2 - d2))
+    n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
+    omega = np.sqrt(roots.positive_roots(n2 - d2))
     lag = np.angle(nd(omega)) + np.pi  # phase of L ahead of -1, 0 to 2 pi
     every = lag > -1.0
     turn = np.minimum(lag, 2.0 * np.pi - lag)
@@ -239,8 +239,8 @@ def margins(
     n, d = n.trim(), d.trim()
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
         delay, delay_at = 0.0, math.inf  # L does not fall off: any delay turns it round -1
-    far, near = polynomials.squared_magnitude(d - n), polynomials.squared_magnitude(d + n)
-    worst, disk_at = polynomials.least_ratio(-far, near)
+    far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
+    worst, disk_at = roots.least_ratio(-far, near)
     disk = 2.0 / math.sqrt(-worst)
     return Margins(
         True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
@@ -326,17 +326,17 @@ def small_gain(
         raise ParameterError("equation", equation, "must be 9, 10, 11, 12 or 13")
     at = "force" if equation < 12 else "compensator"
     n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
-    n2, d2 = polynomials.squared_magnitude(n), polynomials.squared_magnitude(d)
+    n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
     how = "extreme of a ratio of polynomials: exact. "
     if equation == 9:
-        worst, omega = polynomials.least_ratio(polynomials.squared_magnitude(n + d), d2)
+        worst, omega = roots.least_ratio(roots.squared_magnitude(n + d), d2)
         margin = math.sqrt(max(worst, 0.0))
         how += "Necessary for stability, not sufficient"
         return Verdict(worst > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
-    worst, omega = polynomials.least_ratio(-n2, d2)
+    worst, omega = roots.least_ratio(-n2, d2)
     margin = 1.0 / math.sqrt(-worst) if worst else math.inf
     how += "Sufficient for stability, not necessary"
-    fails = polynomials.positive_bands(n2 - d2)
+    fails = roots.positive_bands(n2 - d2)
     measures = "least right side over left side"
     return Verdict(margin > 1.0, margin, omega, (LINEAR,), how, measures, fails)
 
@@ -359,7 +359,7 @@ def transparency(
     e, d = linear_loop.device_admittance(axis, K, compensator)
     s = 1j * np.asarray(omega, dtype=float)
     felt = number("b", b, 0.0, unit="N.s/m") * e(s)
-    return felt / (felt + (d // polynomials.VARIABLE)(s))
+    return felt / (felt + (d // roots.VARIABLE)(s))
 
 
 # ---- the worst case over hands -------------------------------------------------------------------
@@ -444,12 +444,12 @@ def critical_hand(
     """
     A = linear_loop.characteristic(axis, K, b, None, compensator)
     E = linear_loop.device_admittance(axis, K, compensator)[0]
-    AE = polynomials.cross_spectrum(-A, E).coef
+    AE = roots.cross_spectrum(-A, E).coef
     R, X = Polynomial(AE.real[::2]), Polynomial(AE.imag[1::2])
-    Q = polynomials.squared_magnitude(E)  # -A/E = R/Q + j omega X/Q
+    Q = roots.squared_magnitude(E)  # -A/E = R/Q + j omega X/Q
     (m0, m1), (d0, d1), (k0, k1) = box.mass, box.damper, box.spring
     tests = [X - d0 * Q, d1 * Q - X, R - Polynomial([k0, -m1]) * Q, Polynomial([k1, -m0]) * Q - R]
-    edges = np.unique(np.concatenate([polynomials.positive_roots(t) for t in tests]))
+    edges = np.unique(np.concatenate([roots.positive_roots(t) for t in tests]))
     sizes = [Polynomial(np.abs(t.coef)) for t in tests]
     for x in np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))).tolist():
         # Where an edge of the box is met, to 1e-9 of the terms that cancel there.
@@ -483,7 +483,7 @@ def rigid_limit(axis: str, compensator: Compensator = PRINTED) -> tuple[float, f
     """
     driven = linear_loop.device_admittance(axis, 1.0, compensator)[0]
     passive = linear_loop.device_admittance(axis, 0.0, compensator)[0]
-    return polynomials.first_crossing(passive, driven - passive)
+    return roots.first_crossing(passive, driven - passive)
 
 
 def worst_case(  # noqa: PLR0913  # one loop, one box, and how finely to look

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import number
 from ..model.controller import PRINTED, Compensator
-from . import linear_loop, polynomials
+from . import linear_loop, roots
 from .margins import LINEAR, Verdict
 
 
@@ -32,13 +32,13 @@ def passivity(axis: str, K: float, b: float, *, compensator: Compensator = PRINT
     """
     e, d = linear_loop.device_admittance(axis, K, compensator)
     b = number("b", b, 0.0, unit="N.s/m")
-    Q = polynomials.squared_magnitude(e)
-    R = polynomials.real_part(d // polynomials.VARIABLE, e) + b * Q
-    worst, omega = polynomials.least_ratio(R, Q)
+    Q = roots.squared_magnitude(e)
+    R = roots.real_part(d // roots.VARIABLE, e) + b * Q
+    worst, omega = roots.least_ratio(R, Q)
     alone = linear_loop.stable(axis, K, b, None, compensator)
     how = "stable without a hand and Re Z >= 0 at the least of a ratio of polynomials: exact"
     measures = "least Re Z [N.s/m]" + ("" if alone else "; not stable without a hand")
-    fails = polynomials.positive_bands(-R)
+    fails = roots.positive_bands(-R)
     good = alone and worst >= 0.0
     return Verdict(good, worst, omega, (LINEAR, "continuous time"), how, measures, fails)
 
@@ -77,9 +77,7 @@ def colgate_schenkel(
         ),
         f"Colgate and Schenkel's test at {n - 1} frequencies up to pi/Ts: sampled",
         "damping to spare [N.s/m]",
-        tuple(
-            (float(omega[i]), float(omega[j])) for i, j in polynomials.runs_of_true(need >= damping)
-        ),
+        tuple((float(omega[i]), float(omega[j])) for i, j in roots.runs_of_true(need >= damping)),
     )
 
 

@@ -23,16 +23,7 @@ from ..errors import ParameterError, integer
 from ..model.constants import AXES, L1, L2
 from .session import Player, Session
 from .stage import GROUND, THICKNESS, Stage, hardest, plotted_axes
-from .style import (
-    CLAY_DEEP,
-    FORCE_COLORS,
-    GRID,
-    MATERIALS,
-    SKY,
-    TABLE,
-    rgb_bytes,
-    verdict_color,
-)
+from .style import CLAY_DEEP, FORCE_COLORS, GRID, MATERIALS, SKY, TABLE, rgb_bytes, verdict_color
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
 CLAY_TIME, PLOT_TIME = 0.2, 0.5  # [s] between two updates of the clay, and of the plots

@@ -38,7 +38,8 @@ def test_handle_position_from_columns(q1, q2):
 @given(angle, elbow)
 def test_jacobian_is_the_derivative_of_the_position(q1, q2):
     h = 1e-6  # central difference: truncation h^2 l/6, rounding eps l/h, both below 1e-9
-    numeric = np.array([(Arm.forward(np.add((q1, q2), e)) - Arm.forward(np.subtract((q1, q2), e))) / (2 * h)
+    q = np.array((q1, q2))
+    numeric = np.array([(Arm.forward(q + e) - Arm.forward(q - e)) / (2 * h)
                         for e in (np.array([h, 0]), np.array([0, h]))]).T  # fmt: skip
     np.testing.assert_allclose(Arm.jacobian((q1, q2)), numeric, atol=1e-9)
 

@@ -31,7 +31,7 @@ def test_soft_border_kick_gives_each_side_its_share(b0, b1, L):
 
 @given(*[st.floats(0, 9).map(lambda e: 10.0**e)] * 2, *[st.floats(1e-6, 1e-2)] * 3)
 def test_impulse_of_a_step_is_b_times_its_distance_in_any_clay(bx, by, h0, h, h1):
-    """The shares that two kicks give to the velocity of the step between them add up to b h, whatever their lengths."""
+    """The shares of two kicks in the step between them sum to b h, for steps of any length."""
     b, free = (bx, by), (0.0, 0.0)
     H0, H1 = 0.5 * (h0 + h), 0.5 * (h + h1)
     first = clay.split_damping(free, b, H0, h0 / (2 * H0), h / (2 * H0), 0.92, 0.0)
@@ -42,7 +42,7 @@ def test_impulse_of_a_step_is_b_times_its_distance_in_any_clay(bx, by, h0, h, h1
 
 
 def test_slow_force_balances_whatever_pushes():
-    """Whichever axes are stiff: under it, and the clay that is not, the handle does not accelerate along them."""
+    """Under the slow force the handle does not accelerate along any stiff axis."""
     W, g, soft = np.array([[0.8, 0.2], [0.2, 0.15]]), np.array([1.0, -2.0]), np.array([0.3, -0.4])
     for stiff in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
         slow = clay.slow_force(*g, W[0, 0], W[0, 1], W[1, 1], *stiff, *soft)
@@ -82,10 +82,18 @@ def test_each_axis_follows_its_own_coordinate():
     assert r.b(0.0) == (100.0, 200.0)
 
 
-@pytest.mark.parametrize("edges,values,along", [
-    ((0.1, 0.05), (0, 1, 0), "x"), ((0.1,), (1.0,), "x"), ((0.1,), (0.0, -1.0), "x"), ((0.1,), (0.0, 1.0), "z"),
-    ((float("nan"),), (0.0, 1.0), "x"), (None, (0.0,), "x"), ((0.1,), (0.0, 1e12), "x"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "edges,values,along",
+    [
+        ((0.1, 0.05), (0, 1, 0), "x"),
+        ((0.1,), (1.0,), "x"),
+        ((0.1,), (0.0, -1.0), "x"),
+        ((0.1,), (0.0, 1.0), "z"),
+        ((float("nan"),), (0.0, 1.0), "x"),
+        (None, (0.0,), "x"),
+        ((0.1,), (0.0, 1e12), "x"),
+    ],
+)
 def test_bad_profiles_are_refused(edges, values, along):
     with pytest.raises(ParameterError, match="clay"):
         Profile(edges, values, along)

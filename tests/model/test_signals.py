@@ -59,10 +59,21 @@ def test_seed_decides():
     assert np.all(Signal(a)(1.0) == Signal(a)(1.0)) and Signal(a)(1.0)[0] != Signal(b)(1.0)[0]
 
 
-@pytest.mark.parametrize("kw", [
-    dict(rms=(-1.0, 0.0)), dict(low=0.0), dict(low=3.0, high=2.0), dict(period=0.0), dict(high=1e9), dict(seed=-1),
-    dict(seed=1.5), dict(low=0.11, high=0.12), dict(lines=0), dict(lines=10_000),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kw",
+    [
+        dict(rms=(-1.0, 0.0)),
+        dict(low=0.0),
+        dict(low=3.0, high=2.0),
+        dict(period=0.0),
+        dict(high=1e9),
+        dict(seed=-1),
+        dict(seed=1.5),
+        dict(low=0.11, high=0.12),
+        dict(lines=0),
+        dict(lines=10_000),
+    ],
+)
 def test_bad_multisines_are_refused(kw):
     with pytest.raises(ParameterError, match="multisine"):
         dataclasses.replace(Multisine(), **kw)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hapticclay.model import constants, operator, scenario
-from hapticclay.paper import ledger, report
+from hapticclay.paper import claims, report
 
 SOURCE = Path(scenario.__file__)
 
@@ -62,7 +62,7 @@ def test_every_row_that_should_agree_does(ledger_rows):
     wrong = [(r.what, r.error) for r in ledger_rows if r.agrees is False]
     assert not wrong
     assert sum(r.agrees is True for r in ledger_rows) > 40
-    assert {r.status for r in ledger_rows} == set(ledger.STATUSES)
+    assert {r.status for r in ledger_rows} == set(claims.STATUSES)
 
 
 @pytest.mark.parametrize(

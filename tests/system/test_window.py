@@ -84,9 +84,12 @@ class Mouse:
         self.screen, self.told = screen, folder.with_name(folder.name + ".told")
         self.program = subprocess.Popen(
             [sys.executable, "-W", "error", "-X", "faulthandler", "-c", TOLD, *args],
-            cwd=folder, env={**screen, "TOLD": str(self.told)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            cwd=folder,
+            env={**screen, "TOLD": str(self.told)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-        )  # fmt: skip
+        )
         for _ in range(600):
             found = subprocess.run(
                 ["xdotool", "search", "--name", "MuJoCo"],

@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop, margins, polynomials
+from hapticclay.theory import linear_loop, margins, roots
 from hapticclay.theory.margins import BREAKS
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)
@@ -242,11 +242,11 @@ def test_transparency_is_equation_7(K, b, axis):
 
 def test_least_finds_the_ends_and_the_middle():
     # (x^2 - 2x + 3)/1 at x = omega^2 = 1; 1/(x + 1) at infinity; (x + 1)/(x + 2) at 0
-    assert polynomials.least_ratio(
-        Polynomial([3.0, -2.0, 1.0]), Polynomial([1.0])
-    ) == pytest.approx((2.0, 1.0))
-    assert polynomials.least_ratio(Polynomial([1.0]), Polynomial([1.0, 1.0])) == (0.0, math.inf)
-    assert polynomials.least_ratio(Polynomial([1.0, 1.0]), Polynomial([2.0, 1.0])) == (0.5, 0.0)
+    assert roots.least_ratio(Polynomial([3.0, -2.0, 1.0]), Polynomial([1.0])) == pytest.approx(
+        (2.0, 1.0)
+    )
+    assert roots.least_ratio(Polynomial([1.0]), Polynomial([1.0, 1.0])) == (0.0, math.inf)
+    assert roots.least_ratio(Polynomial([1.0, 1.0]), Polynomial([2.0, 1.0])) == (0.5, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticclay.theory.bisection import bisect, first_failure
+from hapticclay.theory.roots import bisect, first_failure
 
 
 @given(st.floats(1e-3, 1e3), st.floats(1e-12, 1e-1))
