@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 class ParameterError(ValueError):
     """A parameter was refused.
 
-    Attributes:
+    Args:
         field: name of the parameter.
         value: the value that was given.
         bound: what would have been accepted, in words.

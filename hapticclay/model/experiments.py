@@ -169,6 +169,8 @@ class VariableCut(PathExperiment):
         as_printed: take K = 1 on both axes, with which y is unstable.
         b: damping before and after the border, on both axes [N.s/m], 0 to 1e9 (Eqs. 23-26).
         border: coordinate at which the second clay begins, on each axis [m].
+        length: as in PathExperiment [m]; 10 cm by default.
+        origin: as in Experiment [m]; the nominal pose is the middle of the square by default.
     """
 
     growth: Annotated[
@@ -207,6 +209,9 @@ class StabilityTest(Experiment):
         axis: axis of the maneuver; the other one keeps its default gain.
         rms: root mean square of the muscle force [N], 0 to 1e6.
         seed: seed of its phases, 0 to 2^32 - 1.
+        operator: as in Experiment; the nominal hand by default.
+        t_max: as in Experiment [s]; 20 s by default.
+        origin: as in Experiment [m]; the nominal pose by default.
     """
 
     gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]

@@ -129,7 +129,7 @@ def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
     code, out, _ = said(capsys, *words, str(tmp_path))
     assert code == 0 and "8 runs in" in out and (tmp_path / "status.png").is_file()
     assert read_sweep(tmp_path)["steps"].to_pylist() == [1, 1, 2, 2] * 2
-    assert parameter_unit("depth") == "m" and study_plots._label("depth") == "depth [m]"
+    assert parameter_unit("depth") == "m" and study_plots._column_label("depth") == "depth [m]"
     with pytest.raises(ParameterError, match="did you mean 'depth'"):
         Sweep("staircase", parse_grid("deph=0.01:0.02:2"))
 

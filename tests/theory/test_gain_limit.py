@@ -404,7 +404,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
             b,
             tuple(gain),
             tuple(force),
-            th is not None,
+            operator=th,
             shaping=True,
             dt=Ts / 8,
             Ts=Ts,
