@@ -1,5 +1,6 @@
 """The documents say what is so: snippets run, commands exist, figures and symbols are current."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -116,3 +117,33 @@ def test_every_public_name_has_a_docstring():
 
 def test_changelog_has_the_present_version():
     assert f"## {hc.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+ANSWERS = re.findall(r"^\| (.*?) \| `(hapticclay/\S+\.py)` \| `(\w+)` \|$", CONTRIBUTING, re.M)
+
+
+@pytest.mark.parametrize("question, file, name", ANSWERS)
+def test_a_question_is_answered_by_the_file_that_defines_the_name(question, file, name):
+    """CONTRIBUTING's tables: the name stands at the top level of that file."""
+    found = set()
+    for node in ast.parse((ROOT / file).read_text()).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
+    assert name in found
+
+
+def test_the_tables_ask_all_questions():
+    asked = " ".join(question for question, _, _ in ANSWERS)
+    for word in ("compensator", "fe = b v", "gain limit", "end of a run") + (
+        "clay law",
+        "controller",
+        "arm",
+        "experiment",
+        "command",
+        "plot",
+    ):
+        assert word in asked, word
