@@ -61,6 +61,28 @@ def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PL
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
+def feedback_law(g, s, delta, y, yd, p, v, c):
+    """Servo acceleration of one axis at an instant, without forces; `feedback_vector` as a law.
+
+    Args:
+        g: closed position loop G (Eqs. 15, 16).
+        s: sensitivity Sh (Eqs. 17, 18).
+        delta: compensator output [m].
+        y: reference position [m].
+        yd: reference velocity [m/s].
+        p: handle position [m].
+        v: handle velocity [m/s].
+        c: centripetal acceleration, towards the centre [m/s^2].
+
+    Returns:
+        (acceleration of the handle, acceleration of the reference) [m/s^2].
+    """
+    ydd = g.stiffness * (delta - y) - g.damping * yd
+    # a kick of one second from rest, in which the velocity after it is the acceleration
+    a = servo_acceleration(1.0, -s.damping, s.stiffness, ydd, yd, v, y, p, c)
+    return a, ydd
+
+
 def solve_velocity(n, a, W, f, d):
     """Solves n u = a + W (f - d u) for the handle velocity u after a kick.
 

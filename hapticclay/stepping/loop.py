@@ -312,11 +312,8 @@ def vector_field(c, bx, by, uhx, uhy, q1, q2, w1, w2, state):  # noqa: PLR0913  
     hx -= operator.operator_force(spring, mass, damper, px, cx, vx)
     hy -= operator.operator_force(spring, mass, damper, py, cy, vy)
     fex, fey = clay.viscous_force(bx, by, vx, vy)
-    y2x = G[0].stiffness * (deltax - yx) - G[0].damping * ydx
-    y2y = G[1].stiffness * (deltay - yy) - G[1].damping * ydy
-    # a kick of one second from rest, in which u is the acceleration
-    ax = controller.servo_acceleration(1.0, -S[0].damping, S[0].stiffness, y2x, ydx, vx, yx, px, cx)
-    ay = controller.servo_acceleration(1.0, -S[1].damping, S[1].stiffness, y2y, ydy, vy, yy, py, cy)
+    ax, y2x = controller.feedback_law(G[0], S[0], deltax, yx, ydx, px, vx, cx)
+    ay, y2y = controller.feedback_law(G[1], S[1], deltay, yy, ydy, py, vy, cy)
     _, _, _, _, ffx, ffy, t1, t2 = controller.saturated_step(
         1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (1.0, 1.0), (ax, ay), (sxx, sxy, syy),
         (hx - fex, hy - fey), (mass, mass), (limit1, limit2, square1, square2),

@@ -155,14 +155,8 @@ class Sampled(Leapfrog):
         """`_control` from the state of the handle, the hand force and the force of the clay [N]."""
         s = self.scenario
         f = (force[0] - fe[0], force[1] - fe[1])
-        a = []
-        for i, (g, h, z) in enumerate(zip(G, S, (x, y), strict=True)):
-            y2 = g.stiffness * (z[0] - z[2]) - g.damping * z[3]
-            a.append(
-                controller.servo_acceleration(
-                    1.0, -h.damping, h.stiffness, y2, z[3], v[i], z[2], p[i], c[i]
-                )
-            )
+        law = controller.feedback_law
+        a = [law(G[i], S[i], z[0], z[2], z[3], p[i], v[i], c[i])[0] for i, z in enumerate((x, y))]
         W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
         limit = inf, inf, inf, inf  # the limits come last, after the clay's share
         *_, t1, t2 = controller.saturated_step(1.0, ZERO, u, (1.0, 1.0), a, W, f, ZERO, limit)
