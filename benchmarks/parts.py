@@ -33,7 +33,7 @@ from . import common
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:
     """The arm with these parts of mjcf/, and what change adds."""
-    spec = engine._compose(["arm.xml", *files])
+    spec = engine.compose_spec(["arm.xml", *files])
     if change:
         change(spec)
     return spec.compile()

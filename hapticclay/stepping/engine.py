@@ -89,17 +89,22 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     accurate = scenario.integrator == "accurate"
     parts = ["arm.xml"] + ["clay.xml"] * (scenario.clay is not None) + ["states.xml"] * accurate
     with warnings_caught() as caught:
-        spec = _compose(parts)
+        spec = compose_spec(parts)
         spec.option.timestep = scenario.dt
         if accurate:
             spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         for name, limit in zip(("shoulder", "elbow"), scenario.torque_limit, strict=True):
             spec.actuator(name).ctrlrange = (-limit, limit)
         model = spec.compile()
-    return _sound(model, caught)
+    return checked_model(model, caught)
 
 
-def _compose(parts: list[str]) -> mujoco.MjSpec:
+def compose_spec(parts: list[str]) -> mujoco.MjSpec:
+    """The specification of a model from files of mjcf/, with the arm of model.constants.
+
+    Args:
+        parts: names of the files.
+    """
     text = "".join(f'<include file="{part}"/>' for part in parts)
     files = {part: (mjcf_folder() / part).read_bytes() for part in parts}
     spec = mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
@@ -112,7 +117,16 @@ def _compose(parts: list[str]) -> mujoco.MjSpec:
     return spec
 
 
-def _sound(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
+def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
+    """The model, refused if the engine warned while compiling it.
+
+    Args:
+        model: the model.
+        caught: warnings of the engine.
+
+    Raises:
+        RuntimeError: there are some.
+    """
     if caught:
         raise RuntimeError(f"mjcf: {'; '.join(caught)}")
     return model
@@ -129,7 +143,7 @@ def arm_at(q: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         (2, 2).
     """
     with warnings_caught() as caught:
-        model = _sound(_compose(["arm.xml"]).compile(), caught)
+        model = checked_model(compose_spec(["arm.xml"]).compile(), caught)
     data = mujoco.MjData(model)
     data.qpos[:] = q
     mujoco.mj_forward(model, data)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model.constants import AXES, L1, L2
 from ..model.scenario import Scenario
-from ..stepping.engine import _compose, _sound, mujoco, warnings_caught
+from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
 from .style import MATERIALS, clay_color, rgb
 
@@ -185,7 +185,7 @@ def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
         tool: width of the tool, and depth of its tip under the surface [m].
     """
     with warnings_caught() as caught:
-        spec = _compose(["arm.xml", "room.xml"])
+        spec = compose_spec(["arm.xml", "room.xml"])
         for name, color in MATERIALS.items():
             spec.material(name).rgba = (*rgb(color), 1.0)
         for body, *skin in SKIN:
@@ -201,7 +201,7 @@ def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
         if clay:
             _block(spec, clay)
         model = spec.compile()
-    return _sound(model, caught)
+    return checked_model(model, caught)
 
 
 def _skin(body: Any, shape: str, begin: Any, end: Any, radius: float, material: str) -> None:
