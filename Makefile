@@ -23,8 +23,8 @@ demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say 
 test: .venv/dev.done  ## set up and run all tests, on all cores
 	$(BIN)/python -m pytest
 
-coverage: .venv/dev.done  ## the same, and which lines they reach: out/coverage/index.html
-	$(BIN)/python -m pytest --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
+coverage: .venv/dev.done  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
+	$(BIN)/python -m pytest -m "not perf" -k "not beyond_the_limit_of_the_process" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
 
 check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/ruff check .
