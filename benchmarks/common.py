@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import hapticclay as hc
 from hapticclay import files
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -24,6 +25,12 @@ DISTRIBUTIONS = (
     "drake",
     "pin",
 )
+
+
+def warm() -> None:
+    """Compile the loops, or load their machine code, before the clock runs."""
+    for kind in ({}, {"integrator": "accurate"}, {"control": "sampled"}):
+        hc.simulate(hc.free(t_max=0.01, **kind), engine="native")
 
 
 def machine() -> list[str]:

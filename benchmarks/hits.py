@@ -140,7 +140,7 @@ def methods() -> dict[str, tuple[float, ...]]:
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
     if not simulate.has_numba():
         return {"fast": fast, "accurate": accurate}
-    simulate.load_compiled(), simulate.load_compiled(accurate=True)
+    common.warm()
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}
 
 

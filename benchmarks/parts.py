@@ -9,14 +9,12 @@ Every part is measured beside the plain scene, in turns; medians of ratios. Writ
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import mujoco
 import numpy as np
@@ -25,7 +23,8 @@ from tabulate import tabulate
 import hapticclay as hc
 from hapticclay.model.hardware import Coupling, Interface
 from hapticclay.model.signals import Multisine
-from hapticclay.stepping import energy, engine
+from hapticclay.simulation import simulate
+from hapticclay.stepping import engine
 from hapticclay.views import stage
 
 from . import common
@@ -68,7 +67,6 @@ def _heights(spec: Any) -> None:
 ENGINE: dict[str, Callable[[], mujoco.MjModel]] = {
     "arm alone": lambda: arm(),
     "clay": lambda: arm("clay.xml"),
-    "controller's states, RK4": lambda: hc.build(hc.free(integrator="accurate")),
     "skin": lambda: arm("room.xml", change=lambda spec: _skin(spec)),
     "skin, room, heightfield": lambda: arm(
         "room.xml", change=lambda spec: (_skin(spec), _heights(spec))
@@ -88,7 +86,6 @@ def _sampled(**interface: Any) -> hc.Scenario:
 LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     "cut": (CUT, {}),
     "one sample in 100 recorded": (CUT, {"every": 100}),
-    "no energy ledger": (CUT, {}),
     "no clay": (dataclasses.replace(CUT, clay=None, gain=(0.01, 0.01)), {}),
     "shaping": (dataclasses.replace(CUT, shaping=True), {}),
     "Th": (dataclasses.replace(CUT, operator=hc.Operator(), force=(2.0, 0.0)), {}),
@@ -125,13 +122,11 @@ def step(model: mujoco.MjModel, steps: int) -> float:
     return spent / (max(1, steps // 500) * 500)
 
 
-def run(name: str, steps: int) -> float:
-    """Seconds a step of the whole loop in Python, the inlining (once a process) not counted."""
+def run(name: str, steps: int, engine: str = "python") -> float:
+    """Seconds a step of the whole loop."""
     scenario, how = LOOP[name]
     scenario = dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, stop=False)
-    off = mock.patch.object(energy.EnergyLedger, "add", lambda *_: None)
-    with off if name == "no energy ledger" else contextlib.nullcontext():
-        r = hc.simulate(scenario, engine="python", **how)
+    r = hc.simulate(scenario, engine=engine, **how)
     return r.wall_time / r.steps
 
 
@@ -157,6 +152,7 @@ def compare(names: list[str], cost: Callable[[str], float], rounds: int) -> list
 TITLES = {
     "engine": "One step of the engine, in C, beside the arm alone.",
     "loop": "One step of the whole loop in Python, every sample recorded, beside the constant cut.",
+    "native": "The same, compiled.",
 }
 
 
@@ -167,6 +163,8 @@ def sections(data: dict[str, Any]) -> list[str]:
         "A scene holds what it needs and no more: a part that is off costs nothing.",
     ]
     for name, title in TITLES.items():
+        if name not in data:
+            continue
         cells = [
             {"part": r["part"], "over plain": f"{r['ratio']:.2f}", "us": f"{r['us']:.2f}"}
             for r in data[name]
@@ -188,6 +186,10 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
+    if simulate.has_numba():
+        common.warm()
+        native = compare(list(LOOP), lambda name: run(name, 10 * steps, "native"), rounds)
+        found["native"] = native
     return common.write(out, "parts", {"rounds": rounds, "steps": steps, **found})
 
 

@@ -26,7 +26,6 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.simulation import simulate
-from hapticclay.stepping import leapfrog
 
 from . import common
 
@@ -63,14 +62,9 @@ def floor(
     return spent / (steps // 500 * 500)
 
 
-def loop(scenario: hc.Scenario, steps: int, inlined: bool = True) -> float:
+def loop(scenario: hc.Scenario, steps: int) -> float:
     """Seconds a step of the Python run, every sample recorded."""
-    usual, leapfrog.FUSE_FROM = leapfrog.FUSE_FROM, 0 if inlined else 10**12
-    leapfrog._fused.clear()
-    try:
-        r = hc.simulate(lasting(scenario, steps), engine="python")
-    finally:
-        leapfrog.FUSE_FROM = usual
+    r = hc.simulate(lasting(scenario, steps), engine="python")
     assert r.steps >= steps, r.status
     return r.wall_time / r.steps
 
@@ -87,10 +81,11 @@ def timed(function, *args, **kw) -> np.ndarray:
     return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1]))
 
 
-def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
+def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
     """The compiled run over the floor just before and after it, in processor time.
 
-    One of a batch of summaries; one alone, from call to return, all samples recorded.
+    One of a batch of summaries; one alone, from call to return, all samples recorded; none but the
+    last.
     """
     from hapticclay.stepping.compiled import BatchPool
 
@@ -100,7 +95,13 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float]:
     s, pool = lasting(scenario, steps), BatchPool(1)
     first, short, then = bare(), timed(pool.brief, s)[1], bare()
     whole = timed(hc.simulate, s, engine="native")[1]
-    return short / (0.5 * (first + then)), whole / (0.5 * (then + bare()))
+    between = bare()
+    thin = timed(hc.simulate, s, engine="native", every=1_000_000)[1]
+    return (
+        short / (0.5 * (first + then)),
+        whole / (0.5 * (then + between)),
+        thin / (0.5 * (between + bare())),
+    )
 
 
 def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
@@ -109,13 +110,7 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     for name, scenario in SCENES.items():
         times = []
         for _ in range(rounds):
-            times.append(
-                (
-                    floor(scenario, steps),
-                    loop(scenario, steps),
-                    loop(scenario, steps, inlined=False),
-                )
-            )
+            times.append((floor(scenario, steps), loop(scenario, steps)))
         compiled = (
             [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
         )
@@ -125,11 +120,12 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
                 "floor_us": 1e6 * statistics.median(t[0] for t in times),
                 "python_us": 1e6 * statistics.median(t[1] for t in times),
                 "ratio": statistics.median(t[1] / t[0] for t in times),
-                "ratio_not_inlined": statistics.median(t[2] / t[0] for t in times),
             }
         )
         for what, ratios in zip(
-            ("native", "native_recorded"), zip(*compiled, strict=True), strict=False
+            ("native", "native_recorded", "native_last_alone"),
+            zip(*compiled, strict=True),
+            strict=False,
         ):
             rows[-1][what] = statistics.median(ratios)
     return rows

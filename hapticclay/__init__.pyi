@@ -17,15 +17,16 @@ from .model.hardware import Interface as Interface
 from .model.operator import Operator as Operator
 from .model.scenario import Scenario as Scenario
 from .model.signals import Multisine as Multisine
+from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record
 from .simulation.record import irregularity as irregularity
 from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import port_energy as port_energy
 from .simulation.simulate import simulate as simulate
-from .stepping.engine import Crossing as Crossing
 from .stepping.engine import build as build
 from .stepping.monitor import Outcome as Outcome
+from .stepping.run import Crossing as Crossing
 from .studies.identification import Identified as Identified
 from .studies.identification import Noise as Noise
 from .studies.identification import identify as identify

@@ -48,7 +48,7 @@ PLAIN = {  # files whose tests are about the Python loop
     "test_loop.py",
     "test_monitor.py",
 }
-AUTO_FROM = simulate.NATIVE_FROM
+PAYS = simulate._pays
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
@@ -94,7 +94,7 @@ def pytest_runtest_protocol(item):
 def auto_engine(request, monkeypatch):
     """The compiled loop from the first step on, or the Python one as ever."""
     plain = request.node.get_closest_marker("plain")
-    monkeypatch.setattr(simulate, "NATIVE_FROM", AUTO_FROM if plain else 0)
+    monkeypatch.setattr(simulate, "_pays", PAYS if plain else lambda s: simulate.has_numba())
 
 
 @pytest.fixture(scope="session")

@@ -30,6 +30,9 @@ class RunCommand:
         scenario: The experiment.
         out: Folder for record.npz, summary.json and the plots.
         every: Keep every n-th sample in the record.
+        error: Largest error to allow, as in 1e-6 (seconds, of the times at which borders are
+            crossed) or 1e-7m (of positions): dt and integrator are then chosen, and verified by
+            runs at other steps.
         plots: Draw the plots.
     """
 
@@ -38,19 +41,23 @@ class RunCommand:
         Path | None, tyro.conf.arg(help_behavior_hint="(default: out/run/EXPERIMENT)")
     ] = None
     every: int = 1
+    error: str | None = None
     plots: bool = True
 
     def __call__(self) -> int:
         out = self.out or Path("out/run", self.scenario.name)
         writable(out)
         with console.ctrl_c() as asked:
-            record = simulate_with_progress(self.scenario, self.every, asked)
+            record = simulate_with_progress(self.scenario, self.every, asked, self.error)
         deliver(record, out, self.plots)
         return 130 if record.outcome.code == "interrupted" else 0
 
 
 def simulate_with_progress(
-    scenario: Scenario, every: int, stop: Callable[[], bool] = lambda: False
+    scenario: Scenario,
+    every: int,
+    stop: Callable[[], bool] = lambda: False,
+    error: str | None = None,
 ) -> Record:
     """Runs simulate() under a progress bar.
 
@@ -58,6 +65,7 @@ def simulate_with_progress(
         scenario: the run.
         every: keep every n-th sample.
         stop: ends the run when it returns True.
+        error: largest error to allow, as in simulate(); the bar then shows one run after another.
     """
     from ..simulation.simulate import simulate
 
@@ -69,7 +77,7 @@ def simulate_with_progress(
             show(max(t / scenario.t_max, way))
             return stop()
 
-        return simulate(scenario, every=every, progress=progress)
+        return simulate(scenario, every=every, progress=progress, error=error)
 
 
 def deliver(record: Record, folder: Path, plots: bool) -> None:
@@ -127,6 +135,10 @@ def run_table(record: Record) -> str:
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
+    if record.error is not None:
+        lines.append(f"error: {record.error}")
+        if record.error.note:
+            lines.append(f"why: {record.error.note}")
     speed = record.t[-1] / record.wall_time if len(record.t) and record.wall_time else 0.0
     lines.append(f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time")
     return "\n".join(lines)

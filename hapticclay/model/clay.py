@@ -55,7 +55,7 @@ def split_damping(b0, b1, H, L, R, W, damper):
     return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
 
 
-def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # compiled and inlined: plain numbers
+def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # plain numbers, for speed
     """Force of stiff clay on a handle in slow motion that nothing else supports.
 
     Args:
@@ -221,87 +221,6 @@ def _region_law(table, axis, k, t):
             table[ENTERED_ROW + axis, j] = t
         value -= rate * table[ENTERED_ROW + axis, j]
     return value, rate
-
-
-class Regions:
-    """The clay region of the handle and its borders.
-
-    Args:
-        clay: the clay; None for none.
-        length: the run ends when p_x reaches this [m]; None for no end.
-        p: handle position at the start [m], (x, y).
-
-    Attributes:
-        table: the clay, from `region_table`.
-        index: of the region along x and along y.
-        low: lower borders of the present region, (x, y) [m].
-        high: upper borders of the present region, (x, y) [m].
-        base: damping of the present region at t = 0, (x, y) [N.s/m].
-        rate: growth of the damping, (x, y) [N.s/m per s].
-        grows: whether the clay of any region grows.
-        stiffest: largest damping of any region before growth [N.s/m].
-    """
-
-    def __init__(self, clay: Clay | None, length: float | None, p: tuple[float, float]):
-        self.table = region_table(clay, length)
-        self.index = [
-            bisect.bisect_right(row[1:].tolist(), x) for row, x in zip(self.table, p, strict=False)
-        ]
-        self.stiffest = float(self.table[VALUE_ROW : VALUE_ROW + 2].max())
-        self.grows = bool(self.table[RATE_ROW : RATE_ROW + 2].any())
-        self._settle(0.0)
-
-    def _settle(self, t: float) -> None:
-        found = enter_region(self.table, self.index[0], self.index[1], t)
-        self.low, self.high, self.base, self.rate = ((float(x), float(y)) for x, y in found)
-
-    def b(self, t: float) -> tuple[float, float]:
-        """Damping of the present region.
-
-        Args:
-            t: time [s].
-
-        Returns:
-            (x, y) [N.s/m].
-        """
-        return damping_at(self.base, self.rate, t)
-
-    def change(self, clay: Clay, t: float) -> None:
-        """Replaces the damping between the same borders.
-
-        Args:
-            clay: the new clay.
-            t: time from which it holds [s].
-        """
-        end, entered = self.table[AXIS_ROWS, 2], self.table[ENTERED_ROW : ENTERED_ROW + 2]
-        self.table = region_table(clay, float(end) if end < math.inf else None)
-        self.table[ENTERED_ROW : ENTERED_ROW + 2] = entered
-        self._settle(t)
-
-    def cross(self, i: int, up: bool, t: float) -> float:
-        """Enters the neighbouring region.
-
-        Args:
-            i: coordinate, 0 for x, 1 for y.
-            up: True towards larger values.
-            t: time of the crossing [s].
-
-        Returns:
-            The border crossed [m].
-        """
-        border = self.high[i] if up else self.low[i]
-        self.index[i] += 1 if up else -1
-        self._settle(t)
-        return border
-
-    def at_end(self, i: int, up: bool) -> bool:
-        """Whether the border ahead is the end of the path.
-
-        Args:
-            i: coordinate, 0 for x, 1 for y.
-            up: True towards larger values.
-        """
-        return i == 0 and up and self.high[0] == self.table[AXIS_ROWS, 2]
 
 
 def damping_at(

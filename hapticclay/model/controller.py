@@ -138,44 +138,31 @@ def velocity_under_torque(H, v, u, tau, f, d):
     return ux, uy
 
 
-def saturated_step(H, v, u, n, a, W, f, d, limit):  # noqa: PLR0913  # one a quantity of the law
-    """The kick that the servo asks for, within the torque limits of the motors.
+def kick_at_limit(H, v, u, f, d, tau, limit):
+    """The kick under torques that the limits of the motors cut.
 
     Args:
         H: length of the kick [s].
         v: handle velocity before the kick, (x, y) [m/s].
         u: from `arm.jacobian` [m].
-        n: as in `solve_velocity` [1/s].
-        a: as in `solve_velocity` [m/s^2].
-        W: as in `solve_velocity` [1/kg].
         f: as in `solve_velocity` [N].
         d: as in `solve_velocity` [N.s/m].
-        limit: torque limits of shoulder and elbow [N.m], and their squares.
+        tau: torques that the servo asks for, (shoulder, elbow) [N.m].
+        limit: torque limits, (shoulder, elbow) [N.m].
 
     Returns:
         (ux, uy, g1, g2, ffx, ffy, t1, t2): velocity after the kick [m/s], link accelerations
         [rad/s^2], net hand force [N], motor torques [N.m].
     """
     vx, vy = v
-    u1x, u1y, u2x, u2y = u
     fx, fy = f
     dx, dy = d
-    limit1, limit2, square1, square2 = limit
-    ux, uy = solve_velocity(n, a, W, (fx, fy), (dx, dy))
+    t1 = min(max(tau[0], -limit[0]), limit[0])
+    t2 = min(max(tau[1], -limit[1]), limit[1])
+    ux, uy = velocity_under_torque(H, v, u, (t1, t2), f, d)
     ffx = fx - dx * ux
     ffy = fy - dy * uy
-    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
-    t2 = arm.I2 * g2 - u2x * ffx - u2y * ffy
-    t1 = arm.I1 * g1 - u1x * ffx - u1y * ffy + t2
-    if t1 * t1 > square1 or t2 * t2 > square2:
-        t1 = min(max(t1, -limit1), limit1)
-        t2 = min(max(t2, -limit2), limit2)
-        ux, uy = velocity_under_torque(
-            H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
-        )
-        ffx = fx - dx * ux
-        ffy = fy - dy * uy
-        g1, g2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
+    g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u, H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
 
 

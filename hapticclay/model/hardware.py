@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from math import copysign, exp, inf, sqrt, tau
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -91,11 +90,11 @@ class Interface:
             )
 
 
+SLIDES = (0.0, 1.0, -1.0)
 NOISE_BLOCK = 1024  # samples whose chances are drawn at once
-Pair = tuple[float, float]
 
 
-def round_to_even(x: float, step: float) -> float:
+def round_to_even(x, step):
     """The multiple of step nearest to x; the even one of two equally near.
 
     Args:
@@ -108,41 +107,45 @@ def round_to_even(x: float, step: float) -> float:
     return round(x / step) * step
 
 
-def quantize(x: float, bits: int | None, span: float) -> float:
+def quantize(x, bits, span):
     """Output of a converter: 2^bits levels from -span to span, the middle one zero.
 
     Args:
         x: input, in any unit.
-        bits: resolution; None for an ideal converter without limits.
+        bits: resolution; 0 for an ideal converter without limits.
         span: full scale, in the unit of x.
 
     Returns:
         The output, in the unit of x.
     """
-    if bits is None:
+    if not bits:
         return x
-    half = 2 ** (bits - 1)
-    return min(max(round(x * half / span), -half), half - 1) * span / half
+    half = 1 << (bits - 1)
+    y = x * half / span
+    # the bounds keep what is rounded within the integers of a compiled run
+    level = half if y > half else -half if y < -half else round(y)
+    return min(level, half - 1) * span / half
 
 
-def encode(q: float, counts: int | None) -> float:
+def encode(q, counts):
     """Joint angle as an encoder reads it.
 
     Args:
         q: joint angle [rad].
-        counts: counts per turn; None for an exact reading.
+        counts: counts per turn; 0 for an exact reading.
 
     Returns:
         The reading [rad].
     """
-    return q if counts is None else round_to_even(q, tau / counts)
+    return round_to_even(q, tau / counts) if counts else q
 
 
-def velocity_difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, Ts: float) -> Pair:
-    """Mean rates of two joints since the oldest sample in the history.
+def velocity_difference(then, old, k, q, Ts):
+    """Mean rates of two joints since an earlier sample.
 
     Args:
-        history: (index, angles [rad]) of earlier samples, oldest first.
+        then: index of the earlier sample.
+        old: joint angles of it [rad].
         k: index of the present sample.
         q: joint angles of the present sample [rad].
         Ts: control sample [s].
@@ -150,12 +153,11 @@ def velocity_difference(history: tuple[tuple[int, Pair], ...], k: int, q: Pair, 
     Returns:
         Rates of both joints [rad/s].
     """
-    then, old = history[0]
     span = (k - then) * Ts
     return (q[0] - old[0]) / span, (q[1] - old[1]) / span
 
 
-def low_pass(y: float, mean: float, cutoff: float, span: float) -> float:
+def low_pass(y, mean, cutoff, span):
     """First-order low-pass filter over one interval; exact for a constant signal.
 
     Args:
@@ -171,7 +173,7 @@ def low_pass(y: float, mean: float, cutoff: float, span: float) -> float:
     return keep * y + (1.0 - keep) * mean
 
 
-def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]], list[float]]:
+def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
     """Butterworth low-pass filter of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
 
     The poles lie on a circle of radius 2 pi cutoff (matrix exponential).
@@ -182,7 +184,7 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]]
         Ts: hold of the input [s].
 
     Returns:
-        A, order rows of order numbers, and B, order numbers.
+        (A00, A01, A10, A11, B0, B1); of order 1, A00 and B0 alone are not zero.
     """
     from scipy.linalg import expm
 
@@ -193,29 +195,27 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[list[list[float]]
         else [[0.0, 1.0, 0.0], [-w * w, -sqrt(2.0) * w, w * w], [0.0, 0.0, 0.0]]
     )
     e = expm(Ts * np.array(a))
-    return e[:order, :order].tolist(), e[:order, order].tolist()
+    A, B = np.zeros((2, 2)), np.zeros(2)
+    A[:order, :order], B[:order] = e[:order, :order], e[:order, order]
+    return (*A.ravel().tolist(), *B.tolist())
 
 
-def filter_step(
-    A: list[list[float]], B: list[float], x: tuple[float, ...], u: float
-) -> tuple[float, ...]:
+def filter_step(f, x0, x1, u):
     """State of a filter after one sample.
 
     Args:
-        A: from `butterworth`.
-        B: from `butterworth`.
-        x: state before.
+        f: from `butterworth`.
+        x0: state before: the output.
+        x1: state before, the rest of it.
         u: input.
 
     Returns:
         The state after the sample.
     """
-    return tuple(
-        sum(a * z for a, z in zip(row, x, strict=True)) + b * u for row, b in zip(A, B, strict=True)
-    )
+    return f[0] * x0 + f[1] * x1 + f[4] * u, f[2] * x0 + f[3] * x1 + f[5] * u
 
 
-def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -> Pair:
+def coulomb_friction(w, a11, a12, a22, limit):
     """Coulomb friction of two joints in one kick, implicit.
 
     Each joint either rests after the kick, under a torque within its limit, or slides against the
@@ -233,8 +233,10 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
     Returns:
         Torques on both joints [N.m].
     """
-    best, least = (0.0, 0.0), inf
-    for s1, s2 in product((0, 1, -1), repeat=2):
+    best1, best2, least = 0.0, 0.0, inf
+    for case in range(9):
+        # which way each joint slides, 0 for a joint at rest
+        s1, s2 = SLIDES[case // 3], SLIDES[case % 3]
         if s1 and s2:
             f1, f2 = -s1 * limit[0], -s2 * limit[1]
         elif s1:
@@ -253,13 +255,13 @@ def coulomb_friction(w: Pair, a11: float, a12: float, a22: float, limit: Pair) -
             -s2 * v2 / a22 if s2 else abs(f2) - limit[1],
         )
         if wrong < least:
-            best, least = (f1, f2), wrong
+            best1, best2, least = f1, f2, wrong
         if wrong <= 0.0:
             break
-    return min(max(best[0], -limit[0]), limit[0]), min(max(best[1], -limit[1]), limit[1])
+    return min(max(best1, -limit[0]), limit[0]), min(max(best2, -limit[1]), limit[1])
 
 
-def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float) -> float:
+def passivity_controller(energy, f, v, Ts, W):
     """Passivity controller of one axis: a resisting force, changed where the clay would be active.
 
     Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held
@@ -290,9 +292,7 @@ def passivity_controller(energy: float, f: float, v: float, Ts: float, W: float)
     return copysign(low, v) if along < low else f
 
 
-def virtual_coupling(
-    tool: float, p: float, v: float, b: float, spring: float, damper: float, Ts: float
-) -> Pair:
+def virtual_coupling(tool, p, v, b, spring, damper, Ts):
     """Spring and damper between the handle and a massless tool in clay, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
@@ -325,24 +325,41 @@ class SampleNoise:
     def __init__(self, parts: Interface):
         self.parts = parts
         self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
-        self._rows: list[Any] = []
+        self._first, self._rows = 0, np.zeros((0, 4))
 
-    def __call__(self, k: int) -> tuple[float, bool, Pair]:
-        """Random effects on sample k; the first sample is on time and never lost.
+    def forget(self, first: int) -> None:
+        """Forgets the samples before one.
 
         Args:
-            k: index of the sample.
+            first: its index.
+        """
+        self._rows, self._first = self._rows[first - self._first :], first
+
+    def table(self, first: int, n: int) -> np.ndarray:
+        """Random effects on n samples; the first sample of a run is on time and never lost.
+
+        Args:
+            first: index of the first of them; none of them is forgotten.
+            n: number of samples.
 
         Returns:
-            (offset of the sampling instant [s], whether the sample is lost, noise on the force (x,
-            y) [N]).
+            A row a sample: offset of the sampling instant [s], whether the sample is lost (1 or 0),
+            noise on the force (x, y) [N].
         """
-        while k >= len(self._rows):
-            s, (time, loss, noise) = self.parts, self._streams
-            width = s.jitter * sqrt(3.0)
-            late = time.uniform(-width, width, NOISE_BLOCK).tolist()
-            lost = (loss.random(NOISE_BLOCK) < s.lost).tolist()
-            hiss = (s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))).tolist()
-            self._rows += zip(late, lost, map(tuple, hiss), strict=True)
-        late, lost, hiss = self._rows[k]
-        return (late, lost, hiss) if k else (0.0, False, hiss)
+        blocks, at = [self._rows], first - self._first
+        missing = at + n - len(self._rows)
+        while missing > 0:
+            blocks.append(self._draw())
+            missing -= NOISE_BLOCK
+        self._rows = np.concatenate(blocks)
+        if self._first == 0:
+            self._rows[0, :2] = 0.0
+        return self._rows[at : at + n].copy()
+
+    def _draw(self) -> np.ndarray:
+        s, (time, loss, noise) = self.parts, self._streams
+        width = s.jitter * sqrt(3.0)
+        late = time.uniform(-width, width, NOISE_BLOCK)
+        lost = loss.random(NOISE_BLOCK) < s.lost
+        hiss = s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))
+        return np.column_stack((late, lost, hiss))

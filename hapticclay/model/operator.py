@@ -9,16 +9,14 @@ from ..errors import Bound, check_fields
 from .constants import B_MAX
 
 
-def operator_coefficients(
-    operator: Operator | None, H: float, L: float, R: float, h: float
-) -> tuple[float, float, float, float]:
+def operator_coefficients(hand, H, L, R, h):
     """Response of Th in one kick, without the delay of a step (docs/equations.md, section 4).
 
     The spring acts on the mean position (p(k-1) + 2 p(k) + p(k+1))/4, which adds k h^2/4 to the
     mass and keeps any spring stable at any step h (Newmark, beta = 1/4).
 
     Args:
-        operator: Th; None for Th = 0.
+        hand: mass [kg], damper [N.s/m] and spring [N/m] of Th; zeros for Th = 0.
         H: length of the kick [s].
         L: share of the kick before the sample.
         R: share of the kick after the sample.
@@ -28,10 +26,8 @@ def operator_coefficients(
         (spring [N/m], mass [kg], before, after [N.s/m]): the force on the handle is -(spring p -
         mass c + before v- + after v+), c the centripetal acceleration.
     """
-    mass, damper, spring = 0.0, 0.0, 0.0
-    if operator is not None:
-        mass, damper, spring = operator.mass, operator.damper, operator.spring
-    mass = mass + 0.25 * spring * h * h
+    damper, spring = hand[1], hand[2]
+    mass = hand[0] + 0.25 * spring * h * h
     return spring, mass, damper * L - mass / H, damper * R + mass / H
 
 

@@ -52,7 +52,7 @@ class Scenario:
         origin: world position of p = 0 [m].
         torque_limit: largest torque of the shoulder and elbow motor [N.m], > 0.
         integrator: "fast", second order, one engine step a sample, any stiffness; or "accurate",
-            fourth order, slower: the engine integrates the controller's states with the arm's.
+            fourth order, slower: Runge-Kutta, with the engine's acceleration at each stage.
         control: "continuous", the paper's analysis: the controller is part of the differential
             equation; or "sampled", the paper's hardware: measured, computed and held every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.

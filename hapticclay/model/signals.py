@@ -28,6 +28,26 @@ def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
 
+def mean_of_lines(lines, t, h):
+    """Mean of a multisine over [t - h, t + h], line by line; zero without lines.
+
+    Args:
+        lines: from `Signal.lines`.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y).
+    """
+    x, y = 0.0, 0.0
+    for j in range(len(lines)):
+        a = lines[j, 0] * h
+        share = math.sin(a) / a if a else 1.0
+        x += lines[j, 3] * (share * math.cos(lines[j, 0] * t + lines[j, 1]))
+        y += lines[j, 4] * (share * math.cos(lines[j, 0] * t + lines[j, 2]))
+    return x, y
+
+
 class Signal:
     """A multisine in a form ready for evaluation.
 
@@ -50,18 +70,23 @@ class Signal:
         self.phase = np.random.default_rng(m.seed).uniform(0.0, 2.0 * np.pi, (len(k), 2))
         self.amplitude = np.array(m.rms) * np.sqrt(2.0 / len(k))
 
-    def mean(self, begin: Any, end: Any) -> np.ndarray:
-        """Mean over intervals; the value where an interval has no length.
+    @property
+    def lines(self) -> np.ndarray:
+        """One row a line: omega [rad/s], phase x, y [rad], amplitude x, y; shape (n, 5)."""
+        amplitude = np.tile(self.amplitude, (len(self.omega), 1))
+        return np.column_stack((self.omega, self.phase, amplitude))
+
+    def mean(self, t: Any, h: Any) -> np.ndarray:
+        """Mean over [t - h, t + h]; the value at t for h = 0.
 
         Args:
-            begin: start [s], a number or shape (n,).
-            end: end [s], as begin.
+            t: centre of the interval [s], a number or shape (n,).
+            h: half its length [s], a number or shape (n,).
 
         Returns:
             Shape (2,) or (n, 2).
         """
-        begin, end = np.asarray(begin), np.asarray(end)
-        t, h = 0.5 * (begin + end)[..., None], 0.5 * (end - begin)[..., None]
+        t, h = np.asarray(t)[..., None], np.asarray(h)[..., None]
         lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
         return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
@@ -74,7 +99,7 @@ class Signal:
         Returns:
             Shape (2,) or (n, 2).
         """
-        return self.mean(t, t)
+        return self.mean(t, 0.0)
 
 
 @dataclass(frozen=True)

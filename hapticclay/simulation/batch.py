@@ -14,10 +14,11 @@ import numpy as np
 from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
 from ..model.scenario import Scenario
-from ..stepping.engine import Crossing, warnings_caught
+from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
+from ..stepping.run import Crossing, kind_of
 from . import record
-from .simulate import NUMBA, has_numba, load_compiled, native_fits, native_marches, simulate
+from .simulate import NUMBA, has_numba, load_compiled, simulate
 
 KEEP = ("records", "summaries")
 SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
@@ -63,11 +64,10 @@ def simulate_batch(
     every: int = 1,
     keep: str = "records",
 ) -> Any:
-    """Runs scenarios in parallel; each gives the record of simulate(engine="native"), bit for bit.
+    """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
-    The number of threads and the order do not matter. Accurate runs, scenes that the compiled loop
-    cannot run, and all scenes without numba run one after the other. A record takes 160 bytes a
-    sample, a summary 500 bytes.
+    The number of threads and the order do not matter. Without numba, scenes run one after the
+    other. A record takes 160 bytes a sample, a summary 500 bytes.
 
     Args:
         scenarios: what to run; they may differ in anything.
@@ -91,9 +91,10 @@ def simulate_batch(
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
     out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
-    native = [i for i, s in enumerate(jobs) if native_fits(s)]
-    module = load_compiled() if native and has_numba() else None
+    module = load_compiled() if jobs and has_numba() else None
     if module:
+        for kind in {kind_of(s) for s in jobs}:
+            module.warm(kind)
         pool = module.BatchPool(every)
 
         def run(i: int) -> None:
@@ -104,12 +105,12 @@ def simulate_batch(
             )
 
         with warnings_caught():
-            _on_threads(native, run, min(threads, len(native)))
-    elif native and not has_numba():
+            _on_threads(range(len(jobs)), run, min(threads, len(jobs)))
+        return out
+    if jobs and not has_numba():
         print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
-    for i in sorted(set(range(len(jobs))) - set(native if module else ())):
-        engine = "native" if native_marches(jobs[i]) and has_numba() else "python"
-        r = simulate(jobs[i], every=every, engine=engine)
+    for i, scenario in enumerate(jobs):
+        r = simulate(scenario, every=every, engine="python")
         out[i] = summary_entry(*record.brief(r)) if summaries else r
     return out
 
@@ -119,7 +120,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _on_threads(jobs: list[int], run: Callable[[int], None], threads: int) -> None:
+def _on_threads(jobs: Iterable[int], run: Callable[[int], None], threads: int) -> None:
     """run(job) for each job, on several threads; the first exception ends all and is raised."""
     todo, stop = iter(jobs), threading.Event()
 

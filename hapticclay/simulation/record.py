@@ -9,7 +9,7 @@ import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,10 +21,13 @@ from ..model.hardware import Coupling, Interface
 from ..model.operator import Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..stepping.engine import Crossing, Run
 from ..stepping.monitor import Outcome
+from ..stepping.run import Crossing, Run
 from ..theory import linear_loop
 from ..theory.margins import Verdict
+
+if TYPE_CHECKING:
+    from .accuracy import Accuracy
 
 RECORD_SCHEMA = "hapticclay-record-1"
 ARRAYS = {
@@ -81,6 +84,7 @@ class Record:
         extra: further arrays by name: removed clay and its rate, shape (n,); of sessions, the
             target of the hand and the gain K, shape (n, 2).
         notes: of sessions, how well they kept real time.
+        error: of a run to an asked error, what was asked and reached; else None.
     """
 
     t: np.ndarray
@@ -102,6 +106,7 @@ class Record:
     versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
     extra: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     notes: dict[str, Any] = dataclasses.field(default_factory=dict)
+    error: Accuracy | None = None
 
     @classmethod
     def of(cls, run: Run, wall: float) -> Record:
@@ -222,6 +227,8 @@ class Record:
         """Everything about the run but its arrays, ready for JSON."""
         end = float(self.t[-1]) if len(self.t) else 0.0
         more = {"notes": self.notes} if self.notes else {}
+        if self.error is not None:
+            more["error"] = dataclasses.asdict(self.error)
         extra = {name: EXTRA[name] for name in self.extra}
         return {
             "schema": RECORD_SCHEMA,
@@ -301,6 +308,7 @@ class Record:
                     versions=head["versions"],
                     extra=extra,
                     notes=head.get("notes", {}),
+                    error=_accuracy(head.get("error")),
                 )
         except (
             OSError,
@@ -329,6 +337,14 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
             raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
     if (np.diff(t) < 0.0).any():
         raise ValueError("array t must not go back")
+
+
+def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
+    if d is None:
+        return None
+    from .accuracy import Accuracy  # most records have none
+
+    return Accuracy(**d)
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:

@@ -14,22 +14,16 @@ from typing import Any
 
 from ..errors import ParameterError, choice, integer
 from ..model.scenario import Scenario
-from ..stepping.engine import Run, warnings_caught
-from ..stepping.leapfrog import Leapfrog
-from ..stepping.runge_kutta import RungeKutta
-from ..stepping.sampled import Sampled
+from ..stepping.engine import warnings_caught
+from ..stepping.run import PLAIN, Kernel, borrowed_store, cache_folder, kind_of
 from . import record
 
 ENGINES = ("auto", "python", "native")
-STAGES = 15  # steps of the fast run that one of the accurate run costs
-SAMPLE, WIRE = (
-    470,
-    480,
-)  # bytes that a run needs at its end, measured: a sample kept; a step, where there is hardware
+# measured: time that machine code saves in a step [us]; that it takes to load, and to compile [s]
+SAVED = {"LeapfrogRun": 4.0, "RungeKuttaRun": 10.0, "SampledRun": 20.0}
+LOADING, COMPILING = 0.6, {"LeapfrogRun": 3.5, "RungeKuttaRun": 4.0, "SampledRun": 9.0}
+SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
-NATIVE_FROM = (
-    300_000  # steps from which loading the compiled loop (a second, once per process) pays
-)
 
 
 def simulate(
@@ -38,6 +32,7 @@ def simulate(
     every: int = 1,
     progress: Callable[[float, float], bool | None] | None = None,
     engine: str = "auto",
+    error: float | str | None = None,
 ) -> record.Record:
     """Runs a scenario to its end.
 
@@ -46,45 +41,50 @@ def simulate(
         every: keep each every-th sample, and the last.
         progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as
             "interrupted".
-        engine: "python"; "native", compiled (needs hapticclay[fast]; scenes that it cannot run are
-            run by Python, with a notice); or "auto", native where it is installed and the run may
-            take 300000 steps or more (20000 of "accurate").
+        engine: "python"; "native", compiled (needs hapticclay[fast]); or "auto", compiled where
+            numba is installed and the machine code is loaded already or the run is long enough to
+            repay loading it. All give the same record, bit for bit.
+        error: largest error to allow: seconds at the border crossings (1e-6, "1e-6 s"), or metres
+            of position ("1e-7 m"), 1e-11 or more. Integrator and dt of the scenario are then
+            chosen, finer until runs at other steps confirm the error; record.error says what was
+            reached, and progress goes from 0 s on in each run. None to run the scenario as it is.
 
     Returns:
         The record. Instability and its like are outcomes (record.status), not exceptions.
 
     Raises:
         ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
-            stiff for its integrator, or the record may not fit into memory.
+            stiff for its integrator, the record may not fit into memory, or an error in seconds is
+            asked for without a border to cross.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
+    if error is not None:
+        from .accuracy import simulate_within  # only a run that asks for an error pays for it
+
+        return simulate_within(scenario, error, every=every, progress=progress, engine=engine)
     _check_memory(scenario, every)
     with warnings_caught():
-        kind = _stepper(scenario, choice("engine", engine, ENGINES))
-        run = kind(scenario, every)
-        begin = time.perf_counter()
-        run.go(progress)
-        wall = time.perf_counter() - begin
-    return record.Record.of(run, wall)
+        kernel = _kernel(scenario, choice("engine", engine, ENGINES))
+        with borrowed_store(kernel) as store:
+            run = kind_of(scenario)(scenario, every, kernel, store)
+            begin = time.perf_counter()
+            run.go(progress)
+            wall = time.perf_counter() - begin
+            return record.Record.of(run, wall)
 
 
 def _check_memory(scenario: Scenario, every: int) -> None:
     """Refuses a run whose record would not fit into memory if it lasted for t_max."""
     steps = scenario.t_max / scenario.dt
-    fixed = WIRE * steps if scenario.interface else 0.0
     samples = math.floor(steps / every) + 2
-    if fixed + SAMPLE * samples < SMALL_MEMORY or fixed + SAMPLE * samples < (
-        room := memory_left()
-    ):
+    if SAMPLE * samples < SMALL_MEMORY or SAMPLE * samples < (room := memory_left()):
         return
-    took, left = (fixed + SAMPLE * samples) / 1e9, max(room, 0.0) / 1e9
+    took, left = SAMPLE * samples / 1e9, max(room, 0.0) / 1e9
     need = f"{took:.3g} GB of memory, and {left:.3g} GB are left"
-    if (
-        room > 2.0 * fixed
-        and (more := math.ceil(1.1 * SAMPLE * steps / (room - fixed))) <= 1_000_000
-    ):
+    more = math.ceil(1.1 * SAMPLE * steps / room) if room > 0.0 else math.inf
+    if more <= 1_000_000:
         bound = f"up to {samples} samples take {need}: keep fewer (--every {more}), or lower t_max"
         raise ParameterError("every", every, bound)
     raise ParameterError(
@@ -92,43 +92,30 @@ def _check_memory(scenario: Scenario, every: int) -> None:
     )
 
 
-def _stepper(scenario: Scenario, engine: str) -> type[Run]:
-    """The class that runs this scenario."""
-    if not native_fits(scenario) and not native_marches(scenario):
-        if engine == "native":
-            print(
-                f"hapticclay: native runs no {_not_native(scenario)}; Python does", file=sys.stderr
-            )
-        if scenario.interface:
-            from ..stepping.sampled import HardwareLoop  # only a run with hardware pays for it
-
-            return HardwareLoop
-        return Sampled if scenario.control == "sampled" else RungeKutta
+def _kernel(scenario: Scenario, engine: str) -> Kernel:
+    """How the loops of this run are run."""
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
-    accurate = native_marches(scenario)
-    work = scenario.t_max / scenario.dt * (STAGES if accurate else 1)
-    compile_it = engine == "native" or (engine == "auto" and work >= NATIVE_FROM and has_numba())
-    native = load_compiled(accurate) if compile_it else None
-    if accurate:
-        return native.NativeRungeKutta if native else RungeKutta
-    return native.NativeLeapfrog if native else Leapfrog
+    if engine == "python" or (engine == "auto" and not _pays(scenario)):
+        return PLAIN
+    compiled = load_compiled()
+    return compiled.kernel(scenario) if compiled else PLAIN
 
 
-def _not_native(scenario: Scenario) -> str:
-    """The feature of a scenario that native does not have."""
-    return (
-        "sampled control"
-        if scenario.control == "sampled"
-        else "'accurate' run that is driven or whose clay grows"
-    )
+def _pays(scenario: Scenario) -> bool:
+    """Whether compiled loops are likely to end this run sooner than Python, loading included."""
+    if not has_numba():
+        return False
+    compiled, kind = sys.modules.get("hapticclay.stepping.compiled"), kind_of(scenario)
+    if compiled is not None and compiled.is_warm(kind):
+        return True
+    name, steps = kind.__name__, scenario.t_max / scenario.dt
+    wait = LOADING if any(cache_folder().glob("*/*.nbi")) else COMPILING[name]
+    return 1e-6 * SAVED[name] * steps >= 2.0 * wait  # runs tend to end before t_max
 
 
-def load_compiled(accurate: bool = False) -> Any:
-    """Imports the compiled loop; prints a line that says why, where this fails.
-
-    Args:
-        accurate: whether for an accurate run.
+def load_compiled() -> Any:
+    """Imports the compiled loops; prints a line that says why, where this fails.
 
     Returns:
         The module stepping.compiled; None where it fails.
@@ -136,7 +123,6 @@ def load_compiled(accurate: bool = False) -> Any:
     try:
         from ..stepping import compiled
 
-        compiled.warm(accurate)
         return compiled
     except (
         ImportError,
@@ -149,31 +135,6 @@ def load_compiled(accurate: bool = False) -> Any:
             file=sys.stderr,
         )
         return None
-
-
-def native_fits(scenario: Scenario) -> bool:
-    """Whether the compiled leapfrog can run a scenario: continuous control, fast integrator.
-
-    Args:
-        scenario: the scenario.
-    """
-    return scenario.control == "continuous" and scenario.integrator == "fast"
-
-
-def native_marches(scenario: Scenario) -> bool:
-    """Whether the compiled Runge-Kutta can run a scenario: accurate, and nothing changes with time.
-
-    Args:
-        scenario: the scenario.
-    """
-    clay = scenario.clay
-    grows = clay is not None and any((*(clay.x.growth or ()), *(clay.y.growth or ())))
-    driven = scenario.muscle is not None or scenario.command is not None
-    return (
-        scenario.control == "continuous"
-        and scenario.integrator == "accurate"
-        and not (grows or driven)
-    )
 
 
 NUMBA = "needs numba: pip install hapticclay[fast]"

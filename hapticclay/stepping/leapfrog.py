@@ -1,509 +1,684 @@
-"""The default run: a leapfrog of one engine step a sample, second order, in plain Python."""
+"""The default method: a leapfrog of one engine step a sample, second order.
+
+`kicks` is the loop, written out flat because CPython pays for each call; the laws it spells out are
+those of `model.arm` and `model.controller` (tests/stepping/test_leapfrog.py compares them).
+"""
 
 from __future__ import annotations
 
-import itertools
-import math
 import struct
-from collections.abc import Callable
+from math import cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm
-from ..model.clay import damping_at
-from ..model.operator import NO_HAND
-from ..model.scenario import Scenario
-from . import energy, loop
-from .engine import CHUNK, TOUCH, Run, command_view, find_root, mujoco, shared_view
-from .inline import inline
+from ..model import arm, clay, controller
+from ..model.arm import I1, I2, TRACE_W
+from ..model.constants import L1, L2
+from . import energy, loop, path
+from .loop import SXX, SYY
+from .path import INF, OPEN, TOUCH, put6, put12, put28
 
-LANDINGS = 4  # on borders in one step; a handle that slides along one then completes the step
 FIRST_OF_HIT = 0.02  # first step of a hit that saturates the motors, in decay times of the speed
 HIT_GROWTH = 1.01  # of each step of it over the one before
-INPUTS = 12  # numbers in loop.step_inputs
-ZERO = (0.0, 0.0)
-FUSE_FROM = 50_000  # steps from which inlining the loop (some 50 ms, once per process) pays
+# floats of a raw row: q, p, v before and after, f, tau, delta, joint rates before and after, clay
+# force beside its dampers, two axes each; Jacobian. Of a row of what varies: loop.step_inputs,
+# the clay, and the change of the command to the next sample.
+RAW, VARIED = 24, 16
+RAW_BYTES, VARIED_BYTES = 8 * RAW, 8 * VARIED
+VARIED_BLOCK = 256  # whole steps worked out ahead of a border that may end them
+# the cheapest way for CPython to write floats: (array, offset [bytes], floats)
+put_raw, put_varied = struct.Struct(f"{RAW}d").pack_into, struct.Struct(f"{VARIED}d").pack_into
 
-_row = struct.Struct("14d")
-_fused: dict[Callable[..., Any], Callable[..., Any]] = {}  # loops that have been inlined
+LEAPFROG_STATE = [  # beside path.STATE
+    # (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2 [rad/s^2],
+    # owedx, owedy [N.s]): compensator output and rate, reference model y = G delta and its rate,
+    # link accelerations, impulse owed by stiff clay; positions at the sample, rates before it
+    ("loop", "f8", 12),
+    # of the kick last worked out, beside its raw row, the first of Engine.raw:
+    ("coefficients", "f8", 28),  # loop.loop_coefficients
+    ("inputs", "f8", 12),  # loop.step_inputs
+    ("next", "f8", 12),  # state for the next sample
+    ("command", "f8", 6),  # motors [N.m], implicit clay x, y [N.s/m], further torques [N.m]
+]
 
 
-def written_out(law: Any, steps: int) -> Callable[..., tuple[float, ...]]:
-    """The loop with its laws inlined, where that many steps repay the effort or it is done already.
+def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
+    """Works out one kick, or carries the loop across samples by whole steps within one region.
+
+    A kick is the velocity step from the middle of the step before a sample to the middle of the
+    step after it.
 
     Args:
-        law: `glide_constant` or `glide_varying`.
-        steps: steps to come.
+        s: state of the run, with what `prepare` left there; gets the kick worked out.
+        e: its arrays.
+        n: largest number of steps to make; 0 makes none.
 
     Returns:
-        A function of the same arguments.
+        Number of steps made.
     """
-    if law not in _fused:
-        if steps < FUSE_FROM:
-            return law
-        _fused[law] = inline(law, frozenset({"stiff"} if law is glide_constant else ()))
-    return _fused[law]
+    (
+        H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
+        ox, noy, limit1, limit2, square1, square2, spring, mass, damp0, damp1, held, shaped,
+    ) = s["coefficients"]  # fmt: skip
+    bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = s["inputs"]
+    deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = s["loop"]
+    q1, q2 = s["q"]
+    w1, w2 = s["w"]
+    q, w, ctrl, push, mj_step, model, data = e.q, e.w, e.ctrl, e.push, e.step, e.model, e.data
+    low, high = s["low"], s["high"]
+    lowx, lowy, highx, highy = low[0], low[1], high[0], high[1]
+    varies = n > 0 and s["first"] >= 0
+    varied = e.varied
+    reach = 0.5 * step * step
+    softx, softy, restx, resty, hx, hy, fex, fey = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if n > 0 and s["dampers"]:
+        ctrl[2], ctrl[3] = bx1, by1
+    made = 0
+    p1, p2 = 0.0, 0.0
+    while True:
+        # what changes from step to step
+        if varies:
+            bx0, bx1, by0, by1 = (
+                varied[made, 0], varied[made, 1], varied[made, 2], varied[made, 3]
+            )  # fmt: skip
+            uhx, uhy, stiff = varied[made, 5], varied[made, 6], varied[made, 7]
+            sharex, sharey = varied[made, 8], varied[made, 9]
+            if s["dampers"]:
+                ctrl[2], ctrl[3] = bx1, by1
 
-
-class _Stretch(NamedTuple):
-    """Consecutive rows with these values in common."""
-
-    n: int
-    is_sample: bool  # False at a border between two samples
-    b: Any  # clay at the sample [N.s/m], (2, n), (2, 1) or a tuple
-    k: Any  # loop.step_inputs, (INPUTS, n), (INPUTS, 1) or a tuple
-    H: float  # length of the kick [s]
-    rest: Any = ZERO  # clay's force beside its dampers [N], (2, n) or a tuple
-
-
-def _spread_rows(columns: list[Any], counts: list[int]) -> np.ndarray:
-    """Columns side by side, each repeated to its count; a tuple is one column."""
-    out: list[np.ndarray] = []
-    pairs = zip(columns, counts, strict=True)
-    for single, some in itertools.groupby(pairs, key=lambda pair: isinstance(pair[0], tuple)):
-        if single:  # of careful runs there are thousands
-            out.append(np.array([x for x, _ in some]).T)
+        # kinematics of the handle
+        a2 = q1 + q2
+        u1x, u1y = -L1 * sin(q1), L1 * cos(q1)
+        u2x, u2y = -L2 * sin(a2), L2 * cos(a2)
+        px = u1y + u2y - ox
+        py = noy - u1x - u2x
+        r2 = w1 + w2
+        vx = u1x * w1 + u2x * r2
+        vy = u1y * w1 + u2y * r2
+        s1 = w1 + half * g1
+        s2 = r2 + half * g2
+        s1 = s1 * s1
+        s2 = s2 * s2
+        cx = u1y * s1 + u2y * s2
+        cy = -u1x * s1 - u2x * s2
+        if stiff:  # after the sample the handle stands still where the clay is stiff
+            cx, cy = arm.centripetal_about_sample(
+                L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
+            )
+        if shaped:
+            sxx, sxy, syy = SXX, 0.0, SYY
         else:
-            out += [np.broadcast_to(x, (len(x), n)) for x, n in some]
-    return np.concatenate(out, axis=1) if out else np.empty((2, 0))
+            m1 = u1x / I1
+            m2 = u2x / I2
+            sxx = u1x * m1 + u2x * m2
+            sxy = u1y * m1 + u2y * m2
+            syy = TRACE_W - sxx
+
+        # clay and operator: net force f = (fx - dx ux, fy - dy uy)
+        fx = uhx - bx0 * vx
+        fy = uhy - by0 * vy
+        dx, dy = bx1, by1
+        if held:
+            fx -= spring * px - mass * cx + damp0 * vx
+            fy -= spring * py - mass * cy + damp0 * vy
+            dx += damp1
+            dy += damp1
+
+        # servo: one kick of the reference model, then of the handle
+        vrx = keepx * ydx + takex * (deltax - yx)
+        vry = keepy * ydy + takey * (deltay - yy)
+        ax = nx * vrx + mx * (vx - ydx) + kpx * (yx - px) + cx
+        ay = ny * vry + my * (vy - ydy) + kpy * (yy - py) + cy
+        newx, newy = owedx, owedy
+        if stiff:
+            restx, resty = owedx / H, owedy / H
+            fex, fey = (bx0 + bx1) * vx, (by0 + by1) * vy
+            hx, hy = uhx - spring * px, uhy - spring * py
+            gx = ax - mx * vx + sxx * hx + sxy * hy
+            gy = ay - my * vy + sxy * hx + syy * hy
+            gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
+            newx, newy, softx, softy = loop.owed_impulse(step, H, spring, sharex, sharey, gx, gy)
+            fx += newx - restx
+            fy += newy - resty
+            dx += softx
+            dy += softy
+        gx = ax + sxx * fx + sxy * fy
+        gy = ay + sxy * fx + syy * fy
+        if dx or dy:
+            m1 = nx + sxx * dx
+            m2 = sxy * dy
+            r = sxy * dx / m1
+            uy = (gy - r * gx) / (ny + syy * dy - r * m2)
+            ux = (gx - m2 * uy) / m1
+        else:
+            ux = gx / nx
+            uy = gy / ny
+        ffx = fx - dx * ux
+        ffy = fy - dy * uy
+        gx = ux - vx
+        gy = uy - vy
+        det = H * (u1x * u2y - u2x * u1y)
+        h1 = (gx * u2y - gy * u2x) / det
+        h2 = (gy * u1x - gx * u1y) / det
+        t2 = I2 * h2 - u2x * ffx - u2y * ffy
+        t1 = I1 * h1 - u1x * ffx - u1y * ffy + t2
+        if t1 * t1 > square1 or t2 * t2 > square2:
+            ux, uy, h1, h2, ffx, ffy, t1, t2 = controller.kick_at_limit(
+                H, (vx, vy), (u1x, u1y, u2x, u2y), (fx, fy), (dx, dy), (t1, t2), (limit1, limit2)
+            )
+        if stiff:
+            # motors at their limits hold less against the clay
+            if t1 * t1 >= square1 or t2 * t2 >= square2:
+                gx, gy = arm.handle_acceleration(
+                    (t1 - t2) / I1, t2 / I2, hx, hy, (u1x, u1y, u2x, u2y)
+                )
+                sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
+                gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
+                fx -= newx
+                fy -= newy
+                newx, newy, _, _ = loop.owed_impulse(step, H, spring, sharex, sharey, gx, gy)
+                fx += newx
+                fy += newy
+                ux, uy = controller.velocity_under_torque(
+                    H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
+                )
+                ffx = fx - dx * ux
+                ffy = fy - dy * uy
+                h1, h2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
+            newx -= softx * ux
+            newy -= softy * uy
+            restx -= newx
+            resty -= newy
+            fx -= softx * ux
+            fy -= softy * uy
+            newx *= H
+            newy *= H
+
+        n1 = w1 + H * h1
+        n2 = w2 + H * (h2 - h1)
+        if n:  # a step that would leave the region is left to path.careful
+            r2 = n1 + n2
+            slack = reach * (L1 * n1 * n1 + L2 * r2 * r2) + TOUCH  # where the velocity points
+            x = px + step * ux
+            y = py + step * uy
+            if not (lowx + slack <= x <= highx - slack and lowy + slack <= y <= highy - slack):
+                if not abs(n1) + abs(n2) < INF:
+                    break
+                x, y = arm.handle_position(q1 + step * n1, q2 + step * n2)
+                x, y = x - ox, y + noy
+                if not (lowx - TOUCH <= x <= highx + TOUCH and lowy - TOUCH <= y <= highy + TOUCH):
+                    break
+
+        # to the engine goes what it does not treat implicitly: the hand, and the clay's first part
+        if held:
+            fx -= damp1 * ux
+            fy -= damp1 * uy
+        p2 = u2x * fx + u2y * fy
+        p1 = u1x * fx + u1y * fy + p2
+
+        # compensator, driven by the force that acts in this kick
+        ex = keep * ex + gainx * ffx
+        ey = keep * ey + gainy * ffy
+        put_raw(
+            e.raw, made * RAW_BYTES, q1, q2, px, py, vx, vy, ux, uy, ffx, ffy, t1, t2,
+            deltax, deltay, w1, w2, n1, n2, restx, resty, u1x, u1y, u2x, u2y,
+        )  # fmt: skip
+        deltax += step * ex
+        deltay += step * ey
+        yx += step * vrx
+        yy += step * vry
+        ydx, ydy, g1, g2, owedx, owedy = vrx, vry, h1, h2, newx, newy
+        if n == 0:
+            break
+        ctrl[0], ctrl[1] = t1, t2
+        push[0], push[1] = p1, p2
+        if varies:
+            deltax += varied[made, 14]
+            deltay += varied[made, 15]
+        mj_step(model, data)
+        made += 1
+        if made == n:
+            break
+        q1, q2, w1, w2 = q[0], q[1], w[0], w[1]
+    put12(s["next"], 0, deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy)
+    put6(s["command"], 0, t1, t2, bx1, by1, p1, p2)
+    return made
 
 
-def _rows_at_samples(
-    raw: np.ndarray, k: np.ndarray, rest: np.ndarray, scenario: Scenario
-) -> np.ndarray:
-    """Converts kicks, shape (14, n), to (q, p, v, fh, tau, delta) at their samples, shape (12, n).
+def prepare(s, e, before, after):
+    """Readies a kick for `kicks`.
 
     Args:
-        raw: the kicks.
-        k: loop.step_inputs of each kick, shape (INPUTS, n), or (INPUTS, 1) for all.
-        rest: clay force beside its dampers [N], shape (2, n) or (2, 1).
-        scenario: the scenario.
+        s: state of the run.
+        e: its arrays.
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
     """
-    out = np.empty((12, raw.shape[1]))
-    before, after = raw[4:6], raw[6:8]
+    put28(s["coefficients"], 0, *loop.loop_coefficients(s, before, after))
+    put12(s["inputs"], 0, *inputs(s, e, before, after))
+
+
+def propose(s, e, before, after):
+    """Works out the kick between steps of these lengths.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+    """
+    prepare(s, e, before, after)
+    kicks(s, e, 0)
+
+
+def inputs(s, e, before, after):
+    """loop.step_inputs of the kick now.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+
+    Returns:
+        12 numbers.
+    """
+    t = s["t"]
+    b0, b1 = path.damping_before(s, t - 0.25 * before), path.damping_now(s, t + 0.25 * after)
+    uh = path.mean_force(s, e, t + 0.25 * (after - before), 0.25 * (before + after))
+    return loop.step_inputs(b0, b1, uh, before, after, s["hand"])
+
+
+def vary(s, e, n):
+    """Works out what varies in the next whole steps.
+
+    Args:
+        s: state of the run, with what `prepare` left there.
+        e: its arrays.
+        n: number of steps.
+    """
+    k, coming, dt = s["inputs"], e.ahead, s["dt"]
+    hand = (s["hand"][0], s["hand"][1], s["hand"][2])
+    base, rate = (s["base"][0], s["base"][1]), (s["rate"][0], s["rate"][1])
+    bx0, bx1, by0, by1, L, _, _, stiff, sharex, sharey, meltx, melty = k
+    for j in range(n):
+        i = s["i"] - s["first"] + j
+        t, uhx, uhy = coming[i, 4], coming[i, 0], coming[i, 1]
+        if rate[0] > 0.0 or rate[1] > 0.0:
+            b0 = clay.damping_at(base, rate, t - 0.25 * dt)
+            b1 = clay.damping_at(base, rate, t + 0.25 * dt)
+            bx0, bx1, by0, by1, L, _, _, stiff, sharex, sharey, meltx, melty = loop.step_inputs(
+                b0, b1, (uhx, uhy), dt, dt, hand
+            )
+        x, y = clay.damping_at(base, rate, t)
+        put_varied(
+            e.varied, j * VARIED_BYTES, bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey,
+            meltx, melty, x, y, coming[i, 2], coming[i, 3],
+        )  # fmt: skip
+
+
+def leap_block(s, e, n):
+    """Makes whole steps within one region of the clay and takes them into the record.
+
+    Args:
+        s: state of the run, with what `prepare` and `vary` left there.
+        e: its arrays.
+        n: largest number of steps.
+
+    Returns:
+        Number of steps made.
+    """
+    total = 0
+    while total < n:  # in blocks that stay in the cache
+        most = min(n - total, len(e.raw))
+        made = kicks(s, e, most)
+        if made:
+            accept(s)
+            for j in range(2):
+                s["q"][j], s["w"][j] = e.q[j], e.w[j]
+            tabulate(s, e, made)
+            s["filled"] += made
+            total += made
+        if made < most:
+            break
+    return total
+
+
+def tabulate(s, e, n):
+    """Takes a block of whole steps into the record and the ledger.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        n: number of steps.
+    """
+    at, work, varies = s["filled"], s["work"], s["first"] >= 0
+    raw, out = np.asarray(e.raw)[:n].T.copy(), np.asarray(e.rows)[at : at + n].T
+    k: Any = np.asarray(e.varied)[:n].T.copy() if varies else block_inputs(s)
+    before: Any = raw[4:6]
+    after: Any = raw[6:8]
+    rest: Any = raw[18:20]
     out[0:4] = raw[0:4]
-    out[4:6] = before + k[4] * (after - before)
-    if k[10:12].any():  # see loop.velocity_at_sample
-        soft = k[10:12] * (k[0:4:2] * before + k[1:4:2] * after + rest)
-        out[4:6] = np.where(k[10:12] > 0.0, soft, out[4:6])
-    if scenario.operator:
-        out[6:8] = raw[8:10] + k[0:4:2] * before + k[1:4:2] * after + rest
-    else:
-        out[6:8] = k[5:7]
+    for i in (0, 1):
+        out[4 + i] = before[i] + k[4] * (after[i] - before[i])
+        if np.any(k[10 + i]):  # see loop.velocity_at_sample
+            v = k[10 + i] * (k[2 * i] * before[i] + k[2 * i + 1] * after[i] + rest[i])
+            out[4 + i] = np.where(k[10 + i] > 0.0, v, out[4 + i])
+        out[6 + i] = k[5 + i]
+        if s["held"]:
+            out[6 + i] = raw[8 + i] + k[2 * i] * before[i] + k[2 * i + 1] * after[i] + rest[i]
+        out[12 + i] = k[12 + i]
     out[8:12] = raw[10:14]
+    r1, r2 = arm.joint_velocity(out[4], out[5], raw[20:24], 1.0)
+    out[14], out[15] = r1, r2 - r1
+    done = energy.kick_work(
+        s["dt"], k, rest[0], rest[1], before[0], before[1], after[0], after[1], raw[10], raw[11],
+        0.5 * (raw[14] + raw[16]), 0.5 * (raw[15] + raw[17]), s["hand"][1],
+    )  # fmt: skip
+    for j, x in enumerate(done):  # one after the other, as in the loop below
+        work[j] = float(np.cumsum(np.append(work[j], x))[-1])
+    put6(s["final"], 0, *raw[[2, 3, 6, 7, 16, 17], n - 1].tolist())
+
+
+def tabulate_each(s, e, n):
+    """As `tabulate`, row by row, for compiled runs.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        n: number of steps.
+    """
+    x = block_inputs(s)
+    for j in range(n):
+        if s["first"] >= 0:
+            y = e.varied
+            x = (
+                y[j, 0], y[j, 1], y[j, 2], y[j, 3], y[j, 4], y[j, 5], y[j, 6],
+                y[j, 7], y[j, 8], y[j, 9], y[j, 10], y[j, 11], y[j, 12], y[j, 13],
+            )  # fmt: skip
+        write_row(s, e, j, s["filled"] + j, x)
+        add_work(s, e, j, s["dt"], x)
+
+
+def block_inputs(s):
+    """loop.step_inputs and clay of whole steps, where nothing varies.
+
+    Args:
+        s: state of the run.
+
+    Returns:
+        14 numbers.
+    """
+    k, base = s["inputs"], s["base"]
+    return (
+        k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], base[0], base[1]
+    )  # fmt: skip
+
+
+def write_row(s, e, j, i, x):
+    """Writes the row of a sample.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        j: raw row of the kick.
+        i: row of the record.
+        x: loop.step_inputs of the kick, and the clay at the sample [N.s/m].
+    """
+    raw, rows = e.raw, e.rows
+    vx, vy, ux, uy = raw[j, 4], raw[j, 5], raw[j, 6], raw[j, 7]
+    restx, resty = raw[j, 18], raw[j, 19]
+    for n in range(4):
+        rows[i, n], rows[i, 8 + n] = raw[j, n], raw[j, 10 + n]
+    rows[i, 4] = loop.velocity_at_sample(x, 0, vx, ux, restx)
+    rows[i, 5] = loop.velocity_at_sample(x, 1, vy, uy, resty)
+    if s["held"]:
+        rows[i, 6] = raw[j, 8] + x[0] * vx + x[1] * ux + restx
+        rows[i, 7] = raw[j, 9] + x[2] * vy + x[3] * uy + resty
+    else:
+        rows[i, 6], rows[i, 7] = x[5], x[6]
+    rows[i, 12], rows[i, 13] = x[12], x[13]
+    write_rates(e, j, i)
+
+
+def write_rates(e, j, i):
+    """Writes the joint rates of a row, from its velocity.
+
+    Args:
+        e: arrays of the run.
+        j: raw row of the kick.
+        i: row of the record.
+    """
+    raw, rows = e.raw, e.rows
+    u = (raw[j, 20], raw[j, 21], raw[j, 22], raw[j, 23])
+    r1, r2 = arm.joint_velocity(rows[i, 4], rows[i, 5], u, 1.0)
+    rows[i, 14], rows[i, 15] = r1, r2 - r1
+
+
+def add_work(s, e, j, H, x):
+    """Adds the work of a kick to the ledger.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        j: raw row of the kick.
+        H: length of the kick [s].
+        x: loop.step_inputs of the kick.
+    """
+    raw, work = e.raw, s["work"]
+    done = energy.kick_work(
+        H, x, raw[j, 18], raw[j, 19], raw[j, 4], raw[j, 5], raw[j, 6], raw[j, 7],
+        raw[j, 10], raw[j, 11],
+        0.5 * (raw[j, 14] + raw[j, 16]), 0.5 * (raw[j, 15] + raw[j, 17]), s["hand"][1],
+    )  # fmt: skip
+    for n in range(5):
+        work[n] += done[n]
+    put6(s["final"], 0, raw[j, 2], raw[j, 3], raw[j, 6], raw[j, 7], raw[j, 16], raw[j, 17])
+
+
+def limited(s):
+    """Whether a motor is at its limit in the kick worked out.
+
+    Args:
+        s: state of the run.
+    """
+    tau, limit = s["command"], s["torque_limit"]
+    return abs(tau[0]) >= limit[0] or abs(tau[1]) >= limit[1]
+
+
+def accept(s):
+    """Takes the state after the kick worked out.
+
+    Args:
+        s: state of the run.
+    """
+    for j in range(12):
+        s["loop"][j] = s["next"][j]
+
+
+def step_engine(s, e, command, after):
+    """Gives the engine a command, steps it, and reads it.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        command: (tau1, tau2, implicit clay bx, by [N.s/m], further torques 1, 2 [N.m]).
+        after: length of the step [s].
+    """
+    e.ctrl[0], e.ctrl[1] = command[0], command[1]
+    if s["dampers"]:
+        e.ctrl[2], e.ctrl[3] = command[2], command[3]
+    e.push[0], e.push[1] = command[4], command[5]
+    e.timestep[0] = after
+    e.step(e.model, e.data)
+    e.timestep[0] = s["dt"]
+    s["steps"] += 1
+    for j in range(2):
+        s["q"][j], s["w"][j] = e.q[j], e.w[j]
+
+
+def steps_ahead(run, i, n):
+    """What changes from step to step: muscle force, command and time, over the next whole steps.
+
+    Args:
+        run: the run.
+        i: index of the first sample.
+        n: number of samples.
+
+    Returns:
+        Shape (n, 5): mean muscle force around the sample (x, y) [N], change of the command to the
+        next sample (x, y) [m], time of the sample [s].
+    """
+    dt = run.scenario.dt
+    t = (i + np.arange(n + 1)) * dt
+    out = np.zeros((n, 5))
+    out[:, 0:2] = run.uh(t[:n], 0.5 * dt)
+    if run.command:
+        out[:, 2:4] = np.diff(run.command(t), axis=0)
+    out[:, 4] = t[:n]
     return out
 
 
-class Leapfrog(Run):
-    """One engine step a sample; a step that would cross a border ends on it, another completes it.
+class Leapfrog(NamedTuple):
+    """The method; `path.Method` says what each part does.
 
-    Args:
-        scenario: what to run.
-        every: keep each every-th sample, and the last.
+    Attributes:
+        order: of its error in the step.
     """
 
-    def __init__(self, scenario: Scenario, every: int):
-        super().__init__(scenario, every)
-        self.motion, self.read = shared_view(self.data.qpos, self.data.qvel)
-        self.drive, self.write = command_view(self.data.ctrl, self.data.qfrc_applied)
-        self.state: Any = loop.initial_state(scenario.start, scenario.velocity)
-        self.whole = loop.loop_coefficients(scenario, scenario.dt, scenario.dt)
-        self.hand = scenario.operator or NO_HAND
-        if scenario.control == "continuous":  # `_glide` needs these, before the run is timed
-            written_out(glide_varying if self.varies else glide_constant, self.last)
-            if 0.5 * scenario.dt * self.regions.stiffest * arm.TRACE_W > 1.0:
-                written_out(glide_varying, self.last)
-        self.landings = 0  # on borders since the last sample
-        self.struck = True  # the handle has just come into this clay
-        self.fine = math.inf  # longest step on the way from a hit [s]
-        self.final: Any = None  # velocity of the handle at the end [m/s]
-        self.before = 0.0  # length of the step that led here [s]
-        self.clay = self.regions.base, self.regions.rate  # before the sample
-        self.rows = bytearray(CHUNK * GLIDE_ROW)
-        self.filled = 0
-        self.stretches: list[_Stretch] = []
-        self.ledger = energy.EnergyLedger(scenario)
+    order: int = 2
 
-    def advance(self) -> bool:
-        if not self._glide():
-            self._careful()
-        return self.filled >= CHUNK - 1
+    def glide(self, s, e, room):
+        t, i, dt, base, rate, old = s["t"], s["i"], s["dt"], s["base"], s["rate"], s["old"]
+        n = min(s["last"] - i, room - s["filled"])
+        if n < 1 or s["before"] != dt or t != i * dt or s["closing"] != OPEN or s["struck"]:
+            return 0
+        same = old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
+        if not same or s["fine"] < INF:
+            return 0
+        if s["first"] >= 0:
+            n = min(n, s["first"] + len(e.ahead) - i, VARIED_BLOCK)
+        prepare(s, e, dt, dt)
+        if s["first"] >= 0:
+            self.vary(s, e, n)
+        made = self.block(s, e, n)
+        if made:
+            s["steps"] += made
+            s["i"] = i + made
+            s["t"] = s["i"] * dt
+            s["landings"] = 0
+        return made
 
-    def _glide(self) -> bool:
-        """Makes whole steps, up to the first that crosses a border; False if there is none."""
-        dt = self.scenario.dt
-        n = min(self.last - self.i, CHUNK - 1 - self.filled)
-        if self.before != dt or self.clay != (self.regions.base, self.regions.rate) or n < 1:
-            return False
-        p, ahead = (self.position(self.angles, self.rates, h) for h in (0.0, dt))
-        for i in (0, 1):  # do not run far beyond the border that lies ahead
-            d = ahead[i] - p[i]
-            if d:
-                way = ((self.regions.high[i] if d > 0.0 else self.regions.low[i]) - p[i]) / d
-                n = min(n, max(16, int(min(0.95 * way, n))))
-        q, w, state = tuple(self.angles), tuple(self.rates), self.state
-        rows = range(self.filled * GLIDE_ROW, (self.filled + n) * GLIDE_ROW, GLIDE_ROW)
-        rest: list[tuple[float, float]] = []
-        if self.varies:
-            b, inputs, shift = self._ahead(n)
-            b, k = np.array(b).T, np.array(inputs).T
-        else:
-            b = self.regions.b(self.t)
-            inputs = loop.step_inputs(b, b, self.scenario.force, dt, dt, self.hand)
-            shift = [0.0] * n, [0.0] * n
-            b, k = np.reshape(b, (2, 1)), np.reshape(inputs, (INPUTS, 1))
-        simple = not self.varies and not k[7, 0]
-        many = written_out(glide_constant if simple else glide_varying, self.last)
-        if simple:
-            steps, given = rows, (self.whole, inputs)
-        else:
-            each = inputs if self.varies else itertools.repeat(inputs, n)
-            steps, given = list(zip(rows, each, *shift, strict=True)), (rest, self.whole)
-        while True:
-            self.state = many(
-                steps[:n], *given, state,
-                self.read, self.write, _row.pack_into, self.motion, self.drive, self.rows,
-                mujoco.mj_step, self.model, self.data,
-            )  # fmt: skip
-            good = self._good(self.filled, n)
-            if good == n:
-                break
-            self.angles[0], self.angles[1] = q
-            self.rates[0], self.rates[1] = w
-            n = good
-            rest.clear()
-            if n < 1:
-                self.state = state
-                return False
-        self.stretches.append(_Stretch(n, True, b[:, :n], k[:, :n], dt, np.array(rest or [ZERO]).T))
-        self.filled += n
-        self.steps += n
-        self.i += n
-        self.t = self.i * dt
-        return True
+    def block(self, s, e, n):
+        """As leap_block.
 
-    def _ahead(self, n: int) -> tuple[list, list, list]:
-        """Clay at the next n samples, loop.step_inputs there, change of the command (x, y)."""
-        dt = self.scenario.dt
-        t = (self.i + np.arange(n + 1)) * dt
-        now = t[:n].tolist()
-        b = [self.regions.b(x) for x in now]
-        uh = self.uh(t[:n] - 0.5 * dt, t[:n] + 0.5 * dt).tolist()
-        if self.regions.grows:
-            halves = [(self.regions.b(x - 0.25 * dt), self.regions.b(x + 0.25 * dt)) for x in now]
-            k = [
-                loop.step_inputs(b0, b1, u, dt, dt, self.hand)
-                for (b0, b1), u in zip(halves, uh, strict=True)
-            ]
-        else:
-            same = loop.step_inputs(b[0], b[0], ZERO, dt, dt, self.hand)
-            k = [(*same[:5], *u, *same[7:]) for u in uh]
-        return b, k, self.shift(t[:n], t[1:]).T.tolist()
-
-    def _good(self, first: int, n: int) -> int:
-        """Number of the n steps from row first that stay in the region."""
-        rows = np.frombuffer(self.rows, dtype=float, count=14 * (first + n)).reshape(-1, 14)
-        end = self.position(self.angles, self.rates, 0.0)
-        out = np.zeros(n + 1, dtype=bool)
-        for i in (0, 1):
-            low, high = self.regions.low[i], self.regions.high[i]
-            if low > -math.inf or high < math.inf:
-                x = np.append(rows[first:, 2 + i], end[i])
-                out |= ~((x >= low - TOUCH) & (x <= high + TOUCH))
-        return int(out.argmax()) - 1 if out.any() else n
-
-    def _careful(self) -> None:
-        """One step with a look at its end, which lies on a border if one is in the way."""
-        target, after, on_grid = self.target()
-        if not after:
-            return self._close("time limit")
-        if on_grid:
-            self.landings = 0
-        q, w = tuple(self.angles), tuple(self.rates)
-        crossed: dict[int, bool] = {}  # borders stepped over without a step: axis, upwards
-        after = min(after, self.fine)
-        while True:
-            if self.struck:
-                self.struck, self.fine = False, self._first_of_a_hit(q, w, after)
-                if self.fine < after:
-                    after, w = self.fine, self._halve(q, w)
-            new, command, sample, out = self._tick(q, w, after)
-            here, there = self.position(q, out[2:], 0.0), self.position(q, out[2:], after)
-            ups = {
-                i: there[i] > self.regions.high[i] for i in (0, 1) if not self.inside(i, there[i])
-            }
-            # no way back over a border: it must not hold the run
-            hit = [i for i in ups if crossed.get(i, ups[i]) == ups[i]]
-            if not hit:
-                landing = None
-                break
-            beyond = [i for i in hit if not self.inside(i, here[i])]
-            if beyond:
-                i = beyond[0]
-                if self._cross(i, ups[i]):
-                    return None
-                crossed[i] = ups[i]
-                continue
-            if self.landings >= LANDINGS:
-                landing = None
-                break
-            spans = {i: self._landing(q, w, i, ups[i], after, there[i]) for i in hit}
-            i = min(hit, key=lambda i: spans[i])
-            landing, after = (i, ups[i]), spans[i]
-            new, command, sample, out = self._tick(q, w, after)
-            break
-        self._keep(on_grid, q, sample, command, out, after)
-        self._engine(w, command, out, after)
-        self.state, self.clay = new, (self.regions.base, self.regions.rate)
-        self.before = after
-        self.fine *= HIT_GROWTH if self._limited(command) else math.inf
-        self.t += after
-        if target - self.t <= 1e-9 * self.scenario.dt:
-            self._arrive(target)
-        if landing is not None:
-            self.landings += 1
-            self._cross(*landing)
-        return None
-
-    def _velocity(self, q, w, out) -> tuple[float, float]:
-        """Handle velocity now [m/s], on the near side of a border.
-
-        Half a kick has led to `out`. In stiff clay that half holds too little of the clay; the
-        velocity is then that of a whole kick.
+        Args:
+            s: state of the run.
+            e: its arrays.
+            n: largest number of steps.
         """
-        k = self._inputs(self.before, self.before)
-        if not (k[10] or k[11]):
-            return out[:2]
-        at, end = self._whole_kick(q, w)
-        x, y = (
-            loop.velocity_at_sample(k, i, at[2 + i], end[i], at[8 + i]) if k[10 + i] else out[i]
-            for i in (0, 1)
-        )
-        return x, y
+        return leap_block(s, e, n)
 
-    def _whole_kick(self, q, w) -> tuple[Any, Any]:
-        """Sample and end of a kick here, with the step before it repeated; see loop.step_loop."""
-        return self._tick(q, w, self.before)[2:]
+    def vary(self, s, e, n):
+        """As the function.
 
-    def _halve(self, q: tuple[float, ...], w: tuple[float, ...]) -> tuple[float, ...]:
-        """Ends the step that led here with its half of the kick; returns the joint rates now."""
-        if self.before:
-            self.state, command, sample, out = self._tick(q, w, 0.0)
-            self._keep(False, q, sample, command, out, 0.0)
-            self.before, w = 0.0, out[2:]
-            self.rates[0], self.rates[1] = w
-        return w
+        Args:
+            s: state of the run.
+            e: its arrays.
+            n: number of steps.
+        """
+        vary(s, e, n)
 
-    def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
-        """First of the steps that resolve a hit which saturates the motors [s]; else inf."""
-        b = max(self.regions.b(self.t))
-        first = FIRST_OF_HIT / (b * arm.TRACE_W) if b else math.inf
+    def stop(self, s):
+        return path.next_sample(s["t"], s["i"], s["last"], s["dt"], s["t_max"])
+
+    def arrive(self, s, target):
+        s["i"] += 1
+        s["t"] = target
+
+    def act(self, s, e):
+        pass
+
+    def strike(self, s, e, after):
+        # a hit that drives motors into their limits is no mean over a long step: its first step is
+        # short, and the step that led here ends with its half of the kick
+        s["fine"] = INF
+        x, y = path.damping_now(s, s["t"])
+        b = max(x, y)
+        first = FIRST_OF_HIT / (b * TRACE_W) if b > 0.0 else INF
         if first >= after:
-            return math.inf
-        state, before = self.state, self.before
-        if before:
-            self.state, _, _, out = self._tick(q, w, 0.0)
-            self.before, w = 0.0, out[2:]
-        command = self._tick(q, w, first)[1]
-        self.state, self.before = state, before
-        return first if self._limited(command) else math.inf
+            return after
+        before, w1, w2, x = s["before"], s["w"][0], s["w"][1], s["loop"]
+        saved = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
+        for trial in range(2):
+            if before > 0.0:
+                propose(s, e, before, 0.0)
+                if trial:
+                    add_work(s, e, 0, 0.5 * before, s["inputs"])
+                accept(s)
+                s["w"][0], s["w"][1] = e.raw[0, 16], e.raw[0, 17]
+            if trial == 0:
+                propose(s, e, 0.0, first)
+                put12(s["loop"], 0, *saved)
+                s["w"][0], s["w"][1] = w1, w2
+                if not limited(s):
+                    return after
+        s["fine"], s["before"] = first, 0.0
+        e.w[0], e.w[1] = s["w"][0], s["w"][1]
+        return first
 
-    def _limited(self, command: tuple[float, ...]) -> bool:
-        """Whether a motor is at its limit in this kick."""
-        limit = self.scenario.torque_limit
-        return abs(command[0]) >= limit[0] or abs(command[1]) >= limit[1]
+    def propose(self, s, e, after):
+        propose(s, e, s["before"], after)
 
-    def _arrive(self, target: float) -> None:
-        """Moves the clock to the time of `target` [s]."""
-        self.i += 1
-        self.t = target
+    def finite(self, s, e):
+        return abs(e.raw[0, 16]) + abs(e.raw[0, 17]) < INF
 
-    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
-        s = self.scenario
-        whole = self.before == after == s.dt
-        c = self.whole if whole else loop.loop_coefficients(s, self.before, after)
-        k = self._inputs(self.before, after)
-        state, *rest = loop.step_loop(c, k, q[0], q[1], w[0], w[1], self.state)
-        if self.command and after:
-            cx, cy = self.shift(self.t, self.t + after).tolist()
-            state = (state[0] + cx, state[1] + cy, *state[2:])
-        return state, *rest
+    def place(self, s, e, h):
+        q, origin = s["q"], s["origin"]
+        x, y = arm.handle_position(q[0] + h * e.raw[0, 16], q[1] + h * e.raw[0, 17])
+        return x - origin[0], y - origin[1]
 
-    def _inputs(self, before: float, after: float) -> tuple[float, ...]:
-        """loop.step_inputs of the kick at this time, between steps of these lengths."""
-        t = self.t
-        b0, b1 = damping_at(*self.clay, t - 0.25 * before), self.regions.b(t + 0.25 * after)
-        return loop.step_inputs(
-            b0, b1, self.uh(t - 0.5 * before, t + 0.5 * after), before, after, self.hand
-        )
+    def keep(self, s, e, after, shows):
+        x = s["inputs"]
+        add_work(s, e, 0, 0.5 * (s["before"] + after), x)
+        if not shows:
+            return
+        i, t = s["filled"], s["t"]
+        b = path.damping_now(s, t) if after > 0.0 else path.damping_before(s, t)
+        k = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], b[0], b[1])
+        write_row(s, e, 0, i, k)
+        if after == 0.0 and x[7] > 0.0:
+            e.rows[i, 4] = self.speed(s, e, 0)
+            e.rows[i, 5] = self.speed(s, e, 1)
+            write_rates(e, 0, i)
+        s["filled"] = i + 1
 
-    def _landing(self, q, w, i: int, up: bool, after: float, there: float) -> float:
-        """Length of the step that ends on the border of coordinate i."""
-        border = self.regions.high[i] if up else self.regions.low[i]
+    def commit(self, s, e, after):
+        c, w, dt = s["command"], s["w"], s["dt"]
+        command = (c[0], c[1], c[2], c[3], c[4], c[5])
+        if not (s["before"] == dt and after == dt):
+            n1, n2 = e.raw[0, 16], e.raw[0, 17]
+            command = loop.whole_kick(w[0], w[1], n1, n2, c[0], c[1], after)
+        accept(s)
+        step_engine(s, e, command, after)
+        if len(e.command):
+            x, y = path.command_change(e, s["t"], s["t"] + after)
+            s["loop"][0] += x
+            s["loop"][1] += y
+        if s["fine"] < INF:
+            s["fine"] = s["fine"] * HIT_GROWTH if limited(s) else INF
 
-        def miss(h: float) -> float:
-            return self.position(q, self._tick(q, w, h)[3][2:], h)[i] - border
-
-        return find_root(miss, after, there - border)
-
-    def _cross(self, i: int, up: bool) -> bool:
-        q, w = tuple(self.angles), tuple(self.rates)
-        speed = self._velocity(q, w, self._tick(q, w, 0.0)[3])[i] if self.before else 0.0
-        end = self.cross(i, up, speed)
-        self.struck = True
-        if end:
-            self._close("finished")
-        return end
-
-    def _close(self, code: str) -> None:
-        """Takes the last sample: half a kick brings the rates to it, nothing is stepped."""
-        q = tuple(self.angles)
-        if self.before > 0.0:
-            w = tuple(self.rates)
-            _, command, sample, out = self._tick(q, w, 0.0)
-            self._keep(True, q, sample, command, out, 0.0)
-            self.final = self._velocity(q, w, out)
-        self.finish(code)
-
-    def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
-        k = self._inputs(self.before, after)
-        self._put(is_sample, row, k, 0.5 * (self.before + after), after > 0.0)
-
-    def _put(
-        self, is_sample: bool, row: tuple[float, ...], k: tuple[float, ...], H: float, goes_on: bool
-    ) -> None:
-        """Keeps the row of one kick, with the clay of the region in which the run continues."""
-        _row.pack_into(self.rows, self.filled * GLIDE_ROW, *row[:14])
-        b = self.regions.b(self.t) if goes_on else damping_at(*self.clay, self.t)
-        self.stretches.append(_Stretch(1, is_sample, b, k, H, row[14:]))
-        self.filled += 1
-
-    def _engine(self, w, command, out, after: float) -> None:
-        """Steps the engine by after; the kick goes in whole if it has another length."""
-        model, data, dt = self.model, self.data, self.scenario.dt
-        self.steps += 1
-        if after == self.before == dt:
-            self.write(self.drive, 0, *command)
-            mujoco.mj_step(model, data)
-        else:
-            self._whole(w, command, out, after)
-
-    def _whole(self, w, command, out, after: float) -> None:
-        """Steps the engine by after, from joint rates w to those of out."""
-        t1, t2, *_ = command
-        self.write(self.drive, 0, *loop.whole_kick(w[0], w[1], out[2], out[3], t1, t2, after))
-        self.model.opt.timestep = after
-        mujoco.mj_step(self.model, self.data)
-        self.model.opt.timestep = self.scenario.dt
-
-    def flush(self) -> None:
-        n, self.filled = self.filled, 0
-        raw = np.frombuffer(self.rows, dtype=float, count=14 * n).reshape(n, 14).T.copy()
-        pieces, self.stretches = self.stretches, []
-        k, H, which = np.empty((INPUTS, 0)), np.array([x.H for x in pieces]), slice(n)
-        rest = np.empty((2, 0))
-        if len(pieces) == 1:
-            k, rest = np.reshape(pieces[0].k, (INPUTS, -1)), np.reshape(pieces[0].rest, (2, -1))
-        elif pieces:
-            counts = [x.n for x in pieces]
-            k, H = _spread_rows([x.k for x in pieces], counts), np.repeat(H, counts)
-            rest = _spread_rows([x.rest for x in pieces], counts)
-            if not all(x.is_sample for x in pieces):
-                which = np.flatnonzero(np.repeat([x.is_sample for x in pieces], counts))
-        samples = [x for x in pieces if x.is_sample]
-        rows = _rows_at_samples(raw, k, rest, self.scenario)
-        if self.final and n:
-            rows[4:6, -1] = self.final
-        good = self.judge(
-            rows[:, which],
-            lambda: _spread_rows([x.b for x in samples], [x.n for x in samples]),
-        )
-        if self.outcome is not None and self.end_time is None:
-            n = good if isinstance(which, slice) or not good else int(which[good - 1]) + 1
-        self.ledger.add(raw[:, :n], k[:, :n], rest[:, :n], H[:n])
-
-    def balance(self) -> dict[str, float]:
-        return self.ledger.close()
-
-
-GLIDE_ROW = 14 * 8  # bytes of a row: q, p, v before and after, f, tau, delta, two axes each
-
-
-def glide_constant(rows, c, k, state, read, write, keep, motion, drive, buffer, step, model, data):  # noqa: PLR0913  # compiled and inlined: plain numbers
-    """Whole steps within one region of clay that is not stiff.
-
-    Args:
-        rows: range of offsets into the record, one a step [bytes].
-        c: from `loop.loop_coefficients`, for whole steps.
-        k: from `loop.step_inputs`, for whole steps.
-        state: see `loop.step_loop`.
-        read: unpacks q1, q2, w1, w2 from `motion`.
-        write: packs a command into `drive`.
-        keep: packs one row into `buffer`.
-        motion: the engine's memory.
-        drive: the engine's memory.
-        buffer: the record.
-        step: mj_step.
-        model: the engine's model.
-        data: the engine's data.
-
-    Returns:
-        The state after the last step.
-    """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
-    for row in rows:
-        q1, q2, w1, w2 = read(motion)
-        (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
-            (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy, _, _),
-            (ux, uy, n1, n2),
-        ) = loop.step_loop(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
-        write(drive, 0, t1, t2, bx, by, p1, p2)
-        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
-        step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
-
-
-def glide_varying(  # noqa: PLR0913  # compiled and inlined: plain numbers
-    steps, rest, c, state, read, write, keep, motion, drive, buffer, step, model, data
-):
-    """As `glide_constant`, where the clay is stiff or anything changes from step to step.
-
-    Args:
-        steps: a step each: offset into the record [bytes], `loop.step_inputs`, change of the
-            command over it x, y [m].
-        rest: list that gets the clay force beside its dampers in each kick, (x, y) [N].
-        c: as in `glide_constant`.
-        state: as in `glide_constant`.
-        read: as in `glide_constant`.
-        write: as in `glide_constant`.
-        keep: as in `glide_constant`.
-        motion: as in `glide_constant`.
-        drive: as in `glide_constant`.
-        buffer: as in `glide_constant`.
-        step: as in `glide_constant`.
-        model: as in `glide_constant`.
-        data: as in `glide_constant`.
-
-    Returns:
-        The state after the last step.
-    """
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11 = state
-    for row, k, cx, cy in steps:
-        q1, q2, w1, w2 = read(motion)
-        (
-            (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11),
-            (t1, t2, bx, by, p1, p2),
-            (px, py, vx, vy, fx, fy, dx, dy, rx, ry),
-            (ux, uy, n1, n2),
-        ) = loop.step_loop(c, k, q1, q2, w1, w2, (s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11))
-        s0 += cx
-        s1 += cy
-        write(drive, 0, t1, t2, bx, by, p1, p2)
-        keep(buffer, row, q1, q2, px, py, vx, vy, ux, uy, fx, fy, t1, t2, dx, dy)
-        rest.append((rx, ry))
-        step(model, data)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11
+    def speed(self, s, e, i):
+        # half a kick has led to the border; in stiff clay that half holds too little of the clay,
+        # and the velocity is that of a whole kick, with the step before it repeated
+        before = s["before"]
+        if before == 0.0:
+            return 0.0
+        k = inputs(s, e, before, before)
+        felt = k[10 + i] > 0.0
+        propose(s, e, before, before if felt else 0.0)
+        raw = e.raw
+        if felt:
+            return loop.velocity_at_sample(k, i, raw[0, 4 + i], raw[0, 6 + i], raw[0, 18 + i])
+        return raw[0, 6 + i]

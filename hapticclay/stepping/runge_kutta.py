@@ -1,295 +1,486 @@
-"""The accurate run: the engine's fourth-order Runge-Kutta, with the controller among its states.
+"""The accurate method: the classic Runge-Kutta, fourth order, with the controller among its states.
 
-`march` is the same method on numbers alone, for many steps at a time; `compiled` compiles it. There
-the engine gives the acceleration of the arm at each stage, and the states are integrated here.
+The engine gives the acceleration of the arm at each stage; the states are integrated here. `march`
+is the loop as a differential equation, written out flat because CPython pays for each call; the
+laws it spells out are those of `model.arm` and `model.controller`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+import struct
+from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ParameterError
-from ..model import arm
-from ..model.operator import NO_HAND
-from ..model.scenario import Scenario
-from . import energy, loop
-from .engine import CHUNK, TOUCH, Run, find_root, mujoco
-from .stride import call_engine, load_double, store_double, write_command
+from ..model import arm, clay, controller
+from ..model.arm import I1, I2, TRACE_W
+from ..model.constants import C_POLE, L1, L2, G, S
+from . import loop, path
+from .loop import SXX, SYY
+from .path import INF, OPEN, ROW, TOUCH, put5, put6, put8, put10, put17
+from .run import CROSSINGS_ROOM, Run
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most of them for one sample
+POWERS = 5  # of energy.kick_work
+COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the run
+ROW_BYTES = 8 * ROW
+GX, GY, SX, SY = *G, *S
+# stiffness [1/s^2] and damping [1/s] of G and of Sh
+KGX, DGX, KGY, DGY = GX.stiffness, GX.damping, GY.stiffness, GY.damping
+KSX, DSX, KSY, DSY = SX.stiffness, SX.damping, SY.stiffness, SY.damping
+# the cheapest way for CPython to write floats: (array, offset [bytes], floats)
+put_sample = struct.Struct(f"{ROW}d").pack_into
+
+RUNGE_KUTTA_STATE = [  # beside path.STATE
+    ("substeps", "i8"),  # engine steps a sample
+    ("part", "i8"),  # which of them comes next
+    ("share", "f8"),  # length of all but the last of them [s]
+    # compensator output and rate, reference model y = G delta and its rate: deltax, deltay [m],
+    # deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s]; the command is not in delta
+    ("control", "f8", 8),
+    ("done", "f8", POWERS),  # works up to now, see energy.kick_work
+    # of the step last worked out:
+    ("next", "f8", 17),  # q, q', control and works at its end
+    ("sample", "f8", 10),  # p [m], v [m/s], fh [N], tau [N.m], delta [m] at its start
+]
 
 
-class RungeKutta(Run):
-    """The loop as a differential equation; steps end on borders. Explicit.
+def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
+    """Works out one step, or steps from sample to sample within one region.
 
     Args:
-        scenario: what to run.
-        every: keep each every-th sample, and the last.
+        s: state of the run; gets the step worked out, or is advanced.
+        e: its arrays; rows are filled.
+        span: length of the one step [s]; 0 works out its start alone.
+        n: largest number of samples to pass; 0 for the one step.
+
+    Returns:
+        Number of rows filled.
+    """
+    Q1, Q2 = s["q"]
+    W1, W2 = s["w"]
+    DX, DY, EX, EY, YX, YY, VX, VY = s["control"]
+    muscle, motors, melted, damped, through = s["done"]
+    gainx, gainy = s["gain"]
+    mass, damper, spring = s["hand"]
+    limit1, limit2 = s["torque_limit"]
+    ox, oy = s["origin"]
+    square1, square2, noy = limit1 * limit1, limit2 * limit2, -oy
+    held, shaped, dampers = s["held"], s["shaping"], s["dampers"]
+    q, w, ctrl, push, acceleration = e.q, e.w, e.ctrl, e.push, e.acceleration
+    forward, model, data, coming, rows = e.forward, e.model, e.data, e.ahead, e.rows
+    low, high = s["low"], s["high"]
+    lowx, lowy, highx, highy = low[0] - TOUCH, low[1] - TOUCH, high[0] + TOUCH, high[1] + TOUCH
+    base, rate = (s["base"][0], s["base"][1]), (s["rate"][0], s["rate"][1])
+    grows, commanded = rate[0] > 0.0 or rate[1] > 0.0, len(e.command) > 0
+    tabled = n > 0 and s["first"] >= 0
+    t, i, part, parts, dt = s["t"], s["i"], s["part"], s["substeps"], s["dt"]
+    at, steps, h, share = s["filled"], s["steps"], span, dt / parts
+    end = at + n
+    j = 2 * parts * (i - s["first"])
+    last = (W1, W2, muscle, motors, melted, damped, through)  # at the last row
+    shiftx, shifty, uhx, uhy = 0.0, 0.0, 0.0, 0.0
+    bx, by = base
+    if n > 0:
+        uhx, uhy = path.mean_force(s, e, t, 0.0)
+    if dampers:
+        ctrl[2], ctrl[3] = bx, by
+    while True:
+        if n > 0:
+            h = share if part < parts - 1 else (i + 1) * dt - t
+        # the point of the stage, from the start of the step on, and sums of what changes there
+        q1, q2, w1, w2, deltax, deltay, ex, ey = Q1, Q2, W1, W2, DX, DY, EX, EY
+        yx, yy, ydx, ydy = YX, YY, VX, VY
+        f1, f2, f3, f4, f5, f6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # over stages 0, 1, 2
+        g1, g2, g3, g4, g5, g6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # over stages 1, 2, 3
+        p1, p2, p3, p4, p5 = 0.0, 0.0, 0.0, 0.0, 0.0  # over all, the inner ones twice
+        px0, py0, vx0, vy0, hx0, hy0 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        t10, t20, dx0, dy0, bx0, by0 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for stage in range(4):
+            # what changes with time
+            if stage != 2:
+                now = t if stage == 0 else t + h if stage == 3 else t + 0.5 * h
+                if tabled:
+                    uhx, uhy = coming[j, 0], coming[j, 1]
+                    shiftx, shifty = coming[j, 2], coming[j, 3]
+                    j += 1
+                elif n == 0:
+                    uhx, uhy = path.mean_force(s, e, now, 0.0)
+                    if commanded:
+                        shiftx, shifty = path.command_change(e, 0.0, now)
+                if grows:
+                    bx, by = clay.damping_at(base, rate, now)
+                    ctrl[2], ctrl[3] = bx, by
+
+            # kinematics of the handle
+            a2 = q1 + q2
+            u1x, u1y = -L1 * sin(q1), L1 * cos(q1)
+            u2x, u2y = -L2 * sin(a2), L2 * cos(a2)
+            px = u1y + u2y - ox
+            py = noy - u1x - u2x
+            r2 = w1 + w2
+            vx = u1x * w1 + u2x * r2
+            vy = u1y * w1 + u2y * r2
+            s1 = w1 * w1
+            s2 = r2 * r2
+            cx = u1y * s1 + u2y * s2
+            cy = -u1x * s1 - u2x * s2
+            if shaped:
+                sxx, sxy, syy = SXX, 0.0, SYY
+            else:
+                m1 = u1x / I1
+                m2 = u2x / I2
+                sxx = u1x * m1 + u2x * m2
+                sxy = u1y * m1 + u2y * m2
+                syy = TRACE_W - sxx
+
+            # clay, and the operator's arm but for the acceleration of its mass
+            fex, fey = bx * vx, by * vy
+            hx, hy = uhx, uhy
+            if held:
+                hx -= spring * px - mass * cx + damper * vx
+                hy -= spring * py - mass * cy + damper * vy
+            fx = hx - fex
+            fy = hy - fey
+
+            # servo
+            shownx = deltax + shiftx
+            showny = deltay + shifty
+            yddx = KGX * (shownx - yx) - DGX * ydx
+            yddy = KGY * (showny - yy) - DGY * ydy
+            ax = yddx - DSX * (vx - ydx) + KSX * (yx - px) + cx
+            ay = yddy - DSY * (vy - ydy) + KSY * (yy - py) + cy
+            gx = ax + sxx * fx + sxy * fy
+            gy = ay + sxy * fx + syy * fy
+            ffx, ffy = fx, fy
+            if mass:
+                m1 = 1.0 + sxx * mass
+                m2 = sxy * mass
+                r = m2 / m1
+                gy = (gy - r * gx) / (1.0 + syy * mass - r * m2)
+                gx = (gx - m2 * gy) / m1
+                ffx -= mass * gx
+                ffy -= mass * gy
+            det = u1x * u2y - u2x * u1y
+            t2 = I2 * ((gy * u1x - gx * u1y) / det) - u2x * ffx - u2y * ffy
+            t1 = I1 * ((gx * u2y - gy * u2x) / det) - u1x * ffx - u1y * ffy + t2
+            if t1 * t1 > square1 or t2 * t2 > square2:
+                # a kick of one second from rest, in which the velocity after it is the acceleration
+                _, _, _, _, ffx, ffy, t1, t2 = controller.kick_at_limit(
+                    1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (fx, fy), (mass, mass), (t1, t2),
+                    (limit1, limit2),
+                )  # fmt: skip
+            hx = ffx + fex
+            hy = ffy + fey
+            if stage == 0:
+                px0, py0, vx0, vy0, hx0, hy0 = px, py, vx, vy, hx, hy
+                t10, t20, dx0, dy0, bx0, by0 = t1, t2, shownx, showny, bx, by
+                if h == 0.0:
+                    break
+
+            # the arm
+            q[0], q[1] = q1, q2
+            w[0], w[1] = w1, w2
+            ctrl[0], ctrl[1] = t1, t2
+            m2 = u2x * hx + u2y * hy
+            push[0], push[1] = u1x * hx + u1y * hy + m2, m2
+            forward(model, data)
+            a1, a2 = acceleration[0], acceleration[1]
+
+            # derivative of all states, and the point of the next stage
+            a3 = gainx * ffx - C_POLE * ex
+            a4 = gainy * ffy - C_POLE * ey
+            power = uhx * vx + uhy * vy
+            drive = t1 * w1 + t2 * w2
+            if stage == 0 or stage == 3:
+                m1 = 1.0
+            else:
+                m1 = 2.0
+            p1 += m1 * power
+            p2 += m1 * drive
+            p3 += m1 * (fex * vx + fey * vy)
+            if held:
+                p4 += m1 * (damper * (vx * vx + vy * vy))
+            p5 += m1 * (abs(power) + abs(drive))
+            if stage > 0:
+                g1 += a1
+                g2 += a2
+                g3 += a3
+                g4 += a4
+                g5 += yddx
+                g6 += yddy
+            if stage < 3:
+                f1 += a1
+                f2 += a2
+                f3 += a3
+                f4 += a4
+                f5 += yddx
+                f6 += yddy
+                k = h if stage == 2 else 0.5 * h
+                q1 = Q1 + k * w1
+                q2 = Q2 + k * w2
+                w1 = W1 + k * a1
+                w2 = W2 + k * a2
+                if not abs(w1) + abs(w2) < INF:
+                    break
+                deltax = DX + k * ex
+                deltay = DY + k * ey
+                ex = EX + k * a3
+                ey = EY + k * a4
+                yx = YX + k * ydx
+                yy = YY + k * ydy
+                ydx = VX + k * yddx
+                ydy = VY + k * yddy
+
+        k = h / 6.0
+        q1 = Q1 + h * (W1 + k * f1)
+        q2 = Q2 + h * (W2 + k * f2)
+        w1 = W1 + k * (f1 + g1)
+        w2 = W2 + k * (f2 + g2)
+        if n > 0:  # a step that would leave the region is left to path.careful
+            if not abs(w1) + abs(w2) < INF:
+                break
+            x, y = arm.handle_position(q1, q2)
+            if not (lowx <= x - ox <= highx and lowy <= y + noy <= highy):
+                break
+            if part == 0:
+                put_sample(
+                    rows, at * ROW_BYTES, Q1, Q2, px0, py0, vx0, vy0, hx0, hy0, t10, t20, dx0, dy0,
+                    bx0, by0, W1, W2,
+                )  # fmt: skip
+                last = (W1, W2, muscle, motors, melted, damped, through)
+                at += 1
+        Q1, Q2, W1, W2 = q1, q2, w1, w2
+        DX += h * (EX + k * f3)
+        DY += h * (EY + k * f4)
+        EX += k * (f3 + g3)
+        EY += k * (f4 + g4)
+        YX += h * (VX + k * f5)
+        YY += h * (VY + k * f6)
+        VX += k * (f5 + g5)
+        VY += k * (f6 + g6)
+        muscle += k * p1
+        motors += k * p2
+        melted += k * p3
+        damped += k * p4
+        through += k * p5
+        if n == 0:
+            put17(
+                s["next"], 0, Q1, Q2, W1, W2, DX, DY, EX, EY, YX, YY, VX, VY,
+                muscle, motors, melted, damped, through,
+            )  # fmt: skip
+            put10(s["sample"], 0, px0, py0, vx0, vy0, hx0, hy0, t10, t20, dx0, dy0)
+            return 0
+        steps += 1
+        part += 1
+        t += h
+        if tabled:
+            j -= 1
+        if part == parts:
+            part = 0
+            i += 1
+            t = i * dt
+            if at == end:
+                break
+    made = at - s["filled"]
+    if made:
+        r = at - 1
+        put6(
+            s["final"], 0, rows[r, 2], rows[r, 3], rows[r, 4], rows[r, 5], last[0], last[1]
+        )  # fmt: skip
+        put5(s["work"], 0, last[2], last[3], last[4], last[5], last[6])
+        take(s, e, Q1, Q2, W1, W2)
+        put8(s["control"], 0, DX, DY, EX, EY, YX, YY, VX, VY)
+        put5(s["done"], 0, muscle, motors, melted, damped, through)
+        s["t"], s["i"], s["part"], s["share"], s["filled"] = t, i, part, share, at
+        s["before"], s["steps"] = dt, steps
+    return made
+
+
+def march_block(s, e, n):
+    """Steps from sample to sample within one region.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        n: largest number of samples to pass.
+
+    Returns:
+        Number of rows filled.
+    """
+    return march(s, e, 0.0, n)
+
+
+def take(s, e, q1, q2, w1, w2):
+    """Puts the arm where it now is.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        q1: angle of joint 1 [rad].
+        q2: angle of joint 2 [rad].
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+    """
+    s["q"][0], s["q"][1], s["w"][0], s["w"][1] = q1, q2, w1, w2
+    e.q[0], e.q[1], e.w[0], e.w[1] = q1, q2, w1, w2
+
+
+def stages_ahead(run: Run, i: int, n: int, parts: int) -> np.ndarray:
+    """What changes with time at the stages of the next whole steps: muscle force and command.
+
+    Args:
+        run: the run.
+        i: index of the first sample.
+        n: number of samples, of which the last only ends a step.
+        parts: engine steps a sample.
+
+    Returns:
+        Two rows an engine step, for its start and its middle, and one for the end of the last,
+        shape (2 (n - 1) parts + 1, 4): muscle force (x, y) [N], change of the command since t = 0
+        (x, y) [m].
+    """
+    dt = run.scenario.dt
+    t, end = (i + np.arange(n)) * dt, (i + 1 + np.arange(n)) * dt
+    times = np.empty((n, 2 * parts))
+    for j in range(parts):
+        h = dt / parts if j < parts - 1 else end - t
+        times[:, 2 * j], times[:, 2 * j + 1] = t, t + 0.5 * h
+        t = t + h
+    times = times.ravel()[: 2 * (n - 1) * parts + 1]
+    out = np.empty((len(times), 4))
+    out[:, 0:2] = run.uh(times, 0.0)
+    out[:, 2:4] = run.shift(np.zeros(1), times)
+    return out
+
+
+class RungeKutta(NamedTuple):
+    """The method; `path.Method` says what each part does.
+
+    Attributes:
+        order: of its error in the step.
+    """
+
+    order: int = 4
+
+    def glide(self, s, e, room):
+        i, parts = s["i"], s["substeps"]
+        n = min(s["last"] - i, room - s["filled"])
+        if s["first"] >= 0:
+            n = min(n, s["first"] + (len(e.ahead) - 1) // (2 * parts) - i)
+        if n < 1 or s["part"] > 0 or s["t"] != i * s["dt"] or s["closing"] != OPEN:
+            return 0
+        return self.block(s, e, n)
+
+    def block(self, s, e, n):
+        """As march_block.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            n: largest number of samples.
+        """
+        return march_block(s, e, n)
+
+    def stop(self, s):
+        target, after, on_grid = path.next_sample(s["t"], s["i"], s["last"], s["dt"], s["t_max"])
+        if after > 0.0:
+            if s["part"] == 0:
+                s["share"] = after / s["substeps"]
+            after = s["share"] if s["part"] < s["substeps"] - 1 else target - s["t"]
+        return target, after, on_grid
+
+    def arrive(self, s, target):
+        s["i"] += 1
+        s["t"] = target
+        s["part"] = 0
+
+    def act(self, s, e):
+        pass
+
+    def strike(self, s, e, after):
+        return after
+
+    def propose(self, s, e, after):
+        if after > 0.0:
+            s["steps"] += 1
+        march(s, e, after, 0)
+
+    def finite(self, s, e):
+        return abs(s["next"][2]) + abs(s["next"][3]) < INF
+
+    def place(self, s, e, h):
+        q, origin = s["q"], s["origin"]
+        q1, q2 = q[0], q[1]
+        if h > 0.0:
+            q1, q2 = s["next"][0], s["next"][1]
+        x, y = arm.handle_position(q1, q2)
+        return x - origin[0], y - origin[1]
+
+    def keep(self, s, e, after, shows):
+        if not shows:
+            return
+        px, py, vx, vy, fx, fy, t1, t2, deltax, deltay = s["sample"]
+        (bx, by), i = path.damping_now(s, s["t"]), s["filled"]
+        put_sample(
+            e.rows, i * ROW_BYTES, s["q"][0], s["q"][1], px, py, vx, vy, fx, fy, t1, t2, deltax,
+            deltay, bx, by, s["w"][0], s["w"][1],
+        )  # fmt: skip
+        put6(s["final"], 0, px, py, vx, vy, s["w"][0], s["w"][1])
+        for j in range(POWERS):
+            s["work"][j] = s["done"][j]
+        s["filled"] = i + 1
+
+    def commit(self, s, e, after):
+        x = s["next"]
+        take(s, e, x[0], x[1], x[2], x[3])
+        for j in range(8):
+            s["control"][j] = x[4 + j]
+        for j in range(POWERS):
+            s["done"][j] = x[12 + j]
+        s["part"] = (s["part"] + 1) % s["substeps"]
+
+    def speed(self, s, e, i):
+        u = arm.jacobian(s["q"][0], s["q"][1])
+        vx, vy = arm.handle_velocity(s["w"][0], s["w"][0] + s["w"][1], u)
+        return vy if i else vx
+
+
+class RungeKuttaRun(Run):
+    """A run by `RungeKutta`.
 
     Raises:
         ParameterError: the scene is so stiff that a sample would take more than 1000 steps.
     """
 
-    def __init__(self, scenario: Scenario, every: int):
-        super().__init__(scenario, every)
-        th = scenario.operator or NO_HAND
-        b = max((*scenario.clay.x.values, *scenario.clay.y.values)) if scenario.clay else 0.0
-        fastest = (b + th.damper) * arm.TRACE_W + math.sqrt(th.spring * arm.TRACE_W)
-        self.substeps = max(1, math.ceil(scenario.dt * fastest / STABLE_STEP))
-        if self.substeps > SUBSTEPS:
-            bound = f"explicit: would take {self.substeps} steps a sample in so stiff a scene"
-            bound += "; choose 'fast'"
-            raise ParameterError("integrator", scenario.integrator, bound)
-        data = self.data
-        self.c = loop.ode_parameters(scenario)
-        self.drive: Any = memoryview(data.ctrl)
-        self.push: Any = memoryview(data.qfrc_applied)
-        self.act: Any = memoryview(data.act)
-        self.first = len(data.ctrl) - len(data.act)  # of the states among the actuators
-        data.act[:8] = loop.initial_state(scenario.start, scenario.velocity)[:8]
-        self.rows: list[tuple[float, ...]] = []
-        self.b: list[tuple[float, float]] = []
-        self.start = self._stored()
+    fields, method = RUNGE_KUTTA_STATE, RungeKutta()
 
-    def _derivative(self, t: float):
-        """loop.vector_field at time t [s], at the state of the engine."""
-        (q1, q2), (w1, w2) = self.angles, self.rates
-        state = tuple(self.act[:8])
-        if self.command:
-            cx, cy = self.shift(0.0, t)
-            state = (state[0] + cx, state[1] + cy, *state[2:])
-        (bx, by), (uhx, uhy) = self.regions.b(t), self.uh(t, t)
-        return loop.vector_field(self.c, bx, by, uhx, uhy, q1, q2, w1, w2, state)
+    def _start(self) -> None:
+        super()._start()
+        s, now = self.scenario, self.s
+        _, damper, spring = now["hand"]
+        b = max((*s.clay.x.values, *s.clay.y.values)) if s.clay else 0.0
+        fastest = (b + damper) * TRACE_W + math.sqrt(spring * TRACE_W)
+        parts = max(1, math.ceil(s.dt * fastest / STABLE_STEP))
+        if parts > SUBSTEPS:
+            bound = f"explicit: would take {parts} steps a sample in so stiff a scene"
+            raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
+        now["substeps"], now["landings_most"] = parts, 2**62
+        self._put(control=loop.initial_state(s.start, s.velocity)[:8])
 
-    def _control(self, model, data) -> None:
-        command, rates, _ = self._derivative(data.time)
-        drive, push, first = self.drive, self.push, self.first
-        drive[0], drive[1], push[0], push[1] = command
-        if first == 4:
-            drive[2], drive[3] = self.regions.b(data.time)
-        for i, x in enumerate(rates, first):
-            drive[i] = x
-
-    def go(self, progress) -> None:
-        """As Run.go, with the controller in the engine's callback.
-
-        Args:
-            progress: as in Run.go.
-        """
-        mujoco.set_mjcb_control(self._control)
-        try:
-            super().go(progress)
-        finally:
-            mujoco.set_mjcb_control(None)
-
-    def advance(self) -> bool:
-        target, after, on_grid = self.target()
-        if on_grid or not after:
-            self._keep()
-        if not after:
-            self.finish("time limit")
-            return True
-        n = self.substeps
-        for j in range(n):
-            if self._step(after / n if j < n - 1 else target - self.t, target, j == n - 1):
-                return True
-            if self.t == target:
-                break
-        return len(self.rows) >= CHUNK
-
-    def _step(self, h: float, target: float, last: bool) -> bool:
-        """One engine step of h, or to the border in its way; True at the end of the path."""
-        before = (tuple(self.angles), tuple(self.rates), tuple(self.act))
-
-        def there(h: float) -> tuple[float, float]:
-            self.angles[0], self.angles[1] = before[0]
-            self.rates[0], self.rates[1] = before[1]
-            for i, x in enumerate(before[2]):
-                self.act[i] = x
-            self._leap(h)
-            self.steps += 1
-            return self.position(self.angles, self.rates, 0.0)
-
-        p = there(h)
-        hit = [i for i in (0, 1) if not self.inside(i, p[i])]
-        if not hit:
-            if last:
-                self.i, self.t = self.i + 1, target
-            else:
-                self.t += h
-            return False
-        spans = {}
-        for i in hit:
-            up = p[i] > self.regions.high[i]
-            border = self.regions.high[i] if up else self.regions.low[i]
-            spans[i] = (
-                find_root(lambda x, i=i, border=border: there(x)[i] - border, h, p[i] - border),
-                up,
-            )
-        i = min(spans, key=lambda i: spans[i][0])
-        h, up = spans[i]
-        there(h)
-        self.t += h
-        if target - self.t <= 1e-9 * self.scenario.dt:
-            self.i, self.t = self.i + 1, target
-        speed = self._derivative(self.t)[2][2 + i]
-        if self.cross(i, up, speed):
-            self._keep()
-            self.finish("finished")
-            return True
-        return False
-
-    def _leap(self, h: float) -> None:
-        """One step of h [s] from the state that the engine holds."""
-        self.model.opt.timestep, self.data.time = h, self.t
-        mujoco.mj_step(self.model, self.data)
-
-    def _keep(self) -> None:
-        command, _, sample = self._derivative(self.t)
-        cx, cy = self.shift(0.0, self.t)
-        self.rows.append((*self.angles, *sample, *command[:2], self.act[0] + cx, self.act[1] + cy))
-        self.b.append(self.regions.b(self.t))
-
-    def flush(self) -> None:
-        rows, b = np.array(self.rows).reshape(-1, 12).T.copy(), np.array(self.b).reshape(-1, 2).T
-        self.rows, self.b = [], []
-        self.judge(rows, lambda: b)
-
-    def _stored(self) -> tuple[float, float]:
-        """Energy of the arm, and of mass and spring of the hand [J]."""
-        w1, w2 = self.rates
-        px, py, vx, vy, *_ = self._derivative(self.t)[2]
-        return energy.stored_energy(
-            self.scenario.operator or NO_HAND, w1, w1 + w2, (px, py), (vx, vy)
-        )
-
-    def balance(self) -> dict[str, float]:
-        return energy.energy_balance(self.act[8:13].tolist(), self.start, self._stored())
-
-
-STATES = 17  # q, q', then the states of loop.vector_field and the works
-MARCH_ROW = 12  # floats of a row, as Run.judge takes them
-
-
-class MarchEngine(NamedTuple):
-    """Addresses in the engine.
-
-    Attributes:
-        forward: of mj_forward.
-        model: of the model.
-        data: of the data.
-        q: of the joint angles.
-        w: of the joint rates.
-        acceleration: of the joint accelerations.
-        ctrl: of the controls.
-        push: of the applied joint torques.
-    """
-
-    forward: int
-    model: int
-    data: int
-    q: int
-    w: int
-    acceleration: int
-    ctrl: int
-    push: int
-
-
-def _stage_derivative(c, b, uh, dampers, engine, y, dy):
-    """Writes the derivative of all states y into dy, shape (STATES,); returns (command, sample)."""
-    state = (y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
-    command, rates, sample = loop.vector_field(
-        c, b[0], b[1], uh[0], uh[1], y[0], y[1], y[2], y[3], state
-    )
-    store_double(engine.q, y[0])
-    store_double(engine.q + 8, y[1])
-    store_double(engine.w, y[2])
-    store_double(engine.w + 8, y[3])
-    write_command(engine, dampers, (command[0], command[1], b[0], b[1], command[2], command[3]))
-    call_engine(engine.forward, engine.model, engine.data)
-    dy[0], dy[1] = y[2], y[3]
-    dy[2], dy[3] = load_double(engine.acceleration), load_double(engine.acceleration + 8)
-    for j in range(13):
-        dy[4 + j] = rates[j]
-    return command, sample
-
-
-def _one_step(c, b, uh, dampers, engine, h, y, k):
-    """Carries y over one step of h [s]. k: (5, STATES), workspace; k[0] is the slope at y."""
-    for stage in range(1, 4):
-        ahead = h if stage == 3 else 0.5 * h
-        for j in range(STATES):
-            k[4, j] = y[j] + ahead * k[stage - 1, j]
-        _stage_derivative(c, b, uh, dampers, engine, k[4], k[stage])
-    for j in range(STATES):
-        y[j] += h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
-
-
-def march(c, b, uh, dampers, engine, dt, substeps, low, high, origin, y, k, rows):  # noqa: PLR0913  # compiled and inlined: plain numbers
-    """Steps from sample to sample until rows is full, or before a step that leaves the region.
-
-    Args:
-        c: from loop.ode_parameters.
-        b: clay, (x, y) [N.s/m].
-        uh: muscle force, (x, y) [N].
-        dampers: whether the engine has clay.
-        engine: addresses in the engine.
-        dt: from sample to sample [s].
-        substeps: steps a sample.
-        low: lower borders of the region, (x, y) [m].
-        high: upper borders of the region, (x, y) [m].
-        origin: as in Scenario [m].
-        y: state, shape (STATES,), which is advanced.
-        k: workspace, shape (6, STATES).
-        rows: to fill, shape (n, MARCH_ROW).
-
-    Returns:
-        Number of samples passed and rows filled.
-    """
-    h = dt / substeps
-    for i in range(len(rows)):
-        for j in range(STATES):
-            k[5, j] = y[j]
-        for part in range(substeps):
-            command, sample = _stage_derivative(c, b, uh, dampers, engine, y, k[0])
-            if part == 0:
-                row = rows[i]
-                row[0], row[1] = y[0], y[1]
-                for j in range(6):
-                    row[2 + j] = sample[j]
-                row[8], row[9], row[10], row[11] = command[0], command[1], y[4], y[5]
-            _one_step(c, b, uh, dampers, engine, h, y, k)
-            px, py = arm.handle_position(y[0], y[1])
-            px, py = px - origin[0], py - origin[1]
-            inside = (
-                low[0] - TOUCH <= px <= high[0] + TOUCH and low[1] - TOUCH <= py <= high[1] + TOUCH
-            )
-            if not (inside and abs(y[2]) + abs(y[3]) < np.inf):
-                for j in range(STATES):
-                    y[j] = k[5, j]
-                return i
-    return len(rows)
-
-
-def march_once(c, b, uh, dampers, engine, h, y, k):
-    """One step.
-
-    Args:
-        c: from loop.ode_parameters.
-        b: clay, (x, y) [N.s/m].
-        uh: muscle force, (x, y) [N].
-        dampers: whether the engine has clay.
-        engine: addresses in the engine.
-        h: length of the step [s].
-        y: state, shape (STATES,), which is advanced.
-        k: workspace, shape (6, STATES).
-    """
-    _stage_derivative(c, b, uh, dampers, engine, y, k[0])
-    _one_step(c, b, uh, dampers, engine, h, y, k)
-
-
-COMPILED_STAGES = (_one_step, _stage_derivative)  # by `compiled`, beside `march` and `march_once`
+    def _make(self, room: int) -> None:
+        if not self.varies:
+            super()._make(room)
+            return
+        now, parts = self.s, self.s["substeps"]
+        most = max(1, COSINES // (2 * parts * max(1, len(self.e.muscle), len(self.e.command))))
+        now["crossed"] = 0
+        while now["code"] == OPEN and now["filled"] < room and now["crossed"] < CROSSINGS_ROOM - 3:
+            n = max(0, min(room - now["filled"], self.last - self.i, most))
+            now["first"] = self.i
+            self._arrays(ahead=stages_ahead(self, self.i, n + 1, parts))
+            self.kernel.advance(self, min(room, now["filled"] + max(n, 1)))

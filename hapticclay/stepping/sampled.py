@@ -1,478 +1,1163 @@
 """The sampled run, as on hardware: measured, computed and held every Ts; the arm moves in between.
 
-`HardwareLoop` adds the hardware: jitter, encoders, converters, delay, friction, passivity control.
+The controller is exact between samples. At an event, a sample or a change of the torques, the kick
+falls into two: one under the old torques, which brings the velocity to the sample, where it is
+measured, and one under the new torques. Steps end on events, as they do on borders. Hardware adds
+jitter, lost samples, encoders, converters, filters, delay, friction, a passivity controller and a
+virtual coupling to the same loop.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm, controller, hardware, operator
-from ..model.clay import damping_at, viscous_force
+from ..model import arm, clay, controller, hardware, operator
 from ..model.constants import AXES, G, S
-from ..model.hardware import Pair
-from ..model.scenario import Scenario
-from . import energy, loop
-from .leapfrog import CHUNK, ZERO, Leapfrog
+from . import energy, loop, path
+from .path import INF, OPEN, TOUCH, put4, put6, put8, put10, put14, put18
+from .run import CHUNK, Run
+
+SLACK = 1e-9  # of dt: events so close are one
+HOLD = 10  # numbers that the motors hold, see SAMPLED_STATE
+AHEAD = 10  # muscle force of a kick before, after and around a sample, at it; change of the command
+
+SAMPLED_STATE = [  # beside path.STATE
+    # the controller and its hardware
+    ("ratio", "i8"),  # steps in a control sample
+    ("Ts", "f8"),
+    ("physical", "i8"),  # whether the clay is there all the time; else the motors render it
+    ("memory", "f8", 40),  # rows (A, B) of controller.held_compensator, x and y
+    ("wired", "i8"),  # whether there is hardware
+    ("uneven", "i8"),  # whether events may lie between the steps
+    ("random", "i8"),  # whether Engine.chance matters
+    ("encoder", "i8"),  # as in hardware.Interface, 0 for none
+    ("difference", "i8"),
+    ("window", "i8"),
+    ("cutoff", "f8"),
+    ("filters", "i8"),
+    ("force_filter", "f8", 6),  # hardware.butterworth
+    ("adc_bits", "i8"),
+    ("adc_range", "f8"),
+    ("dac_bits", "i8"),
+    ("dac_range", "f8", 2),
+    ("delay", "f8"),
+    ("whole_delay", "i8"),  # samples, and what remains
+    ("part_delay", "f8"),
+    ("rubs", "i8"),
+    ("friction", "f8", 2),
+    ("guarded", "i8"),
+    ("coupled", "i8"),
+    ("coupling", "f8", 2),
+    # now
+    ("loop", "f8", 8),  # delta, delta', y, y' of x, then of y
+    # what the motors hold: their torques [N.m], force of the clay as rendered, of it that of the
+    # passivity controller, that of the coupling [N], velocity of its tool [m/s]; two each
+    ("hold", "f8", HOLD),
+    ("owed", "f8", 2),  # impulse owed by stiff clay [N.s]
+    ("pose", "f8", 10),  # arm.jacobian, position [m], arm.mobility, determinant, see `measure_pose`
+    # rates behind their filter [rad/s], states of the filters of the force x and y [N], net force
+    # last given to the compensator [N], energy that the clay has taken [J], position then [m], that
+    # of the tool of the coupling [m]; two each
+    ("wires", "f8", 14),
+    ("k", "i8"),  # index of the next control sample
+    ("when", "f8"),  # its time [s]
+    ("then", "f8"),  # of the one after it
+    ("due", "f8"),  # when the next torques in the queue come [s], inf for none
+    ("due_next", "f8"),  # and those after them
+    ("queue_at", "i8"),  # their place in it
+    ("queued", "i8"),  # their number
+    ("oldest", "i8"),  # row of the past samples, see Engine.ring
+    ("newest", "i8"),  # of the past forces
+    ("first_chance", "i8"),  # sample of the first row of Engine.chance
+    ("lost", "i8"),  # whether the next sample is
+    ("noise", "f8", 2),  # on its force [N]
+    ("grid", "f8"),  # time of the next whole step [s]
+    # what `respond` works out, for `commit`
+    ("event", "i8"),  # whether there is any
+    ("acts", "i8"),  # whether it is a sample
+    ("shown", "i8"),  # whether that is not lost
+    ("uh", "f8", 2),  # muscle force now [N]
+    ("shift", "f8", 2),  # change of the command over a sample [m]
+    ("loop_next", "f8", 8),
+    ("hold_next", "f8", HOLD),
+    ("wires_next", "f8", 14),
+    ("entry", "f8", 1 + HOLD),  # of the queue: time [s], what to hold
+    ("enters", "i8"),  # whether that is to come later
+    ("leaves", "i8"),  # entries that leave the queue
+    ("turned", "f8", 2),  # joint angles as measured [rad]
+    ("start", "f8", 4),  # joint rates [rad/s] and impulse owed [N.s] behind the kick to the sample
+    ("early_force", "f8", 2),  # hand force of that kick [N]
+    ("early_work", "f8", path.SUMS),  # and its works [J]
+    # kicks: `ready_kick` writes numbers of the one before a sample, after it, and around it
+    ("early", "f8", 18),
+    ("late", "f8", 18),
+    ("whole", "f8", 18),
+    # the kick last worked out
+    ("sample", "f8", 10),  # p [m], v before [m/s], net force [N], delta [m], clay's rest [N]
+    ("end", "f8", 4),  # velocity [m/s] and joint rates [rad/s] after it
+    ("left", "f8", 2),  # impulse owed [N.s]
+    ("slip", "f8", 2),  # torques of the friction [N.m]
+]
 
 
-class Sampled(Leapfrog):
-    """Leapfrog under torques that change at samples; the controller is exact in between.
-
-    At a sample the kick falls into two: one under the old torques, which brings the velocity to the
-    sample, where it is measured, and one under the new torques. Steps end on borders as in
-    continuous time.
+def ready_kick(s, x, before, after, uh):
+    """Readies the numbers of a kick: loop.step_inputs and coefficients.
 
     Args:
-        scenario: what to run.
-        every: keep each every-th sample, and the last.
+        s: state of the run.
+        x: gets them, shape (18,).
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+        uh: muscle force, (x, y) [N].
+    """
+    span = before + after
+    H = 0.5 * span
+    spring, mass, damp0, damp1 = operator.operator_coefficients(
+        s["hand"], H, before / span, after / span, max(before, after)
+    )
+    bx0, bx1, by0, by1, L, uhx, uhy = 0.0, 0.0, 0.0, 0.0, before / span, uh[0], uh[1]
+    stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
+    if s["physical"]:
+        t = s["t"]
+        bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy = loop.step_inputs(
+            path.damping_before(s, t - 0.25 * before), path.damping_now(s, t + 0.25 * after),
+            (uhx, uhy), before, after, s["hand"],
+        )  # fmt: skip
+    put18(
+        x, 0, bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy,
+        H, after, spring, mass, damp0, damp1,
+    )  # fmt: skip
+
+
+def ready_kick_now(s, muscle, x, before, after):
+    """As `ready_kick`, under the muscle force of the kick now.
+
+    Args:
+        s: state of the run.
+        muscle: see Engine.
+        x: gets the numbers, shape (18,).
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+    """
+    t = s["t"] + 0.25 * (after - before)
+    ready_kick(s, x, before, after, path.muscle_force(s, muscle, t, 0.25 * (before + after)))
+
+
+def measure_pose(s):
+    """Takes Jacobian, position, mobility and determinant at the present joint angles.
+
+    Args:
+        s: state of the run.
+    """
+    q1, q2 = s["q"]
+    ox, oy = s["origin"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2)
+    wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y))
+    put10(
+        s["pose"], 0, u1x, u1y, u2x, u2y, u1y + u2y - ox, -oy - u1x - u2x, wxx, wxy, wyy,
+        u1x * u2y - u2x * u1y,
+    )  # fmt: skip
+
+
+def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPython
+    """Works out one kick of the arm and the operator alone, under given torques on the joints.
+
+    Args:
+        s: state of the run; gets sample, end and left.
+        x: from `ready_kick`.
+        t1: torque on the shoulder [N.m].
+        t2: torque on the elbow [N.m].
+        w1: rate of joint 1 before the kick [rad/s].
+        w2: rate of joint 2 before the kick [rad/s].
+        owedx: impulse that stiff clay owes from the step before, x [N.s].
+        owedy: the same, y [N.s].
+    """
+    (
+        bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _,
+        H, step, spring, mass, damp0, damp1,
+    ) = x  # fmt: skip
+    u1x, u1y, u2x, u2y, px, py, sxx, sxy, syy, det = s["pose"]
+    r2 = w1 + w2
+    vx = u1x * w1 + u2x * r2
+    vy = u1y * w1 + u2y * r2
+    fx = uhx - bx0 * vx
+    fy = uhy - by0 * vy
+    dx, dy = bx1 + damp1, by1 + damp1
+    if s["held"]:
+        s1 = w1 * w1
+        s2 = r2 * r2
+        cx = u1y * s1 + u2y * s2
+        cy = -u1x * s1 - u2x * s2
+        if stiff:  # after the sample the handle stands still where the clay is stiff
+            cx, cy = arm.centripetal_about_sample(
+                L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
+            )
+        fx -= spring * px - mass * cx + damp0 * vx
+        fy -= spring * py - mass * cy + damp0 * vy
+    a1, a2 = (t1 - t2) / arm.I1, t2 / arm.I2
+    restx, resty, softx, softy = 0.0, 0.0, 0.0, 0.0
+    if stiff:
+        restx, resty = owedx / H, owedy / H
+        hx, hy = uhx - spring * px, uhy - spring * py
+        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y))
+        hx, hy = clay.slow_force(
+            hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
+        )
+        owedx, owedy, softx, softy = loop.owed_impulse(step, H, spring, sharex, sharey, hx, hy)
+        fx += owedx - restx
+        fy += owedy - resty
+        dx += softx
+        dy += softy
+    # see controller.velocity_under_torque
+    n = 1.0 / H
+    gx = n * vx + (u1x * a1 + u2x * a2) + sxx * fx + sxy * fy
+    gy = n * vy + (u1y * a1 + u2y * a2) + sxy * fx + syy * fy
+    if dx or dy:
+        m1 = n + sxx * dx
+        m2 = sxy * dy
+        r = sxy * dx / m1
+        uy = (gy - r * gx) / (n + syy * dy - r * m2)
+        ux = (gx - m2 * uy) / m1
+    else:
+        ux = gx / n
+        uy = gy / n
+    if stiff:
+        owedx -= softx * ux
+        owedy -= softy * uy
+        restx -= owedx
+        resty -= owedy
+    gx = (ux - vx) / H
+    gy = (uy - vy) / H
+    g1 = (gx * u2y - gy * u2x) / det
+    g2 = (gy * u1x - gx * u1y) / det
+    shown, left = s["loop"], s["left"]
+    put10(
+        s["sample"], 0, px, py, vx, vy, fx - dx * ux, fy - dy * uy, shown[0], shown[4], restx, resty
+    )
+    put4(s["end"], 0, ux, uy, w1 + H * g1, w2 + H * (g2 - g1))
+    left[0], left[1] = H * owedx, H * owedy
+
+
+def push(s, x, hold, w1, w2, owedx, owedy):
+    """Works out one kick under held torques and friction.
+
+    Args:
+        s: state of the run; gets sample, end, left and slip.
+        x: from `ready_kick`.
+        hold: what the motors hold, see SAMPLED_STATE.
+        w1: rate of joint 1 before the kick [rad/s].
+        w2: rate of joint 2 before the kick [rad/s].
+        owedx: impulse that stiff clay owes from the step before, x [N.s].
+        owedy: the same, y [N.s].
+    """
+    t1, t2 = hold[0], hold[1]
+    n1, n2, f1, f2 = 0.0, 0.0, 0.0, 0.0
+    end = s["end"]
+    # with friction: the kick without it, and under one N.m more on either joint
+    for trial in range(4 if s["rubs"] else 1):
+        if trial == 0:
+            kick(s, x, t1, t2, w1, w2, owedx, owedy)
+            n1, n2 = end[2], end[3]
+        elif trial == 1:
+            kick(s, x, t1 + 1.0, t2, w1, w2, owedx, owedy)
+            f1, f2 = end[2], end[3]
+        elif trial == 2:
+            kick(s, x, t1, t2 + 1.0, w1, w2, owedx, owedy)
+            a12 = 0.5 * (f2 - n2 + end[2] - n1)  # equal but for rounding
+            limit = s["friction"]
+            f1, f2 = hardware.coulomb_friction(
+                (n1, n2), f1 - n1, a12, end[3] - n2, (limit[0], limit[1])
+            )
+        else:
+            kick(s, x, t1 + f1, t2 + f2, w1, w2, owedx, owedy)
+            s["slip"][0], s["slip"][1] = f1, f2
+
+
+def add_works(s, x, hold, w1, w2, work):
+    """Adds the works of the kick worked out.
+
+    Args:
+        s: state of the run.
+        x: from `ready_kick`.
+        hold: what the motors hold, see SAMPLED_STATE.
+        w1: rate of joint 1 before the kick [rad/s].
+        w2: rate of joint 2 before the kick [rad/s].
+        work: sums to add to [J], see path.STATE.
+    """
+    _, _, vx, vy, _, _, _, _, restx, resty = s["sample"]
+    ux, uy, n1, n2 = s["end"]
+    H = x[12]
+    w1, w2 = 0.5 * (w1 + n1), 0.5 * (w2 + n2)
+    muscle, motors, taken, hand, through = energy.kick_work(
+        H, x, restx, resty, vx, vy, ux, uy, hold[0], hold[1], w1, w2, s["hand"][1]
+    )
+    work[0] += muscle
+    work[1] += motors
+    work[2] += taken
+    work[3] += hand
+    work[4] += through
+    if s["wired"]:
+        slip = s["slip"]
+        vx, vy = 0.5 * (vx + ux), 0.5 * (vy + uy)
+        work[5] += -H * (slip[0] * w1 + slip[1] * w2)
+        work[6] += H * (hold[4] * vx + hold[5] * vy)
+        work[7] += H * (hold[6] * (vx - hold[8]) + hold[7] * (vy - hold[9]))
+
+
+def look_for_event(s):
+    """Finds whether now is an event, and whether it is a sample.
+
+    Args:
+        s: state of the run.
+    """
+    now = s["t"] + SLACK * s["dt"]
+    s["acts"] = 1 if s["when"] <= now else 0
+    s["event"] = 1 if s["acts"] or s["due"] <= now else 0
+
+
+def respond(s, ring):
+    """The controller acts at an event: works out what `commit` will take.
+
+    Args:
+        s: state of the run; early, whole, uh and shift hold what belongs to now.
+        ring: see Engine.
+    """
+    w1, w2 = s["w"]
+    owedx, owedy = s["owed"]
+    if s["before"] > 0.0:
+        x, hold, work = s["early"], s["hold"], s["early_work"]
+        push(s, x, hold, w1, w2, owedx, owedy)
+        for j in range(path.SUMS):
+            work[j] = 0.0
+        add_works(s, x, hold, w1, w2, work)
+        ux, uy, n1, n2 = s["end"]
+        _, _, vx, vy, fx, fy, _, _, restx, resty = s["sample"]
+        s["early_force"][0] = fx + x[0] * vx + x[1] * ux + restx
+        s["early_force"][1] = fy + x[2] * vy + x[3] * uy + resty
+        put4(s["start"], 0, n1, n2, s["left"][0], s["left"][1])
+        t1, t2 = hold[0] + s["slip"][0], hold[1] + s["slip"][1]
+        x = s["whole"]
+        if x[10] or x[11]:  # half a kick holds too little of stiff clay
+            n1, n2 = soft_rates(s, x, (ux, uy, n1, n2))
+        fx, fy = felt_force(s, n1, n2, t1, t2)
+        w1, w2 = n1, n2
+    else:
+        put4(s["start"], 0, w1, w2, owedx, owedy)
+        fx, fy = first_force(s)
+    s["shown"] = 0
+    if s["acts"]:
+        sample(s, ring, w1, w2, fx, fy)
+    if s["delay"] > 0.0:
+        take_due(s, ring)
+
+
+def soft_rates(s, x, half):
+    """Joint rates in stiff clay now: those of a whole kick, with the step before it repeated.
+
+    Args:
+        s: state of the run.
+        x: from `ready_kick`, of the whole kick.
+        half: velocity [m/s] and joint rates [rad/s] after half of it.
+
+    Returns:
+        Rates of both joints [rad/s].
+    """
+    ux, uy, n1, n2 = half
+    push(s, x, s["hold"], s["w"][0], s["w"][1], s["owed"][0], s["owed"][1])
+    at, end = s["sample"], s["end"]
+    vx = loop.velocity_at_sample(x, 0, at[2], end[0], at[8]) if x[10] > 0.0 else ux
+    vy = loop.velocity_at_sample(x, 1, at[3], end[1], at[9]) if x[11] > 0.0 else uy
+    if vx != ux or vy != uy:
+        u1x, u1y, u2x, u2y, _, _, _, _, _, _ = s["pose"]
+        r1, r2 = arm.joint_velocity(vx, vy, (u1x, u1y, u2x, u2y), 1.0)
+        n1, n2 = r1, r2 - r1
+    return n1, n2
+
+
+def handle_motion(pose, w1, w2):
+    """Velocity and centripetal acceleration of the handle.
+
+    Args:
+        pose: begins with arm.jacobian.
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+
+    Returns:
+        (vx, vy [m/s], cx, cy [m/s^2]).
+    """
+    u1x, u1y, u2x, u2y = pose[0], pose[1], pose[2], pose[3]
+    r2 = w1 + w2
+    s1 = w1 * w1
+    s2 = r2 * r2
+    return (
+        u1x * w1 + u2x * r2, u1y * w1 + u2y * r2, u1y * s1 + u2y * s2, -u1x * s1 - u2x * s2
+    )  # fmt: skip
+
+
+def first_force(s):
+    """The operator's force on the sensor of a handle that does not accelerate.
+
+    Args:
+        s: state of the run.
+
+    Returns:
+        (x, y) [N].
+    """
+    uhx, uhy = s["uh"]
+    if not s["held"]:
+        return uhx, uhy
+    pose, hand = s["pose"], s["hand"]
+    vx, vy, _, _ = handle_motion(pose, s["w"][0], s["w"][1])
+    return uhx - hand[2] * pose[4] - hand[1] * vx, uhy - hand[2] * pose[5] - hand[1] * vy
+
+
+def felt_force(s, w1, w2, t1, t2):
+    """The operator's force on the sensor at the sample, before the torques change.
+
+    Args:
+        s: state of the run.
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+        t1: torque on the shoulder [N.m].
+        t2: torque on the elbow [N.m].
+
+    Returns:
+        (x, y) [N].
+    """
+    uhx, uhy = s["uh"]
+    if not s["held"]:
+        return uhx, uhy
+    u1x, u1y, u2x, u2y, px, py, _, _, _, _ = s["pose"]
+    mass, damper, spring = s["hand"]
+    vx, vy, cx, cy = handle_motion(s["pose"], w1, w2)
+    restx = uhx - operator.operator_force(spring, mass, damper, px, cx, vx)
+    resty = uhy - operator.operator_force(spring, mass, damper, py, cy, vy)
+    fx, fy = restx, resty
+    if s["physical"]:
+        bx, by = path.damping_before(s, s["t"])
+        fx, fy = restx - bx * vx, resty - by * vy
+    # a kick of one second from rest, in which the velocity after it is the acceleration
+    ax, ay = controller.velocity_under_torque(
+        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (mass, mass)
+    )
+    return restx - mass * ax, resty - mass * ay
+
+
+def sample(s, ring, w1, w2, fx, fy):
+    """One sample: what is measured, what the motors are to hold, the compensator at the next.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+        fx: the operator's force on the sensor, x [N].
+        fy: the same, y [N].
+    """
+    pose, hold = s["pose"], s["hold_next"]
+    shown = True
+    if s["wired"]:
+        a, b, c, d, k, m, n, o, p, q, r, t, u, v = s["wires"]
+        put14(s["wires_next"], 0, a, b, c, d, k, m, n, o, p, q, r, t, u, v)
+        fx, fy = sensed_force(s, fx, fy)
+        shown = s["lost"] == 0
+        if shown:
+            w1, w2 = measured_rates(s, ring, w1, w2)
+    if shown:
+        u1x, u1y, u2x, u2y, px, py, wxx, wxy, wyy, _ = pose
+        if s["encoder"]:
+            ox, oy = s["origin"]
+            u1x, u1y, u2x, u2y = arm.jacobian(s["turned"][0], s["turned"][1])
+            px, py = u1y + u2y - ox, -oy - u1x - u2x
+            wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y))
+        det = u1x * u2y - u2x * u1y
+        vx, vy, cx, cy = handle_motion((u1x, u1y, u2x, u2y), w1, w2)
+        bx, by = path.damping_now(s, s["t"])
+        fex, fey = bx * vx, by * vy
+        put10(hold, 0, 0.0, 0.0, fex, fey, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if s["coupled"] or s["guarded"]:
+            render(s, ring, (px, py), (vx, vy), (bx, by), (wxx, wyy))
+            fex, fey = hold[2], hold[3]
+        fx, fy = fx - fex, fy - fey
+        # the servo's law, see controller.feedback_law and controller.solve_velocity
+        deltax, _, yx, ydx, deltay, _, yy, ydy = s["loop"]
+        ax, _ = controller.feedback_law(G[0], S[0], deltax, yx, ydx, px, vx, cx)
+        ay, _ = controller.feedback_law(G[1], S[1], deltay, yy, ydy, py, vy, cy)
+        if s["shaping"]:
+            wxx, wxy, wyy = loop.SXX, 0.0, loop.SYY
+        ux = ax + wxx * fx + wxy * fy
+        uy = ay + wxy * fx + wyy * fy
+        t2 = arm.I2 * ((uy * u1x - ux * u1y) / det) - u2x * fx - u2y * fy
+        t1 = arm.I1 * ((ux * u2y - uy * u2x) / det) - u1x * fx - u1y * fy + t2
+        if not s["physical"]:
+            p1, p2 = arm.joint_torques(fex, fey, (u1x, u1y, u2x, u2y))
+            t1, t2 = t1 - p1, t2 - p2
+        limit1, limit2 = s["torque_limit"]
+        t1 = min(max(t1, -limit1), limit1)
+        t2 = min(max(t2, -limit2), limit2)
+        if s["dac_bits"]:
+            t1 = hardware.quantize(t1, s["dac_bits"], s["dac_range"][0])
+            t2 = hardware.quantize(t2, s["dac_bits"], s["dac_range"][1])
+        hold[0], hold[1] = t1, t2
+        if s["wired"]:
+            s["wires_next"][6], s["wires_next"][7] = fx, fy
+        s["shown"] = 1
+    else:
+        fx, fy = s["wires"][6], s["wires"][7]
+        for j in range(HOLD):
+            hold[j] = s["hold"][j]
+    next_memory(s, fx, fy)
+
+
+def next_memory(s, fx, fy):
+    """States of compensator and reference model at the next sample.
+
+    Args:
+        s: state of the run.
+        fx: net force, x [N].
+        fy: net force, y [N].
+    """
+    (
+        a00, a01, a02, a03, b0, a10, a11, a12, a13, b1,
+        a20, a21, a22, a23, b2, a30, a31, a32, a33, b3,
+        c00, c01, c02, c03, d0, c10, c11, c12, c13, d1,
+        c20, c21, c22, c23, d2, c30, c31, c32, c33, d3,
+    ) = s["memory"]  # fmt: skip
+    x0, x1, x2, x3, y0, y1, y2, y3 = s["loop"]
+    shift = s["shift"]
+    put8(
+        s["loop_next"], 0,
+        a00 * x0 + a01 * x1 + a02 * x2 + a03 * x3 + b0 * fx + shift[0],
+        a10 * x0 + a11 * x1 + a12 * x2 + a13 * x3 + b1 * fx,
+        a20 * x0 + a21 * x1 + a22 * x2 + a23 * x3 + b2 * fx,
+        a30 * x0 + a31 * x1 + a32 * x2 + a33 * x3 + b3 * fx,
+        c00 * y0 + c01 * y1 + c02 * y2 + c03 * y3 + d0 * fy + shift[1],
+        c10 * y0 + c11 * y1 + c12 * y2 + c13 * y3 + d1 * fy,
+        c20 * y0 + c21 * y1 + c22 * y2 + c23 * y3 + d2 * fy,
+        c30 * y0 + c31 * y1 + c32 * y2 + c33 * y3 + d3 * fy,
+    )  # fmt: skip
+
+
+def sensed_force(s, fx, fy):
+    """The hand force behind noise, filter and converter; the filters' states go to wires_next.
+
+    Args:
+        s: state of the run.
+        fx: force on the sensor, x [N].
+        fy: the same, y [N].
+
+    Returns:
+        (x, y) [N].
+    """
+    fx, fy = fx + s["noise"][0], fy + s["noise"][1]
+    f, wires = s["force_filter"], s["wires_next"]
+    if s["filters"]:
+        shownx, showny = wires[2], wires[4]
+        wires[2], wires[3] = hardware.filter_step(f, wires[2], wires[3], fx)
+        wires[4], wires[5] = hardware.filter_step(f, wires[4], wires[5], fy)
+        fx, fy = shownx, showny
+    bits, span = s["adc_bits"], s["adc_range"]
+    return hardware.quantize(fx, bits, span), hardware.quantize(fy, bits, span)
+
+
+def measured_rates(s, ring, w1, w2):
+    """Joint rates as they are measured; the angles go to turned, the filtered rates to wires_next.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+
+    Returns:
+        Rates of both joints [rad/s].
+    """
+    turned, wires = s["turned"], s["wires_next"]
+    turned[0] = hardware.encode(s["q"][0], s["encoder"])
+    turned[1] = hardware.encode(s["q"][1], s["encoder"])
+    if not s["difference"]:
+        return w1, w2
+    old, k, Ts, cutoff = s["oldest"], float(s["k"]), s["Ts"], s["cutoff"]
+    w1, w2 = hardware.velocity_difference(
+        ring[old, 0], (ring[old, 1], ring[old, 2]), k, (turned[0], turned[1]), Ts
+    )
+    if cutoff > 0.0:
+        span = (k - ring[(old - 1) % s["window"], 0]) * Ts
+        w1 = hardware.low_pass(wires[0], w1, cutoff, span)
+        w2 = hardware.low_pass(wires[1], w2, cutoff, span)
+    wires[0], wires[1] = w1, w2
+    return w1, w2
+
+
+def render(s, ring, p, v, b, W):
+    """Force of the clay on the handle, by coupling and passivity controller, into hold_next.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+        p: handle position, (x, y) [m].
+        v: handle velocity, (x, y) [m/s].
+        b: clay, (x, y) [N.s/m].
+        W: mobility of the handle, (xx, yy) [1/kg].
+    """
+    hold, wires, Ts = s["hold_next"], s["wires_next"], s["Ts"]
+    spring, damper = s["coupling"]
+    delay, share = s["whole_delay"], s["part_delay"]
+    window, n = s["window"], delay + 2
+    since, before = window + (s["newest"] - delay) % n, window + (s["newest"] - delay - 1) % n
+    for i in range(2):
+        if s["coupled"]:
+            wires[12 + i], u = hardware.virtual_coupling(
+                wires[12 + i], p[i], v[i], b[i], spring, damper, Ts
+            )
+            hold[2 + i] = hold[6 + i] = b[i] * u
+            hold[8 + i] = u
+        if s["guarded"]:
+            # since the last sample the motors have held one force, then another
+            mean = (1.0 - share) * ring[since, i] + share * ring[before, i]
+            wires[8 + i] += mean * (p[i] - wires[10 + i])
+            wires[10 + i] = p[i]
+            f = hold[2 + i]
+            hold[2 + i] = hardware.passivity_controller(wires[8 + i], f, v[i], Ts, W[i])
+            hold[4 + i] = hold[2 + i] - f
+
+
+def queue_row(s, n):
+    """Row of the ring that holds an entry of the queue.
+
+    Args:
+        s: state of the run.
+        n: which of those queued, 0 for the next.
+    """
+    delay = s["whole_delay"]
+    return s["window"] + delay + 2 + (s["queue_at"] + n) % (delay + 4)
+
+
+def take_due(s, ring):
+    """Puts new torques into the queue and takes those that are due.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+    """
+    now, hold, entry, n = s["t"] + SLACK * s["dt"], s["hold_next"], s["entry"], 0
+    s["enters"] = s["shown"]
+    if s["shown"]:
+        entry[0] = s["when"] + s["delay"]
+        for j in range(HOLD):
+            entry[1 + j] = hold[j]
+    while n < s["queued"] and ring[queue_row(s, n), 0] <= now:
+        n += 1
+    if n == s["queued"] and s["enters"] and entry[0] <= now:
+        s["enters"] = 0
+    elif n > 0:
+        row = queue_row(s, n - 1)
+        for j in range(HOLD):
+            hold[j] = ring[row, 1 + j]
+    else:
+        for j in range(HOLD):
+            hold[j] = s["hold"][j]
+    s["leaves"] = n
+
+
+def take_event(s, chance, ring):
+    """Takes what `respond` has worked out.
+
+    Args:
+        s: state of the run.
+        chance: see Engine.
+        ring: see Engine.
+    """
+    a, b, c, d, f, g, h, i, j, k = s["hold_next"]
+    put10(s["hold"], 0, a, b, c, d, f, g, h, i, j, k)
+    if s["acts"]:
+        a, b, c, d, f, g, h, i = s["loop_next"]
+        put8(s["loop"], 0, a, b, c, d, f, g, h, i)
+        if s["wired"]:
+            take_wires(s, ring)
+        s["k"] += 1
+        look_ahead(s, chance)
+    if s["delay"] > 0.0:
+        take_queue(s, ring)
+    s["event"] = 0
+
+
+def take_wires(s, ring):
+    """Takes what the hardware remembers.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+    """
+    a, b, c, d, k, m, n, o, p, q, r, t, u, v = s["wires_next"]
+    put14(s["wires"], 0, a, b, c, d, k, m, n, o, p, q, r, t, u, v)
+    if s["shown"] and s["difference"]:
+        old = s["oldest"]
+        ring[old, 0] = float(s["k"])
+        ring[old, 1], ring[old, 2] = s["turned"][0], s["turned"][1]
+        s["oldest"] = (old + 1) % s["window"]
+    if s["shown"] and s["guarded"]:
+        s["newest"] = (s["newest"] + 1) % (s["whole_delay"] + 2)
+        row = s["window"] + s["newest"]
+        if s["delay"] > 0.0:  # what is asked for is not what the motors hold
+            ring[row, 0], ring[row, 1] = s["entry"][3], s["entry"][4]
+        else:
+            ring[row, 0], ring[row, 1] = s["hold"][2], s["hold"][3]
+
+
+def take_queue(s, ring):
+    """Moves the queue on.
+
+    Args:
+        s: state of the run.
+        ring: see Engine.
+    """
+    s["queue_at"], s["queued"] = s["queue_at"] + s["leaves"], s["queued"] - s["leaves"]
+    if s["enters"]:
+        row = queue_row(s, s["queued"])
+        for j in range(1 + HOLD):
+            ring[row, j] = s["entry"][j]
+        s["queued"] += 1
+    s["due"] = ring[queue_row(s, 0), 0] if s["queued"] > 0 else INF
+    s["due_next"] = ring[queue_row(s, 1), 0] if s["queued"] > 1 else INF
+
+
+def look_ahead(s, chance):
+    """Takes the times of the next two samples, and what happens to the first.
+
+    Args:
+        s: state of the run.
+        chance: see Engine.
+    """
+    k, ratio, dt = s["k"], s["ratio"], s["dt"]
+    s["when"], s["then"] = k * ratio * dt, (k + 1) * ratio * dt
+    if s["random"]:
+        row = k - s["first_chance"]
+        s["when"] += chance[row, 0]
+        s["then"] += chance[row + 1, 0]
+        s["lost"] = 1 if chance[row, 1] > 0.0 else 0
+        s["noise"][0], s["noise"][1] = chance[row, 2], chance[row, 3]
+
+
+def work_out(s, x, event):
+    """Works out the kick that leads on from now.
+
+    Args:
+        s: state of the run.
+        x: from `ready_kick`.
+        event: whether it follows an event.
+    """
+    if event:
+        w1, w2, owedx, owedy = s["start"]
+        push(s, x, s["hold_next"], w1, w2, owedx, owedy)
+    else:
+        push(s, x, s["hold"], s["w"][0], s["w"][1], s["owed"][0], s["owed"][1])
+
+
+def place_after(s, h):
+    """Handle position after the kick worked out.
+
+    Args:
+        s: state of the run.
+        h: time since [s].
+
+    Returns:
+        (x, y) [m].
+    """
+    q, end, origin = s["q"], s["end"], s["origin"]
+    x, y = arm.handle_position(q[0] + h * end[2], q[1] + h * end[3])
+    return x - origin[0], y - origin[1]
+
+
+def enter(s, rows, rendered, x, after, shows):
+    """Takes the kick worked out, and that to the event, into the ledger and the record.
+
+    Args:
+        s: state of the run.
+        rows: see Engine.
+        rendered: see Engine.
+        x: from `ready_kick`.
+        after: length of the step after the sample [s].
+        shows: whether it has a row of the record.
+    """
+    before, end = s["before"], s["end"]
+    event = s["event"] > 0 and after > 0.0
+    early = event and before > 0.0
+    hold, w1, w2 = s["hold"], s["w"][0], s["w"][1]
+    if event:
+        hold, w1, w2 = s["hold_next"], s["start"][0], s["start"][1]
+    if early:
+        for j in range(path.SUMS):
+            s["work"][j] += s["early_work"][j]
+    add_works(s, x, hold, w1, w2, s["work"])
+    put6(s["final"], 0, s["sample"][0], s["sample"][1], end[0], end[1], end[2], end[3])
+    if not shows:
+        return
+    i = s["filled"]
+    px, py, vx, vy, fx, fy, deltax, deltay, restx, resty = s["sample"]
+    ux, uy, _, _ = end
+    rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = s["q"][0], s["q"][1], px, py
+    rows[i, 4] = loop.velocity_at_sample(x, 0, vx, ux, restx)
+    rows[i, 5] = loop.velocity_at_sample(x, 1, vy, uy, resty)
+    rows[i, 6], rows[i, 7] = x[5], x[6]
+    if s["held"]:
+        rows[i, 6] = fx + x[0] * vx + x[1] * ux + restx
+        rows[i, 7] = fy + x[2] * vy + x[3] * uy + resty
+    rows[i, 8], rows[i, 9], rows[i, 10], rows[i, 11] = hold[0], hold[1], deltax, deltay
+    bx, by = path.damping_now(s, s["t"]) if after > 0.0 else path.damping_before(s, s["t"])
+    rows[i, 12], rows[i, 13] = bx, by
+    enter_rates(s, rows, i)
+    if early:
+        # the means of both kicks, half of each step, interpolated at the sample
+        share, f = after / (before + after), s["early_force"]
+        rows[i, 6] += share * (f[0] - rows[i, 6])
+        rows[i, 7] += share * (f[1] - rows[i, 7])
+    if len(rendered):
+        rendered[i, 0], rendered[i, 1] = hold[2], hold[3]
+    s["filled"] = i + 1
+
+
+def enter_rates(s, rows, i):
+    """Enters the joint rates of a row, from its velocity.
+
+    Args:
+        s: state of the run.
+        rows: see Engine.
+        i: the row.
+    """
+    u1x, u1y, u2x, u2y, _, _, _, _, _, _ = s["pose"]
+    r1, r2 = arm.joint_velocity(rows[i, 4], rows[i, 5], (u1x, u1y, u2x, u2y), 1.0)
+    rows[i, 14], rows[i, 15] = r1, r2 - r1
+
+
+def command(s, ctrl, push, after):
+    """Gives the engine a step with the kick worked out, and that to the event.
+
+    Args:
+        s: state of the run.
+        ctrl: see Engine.
+        push: see Engine.
+        after: length of the step [s].
+    """
+    hold, w, end, left = s["hold"], s["w"], s["end"], s["left"]
+    s["owed"][0], s["owed"][1] = left[0], left[1]
+    t1, t2, bx, by, p1, p2 = loop.whole_kick(w[0], w[1], end[2], end[3], hold[0], hold[1], after)
+    ctrl[0], ctrl[1] = t1, t2
+    if s["dampers"]:
+        ctrl[2], ctrl[3] = bx, by
+    push[0], push[1] = p1, p2
+
+
+def observe(s, q, w):
+    """Reads the engine after a step.
+
+    Args:
+        s: state of the run.
+        q: see Engine.
+        w: see Engine.
+    """
+    s["steps"] += 1
+    for j in range(2):
+        s["q"][j], s["w"][j] = q[j], w[j]
+    measure_pose(s)
+
+
+def ready_kicks(s, ahead, row, grows):
+    """Readies the kicks of a whole step between whole steps.
+
+    Args:
+        s: state of the run.
+        ahead: see Engine.
+        row: of it; -1 where nothing is driven.
+        grows: whether the clay does, so that all numbers change.
+    """
+    dt, now, shift, force = s["dt"], s["uh"], s["shift"], s["force"]
+    early, late, whole = (force[0], force[1]), (force[0], force[1]), (force[0], force[1])
+    now[0], now[1], shift[0], shift[1] = force[0], force[1], 0.0, 0.0
+    if row >= 0:
+        a = ahead
+        early, late, whole = (a[row, 0], a[row, 1]), (a[row, 2], a[row, 3]), (a[row, 4], a[row, 5])
+        now[0], now[1], shift[0], shift[1] = a[row, 6], a[row, 7], a[row, 8], a[row, 9]
+    if row < 0 or grows:
+        ready_kick(s, s["early"], dt, 0.0, early)
+        ready_kick(s, s["late"], 0.0, dt, late)
+        ready_kick(s, s["whole"], dt, dt, whole)
+    else:
+        s["early"][5], s["early"][6] = early
+        s["late"][5], s["late"][6] = late
+        s["whole"][5], s["whole"][6] = whole
+
+
+class Sampled(NamedTuple):
+    """The method; `path.Method` says what each part does.
+
+    Attributes:
+        order: of its error in the step.
     """
 
-    def __init__(self, scenario: Scenario, every: int):
-        super().__init__(scenario, every)
-        self.n = round((scenario.Ts or scenario.dt) / scenario.dt)
-        # rows of (A, B) of each axis, as floats: a product of so small matrices costs more in NumPy
-        self.blocks = [
-            np.column_stack(controller.held_compensator(axis, K, self.n * scenario.dt)).tolist()
-            for axis, K in zip(AXES, scenario.gain, strict=True)
+    order: int = 2
+
+    def glide(self, s, e, room):
+        i, dt, base, rate, old = s["i"], s["dt"], s["base"], s["rate"], s["old"]
+        n, row = min(s["last"] - i, room - s["filled"]), -1
+        if n < 1 or s["before"] != dt or s["t"] != i * dt or s["closing"] != OPEN or s["struck"]:
+            return 0
+        same = old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
+        if not same:
+            return 0
+        if s["first"] >= 0:
+            row = i - s["first"]
+            n = min(n, len(e.ahead) - row)
+        ready_kicks(s, e.ahead, -1, True)
+        varies = row >= 0 or (s["physical"] and (rate[0] > 0.0 or rate[1] > 0.0))
+        grows = s["physical"] and (rate[0] > 0.0 or rate[1] > 0.0)
+        lowx, lowy, highx, highy = s["low"][0], s["low"][1], s["high"][0], s["high"][1]
+        for made in range(n):
+            if s["uneven"] and self.stop(s)[1] < dt:
+                return made
+            if varies:
+                ready_kicks(s, e.ahead, row + made if row >= 0 else -1, grows)
+            look_for_event(s)
+            if s["event"]:
+                respond(s, e.ring)
+            x = s["late"] if s["event"] else s["whole"]
+            work_out(s, x, s["event"] > 0)
+            px, py = place_after(s, dt)
+            # a step that would leave the region, or end nowhere, is left to path.careful
+            if not (lowx - TOUCH <= px <= highx + TOUCH and lowy - TOUCH <= py <= highy + TOUCH):
+                return made
+            enter(s, e.rows, e.rendered, x, dt, True)
+            if s["event"]:
+                take_event(s, e.chance, e.ring)
+            command(s, e.ctrl, e.push, dt)
+            e.step(e.model, e.data)
+            observe(s, e.q, e.w)
+            s["i"] = i + made + 1
+            s["t"] = s["i"] * dt
+            s["landings"] = 0
+        return n
+
+    def stop(self, s):
+        t, dt, delay = s["t"], s["dt"], s["delay"]
+        target, after, on_grid = path.next_sample(t, s["i"], s["last"], dt, s["t_max"])
+        s["grid"] = target
+        if s["uneven"] and after > 0.0:
+            near = SLACK * dt
+            stop = INF
+            for event in (s["when"], s["then"], s["when"] + delay, s["due"], s["due_next"]):
+                if t + near < event < stop:
+                    stop = event
+            if stop < target - near:
+                return stop, stop - t, on_grid
+        return target, after, on_grid
+
+    def arrive(self, s, target):
+        if target == s["grid"]:
+            s["i"] += 1
+        s["t"] = target
+
+    def act(self, s, e):
+        look_for_event(s)
+        if s["event"]:
+            t, before = s["t"], s["before"]
+            s["uh"][0], s["uh"][1] = path.muscle_force(s, e.muscle, t, 0.0)
+            if len(e.command):
+                s["shift"][0], s["shift"][1] = path.command_change(e, t, t + s["Ts"])
+            if before > 0.0:
+                ready_kick_now(s, e.muscle, s["early"], before, 0.0)
+                ready_kick_now(s, e.muscle, s["whole"], before, before)
+            respond(s, e.ring)
+
+    def strike(self, s, e, after):
+        return after  # torques that are held do not follow a hit
+
+    def propose(self, s, e, after):
+        event = s["event"] > 0 and after > 0.0
+        ready_kick_now(s, e.muscle, s["late"], 0.0 if event else s["before"], after)
+        work_out(s, s["late"], event)
+
+    def finite(self, s, e):
+        return abs(s["end"][2]) + abs(s["end"][3]) < INF
+
+    def place(self, s, e, h):
+        return place_after(s, h)
+
+    def keep(self, s, e, after, shows):
+        enter(s, e.rows, e.rendered, s["late"], after, shows)
+        if shows and after == 0.0:
+            i = s["filled"] - 1
+            e.rows[i, 4] = self.speed(s, e, 0)
+            e.rows[i, 5] = self.speed(s, e, 1)
+            enter_rates(s, e.rows, i)
+
+    def commit(self, s, e, after):
+        if s["event"]:
+            take_event(s, e.chance, e.ring)
+        command(s, e.ctrl, e.push, after)
+        e.timestep[0] = after
+        e.step(e.model, e.data)
+        e.timestep[0] = s["dt"]
+        observe(s, e.q, e.w)
+
+    def speed(self, s, e, i):
+        # half a kick has led to the border; in stiff clay that half holds too little of the clay,
+        # and the velocity is that of a whole kick, with the step before it repeated
+        before = s["before"]
+        if before == 0.0:
+            return 0.0
+        x, at, end = s["whole"], s["sample"], s["end"]
+        ready_kick_now(s, e.muscle, x, before, before)
+        felt = x[10 + i] > 0.0
+        if not felt:
+            ready_kick_now(s, e.muscle, x, before, 0.0)
+        work_out(s, x, False)
+        return loop.velocity_at_sample(x, i, at[2 + i], end[i], at[8 + i]) if felt else end[i]
+
+
+class SampledRun(Run):
+    """A run by `Sampled`."""
+
+    fields, method = SAMPLED_STATE, Sampled()
+
+    def _start(self) -> None:
+        super()._start()
+        s, now = self.scenario, self.s
+        now["ratio"] = round((s.Ts or s.dt) / s.dt)
+        now["Ts"] = now["ratio"] * float(s.dt)
+        now["physical"] = int(s.render == "implicit")
+        blocks = [
+            np.column_stack(controller.held_compensator(axis, K, now["Ts"]))
+            for axis, K in zip(AXES, s.gain, strict=True)
         ]
-        s = self.state
-        # (delta, delta', y, y') of each axis, the torques held, the impulse that stiff clay owes
-        self.state = (s[0:8:2], s[1:8:2], ZERO, ZERO)
-        self.fresh = -1  # index of the last sample that was acted upon
-        self.physical = scenario.render == "implicit"
-        self.row: tuple[float, ...] | None = None
-        # a sample each since the last look: fh before the torques change [N], its weight
-        self.early: list[tuple[float, float, float]] = []
+        x = loop.initial_state(s.start, s.velocity)
+        self._put(memory=np.ravel(blocks), loop=(*x[0:8:2], *x[1:8:2]))
+        measure_pose(now)
+        now["due"] = now["due_next"] = math.inf
+        self.ring = np.zeros((0, 1 + HOLD))
+        self.rendered = np.zeros((0, 2))
+        self.rendered_kept: list[np.ndarray] = []
+        self.last_rendered: Any = None
+        if s.interface:
+            self._wire(s.interface)
+        look_ahead(now, self.e.chance)
 
-    def advance(self) -> bool:
-        self._careful()
-        return self.filled >= CHUNK - 4
-
-    def _inputs(self, before: float, after: float) -> tuple[float, ...]:
-        if self.physical:
-            return super()._inputs(before, after)
-        uh = self.uh(self.t - 0.5 * before, self.t + 0.5 * after)
-        return loop.step_inputs(ZERO, ZERO, uh, before, after, self.hand)
-
-    def _first_of_a_hit(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> float:
-        return inf  # torques that are held do not follow a hit
-
-    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
-        x, y, tau, owed = self.state
-        before, s = self.before, self.scenario
-        self.row, shown = None, (x[0], y[0])
-        if after > 0.0 and self._is_sample():
-            seen = w
-            if before:
-                c, k = loop.plant_coefficients(s, before, 0.0), self._inputs(before, 0.0)
-                at, out, owed = loop.step_plant(c, k, q[0], q[1], w[0], w[1], *tau, *owed)
-                self.row = (*q, *at[:4], *out[:2], *at[4:6], *tau, *shown, *at[6:])
-                seen, w = self._seen(q, w, out), out[2:]
-                force = self._felt(q, seen, tau)
-            else:
-                force = self._first(q, w)
-            tau, f = self._control(q, seen, x, y, force)
-            shift = self.shift(self.t, self.t + self.n * s.dt).tolist() if self.command else ZERO
-            x, y = map(self._hold, (x, y), self.blocks, f, shift)
-            before = 0.0
-        c, k = loop.plant_coefficients(s, before, after), self._inputs(before, after)
-        at, out, owed = loop.step_plant(c, k, *q, *w, *tau, *owed)
-        return (x, y, tau, owed), (*tau, 0.0, 0.0, 0.0, 0.0), (*at[:6], *shown, *at[6:]), out
-
-    def _seen(self, q, w, out) -> Any:
-        """Joint rates at the sample [rad/s], see `_velocity`."""
-        v = self._velocity(q, w, out)
-        if v == out[:2]:
-            return out[2:]
-        r1, r2 = arm.joint_velocity(v[0], v[1], self._measure(q, w)[0], 1.0)
-        return r1, r2 - r1
-
-    def _whole_kick(self, q, w) -> tuple[Any, Any]:
-        _, _, tau, owed = self.state
-        h = self.before
-        c, k = loop.plant_coefficients(self.scenario, h, h), self._inputs(h, h)
-        at, out, _ = loop.step_plant(c, k, *q, *w, *tau, *owed)
-        return (*at[:6], *ZERO, *at[6:]), out
-
-    def _measure(self, q, w) -> tuple[tuple[float, float, float, float], Pair, Pair, Pair]:
-        """arm.jacobian, position, velocity and centripetal acceleration of the handle."""
-        ox, oy = self.scenario.origin
-        u, p, _, v, c = loop.measure_handle(q[0], q[1], w[0], w[1], 0.0, 0.0, ox, -oy)
-        return u, p, v, c
-
-    def _first(self, q, w) -> Pair:
-        """The operator's force on the sensor of a handle that does not accelerate [N]."""
-        uh, th = self.uh(self.t, self.t), self.scenario.operator
-        if th is None:
-            return uh
-        _, p, v, _ = self._measure(q, w)
-        x, y = (uh[i] - th.spring * p[i] - th.damper * v[i] for i in (0, 1))
-        return x, y
-
-    def _felt(self, q, w, tau) -> Pair:
-        """The operator's force on the sensor at the sample, before the torques change [N]."""
-        uh, th = self.uh(self.t, self.t), self.scenario.operator
-        if th is None:
-            return uh
-        u, p, v, c = self._measure(q, w)
-        b = damping_at(*self.clay, self.t) if self.physical else ZERO
-        rest = [
-            uh[i] - operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
-            for i in (0, 1)
+    def _wire(self, parts: hardware.Interface) -> None:
+        """Sets up the hardware."""
+        s, now, Ts = self.scenario, self.s, self.s["Ts"]
+        cutoff, delay = parts.force_filter, parts.delay / Ts
+        now["wired"] = 1
+        now["uneven"] = int(parts.jitter > 0.0 or parts.delay > 0.0)
+        now["random"] = int(parts.jitter > 0.0 or parts.lost > 0.0 or parts.force_noise > 0.0)
+        now["encoder"], now["window"] = parts.encoder or 0, parts.window
+        now["difference"] = int(parts.velocity == "difference")
+        now["cutoff"] = float(parts.velocity_filter or 0.0)
+        now["adc_bits"], now["dac_bits"] = parts.adc_bits or 0, parts.dac_bits or 0
+        now["adc_range"], now["delay"] = float(parts.adc_range), float(parts.delay)
+        now["whole_delay"] = whole = math.floor(delay + SLACK)
+        now["part_delay"] = max(delay - whole, 0.0)
+        now["rubs"], now["guarded"] = int(any(parts.friction)), int(parts.passivity)
+        now["coupled"] = int(parts.coupling is not None)
+        if parts.coupling:
+            self._put(coupling=(parts.coupling.spring, parts.coupling.damper))
+        if cutoff is not None:
+            now["filters"] = 1
+            self._put(force_filter=hardware.butterworth(cutoff, parts.filter_order, Ts))
+        self._put(friction=parts.friction, dac_range=parts.dac_range or s.torque_limit)
+        (q1, q2), (w1, w2) = self.data.qpos.tolist(), self.data.qvel.tolist()
+        self._put(wires=(w1, w2, *[0.0] * 8, *s.start, *s.start))
+        # before the start the joints have turned so for long
+        past = [
+            (
+                float(j),
+                hardware.encode(q1 + j * Ts * w1, now["encoder"]),
+                hardware.encode(q2 + j * Ts * w2, now["encoder"]),
+            )
+            for j in range(-parts.window, 0)
         ]
-        # a kick of one second from rest, in which the velocity after it is the acceleration
-        fex, fey = viscous_force(*b, *v)
-        f = rest[0] - fex, rest[1] - fey
-        a = controller.velocity_under_torque(1.0, ZERO, u, tau, f, (th.mass, th.mass))
-        return rest[0] - th.mass * a[0], rest[1] - th.mass * a[1]
+        self.ring = np.zeros((parts.window + whole + 2 + whole + 4, 1 + HOLD))
+        self.ring[: parts.window, :3] = past
+        self._arrays(ring=self.ring)
+        if s.render == "held":
+            self.rendered = np.zeros((CHUNK - 1, 2))
+            self._arrays(rendered=self.rendered)
+        if now["random"]:
+            self.noise = hardware.SampleNoise(parts)
+            self._arrays(chance=self.noise.table(0, 2))
 
-    def _is_sample(self) -> bool:
-        return self.i % self.n == 0 and self.t == self.i * self.scenario.dt and self.fresh != self.i
+    def _make(self, room: int) -> None:
+        now = self.s
+        rows = max(room - self.filled, 0) + 1
+        if now["random"]:  # no more samples begin in a call than rows, and a look ahead
+            now["first_chance"] = now["k"]
+            self._arrays(chance=self.noise.table(now["k"], rows // now["ratio"] + 8))
+        if self.muscle or self.command:
+            now["first"] = self.i
+            self._arrays(ahead=self._ahead(min(rows, max(self.last - self.i, 0) + 1)))
+        super()._make(room)
 
-    def _control(self, q, w, x, y, force):
-        """Torques to hold, and the net force for the compensator, from the present measurements."""
-        u, p, v, c = self._measure(q, w)
-        fe = viscous_force(*self.regions.b(self.t), *v)
-        return self._torques(u, p, v, c, x, y, force, fe)
+    def _ahead(self, n: int) -> np.ndarray:
+        """What drives the next n whole steps, see AHEAD; shape (n, AHEAD)."""
+        dt, i = self.scenario.dt, self.i
+        t = (i + np.arange(n)) * dt
+        out = np.empty((n, AHEAD))
+        out[:, 0:2] = self.uh(t - 0.25 * dt, 0.25 * dt)
+        out[:, 2:4] = self.uh(t + 0.25 * dt, 0.25 * dt)
+        out[:, 4:6] = 0.5 * (out[:, 0:2] + out[:, 2:4])
+        out[:, 6:8] = self.uh(t, 0.0)
+        out[:, 8:10] = self.shift(t, t + self.s["Ts"])
+        return out
 
-    def _torques(
-        self,
-        u: tuple[float, float, float, float],
-        p: Pair,
-        v: Pair,
-        c: Pair,
-        x,
-        y,
-        force: Pair,
-        fe: Pair,
-    ):
-        """`_control` from the state of the handle, the hand force and the force of the clay [N]."""
-        s = self.scenario
-        f = (force[0] - fe[0], force[1] - fe[1])
-        law = controller.feedback_law
-        a = [law(G[i], S[i], z[0], z[2], z[3], p[i], v[i], c[i])[0] for i, z in enumerate((x, y))]
-        W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
-        limit = inf, inf, inf, inf  # the limits come last, after the clay's share
-        *_, t1, t2 = controller.saturated_step(1.0, ZERO, u, (1.0, 1.0), a, W, f, ZERO, limit)
-        if not self.physical:
-            p1, p2 = arm.joint_torques(*fe, u)
-            t1, t2 = t1 - p1, t2 - p2
-        (l1, l2) = s.torque_limit
-        return (min(max(t1, -l1), l1), min(max(t2, -l2), l2)), f
+    def _save(self) -> Any:
+        if self.s["random"]:
+            self.noise.forget(self.s["k"])
+        return super()._save(), self.ring.copy()
 
-    @staticmethod
-    def _hold(z, block, f: float, shift: float) -> tuple[float, ...]:
-        z0, z1, z2, z3 = z
-        delta, *rest = [
-            a0 * z0 + a1 * z1 + a2 * z2 + a3 * z3 + b * f for a0, a1, a2, a3, b in block
-        ]
-        return delta + shift, *rest
+    def _restore(self, saved: Any) -> None:
+        super()._restore(saved[0])
+        self.ring[:] = saved[1]
 
-    def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        before, early = self.before, (0.0, 0.0, 0.0)
-        if self.row:
-            k = self._inputs(before, 0.0)
-            self._put(False, self.row, k, 0.5 * before, False)
-            _, _, _, _, v0x, v0y, v1x, v1y, fx, fy, *_, restx, resty = self.row
-            fx, fy = fx + k[0] * v0x + k[1] * v1x + restx, fy + k[2] * v0y + k[3] * v1y + resty
-            # the means of both kicks, half of each step, interpolated at the sample
-            early = fx, fy, after / (before + after)
-            before = 0.0
-            self.fresh = self.i
-        elif after and self._is_sample():
-            before, self.fresh = 0.0, self.i
-        row = (*q, *sample[:4], *out[:2], *sample[4:6], *command[:2], *sample[6:])
-        k = self._inputs(before, after)
-        self._put(is_sample, row, k, 0.5 * (before + after), after > 0.0)
-        if is_sample:
-            self.early.append(early)
+    def flush(self) -> None:
+        n = self.filled
+        if n and len(self.rendered):
+            self.last_rendered = self.rendered[n - 1].tolist()
+        super().flush()
 
-    def judge(self, rows: np.ndarray, b: Callable[[], np.ndarray]) -> int:
-        """As Run.judge, with the hand force of both kicks at a sample.
+    def judge(self, rows: np.ndarray) -> int:
+        """As Run.judge, with the force that the motors render.
 
         Args:
             rows: as in Run.judge.
-            b: as in Run.judge.
         """
-        early = np.array(self.early).T
-        self.early.clear()
-        rows[6:8] += early[2] * (early[:2] - rows[6:8])
-        return super().judge(rows, b)
-
-    def _engine(self, w, command, out, after: float) -> None:
-        self.steps += 1
-        self._whole(w, command, out, after)
-
-
-TIME_SLACK = 1e-9  # of dt: events so close are one
-
-
-class HeldForce(NamedTuple):
-    """What the motors hold, and its parts; all (x, y) or (shoulder, elbow).
-
-    Attributes:
-        torque: of the motors [N.m].
-        clay: force as rendered, with that of the passivity controller [N].
-        guard: force added by the passivity controller [N].
-        coupling: force of the virtual coupling [N].
-        tool: velocity of the tool of the coupling [m/s].
-    """
-
-    torque: Pair = ZERO
-    clay: Pair = ZERO
-    guard: Pair = ZERO
-    coupling: Pair = ZERO
-    tool: Pair = ZERO
-
-
-class HardwareState(NamedTuple):
-    """State of the hardware between two samples.
-
-    Attributes:
-        k: index of the next sample.
-        queue: (time [s], force to hold) still to come.
-        history: (index, angles [rad]) of past samples, see hardware.velocity_difference.
-        rates: joint rates behind their filter [rad/s].
-        filters: states of the filters of the force, x and y.
-        force: net force last given to the compensator [N].
-        energy: energy that the clay has taken on each axis [J], up to `position`.
-        position: of the handle at the last sample [m].
-        forces: last forces of the clay, newest first [N].
-        tool: position of the tool of the coupling [m].
-    """
-
-    k: int
-    queue: tuple[tuple[float, HeldForce], ...]
-    history: tuple[tuple[int, Pair], ...]
-    rates: Pair
-    filters: tuple[tuple[float, ...], tuple[float, ...]]
-    force: Pair
-    energy: Pair
-    position: Pair
-    forces: tuple[Pair, ...]
-    tool: Pair
-
-
-class HardwareLoop(Sampled):
-    """The sampled loop with hardware: samples and changes of torque come at their own times.
-
-    A step ends on each, as it does on borders.
-
-    Args:
-        scenario: what to run; it has an interface.
-        every: keep each every-th sample, and the last.
-    """
-
-    def __init__(self, scenario: Scenario, every: int):
-        super().__init__(scenario, every)
-        assert scenario.interface is not None
-        self.parts = scenario.interface
-        self.Ts = self.n * scenario.dt
-        self.chance = hardware.SampleNoise(self.parts)
-        cutoff, order = self.parts.force_filter, self.parts.filter_order
-        self.filter = None if cutoff is None else hardware.butterworth(cutoff, order, self.Ts)
-        self.whole_delay = math.floor(self.parts.delay / self.Ts + TIME_SLACK)  # samples
-        self.part_delay = max(self.parts.delay / self.Ts - self.whole_delay, 0.0)
-        q, w = tuple(self.angles), tuple(self.rates)
-        # before the start the joints have turned so for long
-        past = tuple((j, self._encoded((q[0] + j * self.Ts * w[0], q[1] + j * self.Ts * w[1])))
-                     for j in range(-self.parts.window, 0))  # fmt: skip
-        start: Pair = scenario.start
-        rest = (0.0,) * order
-        hw = HardwareState(
-            0, (), past, w, (rest, rest), ZERO, ZERO, start, (ZERO,) * (self.whole_delay + 2), start
-        )
-        self.state = (*self.state[:2], HeldForce(), hw, ZERO)
-        self.extra: list[tuple[float, ...]] = []
-        # of the row at an event, and after it
-        self.extras: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
-        self.acting = HeldForce()
-        self.rendered: list[tuple[float, float, float]] = []  # time [s], clay as rendered [N]
-        self.ledger = energy.EnergyLedger(scenario, self.extra)
-        self.grid = 0.0
-
-    def target(self) -> tuple[float, float, bool]:
-        target, after, on_grid = super().target()
-        self.grid, near = target, TIME_SLACK * self.scenario.dt
-        hw = self.state[3]
-        soon = [
-            self._when(hw.k),
-            self._when(hw.k + 1),
-            self._when(hw.k) + self.parts.delay,
-            *(d for d, _ in hw.queue),
-        ]
-        stop = min((t for t in soon if t > self.t + near), default=target)
-        if after and stop < target - near:
-            return stop, stop - self.t, on_grid
-        return target, after, on_grid
-
-    def _arrive(self, target: float) -> None:
-        if target == self.grid:
-            super()._arrive(target)
-        self.t = target
-
-    def _when(self, k: int) -> float:
-        return k * self.n * self.scenario.dt + self.chance(k)[0]
-
-    def _is_sample(self) -> bool:
-        return False  # an event has its own row already
-
-    def _tick(self, q: tuple[float, ...], w: tuple[float, ...], after: float) -> Any:
-        x, y, held, hw, owed = self.state
-        before, now = self.before, self.t + TIME_SLACK * self.scenario.dt
-        self.row, shown = None, (x[0], y[0])
-        sample = after > 0.0 and self._when(hw.k) <= now
-        if sample or after > 0.0 and hw.queue and hw.queue[0][0] <= now:
-            seen = w
-            if before:
-                at, out, owed, slip = self._push(before, 0.0, q, w, held, owed)
-                self.row = (*q, *at[:4], *out[:2], *at[4:6], *held.torque, *shown, *at[6:])
-                self.extras = (_hardware_work(slip, held), ())
-                tau = held.torque[0] + slip[0], held.torque[1] + slip[1]
-                seen, w = self._seen(q, w, out), out[2:]
-                force = self._felt(q, seen, tau)
-            else:
-                force = self._first(q, w)
-            if sample:
-                x, y, hw = self._sample(q, seen, x, y, force, hw)
-            while hw.queue and hw.queue[0][0] <= now:
-                held, hw = hw.queue[0][1], hw._replace(queue=hw.queue[1:])
-            before = 0.0
-        at, out, owed, slip = self._push(before, after, q, w, held, owed)
-        self.extras, self.acting = (self.extras[0], _hardware_work(slip, held)), held
-        return (
-            (x, y, held, hw, owed),
-            (*held.torque, 0.0, 0.0, 0.0, 0.0),
-            (*at[:6], *shown, *at[6:]),
-            out,
-        )
-
-    def _whole_kick(self, q, w) -> tuple[Any, Any]:
-        _, _, held, _, owed = self.state
-        at, out, _, _ = self._push(self.before, self.before, q, w, held, owed)
-        return (*at[:6], *ZERO, *at[6:]), out
-
-    def _push(
-        self, before: float, after: float, q, w, held: HeldForce, owed: Pair
-    ) -> tuple[Any, Any, Any, Pair]:
-        """loop.step_plant under held torques and friction, and the friction torques [N.m]."""
-        c, k = loop.plant_coefficients(self.scenario, before, after), self._inputs(before, after)
-        t1, t2 = held.torque
-        at, out, left = loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1, t2, *owed)
-        limit: Any = self.parts.friction
-        if limit == ZERO:
-            return at, out, left, ZERO
-        one, two = (
-            loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + d1, t2 + d2, *owed)[1]
-            for d1, d2 in ((1.0, 0.0), (0.0, 1.0))
-        )
-        a12 = 0.5 * (one[3] - out[3] + two[2] - out[2])  # equal but for rounding
-        f1, f2 = hardware.coulomb_friction(out[2:], one[2] - out[2], a12, two[3] - out[3], limit)
-        return *loop.step_plant(c, k, q[0], q[1], w[0], w[1], t1 + f1, t2 + f2, *owed), (f1, f2)
-
-    def _encoded(self, q) -> Pair:
-        return hardware.encode(q[0], self.parts.encoder), hardware.encode(q[1], self.parts.encoder)
-
-    def _sample(self, q, w, x, y, force, hw: HardwareState):
-        """One sample: the measurement, the torques to come, the controller's states at the next."""
-        s, parts, k = self.scenario, self.parts, hw.k
-        _, lost, noise = self.chance(k)
-        force, filters = self._sensed(force, noise, hw)
-        hw = hw._replace(k=k + 1, filters=filters)
-        if not lost:
-            q, w, hw = self._turned(k, q, w, hw)
-            u, p, v, c = self._measure(q, w)
-            held, hw = self._render(u, p, v, hw)
-            tau, f = self._torques(u, p, v, c, x, y, force, held.clay)
-            span = parts.dac_range or s.torque_limit
-            t1, t2 = (
-                hardware.quantize(t, parts.dac_bits, r) for t, r in zip(tau, span, strict=True)
-            )
-            due = self._when(k) + parts.delay
-            hw = hw._replace(force=f, queue=(*hw.queue, (due, held._replace(torque=(t1, t2)))))
-        shift = self.shift(self.t, self.t + self.Ts).tolist() if self.command else ZERO
-        x, y = map(self._hold, (x, y), self.blocks, hw.force, shift)
-        return x, y, hw
-
-    def _sensed(self, force, noise: Pair, hw: HardwareState):
-        """The hand force behind noise, filter and converter [N], and the states of the filters."""
-        filters = hw.filters
-        if any(noise):
-            force = force[0] + noise[0], force[1] + noise[1]
-        if self.filter:
-            shown = filters[0][0], filters[1][0]
-            filters = tuple(
-                hardware.filter_step(*self.filter, z, f)
-                for z, f in zip(filters, force, strict=True)
-            )
-            force = shown
-        bits, span = self.parts.adc_bits, self.parts.adc_range
-        x, y = (hardware.quantize(f, bits, span) for f in force)
-        return (x, y), filters
-
-    def _turned(self, k: int, q, w, hw: HardwareState):
-        """Joint angles [rad] and rates [rad/s] as they are measured."""
-        parts, old = self.parts, hw.history
-        q = self._encoded(q)
-        if parts.velocity == "exact":
-            return q, w, hw
-        w = hardware.velocity_difference(old, k, q, self.Ts)
-        if parts.velocity_filter is not None:
-            span = (k - old[-1][0]) * self.Ts
-            w = tuple(
-                hardware.low_pass(a, b, parts.velocity_filter, span)
-                for a, b in zip(hw.rates, w, strict=True)
-            )
-        return q, w, hw._replace(history=(*old, (k, q))[-parts.window :], rates=w)
-
-    def _render(self, u, p: Pair, v: Pair, hw: HardwareState) -> tuple[HeldForce, HardwareState]:
-        """Force of the clay on the handle, by coupling and passivity controller [N]."""
-        parts, b = self.parts, self.regions.b(self.t)
-        fe, held = viscous_force(*b, *v), HeldForce()
-        if parts.coupling:
-            k, d = parts.coupling.spring, parts.coupling.damper
-            tool = [
-                hardware.virtual_coupling(hw.tool[i], p[i], v[i], b[i], k, d, self.Ts)
-                for i in (0, 1)
-            ]
-            hw = hw._replace(tool=(tool[0][0], tool[1][0]))
-            fe = viscous_force(*b, tool[0][1], tool[1][1])
-            held = held._replace(coupling=fe, tool=(tool[0][1], tool[1][1]))
-        if not parts.passivity:
-            return held._replace(clay=fe), hw
-        f0, f1 = hw.forces[self.whole_delay : self.whole_delay + 2]  # since the last: f1, then f0
-        mean = [(1.0 - self.part_delay) * f0[i] + self.part_delay * f1[i] for i in (0, 1)]
-        e: Any = tuple(hw.energy[i] + mean[i] * (p[i] - hw.position[i]) for i in (0, 1))
-        W = arm.mobility(u)[::2]
-        safe: Any = tuple(
-            hardware.passivity_controller(e[i], fe[i], v[i], self.Ts, W[i]) for i in (0, 1)
-        )
-        hw = hw._replace(energy=e, position=p, forces=(safe, *hw.forces)[: self.whole_delay + 2])
-        return held._replace(clay=safe, guard=(safe[0] - fe[0], safe[1] - fe[1])), hw
-
-    def _keep(self, is_sample: bool, q, sample, command, out, after: float) -> None:
-        self.extra += self.extras if self.row else self.extras[1:]
-        fx, fy = self.acting.clay
-        self.rendered.append((self.t, fx, fy))
-        super()._keep(is_sample, q, sample, command, out, after)
+        before = self.looked
+        good = super().judge(rows)
+        if good and len(self.rendered):
+            self.rendered_kept.append(self.rendered[self.kept[-1][0] - before])
+        return good
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As Run.arrays; where the motors render the clay, fe is what they hold."""
+        """As Run.arrays; where an interface renders the clay, fe is what the motors hold."""
         arrays = super().arrays()
-        if not self.physical and self.rendered:
-            held = np.array(self.rendered)
-            near = TIME_SLACK * self.scenario.dt
-            last = np.searchsorted(held[:, 0], arrays["t"] + near, side="right") - 1
-            arrays["fe"] = held[last, 1:]
+        if self.rendered_kept:
+            arrays["fe"] = np.concatenate(self.rendered_kept)
         return arrays
 
+    def brief(self) -> tuple[Any, ...]:
+        """As Run.brief."""
+        *found, last, balance = super().brief()
+        if self.without_samples and self.last_rendered:
+            last[3] = tuple(self.last_rendered)
+        return *found, last, balance
 
-def _hardware_work(slip: Pair, held: HeldForce) -> tuple[float, ...]:
-    """A row of energy.EnergyLedger.extra."""
-    return *slip, *held.guard, *held.coupling, *held.tool
+    def balance(self) -> dict[str, float]:
+        """As Run.balance, with what the hardware takes."""
+        out, parts = super().balance(), self.scenario.interface
+        if parts:
+            used = any(parts.friction), parts.passivity, parts.coupling is not None
+            work = [float(x) for x in self.s["work"]][-len(energy.HARDWARE_WORK) :]
+            names = zip(energy.HARDWARE_WORK, work, used, strict=True)
+            out |= {name: x for name, x, on in names if on}
+            out["residual"] -= out.get("friction", 0.0)
+        return out

@@ -25,7 +25,7 @@ from ..files import atomic
 from ..model.constants import AXES
 from ..simulation.batch import cores
 from ..simulation.record import Record
-from ..simulation.simulate import has_numba, native_fits, simulate
+from ..simulation.simulate import has_numba, simulate
 from ..theory import gain_limit
 from .sampling import Sweep
 
@@ -92,11 +92,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
     names = list(sweep.vary)
     try:
         scenario = sweep.scenario(point)
-        compiled = (
-            len(sweep) * scenario.t_max / scenario.dt >= COMPILE_FROM
-            and native_fits(scenario)
-            and has_numba()
-        )
+        compiled = len(sweep) * scenario.t_max / scenario.dt >= COMPILE_FROM and has_numba()
         return result_row(
             index, names, point, simulate(scenario, engine="native" if compiled else "python")
         )

@@ -22,15 +22,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, integer, number
+from ..model import clay as laws
 from ..model.clay import Clay, Profile
 from ..model.constants import AXES, B_MAX, L1, L2
 from ..model.operator import Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
-from ..stepping import leapfrog, loop, monitor
-from ..stepping.leapfrog import Leapfrog, written_out
+from ..stepping import monitor, path
 from ..stepping.monitor import Outcome
+from ..stepping.run import LeapfrogRun
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import gain_limit
 
@@ -97,60 +98,88 @@ class Pull:
         """
         return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
 
-    def mean(self, begin: Any, end: Any) -> np.ndarray:
-        """Returns the mean force over intervals [N], as `Signal.mean`.
+    def ramp(self) -> tuple[float, ...]:
+        """The force of the spring as in path.SCENARIO: since [s], (x, y) [N], its rate [N/s]."""
+        return self._since, *(self.spring * self._from), *(self.spring * self._rate)
+
+    def mean(self, t: Any, h: Any) -> np.ndarray:
+        """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`.
 
         Args:
-            begin: of the intervals [s].
-            end: of the intervals [s].
+            t: centre of the interval [s].
+            h: half its length [s]; the force changes evenly, and h does not matter.
         """
-        return np.array(self.force) + self.spring * self.at(
-            0.5 * (np.asarray(begin) + np.asarray(end))
-        )
+        return np.array(self.force) + self.spring * self.at(t)
 
 
-class _Live(Leapfrog):
-    """A run that goes on slice by slice, and whose muscle, gain and clay may change in between."""
+class LiveRun(LeapfrogRun):
+    """A run that goes on slice by slice, and whose muscle, gain and clay may change in between.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample.
+
+    Attributes:
+        keeping: whether samples are kept.
+        gains: (index of the first sample with it, gain), one after the other.
+    """
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
         assert scenario.operator is not None
         self.muscle = Pull(scenario.operator.spring, scenario.start)
         self.varies = True
-        written_out(leapfrog.glide_varying, self.last)  # compile now, not while the hand waits
-        self.limit = self.last
         # motion is the person's: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
         self.keeping = True
-        self.gains = [(0, scenario.gain)]  # index of the first sample with it
+        self.gains = [(0, scenario.gain)]
 
     def slice(self, steps: int) -> None:
-        """Makes this many steps, unless the run ends."""
-        self.last = self.pause = min(self.i + steps, self.limit)
+        """Makes this many steps, unless the run ends.
+
+        Args:
+            steps: number of steps.
+        """
+        self.pause = min(self.i + steps, self.last)
+        self._put(force=self.muscle.force, ramp=self.muscle.ramp())
         self.go(None)
         if self.filled:
             self.flush()
 
     def change(self, scenario: Scenario) -> None:
-        """Goes on with another gain, or with other damping between the same borders."""
+        """Goes on with another gain, or with other damping between the same borders.
+
+        Args:
+            scenario: with the new gain and clay.
+        """
         if scenario.gain != self.scenario.gain:
             self.gains.append((self.i, scenario.gain))
         self.scenario = scenario
-        self.whole = loop.loop_coefficients(scenario, scenario.dt, scenario.dt)
+        self._tell(scenario)
         self.watch.scenario = replace(scenario, muscle=Multisine())
         if scenario.clay is not None:
-            self.regions.change(scenario.clay, self.t)
+            table, first = laws.region_table(scenario.clay, scenario.length), laws.ENTERED_ROW
+            table[first : first + 2] = self.table[first : first + 2]
+            self.table = table
+            self._arrays(table=table)
+            path.settle(self.s, self.e.table)
 
-    def judge(self, rows: np.ndarray, b: Any) -> int:
+    def judge(self, rows: np.ndarray) -> int:
+        """As Run.judge; forgets the samples while they are not to be kept.
+
+        Args:
+            rows: as in Run.judge.
+        """
         before = len(self.kept)
-        good = super().judge(rows, b)
+        good = super().judge(rows)
         if not self.keeping:
             del self.kept[before:]
         return good
 
     def end(self) -> None:
         """Ends the run here, as one that reached its end."""
-        self._close("finished")
+        self.s["closing"] = path.FINISHED
+        self.advance(self.filled + 1)
         self.flush()
 
 
@@ -273,7 +302,7 @@ class Session:
                 )
         self.given = scenario
         self.scenario = played(scenario, self.stiffness)
-        self.run = _Live(self.scenario, self.every)
+        self.run = LiveRun(self.scenario, self.every)
         self.paused, self.recording = False, True
         self.clock = Clock()
         self.point: tuple[float, float] | None = None
@@ -308,7 +337,7 @@ class Session:
     @property
     def b(self) -> tuple[float, float]:
         """Damping of the clay at the handle [N.s/m]."""
-        return self.run.regions.b(self.run.t)
+        return self.run.b()
 
     @property
     def gain(self) -> tuple[float, float]:
@@ -392,7 +421,6 @@ class Session:
         """
         run = self.run
         if run.outcome is None and run.i:
-            run.last = run.limit
             run.end()
         if not run.kept:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
@@ -439,8 +467,7 @@ class Session:
 
     def _state(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Handle position [m] and velocity [m/s], half a step ago."""
-        p = self.run.position(self.run.angles, self.run.rates, 0.0)
-        behind = self.run.position(self.run.angles, self.run.rates, -self.scenario.dt)
+        p, behind = self.run.position(), self.run.position(-self.scenario.dt)
         vx, vy = ((a - b) / self.scenario.dt for a, b in zip(p, behind, strict=True))
         return p, (vx, vy)
 
@@ -453,7 +480,7 @@ class Session:
         spring = self.run.muscle
         th = self.scenario.operator
         assert th is not None
-        hand = spring.mean(self.t, self.t) - th.spring * np.array(p) - th.damper * np.array(v)
+        hand = spring.mean(self.t, 0.0) - th.spring * np.array(p) - th.damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
         self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist())))
 

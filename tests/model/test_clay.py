@@ -51,35 +51,51 @@ def test_slow_force_balances_whatever_pushes():
         assert np.abs(rest).max() < 1e-15 * 10  # a few roundings
 
 
+def regions(damping, length, x=0.0, y=0.0):
+    """The region around a place: the table, its indices, and a function that enters a region."""
+    table = clay.region_table(damping, length)
+    at = [
+        int(np.searchsorted(table[clay.EDGE_ROW + i][1:], (x, y)[i], side="right")) for i in (0, 1)
+    ]
+    return table, at, lambda ix, iy, t=0.0: clay.enter_region(table, ix, iy, t)
+
+
 def test_regions_of_the_slab():
-    r = clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.20, (0.0, 0.0))
-    assert r.b(0.0) == (0.0, 0.0) and r.high[0] == 0.05
-    assert not r.at_end(0, True)
-    assert (
-        r.cross(0, True, 0.0) == 0.05
-        and r.b(0.0) == (90.0, 90.0)
-        and (r.low[0], r.high[0]) == (0.05, 0.15)
-    )
-    assert r.cross(0, True, 0.0) == 0.15 and r.b(0.0) == (0.0, 0.0)
-    assert r.at_end(0, True) and r.high[0] == 0.20
-    assert r.cross(0, False, 0.0) == 0.15 and r.b(0.0) == (90.0, 90.0)
+    table, at, enter = regions(clay.slab(90.0, 0.05, 0.15), 0.20)
+    assert at == [0, 0] and table[clay.AXIS_ROWS, 2] == 0.20
+    ways = [(low[0], high[0], b) for low, high, b, _ in (enter(i, 0) for i in range(3))]
+    assert ways == [
+        (-np.inf, 0.05, (0.0, 0.0)),
+        (0.05, 0.15, (90.0, 90.0)),
+        (0.15, 0.20, (0.0, 0.0)),
+    ]
 
 
 @pytest.mark.parametrize(
     "p,b", [((0.05, 0.0), 90.0), ((0.049, 0.0), 0.0), ((0.1, 0.3), 90.0), ((0.15, 0.0), 0.0)]
 )
 def test_regions_from_any_start(p, b):
-    assert clay.Regions(clay.slab(90.0, 0.05, 0.15), 0.2, p).b(0.0) == (b, b)
+    _, at, enter = regions(clay.slab(90.0, 0.05, 0.15), 0.2, *p)
+    assert enter(*at)[2] == (b, b)
 
 
 def test_each_axis_follows_its_own_coordinate():
     both = Clay(Profile((0.05,), (50.0, 100.0), "x"), Profile((0.05,), (50.0, 200.0), "y"))
-    r = clay.Regions(both, None, (0.0, 0.0))
-    assert r.b(0.0) == (50.0, 50.0)
-    r.cross(1, True, 0.0)
-    assert r.b(0.0) == (50.0, 200.0)
-    r.cross(0, True, 0.0)
-    assert r.b(0.0) == (100.0, 200.0)
+    _, at, enter = regions(both, None)
+    assert at == [0, 0]
+    assert [enter(*i)[2] for i in ((0, 0), (0, 1), (1, 1))] == [
+        (50.0, 50.0),
+        (50.0, 200.0),
+        (100.0, 200.0),
+    ]
+
+
+def test_clay_grows_from_its_first_entry():
+    both = Profile((0.05,), (10.0, 20.0), "x", growth=(1.0, 3.0))
+    _, _, enter = regions(Clay(both, both), None)
+    for t in (2.0, 5.0):  # the second time, it has grown since the first
+        _, _, base, rate = enter(1, 0, t)
+        assert clay.damping_at(base, rate, 6.0) == (20.0 + 3.0 * 4.0,) * 2
 
 
 @pytest.mark.parametrize(

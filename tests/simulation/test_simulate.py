@@ -1,6 +1,7 @@
 """Whole runs against independent solutions (oracles.py), not against earlier runs."""
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -320,3 +321,23 @@ def test_speed_is_a_small_multiple_of_the_bare_engine():
     scene = throughput.SCENES["constant cut"]
     ratio = min(throughput.loop(scene, 8000) / throughput.floor(scene, 8000) for _ in range(3))
     assert ratio < 4.0
+
+
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
+    """Runs share engines one after the other, never at the same time."""
+    s = hc.constant_cut(t_max=3.0)
+    alone = hc.simulate(s, engine=engine)
+    inner = []
+
+    def progress(t, x):
+        inner.append(hc.simulate(hc.constant_cut(b=30.0, t_max=0.1), engine=engine))
+
+    outer = hc.simulate(s, engine=engine, progress=progress)
+    with ThreadPoolExecutor(3) as pool:
+        beside = list(pool.map(lambda _: hc.simulate(s, engine=engine), range(6)))
+    for r in (outer, *beside):
+        np.testing.assert_array_equal(r.p, alone.p)
+        assert r.energy == alone.energy and r.crossings == alone.crossings
+    assert inner and all(r.scenario.clay.x.values[1] == 30.0 for r in inner)
+    assert {r.p.tobytes() for r in inner} == {inner[0].p.tobytes()}

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.stepping import engine
+from hapticclay.stepping import engine, run
 from tests.oracles import Linear
 
 
@@ -95,6 +95,7 @@ def test_an_engine_that_disobeys_shows_in_the_balance(monkeypatch):
         return model
 
     monkeypatch.setattr(engine, "build", build)
+    monkeypatch.setattr(run, "_idle", {})  # engines that were built before
     e = hc.simulate(hc.constant_cut(t_max=2.0)).energy
     assert abs(e["residual"]) > 1e-3 * e["throughput"]
 

@@ -18,7 +18,7 @@ from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.stepping.sampled import HardwareLoop
+from hapticclay.stepping.sampled import SampledRun
 from hapticclay.theory import linear_loop
 
 EVERYWHERE = Profile((), (90.0,))
@@ -176,7 +176,7 @@ def test_halves_go_to_the_even_level():
     assert hardware.encode(math.tau * 3 / 1000, 1000) == pytest.approx(
         math.tau * 3 / 1000, rel=1e-15
     )
-    assert hardware.encode(0.123, None) == 0.123
+    assert hardware.encode(0.123, 0) == 0.123
 
 
 def test_in_a_run_torques_lie_on_levels_within_the_range():
@@ -195,7 +195,7 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
 def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
     at = lambda k: (1.0 + k * Ts * w1, -0.5 + k * Ts * w2)  # noqa: E731
-    found = hardware.velocity_difference(tuple((j, at(j)) for j in range(-window, 0)), 0, at(0), Ts)
+    found = hardware.velocity_difference(-window, at(-window), 0, at(0), Ts)
     assert found == pytest.approx((w1, w2), abs=16 * EPS / (window * Ts))
 
 
@@ -209,7 +209,7 @@ def test_window_divides_the_noise_of_an_encoder():
         q = [hardware.encode(w * k * Ts, counts) for k in range(4000)]
         v = np.array(
             [
-                hardware.velocity_difference(((k - m, (q[k - m], 0.0)),), k, (q[k], 0.0), Ts)[0]
+                hardware.velocity_difference(k - m, (q[k - m], 0.0), k, (q[k], 0.0), Ts)[0]
                 for k in range(m, 4000)
             ]
         )
@@ -238,18 +238,12 @@ def test_velocity_filter_is_an_exact_first_order_lag_of_held_means():
 def test_difference_lags_half_its_window_in_a_run():
     """Under a steady acceleration the mean over m samples is the rate m Ts/2 ago."""
     s = hc.free(control="sampled", t_max=0.02)
-    shown = []
-
-    class Spy(HardwareLoop):
-        def _turned(self, k, q, w, hw):
-            found = super()._turned(k, q, w, hw)
-            shown.append((w, found[1]))
-            return found
-
     for m in (1, 4):
-        shown.clear()
-        run = Spy(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
-        run.go(None)
+        run = SampledRun(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
+        shown = []
+        for _ in range(run.last):
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with start
+            shown.append((tuple(run.s["start"])[:2], tuple(run.s["wires"])[:2]))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate
@@ -267,30 +261,30 @@ def test_difference_lags_half_its_window_in_a_run():
 def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
     from scipy import signal
 
-    A, B = hardware.butterworth(cutoff, order, TS)
+    f = hardware.butterworth(cutoff, order, TS)
     b, a = signal.butter(order, math.tau * cutoff, analog=True)
     n, d, _ = signal.cont2discrete((b, a), TS, method="zoh")
     u = np.random.default_rng(2).standard_normal(200)
-    x, y = (0.0,) * order, []
+    x, y = (0.0, 0.0), []
     for v in u:
         y.append(x[0])
-        x = hardware.filter_step(A, B, x, v)
+        x = hardware.filter_step(f, *x, v)
     np.testing.assert_allclose(
         y, signal.lfilter(n[0], d, u), atol=1e-9
     )  # polynomials of order 2 near z = 1
-    still = (0.0,) * order
+    still = (0.0, 0.0)
     for _ in range(20_000):
-        still = hardware.filter_step(A, B, still, 1.0)
+        still = hardware.filter_step(f, *still, 1.0)
     assert still[0] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_noise_has_its_rms_and_each_part_its_own_stream():
     n = 20_000
     a, b = (hardware.SampleNoise(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
-    noise = np.array([a(k)[2] for k in range(n)])
+    noise = a.table(0, n)[:, 2:]
     assert np.all(np.abs(noise.std(axis=0) - 0.3) < 5 * 0.3 / math.sqrt(2 * n))
     assert np.abs(np.corrcoef(noise.T)[0, 1]) < 5 / math.sqrt(n)
-    assert [b(k)[2] for k in range(50)] == [a(k)[2] for k in range(50)]
+    np.testing.assert_array_equal(b.table(0, 50)[:, 2:], noise[:50])
 
 
 # ---- time ----------------------------------------------------------------------------------------
@@ -300,7 +294,7 @@ def test_noise_has_its_rms_and_each_part_its_own_stream():
 def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
     n, rms = 20_000, 0.28 * TS
     c = hardware.SampleNoise(hc.Interface(jitter=rms))
-    late = np.array([c(k)[0] for k in range(n)])
+    late = c.table(0, n)[:, 0]
     assert late[0] == 0.0 and np.all(np.diff(np.arange(n) * TS + late) > 0.0)
     assert abs(late.std() - rms) < 5 * rms / math.sqrt(
         5 * n

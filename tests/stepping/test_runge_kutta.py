@@ -1,15 +1,25 @@
-"""The accurate integrator: fourth order, and a guest in the engine that leaves no trace."""
+"""The accurate integrator: fourth order, by the laws of the loop, one source for both engines."""
 
 import dataclasses
+import importlib.util
 
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.model import arm, clay, controller, operator
+from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.constants import G, S
 from hapticclay.model.operator import Operator
+from hapticclay.stepping import runge_kutta
+from hapticclay.stepping.run import PLAIN
+from hapticclay.stepping.runge_kutta import RungeKuttaRun
 from tests.oracles import nonlinear, piecewise_linear, store
+from tests.oracles.laws import servo_kick
 
 EDGES = (0.05, 0.15, 0.20)
 CASES = {
@@ -93,17 +103,7 @@ def test_stiffness_takes_more_steps_and_then_is_refused():
             hc.simulate(dataclasses.replace(s, **stiff))
 
 
-def test_the_control_callback_is_removed_and_a_stranger_s_is_respected():
-    hc.simulate(hc.free(integrator="accurate", t_max=0.01))
-    assert mujoco.get_mjcb_control() is None
-
-    def stop(t, x):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        hc.simulate(hc.free(integrator="accurate"), progress=stop)
-    assert mujoco.get_mjcb_control() is None
-
+def test_the_control_callback_of_a_stranger_is_respected():
     def mine(model, data):
         return None
 
@@ -123,15 +123,88 @@ def test_instability_is_a_result_here_too():
     assert np.all(np.isfinite(r.p))
 
 
-def test_states_are_in_the_accurate_scene_alone():
-    assert hc.build(hc.constant_cut()).na == 0
-    model = hc.build(hc.constant_cut(integrator="accurate"))
-    assert (
-        model.na == 13
-        and model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-        and model.ngeom == 0
-    )
-    assert hc.build(hc.free(integrator="accurate")).nu == 2 + 13
+def test_both_integrators_step_one_model():
+    fast, accurate = (hc.build(hc.constant_cut(integrator=x)) for x in ("fast", "accurate"))
+    assert fast.na == accurate.na == 0 and fast.nu == accurate.nu == 4
+
+
+unit = st.floats(-1.0, 1.0)
+
+
+@given(
+    st.sampled_from([*CASES, "weak"]),
+    st.tuples(*[unit] * 10),
+    st.floats(0.0, 100.0),
+    st.integers(0, 1),
+)
+def test_a_stage_is_what_its_laws_say(name, x, b, held):
+    """`march` spells its laws out; put together from the laws, a stage is the same to rounding."""
+    s = hc.constant_cut(integrator="accurate", **CASES.get(name, dict(torque_limit=(0.2, 0.1))))
+    s = dataclasses.replace(s, operator=hc.Operator() if held else s.operator)
+    run = RungeKuttaRun(s, 1)
+    now = run.s
+    for i in (0, 1):
+        now["w"][i], now["base"][i] = x[i], b
+    for j in range(8):
+        now["control"][j] = 0.1 * x[2 + j]
+    runge_kutta.march(now, run.e, 0.0, 0)
+    th = s.operator or Operator(0.0, 0.0, 0.0)
+    (q1, q2), (w1, w2) = now["q"], now["w"]
+    dx, dy, _, _, yx, yy, ydx, ydy = now["control"]
+    u = arm.jacobian(q1, q2)
+    p = np.subtract(arm.handle_position(q1, q2), s.origin).tolist()
+    v, c = arm.handle_velocity(w1, w1 + w2, u), arm.centripetal(w1, w1 + w2, u)
+    W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
+    fe = clay.viscous_force(b, b, *v)
+    a, hand = [], []
+    for i, (delta, y, yd) in enumerate(((dx, yx, ydx), (dy, yy, ydy))):
+        ydd = G[i].stiffness * (delta - y) - G[i].damping * yd
+        k, d = S[i].stiffness, S[i].damping
+        a.append(controller.servo_acceleration(1.0, -d, k, ydd, yd, v[i], y, p[i], c[i]))
+        resists = operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
+        hand.append(s.force[i] - resists)
+    net = hand[0] - fe[0], hand[1] - fe[1]
+    mass = th.mass, th.mass
+    out = servo_kick(1.0, (0.0, 0.0), u, (1.0, 1.0), a, W, net, mass, s.torque_limit)
+    fh = out[4] + fe[0], out[5] + fe[1]
+    expected = (*p, *v, *fh, *out[6:8], dx, dy)
+    np.testing.assert_allclose(now["sample"], expected, rtol=1e-11, atol=1e-11)
+
+
+LAYERS = Clay(
+    Profile((0.01, 0.03), (0.0, 90.0, 30.0), "x"), Profile((0.01,), (40.0, 120.0), "y", (0.0, 9.0))
+)
+SHAKEN = dict(operator=hc.Operator(), muscle=hc.Multisine(rms=(2.0, 0.5), high=3.0))
+ONE_SOURCE = {
+    "hand": hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.3)),
+    "stiff": hc.constant_cut(b=1e4, force=(20.0, 0.5)),
+    "layers": dataclasses.replace(hc.free(force=(1.5, 0.7)), clay=LAYERS),
+    "growing": hc.variable_cut(force=(3.0, 0.0)),
+    "muscle": dataclasses.replace(hc.constant_cut(b=1e3), **SHAKEN),
+    "command": dataclasses.replace(
+        hc.constant_cut(), command=hc.Multisine(rms=(0.01, 0.01), high=3.0)
+    ),
+    "weak": dataclasses.replace(hc.constant_cut(torque_limit=(0.1, 0.15)), **SHAKEN),
+    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+}
+
+
+@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs hapticclay[fast]")
+@pytest.mark.parametrize("name", ONE_SOURCE)
+def test_all_engines_step_bit_for_bit_alike(name):
+    from hapticclay.stepping import compiled
+
+    s = dataclasses.replace(ONE_SOURCE[name], integrator="accurate", dt=1e-3, t_max=4.0)
+    kernels, runs = (PLAIN, compiled.MIXED, compiled.WHOLE), []
+    for kernel in kernels:
+        runs.append(RungeKuttaRun(s, 3, kernel))
+        runs[-1].go(None)
+    plain = runs[0]
+    for other in runs[1:]:
+        assert other.outcome == plain.outcome and other.crossings == plain.crossings
+        assert other.steps == plain.steps and other.balance() == plain.balance()
+        for key, values in plain.arrays().items():
+            np.testing.assert_array_equal(other.arrays()[key], values, err_msg=key)
 
 
 def test_the_choice_is_checked():

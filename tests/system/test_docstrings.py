@@ -54,6 +54,21 @@ def lacking_fields(node):
     return found
 
 
+def arguments(node):
+    """Names of a function's parameters."""
+    return [x.arg for x in node.args.args]
+
+
+# what path.Method documents for every method of stepping
+SHARED = {
+    x.name: arguments(x)
+    for node in MODULES["stepping.path"].body
+    if isinstance(node, ast.ClassDef) and node.name == "Method"
+    for x in node.body
+    if isinstance(x, Function)
+}
+
+
 def undocumented(module, tree):
     """`where: names` of what a module leaves out."""
     for node in tree.body:
@@ -70,6 +85,8 @@ def undocumented(module, tree):
             if isinstance(x, Function) and x.name == "__init__":  # the class's own docstring
                 yield where, lacking_arguments(x, documented(node, "Args"))
             elif isinstance(x, Function) and not x.name.startswith("_"):
+                if "NamedTuple" in bases and SHARED.get(x.name) == arguments(x):
+                    continue
                 if not decorators(x) & {"setter", "override", "overload"}:
                     yield f"{where}.{x.name}", lacking_arguments(x)
 

@@ -1,0 +1,493 @@
+"""Runs to an asked error: choose integrator and step, run, verify at other steps, refine.
+
+Each choice is run at steps 4h, 2h and h, whose differences tell the error (Richardson): that of the
+border times at h, or that of the positions at 4h. Only a run that asks for an error loads this.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, number
+from ..model import arm
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
+from ..stepping.run import Crossing
+from ..stepping.runge_kutta import STABLE_STEP
+from .record import ARRAYS, Record
+from .simulate import has_numba, simulate
+
+UNITS = ("s", "m")
+ROUNDING = 1e-11  # [s], [m] the finest error that can be asked for; runs keep some 1e-12 at best
+SMALLEST = 1e-6  # [s] step, the least of Scenario.dt
+LARGEST = 1e-3  # [s] finest step of three; RATIO times as long, poles of 30 1/s are still resolved
+RATIO = 4  # of the coarsest step of a comparison to the finest
+ROUNDS = 9  # comparisons at most, each at a step at least two times finer
+MARGIN = 0.75  # of the asked error, taken as reached: estimates fall short by so much in 2 %
+ORDER_GAP = 0.5  # from the order of the integrator, up to which an observed order confirms it
+CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order
+DOUBTS = 4  # comparisons that may fail to confirm the order before a plain bound is taken
+ROUNDING_LEFT = 1e-12  # [s], [m] that is left of rounding at any step
+CLEAR = 1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
+LEAST_SAMPLES = 2000  # of a run to t_max at which positions are compared, however few are kept
+TOLD_APART = 1e-13  # [m] a border is passed when the handle is so far beyond it
+
+
+class IntegratorFacts(NamedTuple):
+    """What is known of an integrator before any run.
+
+    Attributes:
+        order: of its error in the step.
+        constants: error over step to the power of the order, by unit.
+        cost: run time of a step, over that of the fast integrator.
+    """
+
+    order: int
+    constants: dict[str, float]
+    cost: float
+
+
+# Measured on 120 cuts and hits like those of tests/simulation/test_accuracy.py, beside their exact
+# solutions: medians, and run times compiled. A scene may have 100 times as much, and is refined.
+METHODS = {
+    "fast": IntegratorFacts(2, {"s": 0.35, "m": 0.5}, 1.0),
+    "accurate": IntegratorFacts(4, {"s": 50.0, "m": 100.0}, 5.0),
+}
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How far a run is from the exact solution, and how far it was allowed to be.
+
+    Attributes:
+        asked: the error asked for [unit].
+        unit: "s", the largest error of the times at which borders are crossed; or "m", of the
+            position at the samples.
+        estimate: the error of the record [unit]; None where nothing bounds it.
+        reached: whether the estimate is as small as asked.
+        integrator: that was chosen.
+        dt: step of the record [s].
+        order: observed over the last three steps; None where it cannot be told.
+        runs: made to choose and to verify.
+        wall_time: of all of them [s].
+        note: why there is no estimate, or why it is not as small as asked; else "".
+    """
+
+    asked: float
+    unit: str
+    estimate: float | None
+    reached: bool
+    integrator: str
+    dt: float
+    order: float | None = None
+    runs: int = 0
+    wall_time: float = 0.0
+    note: str = ""
+
+    def __str__(self) -> str:
+        found = "unknown" if self.estimate is None else f"{self.estimate:.1e} {self.unit}"
+        kept = "reached" if self.reached else "not reached"
+        how = f"{self.integrator}, dt = {self.dt:.3g} s, {self.runs} runs"
+        return f"{found}, {self.asked:g} {self.unit} asked: {kept} ({how})"
+
+
+class Trace(NamedTuple):
+    """What is compared of a run.
+
+    Attributes:
+        dt: its step [s].
+        code: of its outcome.
+        crossings: of borders.
+        t: time of the samples [s], shape (n,).
+        p: position there [m], shape (n, 2).
+    """
+
+    dt: float
+    code: str
+    crossings: tuple[Crossing, ...]
+    t: np.ndarray
+    p: np.ndarray
+
+
+class Comparison(NamedTuple):
+    """What three runs say of the finest one.
+
+    Attributes:
+        estimate: of its error; None where they have nothing to compare.
+        order: observed; None where it cannot be told.
+        confirmed: whether the order is that of the integrator, so that the estimate is sharp.
+        note: what is wrong, "" for nothing.
+        final: whether finer steps would not mend it.
+        finest: of the error of the finest run, where the estimate is of a coarser one.
+    """
+
+    estimate: float | None
+    order: float | None
+    confirmed: bool
+    note: str
+    final: bool = False
+    finest: float | None = None
+
+
+def parse_error(error: object) -> tuple[float, str]:
+    """Reads an asked error.
+
+    Args:
+        error: seconds, or a text of a number and a unit: "1e-6 s", "1e-7 m".
+
+    Returns:
+        The number, and its unit, "s" or "m".
+
+    Raises:
+        ParameterError: no such number or unit, or less than rounding leaves room for.
+    """
+    value, unit = error, "s"
+    if isinstance(error, str):
+        parts = re.fullmatch(r"\s*([-+.\deE]*?\d\.?|[-+]?(?:nan|inf))\s*([^\W\d]*)\s*", error)
+        unit = (parts and parts[2]) or "s"
+        try:
+            value = float(parts[1]) if parts else None
+        except ValueError:
+            value = None
+        if value is None or unit not in UNITS:
+            bound = "must be a number of seconds, or of metres with its unit, such as '1e-7 m'"
+            raise ParameterError("error", error, bound)
+    return number("error", value, ROUNDING, 1.0, unit=unit), unit
+
+
+def simulate_within(
+    scenario: Scenario,
+    error: float | str,
+    *,
+    every: int = 1,
+    progress: Callable[[float, float], bool | None] | None = None,
+    engine: str = "auto",
+) -> Record:
+    """Runs a scenario with the integrator and the step that keep an asked error.
+
+    Args:
+        scenario: what to run; its integrator and dt are replaced. Sampled control keeps Ts (dt
+            where it is None), and steps divide it.
+        error: as in parse_error.
+        every: keep each every-th sample, and the last.
+        progress: as in simulate, from 0 s on for each of the runs.
+        engine: as in simulate.
+
+    Returns:
+        The record with Record.error: of the finest run for an error in s; for one in m of a run at
+        four times its step, at whose samples positions are compared, if that keeps the error.
+
+    Raises:
+        ParameterError: as simulate; or the scene has no border, so that seconds mean nothing.
+    """
+    asked, unit = parse_error(error)
+    if unit == "s" and not _has_border(scenario):
+        bound = "must be in m, as in '1e-6 m': this scene has no border whose crossing has a time"
+        raise ParameterError("error", error, bound)
+    if scenario.control == "sampled":
+        scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)
+    integrator, dt = first_choice(scenario, asked, unit)
+    trial = Trial(dataclasses.replace(scenario, integrator=integrator), unit, every)
+    trial.progress, trial.engine = progress, engine
+    order, most, doubts = METHODS[integrator].order, MARGIN * asked, 0
+    record, found = trial.compare(dt)
+    for rounds in range(1, ROUNDS + 1):
+        doubts += not found.confirmed
+        # an order that is not seen at so many steps will not be; the estimate then is a bound
+        sure = found.confirmed or doubts > DOUBTS
+        if found.final or (sure and found.estimate is not None and found.estimate <= most):
+            break
+        if rounds == ROUNDS or _finer(dt, found, most, order) < SMALLEST:
+            limit = f"{ROUNDS} steps were tried" if rounds == ROUNDS else "no step is smaller"
+            found = found._replace(note=found.note or limit)
+            break
+        try:
+            dt = _finer(dt, found, most, order)
+            record, found = trial.compare(dt)
+        except ParameterError as refusal:  # of memory: what is there is kept
+            found = found._replace(note=f"the next step was refused, {refusal}")
+            break
+    if found.finest is not None and found.estimate is not None and found.estimate > asked:
+        record, found = trial.finest(dt, found)  # no finer step is left to compare with
+    reached = found.estimate is not None and found.estimate <= asked
+    accuracy = Accuracy(
+        asked=asked,
+        unit=unit,
+        estimate=found.estimate,
+        reached=reached,
+        integrator=integrator,
+        dt=record.scenario.dt,
+        order=found.order,
+        runs=trial.runs,
+        wall_time=trial.wall,
+        note="" if reached else found.note,
+    )
+    return dataclasses.replace(record, error=accuracy)
+
+
+def _has_border(scenario: Scenario) -> bool:
+    clay = scenario.clay
+    return scenario.length is not None or (clay is not None and bool(clay.x.edges or clay.y.edges))
+
+
+def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
+    """The next step: where the estimate says that its error is as small as it may be."""
+    halvings = 2
+    if found.estimate is not None:
+        wanted = math.ceil(math.log2(max(found.estimate / most, 1.0)) / order)
+        halvings = min(max(wanted, 1), 5 if found.confirmed else 2)
+    possible = math.floor(math.log2(dt / SMALLEST))
+    return dt / 2.0 ** max(min(halvings, possible), 1)
+
+
+def first_choice(scenario: Scenario, asked: float, unit: str) -> tuple[str, float]:
+    """The cheapest integrator for an asked error by METHODS, and the step of its finest run.
+
+    Args:
+        scenario: what to run; Ts is a number where control is sampled.
+        asked: error [unit].
+        unit: "s" or "m".
+
+    Returns:
+        "fast" or "accurate"; step [s].
+
+    Raises:
+        ParameterError: Ts is too short to be divided.
+    """
+    steps = {}
+    for name, method in METHODS.items():
+        wanted = (MARGIN * asked / method.constants[unit]) ** (1.0 / method.order)
+        wanted /= 1 if unit == "s" else RATIO
+        steps[name] = min(max(wanted, SMALLEST), LARGEST)
+    if scenario.control == "sampled":
+        return "fast", _divided(scenario.Ts or scenario.dt, steps["fast"])
+    if not has_numba():  # the accurate run in Python takes too long to pay
+        return "fast", steps["fast"]
+    # beyond, the explicit method divides its steps, and other steps are no other runs
+    steps["accurate"] = min(steps["accurate"], STABLE_STEP / _fastest_rate(scenario) / RATIO)
+    cost = {name: METHODS[name].cost / step for name, step in steps.items()}
+    if steps["accurate"] < SMALLEST or cost["fast"] <= cost["accurate"]:
+        return "fast", steps["fast"]
+    return "accurate", steps["accurate"]
+
+
+def _divided(Ts: float, dt: float) -> float:
+    """The largest part of Ts that is at most dt and whose RATIO-fold divides Ts too."""
+    most = math.ceil(Ts / (RATIO * LARGEST) - 1e-9)
+    n = RATIO * most
+    while Ts / n > dt and Ts / (2 * n) >= SMALLEST:
+        n *= 2
+    if Ts / n < SMALLEST:
+        bound = f"must be at least {RATIO * SMALLEST:g} s where an error is asked for"
+        raise ParameterError("Ts", Ts, bound)
+    return Ts / n
+
+
+def _fastest_rate(scenario: Scenario) -> float:
+    """Fastest rate by which the explicit integrator divides its steps [1/s]."""
+    hand, clay = scenario.operator or NO_HAND, scenario.clay
+    b = max((*clay.x.values, *clay.y.values)) if clay else 0.0
+    rate = (b + hand.damper) * arm.TRACE_W + math.sqrt(hand.spring * arm.TRACE_W)
+    return max(rate, STABLE_STEP)
+
+
+class Trial:
+    """Runs of one scenario at several steps, and what they say of each other.
+
+    Args:
+        scenario: what to run, at any step.
+        unit: of the error, "s" or "m".
+        every: samples kept of the record, as in simulate.
+
+    Attributes:
+        progress: as in simulate.
+        engine: as in simulate.
+        runs: made so far.
+        wall: run time of all [s].
+    """
+
+    def __init__(self, scenario: Scenario, unit: str, every: int = 1):
+        self.scenario, self.unit, self.every = scenario, unit, every
+        self.progress: Callable[[float, float], bool | None] | None = None
+        self.engine = "auto"
+        self.runs, self.wall = 0, 0.0
+        self.traces: dict[float, Trace] = {}
+
+    def compare(self, dt: float) -> tuple[Record, Comparison]:
+        """Runs at 4 dt, 2 dt and dt, unless it has, and compares.
+
+        Args:
+            dt: step of the finest run [s].
+
+        Returns:
+            The record, of the finest run for an error in s, of the coarsest for one in m, and the
+            comparison; if a run was interrupted, its record.
+        """
+        traces: dict[float, Trace] = {}
+        kept = dt if self.unit == "s" else RATIO * dt
+        record = None
+        for step in (RATIO * dt, RATIO // 2 * dt, dt):
+            if step in self.traces:
+                traces[step] = self.traces[step]
+                continue
+            r = self._run(step, kept)
+            if r.outcome.code == "interrupted":
+                return r, Comparison(None, None, False, "interrupted", True)
+            record = r if step == kept else record
+            traces[step] = Trace(step, r.outcome.code, r.crossings, r.t, r.p)
+        assert record is not None
+        self.traces = traces if self.unit == "s" else {}  # whose samples are those of one record
+        order = METHODS[record.scenario.integrator].order
+        if self.unit == "s":
+            return record, compare_times(*traces.values(), order=order)
+        compared = compare_positions(*traces.values(), order=order)
+        # decays that no step resolves leave their error in one sample, which may not show it
+        if _fastest_rate(self.scenario) * dt > STABLE_STEP and _hides(*traces.values()):
+            compared = compared._replace(confirmed=False)
+        return self._thinned(record), compared
+
+    def finest(self, dt: float, found: Comparison) -> tuple[Record, Comparison]:
+        """The record of the finest run, in place of the coarsest.
+
+        Args:
+            dt: step of the finest run [s].
+            found: of the comparison.
+        """
+        r = self._run(dt, dt)
+        if r.outcome.code == "interrupted":
+            return r, Comparison(None, None, False, "interrupted", True)
+        return self._thinned(r), found._replace(estimate=found.finest)
+
+    def _run(self, dt: float, kept: float) -> Record:
+        """The run at a step; the one at step `kept` is the record."""
+        if self.unit == "m":
+            every = self._compared(kept) * round(kept / dt)
+        else:
+            every = self.every if dt == kept else 1_000_000  # crossings alone are compared
+        scenario = dataclasses.replace(self.scenario, dt=dt)
+        r = simulate(scenario, every=every, progress=self.progress, engine=self.engine)
+        self.runs, self.wall = self.runs + 1, self.wall + r.wall_time
+        return r
+
+    def _compared(self, dt: float) -> int:
+        """Samples kept where positions are compared: a divisor of every, enough to see peaks."""
+        most = min(max(1, int(self.scenario.t_max / dt / LEAST_SAMPLES)), 1_000_000 // RATIO)
+        return next(k for k in range(min(most, self.every), 0, -1) if self.every % k == 0)
+
+    def _thinned(self, r: Record) -> Record:
+        """The record with the samples asked for."""
+        ratio = self.every // self._compared(r.scenario.dt) if self.unit == "m" else 1
+        if ratio == 1:
+            return r
+        last = len(r.t) - 1
+        keep = np.unique(np.append(np.arange(0, last + 1, ratio), last))
+        return dataclasses.replace(r, **{name: getattr(r, name)[keep] for name in ARRAYS})
+
+
+UNSTABLE = "the loop is unstable: errors grow with time, and nothing bounds them"
+DIFFERENT = "from step to step, the runs cross other borders or end otherwise"
+AT_ROUNDING = "rounding: no step does better"
+
+
+def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
+    """The error of the crossing times of the finest of three runs [s].
+
+    Where the differences shrink as the order says, it is the last one over 2^order - 1.
+
+    Args:
+        coarse: at step 4h.
+        middle: at 2h.
+        fine: at h.
+        order: of the integrator.
+    """
+    if _unstable(middle, fine):
+        return Comparison(None, None, False, UNSTABLE, True)
+    first, second = _time_gap(coarse, middle), _time_gap(middle, fine)
+    if second is None:
+        return Comparison(None, None, False, DIFFERENT)
+    if not fine.crossings:
+        return Comparison(None, None, False, "no border was crossed: ask for an error in m", True)
+    # a slow handle is long within the rounding of a border
+    slowest = max(min(abs(c.speed) for c in fine.crossings), TOLD_APART)
+    floor = ROUNDING_LEFT + TOLD_APART / slowest
+    sharp = second / (2.0**order - 1.0)
+    if sharp <= floor:
+        return Comparison(floor, None, True, AT_ROUNDING, True)
+    if not first:
+        return Comparison(second, None, False, "")
+    seen = math.log2(first / second)
+    confirmed = abs(seen - order) <= ORDER_GAP and not _bounces(fine)
+    return Comparison(sharp if confirmed else max(first, second), seen, confirmed, "")
+
+
+def compare_positions(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
+    """The error of the positions of the coarsest of three runs at its samples [m].
+
+    The first sample behind a hit errs by more than others, and by how much depends on where in a
+    step the border lies: differences do not shrink evenly. The finest run has all samples of the
+    coarsest, and 4^-order of its error.
+
+    Args:
+        coarse: at step 4h.
+        middle: at 2h.
+        fine: at h; all with samples at the same times.
+        order: of the integrator.
+    """
+    if _unstable(coarse, fine):
+        return Comparison(None, None, False, UNSTABLE, True)
+    first, second = _position_gap(coarse, fine), _position_gap(middle, fine)
+    if first is None or second is None:
+        return Comparison(None, None, False, DIFFERENT)
+    if first <= ROUNDING_LEFT:
+        return Comparison(ROUNDING_LEFT, None, True, AT_ROUNDING, True)
+    seen = math.log2(first / second - 1.0) if first > second > 0.0 else None
+    confirmed = second <= CLOSER * first
+    sharp = first / (1.0 - 4.0**-order)
+    finest = second / (CLEAR if confirmed else 1.0)
+    return Comparison(
+        sharp if confirmed else max(first, second), seen, confirmed, "", False, finest
+    )
+
+
+def _unstable(a: Trace, b: Trace) -> bool:
+    return {a.code, b.code} <= {"diverged", "limit cycle"}
+
+
+def _bounces(trace: Trace) -> bool:
+    """Whether a border is crossed again within a step, of which the step says little."""
+    last: dict[tuple[str, float], float] = {}
+    found = False
+    for c in trace.crossings:
+        found |= c.time - last.get((c.axis, c.border), -math.inf) < trace.dt
+        last[c.axis, c.border] = c.time
+    return found
+
+
+def _hides(coarse: Trace, _: Trace, fine: Trace) -> bool:
+    """Whether all runs make the same step from a border to the next sample, with one error."""
+    return any((-c.time) % coarse.dt < fine.dt for c in fine.crossings)
+
+
+def _time_gap(a: Trace, b: Trace) -> float | None:
+    """Largest difference of crossing times [s]; None if other borders were crossed."""
+    same = [(c.axis, c.border) for c in a.crossings] == [(c.axis, c.border) for c in b.crossings]
+    if not same or a.code != b.code:
+        return None
+    return max(
+        (abs(c.time - d.time) for c, d in zip(a.crossings, b.crossings, strict=True)), default=0.0
+    )
+
+
+def _position_gap(a: Trace, b: Trace) -> float | None:
+    """Largest distance at the samples that both have [m]; None for other ends."""
+    n = min(len(a.t), len(b.t))
+    both = np.abs(a.t[:n] - b.t[:n]) <= 1e-12 * (1.0 + a.t[:n])  # the last sample may be short
+    away = np.linalg.norm(a.p[:n] - b.p[:n], axis=1)[both]
+    return float(away.max(initial=0.0)) if a.code == b.code else None

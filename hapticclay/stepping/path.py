@@ -1,0 +1,539 @@
+"""The path of a run: samples, borders of the clay and the end, for every method of stepping.
+
+`advance` makes whole steps by the method's own loop and all others by `careful`: the first step,
+those around an event or a border, and the last. The code runs in CPython, and numba compiles the
+same source (`compiled`); both read and write the run through the arguments. What a method supplies
+is listed in `Method`.
+
+`s` is the state of the run, by name: a record when compiled, a dictionary of floats and memoryviews
+when not. `e` holds its arrays: NumPy's when compiled, memoryviews when not.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..model import clay, signals
+
+TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
+OPEN, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # how a run stands
+ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
+SUMS = 8  # of energy.kick_work, and energy.HARDWARE_WORK
+INF = np.inf
+LANDINGS = 4  # on borders in one step; a handle that slides along one then completes the step
+
+SCENARIO = [  # in numbers, see model.scenario
+    ("dt", "f8"),
+    ("t_max", "f8"),
+    ("last", "i8"),  # number of whole steps
+    ("gain", "f8", 2),
+    ("force", "f8", 2),
+    ("origin", "f8", 2),
+    ("torque_limit", "f8", 2),
+    ("hand", "f8", 3),  # mass, damper, spring of the operator's arm; zeros for Th = 0
+    ("held", "i8"),  # whether there is an operator's arm
+    ("shaping", "i8"),
+    ("dampers", "i8"),  # whether there is clay
+    ("ramp", "f8", 5),  # muscle force that changes evenly: since [s], x, y [N], rate x, y [N/s]
+    ("landings_most", "i8"),  # landings on borders in one step
+]
+STATE = [
+    ("t", "f8"),  # now [s]
+    ("i", "i8"),  # of the sample at or before now
+    ("q", "f8", 2),  # joint angles [rad]
+    ("w", "f8", 2),  # joint rates [rad/s]
+    ("before", "f8"),  # length of the step that led here [s]
+    ("fine", "f8"),  # longest step on the way from a hit [s]
+    ("struck", "i8"),  # whether the handle has just come into this clay
+    ("landings", "i8"),  # on borders since the last sample
+    ("closing", "i8"),  # why the next row is the last, OPEN where it is not
+    ("code", "i8"),  # how the run stands
+    ("steps", "i8"),  # engine steps made
+    ("filled", "i8"),  # rows written since the last look
+    ("crossed", "i8"),  # crossings since the last look
+    ("first", "i8"),  # sample of the first row of Engine.ahead; -1 if nothing varies
+    ("index", "i8", 2),  # of the region along x and y
+    ("low", "f8", 2),  # its borders [m]
+    ("high", "f8", 2),
+    ("base", "f8", 2),  # its clay, see clay.damping_at
+    ("rate", "f8", 2),
+    ("old", "f8", 4),  # base and rate of the clay before the sample
+    ("work", "f8", SUMS),  # [J]
+    ("final", "f8", 6),  # of the last kick: position, velocity and joint rates after it
+]
+
+
+# the cheapest way for CPython to write floats into an array: (array, offset [bytes], floats)
+put4, put5, put6, put8, put10, put12, put14, put17, put18, put28 = (
+    struct.Struct(f"{n}d").pack_into for n in (4, 5, 6, 8, 10, 12, 14, 17, 18, 28)
+)
+
+
+class Engine(NamedTuple):
+    """The arrays of a run: the engine's, those that the loops read, and those that they fill.
+
+    Attributes:
+        step: mj_step.
+        forward: mj_forward.
+        model: the model, or its address.
+        data: the data, or its address.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        acceleration: joint accelerations [rad/s^2].
+        ctrl: controls.
+        push: applied joint torques [N.m].
+        timestep: length of a step [s], shape (1,).
+        table: from clay.region_table.
+        muscle: lines of the muscle's multisine, see Signal.lines.
+        command: lines of the command's multisine.
+        ahead: what changes from step to step, from sample s["first"] on; see `steps_ahead` of the
+            method.
+        rows: of the record, shape (n, ROW).
+        crossings: shape (n, 4): coordinate, border [m], time [s], speed along it [m/s].
+        raw: workspace for a block of whole steps.
+        varied: workspace for what varies in it.
+        chance: of a sampled run: random effects, a row a sample, see hardware.SampleNoise.
+        ring: its memory, shape (n, 11), three rings one after the other: index and angles [rad] of
+            past samples, `window` rows; forces of the clay at past samples [N], whole_delay + 2;
+            the queue: time [s] and what to hold from then on, whole_delay + 4.
+        rendered: force of the clay as rendered [N], a line a row, shape (n, 2) or (0, 2).
+    """
+
+    step: Any
+    forward: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    acceleration: Any
+    ctrl: Any
+    push: Any
+    timestep: Any
+    table: Any
+    muscle: Any
+    command: Any
+    ahead: Any
+    rows: Any
+    crossings: Any
+    raw: Any
+    varied: Any
+    chance: Any
+    ring: Any
+    rendered: Any
+
+
+class Method(Protocol):
+    """What a way of stepping supplies: a named tuple of integers with these functions.
+
+    They work on the state `s` and the arrays `e` of a run.
+    """
+
+    def glide(self, s: Any, e: Any, room: int) -> int:
+        """Makes whole steps within one region of the clay, up to one that would leave it.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            room: largest number of rows to fill.
+
+        Returns:
+            Number of steps made.
+        """
+        ...
+
+    def stop(self, s: Any) -> tuple[float, float, bool]:
+        """Where the next step leads to, as `next_sample`.
+
+        Args:
+            s: state of the run.
+        """
+        ...
+
+    def arrive(self, s: Any, target: float) -> None:
+        """Moves the clock there.
+
+        Args:
+            s: state of the run.
+            target: the time [s].
+        """
+        ...
+
+    def act(self, s: Any, e: Any) -> None:
+        """The controller acts: once a step, before it is worked out.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+        """
+        ...
+
+    def strike(self, s: Any, e: Any, after: float) -> float:
+        """Length of the first step in clay that the handle has come into [s].
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            after: length that it may have [s].
+        """
+        ...
+
+    def propose(self, s: Any, e: Any, after: float) -> None:
+        """Works out a step, without effect on the run.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            after: its length [s].
+        """
+        ...
+
+    def finite(self, s: Any, e: Any) -> bool:
+        """Whether the numbers of that step are finite.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+        """
+        ...
+
+    def place(self, s: Any, e: Any, h: float) -> tuple[float, float]:
+        """Handle position on the way of that step, (x, y) [m].
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            h: time since its beginning [s].
+        """
+        ...
+
+    def keep(self, s: Any, e: Any, after: float, shows: bool) -> None:
+        """Takes that step into the ledger and, at a sample, the record.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            after: its length [s]; 0 ends the run.
+            shows: whether now is a sample.
+        """
+        ...
+
+    def commit(self, s: Any, e: Any, after: float) -> None:
+        """Makes that step in the engine.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            after: its length [s].
+        """
+        ...
+
+    def speed(self, s: Any, e: Any, i: int) -> float:
+        """Velocity of a coordinate at a border, on its near side [m/s].
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            i: the coordinate, 0 for x, 1 for y.
+        """
+        ...
+
+
+def next_sample(t, i, last, dt, t_max):
+    """The next sample of a run.
+
+    Args:
+        t: now [s].
+        i: index of the sample at or before now.
+        last: number of whole steps.
+        dt: step [s].
+        t_max: end of the run [s].
+
+    Returns:
+        (time of the next sample [s], length of the step to it [s], whether now is a sample). The
+        length is 0 at the end.
+    """
+    on_grid = t == i * dt
+    if i > last:
+        return t, 0.0, on_grid
+    target = (i + 1) * dt if i < last else t_max
+    after = dt if on_grid and i < last else target - t
+    return target, after if after > 1e-9 * dt else 0.0, on_grid
+
+
+def find_root(f, b, fb, *args):
+    """Root of f between 0 and b, to rounding (false position, Illinois).
+
+    f may vanish at 0 itself, as when a handle enters stiff clay, stops and returns; the root of f/x
+    is then found. Where f does not change its sign, the result lies next to 0.
+
+    Args:
+        f: function of (x, *args).
+        b: end of the interval, b > 0.
+        fb: f at b.
+        args: further arguments of f.
+
+    Returns:
+        The root.
+    """
+    first, end = 1e-9 * b, b
+    a, fa = first, f(first, *args)
+    leaves = fa == 0.0 or (fa > 0.0) == (fb > 0.0)
+    if leaves:
+        while fa == 0.0 or (fa > 0.0) == (fb > 0.0):
+            a *= 8.0
+            if a > 0.5 * b:
+                return first
+            fa = f(a, *args)
+        fa, fb = fa / a, fb / b
+    for _ in range(60):
+        h = b - fb * (b - a) / (fb - fa)
+        fh = f(h, *args)
+        small = abs(fh) < 4e-16  # rounding of a position
+        if leaves:
+            fh /= h
+        if (fh > 0.0) != (fb > 0.0):
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = h, fh
+        if abs(b - a) <= 1e-12 * end or small:
+            break
+    return b
+
+
+def mean_force(s, e, t, h):
+    """Mean muscle force over [t - h, t + h].
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y) [N].
+    """
+    return muscle_force(s, e.muscle, t, h)
+
+
+def muscle_force(s, muscle, t, h):
+    """As `mean_force`.
+
+    Args:
+        s: state of the run.
+        muscle: see Engine; compiled code pays for each array that it passes on.
+        t: centre of the interval [s].
+        h: half its length [s].
+    """
+    x, y = signals.mean_of_lines(muscle, t, h)
+    force, ramp = s["force"], s["ramp"]
+    x += ramp[1] + (t - ramp[0]) * ramp[3]
+    y += ramp[2] + (t - ramp[0]) * ramp[4]
+    return force[0] + x, force[1] + y
+
+
+def command_change(e, t0, t1):
+    """Change of the command between two times, (x, y) [m].
+
+    Args:
+        e: arrays of the run.
+        t0: first time [s].
+        t1: second time [s].
+    """
+    x0, y0 = signals.mean_of_lines(e.command, t0, 0.0)
+    x1, y1 = signals.mean_of_lines(e.command, t1, 0.0)
+    return x1 - x0, y1 - y0
+
+
+def damping_before(s, t):
+    """Clay of the step that led here at a time, (x, y) [N.s/m].
+
+    Args:
+        s: state of the run.
+        t: time [s].
+    """
+    old = s["old"]
+    return clay.damping_at((old[0], old[1]), (old[2], old[3]), t)
+
+
+def damping_now(s, t):
+    """Clay of the present region at a time, (x, y) [N.s/m].
+
+    Args:
+        s: state of the run.
+        t: time [s].
+    """
+    base, rate = s["base"], s["rate"]
+    return clay.damping_at((base[0], base[1]), (rate[0], rate[1]), t)
+
+
+def side(p, low, high):
+    """1 beyond the upper border, -1 beyond the lower, 0 within; a NaN is within.
+
+    Args:
+        p: coordinate [m].
+        low: lower border [m].
+        high: upper border [m].
+    """
+    return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0
+
+
+def settle(s, table):
+    """Takes borders and clay of the region in which the run continues.
+
+    Args:
+        s: state of the run.
+        table: from clay.region_table.
+    """
+    low, high, base, rate = clay.enter_region(table, s["index"][0], s["index"][1], s["t"])
+    for j in range(2):
+        s["low"][j], s["high"][j], s["base"][j], s["rate"][j] = low[j], high[j], base[j], rate[j]
+
+
+def cross(m, s, e, i, up):
+    """Records a crossing and enters the next region; at the end of the path, closes the run.
+
+    Args:
+        m: the method.
+        s: state of the run.
+        e: its arrays.
+        i: coordinate, 0 for x, 1 for y.
+        up: 1 towards larger values, -1 towards smaller ones.
+    """
+    border = s["high"][i] if up > 0 else s["low"][i]
+    n, crossings = s["crossed"], e.crossings
+    crossings[n, 0], crossings[n, 1], crossings[n, 2] = float(i), border, s["t"]
+    crossings[n, 3] = m.speed(s, e, i)
+    s["crossed"] = n + 1
+    if i == 0 and up > 0 and border == e.table[clay.AXIS_ROWS, 2]:
+        s["closing"] = FINISHED
+    else:
+        s["index"][i] += up
+        settle(s, e.table)
+        s["struck"] = 1
+
+
+def distance_beyond(h, m, s, e, i, border):
+    """Distance by which a step of length h would pass a border of coordinate i [m].
+
+    Args:
+        h: length of the step [s].
+        m: the method.
+        s: state of the run.
+        e: its arrays.
+        i: coordinate, 0 for x, 1 for y.
+        border: where it lies [m].
+    """
+    m.propose(s, e, h)
+    x, y = m.place(s, e, h)
+    return (y if i else x) - border
+
+
+def locate_event(m, s, e, after, place, sides):
+    """The step that ends on the first border in its way.
+
+    Args:
+        m: the method.
+        s: state of the run.
+        e: its arrays.
+        after: length of the step that crosses [s].
+        place: where that leads, (x, y) [m].
+        sides: borders that it crosses, see `side`, (x, y).
+
+    Returns:
+        (length [s], coordinate, side).
+    """
+    span, axis, up = after, -1, 0
+    for i in range(2):
+        if sides[i]:
+            border = s["high"][i] if sides[i] > 0 else s["low"][i]
+            length = find_root(distance_beyond, after, place[i] - border, m, s, e, i, border)
+            if axis < 0 or length < span:
+                span, axis, up = length, i, sides[i]
+    return span, axis, up
+
+
+def careful(m, s, e):
+    """One step with a look at its end, which lies on a border if one is in the way.
+
+    Args:
+        m: the method.
+        s: state of the run.
+        e: its arrays.
+    """
+    target, after, on_grid = m.stop(s)
+    if s["closing"] == OPEN and after == 0.0:
+        s["closing"] = TIME_LIMIT
+    if on_grid:
+        s["landings"] = 0
+    after = min(after, s["fine"])
+    axis, up = -1, 0  # border that the step ends on
+    overx, overy = 0, 0  # borders stepped over without a step
+    act = True
+    while True:
+        if s["closing"] != OPEN:
+            after = 0.0
+        elif act:  # once; anew in other clay
+            m.act(s, e)
+            act = False
+        if s["struck"] and after > 0.0:
+            s["struck"] = 0
+            after = m.strike(s, e, after)
+        m.propose(s, e, after)
+        good = m.finite(s, e)
+        if after == 0.0 or axis >= 0 or not good:
+            break
+        x, y = m.place(s, e, after)
+        sx, sy = side(x, s["low"][0], s["high"][0]), side(y, s["low"][1], s["high"][1])
+        # no way back over a border: it must not hold the run
+        sx, sy = sx if overx in (0, sx) else 0, sy if overy in (0, sy) else 0
+        if sx == 0 and sy == 0:
+            break
+        herex, herey = m.place(s, e, 0.0)
+        if sx and side(herex, s["low"][0], s["high"][0]):
+            i, over, overx = 0, sx, sx
+        elif sy and side(herey, s["low"][1], s["high"][1]):
+            i, over, overy = 1, sy, sy
+        elif s["landings"] >= s["landings_most"]:
+            break
+        else:
+            after, axis, up = locate_event(m, s, e, after, (x, y), (sx, sy))
+            continue
+        cross(m, s, e, i, over)
+        act = True
+        if s["closing"] != OPEN and s["before"] == 0.0:
+            break
+    if s["before"] > 0.0 or s["closing"] == OPEN:
+        m.keep(s, e, after, on_grid or s["closing"] != OPEN)
+    if s["closing"] != OPEN:
+        s["code"] = s["closing"]
+    elif not good:
+        s["code"] = NOT_FINITE
+    else:
+        m.commit(s, e, after)
+        for j in range(2):
+            s["old"][j], s["old"][2 + j] = s["base"][j], s["rate"][j]
+        s["before"] = after
+        s["t"] += after
+        if target - s["t"] <= 1e-9 * s["dt"]:
+            m.arrive(s, target)
+        if axis >= 0:
+            s["landings"] += 1
+            cross(m, s, e, axis, up)
+
+
+def advance(m, s, e, room):
+    """Steps until rows or crossings are full, or the run is over.
+
+    Args:
+        m: the method.
+        s: state of the run, which is advanced.
+        e: its arrays.
+        room: largest number of rows to fill.
+    """
+    while s["code"] == OPEN and s["filled"] < room and s["crossed"] < len(e.crossings) - 3:
+        if not m.glide(s, e, room):
+            careful(m, s, e)
