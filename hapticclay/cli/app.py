@@ -28,6 +28,7 @@ from .console import scenario_words
 COMMANDS = {  # a command is a dataclass of its options; calling it returns the exit status
     "run": "hapticclay.cli.run:RunCommand",
     "stability": "hapticclay.cli.stability:StabilityCommand",
+    "accuracy": "hapticclay.cli.accuracy:AccuracyCommand",
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",

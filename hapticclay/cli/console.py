@@ -101,18 +101,21 @@ def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
         yield show
 
 
-def text_table(rows: Sequence[Sequence[str]], head: Sequence[str], align: str) -> str:
-    """A table for a terminal.
+def text_table(
+    rows: Sequence[Sequence[str]], head: Sequence[str], align: str, form: str = "simple"
+) -> str:
+    """A table for a terminal, or a page.
 
     Args:
         rows: its cells.
         head: its column titles.
         align: a letter a column, "l" for left, "r" for right.
+        form: "simple", or "pipe" for Markdown.
     """
     from tabulate import tabulate
 
     sides = [{"l": "left", "r": "right"}[a] for a in align]
-    return tabulate(rows, head, colalign=sides if rows else None, disable_numparse=True)
+    return tabulate(rows, head, form, colalign=sides if rows else None, disable_numparse=True)
 
 
 def fixed(x: float | None, digits: int) -> str:

@@ -17,6 +17,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, N
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES, L1, L2, ORIGIN, PATH_LENGTH
+from ..studies.accuracy import CLEAR, SAMPLED, Ladder
 from ..studies.identification import (
     NOMINAL_POSE,
     Identified,
@@ -539,3 +540,66 @@ def _cell_values(data: Mapped, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
     np.add.at(out, (j[good], i[good]), data.z[good])
     np.add.at(count, (j[good], i[good]), 1.0)
     return np.divide(out, count, out=np.full_like(out, np.nan), where=count > 0)
+
+
+# Error against run time
+
+SERIES_LOOKS: dict[str, Any] = {  # curve, and where its steps are written
+    "fast": (dict(color=BLUE, marker="o", ls="-"), dict(xytext=(7, 5), ha="left")),
+    "accurate": (dict(color=VERMILION, marker="s", ls="-"), dict(xytext=(-7, -12), ha="right")),
+    SAMPLED: (dict(color=GREY, marker="^", ls=":"), dict(xytext=(7, 5), ha="left")),
+}
+ERROR_AXES = {"s": "error of the border times [s]", "m": "error of the position [m]"}
+
+
+def accuracy_plot(ladder: Ladder) -> Figure:
+    """Plots error against run time, a panel a unit, a curve a method, a mark a step.
+
+    Rings mark settings that are the cheapest for an error; in the grey band, the error of the
+    reference hides that of a setting.
+
+    Args:
+        ladder: from `accuracy_ladder`.
+    """
+    units = ladder.units()
+    with figure_style():
+        figure = Figure(figsize=(4.4 * max(len(units), 1) + 0.6, 4.6))
+        axes = figure.subplots(1, max(len(units), 1), squeeze=False)[0]
+        for ax, unit in zip(axes, units, strict=False):
+            _accuracy_panel(ax, ladder, unit)
+        if units:
+            add_legend(figure, axes[-1], 5 if len(units) > 1 else 2)
+        parts = [ladder.scenario.name, f"{ladder.simulated:.4g} s simulated"]
+        set_title(axes[0], *parts, f"engine {ladder.engine}", "steps written beside the marks")
+    return figure
+
+
+def _accuracy_panel(ax: Axes, ladder: Ladder, unit: str) -> None:
+    ax.set(xscale="log", yscale="log", xlabel="run time [s]", ylabel=ERROR_AXES[unit])
+    points = [(x, e) for x in ladder.settings if (e := ladder.shown(x, unit)) and x.wall]
+    for name, (look, side) in SERIES_LOOKS.items():
+        mine = [(x.wall, e, x.dt) for x, e in points if x.series == name]
+        if not mine:
+            continue
+        walls, errors, steps = zip(*mine, strict=True)
+        ax.plot(walls, errors, ms=5, lw=1.4, label=name, zorder=3, **look)
+        for i in sorted({0, len(mine) - 1}):
+            at: Any = (walls[i], errors[i])
+            told: Any = dict(side, textcoords="offset points", fontsize=8, color=look["color"])
+            ax.annotate(_step(steps[i]), at, **told)
+    best = [(x.wall, e) for x, e in points if x in ladder.cheapest(unit).values()]
+    if best:
+        ring: Any = dict(ls="none", marker="o", mfc="none", color=BLACK, ms=11, mew=1.2, zorder=4)
+        ax.plot(*zip(*best, strict=True), label="cheapest for an error", **ring)
+    ax.margins(x=0.15, y=0.1)
+    (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
+    ax.set_xlim(first, 2.5 * last)  # room for the last step
+    if left := ladder.left[unit]:
+        low = min(low, 0.3 * left)
+        ax.axhspan(low, CLEAR * left, color=PALE_GREY, lw=0, label="hidden by the reference")
+    ax.set_ylim(low, high)
+
+
+def _step(dt: float) -> str:
+    """A step in words: 20 ms, 0.36 ms, 5 us."""
+    return f"{1e3 * dt:.3g} ms" if dt >= 1e-5 else f"{1e6 * dt:.3g} us"

@@ -49,6 +49,33 @@ def test_run_free_and_no_plots(capsys, tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["record.npz", "summary.json"]
 
 
+def test_a_run_to_an_asked_error_says_what_was_reached(capsys, tmp_path):
+    code, out, err = run(
+        capsys, "run", "constant", "--error", "1e-5m", "--no-plots", "--out", str(tmp_path)
+    )
+    assert (code, err) == (0, "") and "error: " in out
+    assert "1e-05 m asked: reached (fast, dt = " in out and "why:" not in out
+    assert hc.Record.load(tmp_path).error.reached
+    args = ("--gain", "1", "1", "--error", "1e-5", "--no-plots", "--out", str(tmp_path))
+    code, out, _ = run(capsys, "run", "constant", *args)
+    assert code == 0 and "asked: not reached" in out and "why: the loop is unstable" in out
+
+
+def test_accuracy_writes_figure_page_and_numbers(capsys, tmp_path):
+    args = ("--length", "0.06", "--quick", "--out", str(tmp_path))
+    code, out, err = run(capsys, "accuracy", "constant", *args)
+    assert (code, err) == (0, "")
+    assert sorted(os.listdir(tmp_path)) == ["accuracy.json", "accuracy.md", "accuracy.png"]
+    assert "Cheapest setting by error in the times of the border crossings" in out
+    data = json.loads((tmp_path / "accuracy.json").read_text())
+    assert data["schema"] == "hapticclay-accuracy-1"
+    series = {x["series"] for x in data["settings"]}
+    assert series == {"fast", "accurate", "sampled, Ts = dt"}
+    page = (tmp_path / "accuracy.md").read_text()
+    assert "](accuracy.png)" in page and page.count("\n| fast ") >= 6
+    assert max(map(len, out.splitlines())) <= 80 or "Errors are against" in out
+
+
 def test_instability_is_a_result_with_advice(capsys, tmp_path):
     code, out, _ = run(capsys, "run", "constant", "--gain", "1", "1", "--out", str(tmp_path))
     assert code == 0
@@ -118,6 +145,22 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["help", "nope"], ["command = 'nope'"]),
         ([], ["give a command: run, stability"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
+        (["run", "constant", "--error", "1e-6 kg"], ["error = '1e-6 kg'", "such as '1e-7 m'"]),
+        (["run", "constant", "--error", "0"], ["error = 0.0", ">= 1e-11"]),
+        (["run", "constant", "--error", "-1e-6"], ["error = -1e-06", ">= 1e-11"]),
+        (["run", "constant", "--error", "nan"], ["error = nan", "finite"]),
+        (["run", "constant", "--error"], ["--error = '': must be a word"]),
+        (["run", "stability", "--error", "1e-6"], ["error = '1e-6': must be in m"]),
+        (["run", "constant", "--eror", "1"], ["--eror: no", "did you mean --error?"]),
+        (["accuracy"], ["give an experiment: constant, variable, stability, free\n"]),
+        (["accuracy", "constnat"], ["constnat", "did you mean 'constant'"]),
+        (["accuracy", "free", "--qiuck"], ["did you mean --quick?"]),
+        (["accuracy", "constant", "--b", "nan"], ["b = nan", "finite"]),
+        (["accuracy", "constant", "--out", "/proc/no"], ["out = '/proc/no'", "writable folder"]),
+        (
+            ["accuracy", "free", "--control", "sampled", "--dt", "1e-5"],
+            ["Ts = 1e-05: must be at least 1.6e-05 s"],
+        ),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, words):

@@ -1,0 +1,124 @@
+"""`hapticclay accuracy`: error against run time of one scenario, and the cheapest settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from ..files import atomic, writable
+from . import console
+
+if TYPE_CHECKING:
+    from ..studies.accuracy import Ladder
+
+ERROR_NAMES = {"s": "times of the border crossings", "m": "position"}
+
+
+@dataclass(frozen=True)
+class AccuracyCommand:
+    """Draw error against run time of an experiment, and name the cheapest setting for each error.
+
+    The experiment runs at a ladder of steps, with both integrators, and under sampled control.
+
+    Attributes:
+        scenario: The experiment; its dt and integrator are replaced.
+        out: Folder for accuracy.png, accuracy.md and accuracy.json.
+        quick: Run fewer steps, once each.
+    """
+
+    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/accuracy/EXPERIMENT)")
+    ] = None
+    quick: bool = False
+
+    def __call__(self) -> int:
+        from ..studies.accuracy import accuracy_ladder
+
+        out = self.out or Path("out/accuracy", self.scenario.name)
+        writable(out)
+
+        def bar(runs: Iterable) -> Iterable:
+            return console.progress_bar(runs, desc="accuracy")
+
+        found = accuracy_ladder(self.scenario, self.quick, bar)
+        try:
+            self._save(found, out)
+        finally:  # a full disk must not hide the results
+            print(cheapest_tables(found))
+        print(f"written to {out}")
+        return 0
+
+    def _save(self, found: Ladder, out: Path) -> None:
+        from ..views import study_plots
+
+        console.save_json(found.summary(), out / "accuracy.json")
+        with atomic(out / "accuracy.md") as f:
+            f.write((accuracy_page(found) + "\n").encode())
+        console.save_figures({"accuracy": study_plots.accuracy_plot(found)}, out)
+
+
+def cheapest_tables(found: Ladder, markdown: bool = False) -> str:
+    """The cheapest setting for each asked error, a table a unit.
+
+    Args:
+        found: the ladder.
+        markdown: whether for a page instead of a terminal.
+    """
+    parts = []
+    for unit in found.units():
+        rows = [
+            [f"{asked:.0e}", x.series, f"{x.dt:.3g}", _error(found, x, unit), f"{x.wall:.2g}"]
+            for asked, x in found.cheapest(unit).items()
+        ]
+        head = [f"asked error [{unit}]", "integrator", "dt [s]", f"error [{unit}]", "run time [s]"]
+        parts += [f"Cheapest setting by error in the {ERROR_NAMES[unit]}:"]
+        parts += [console.text_table(rows, head, "rlrrr", "pipe" if markdown else "simple")]
+    left = [f"{e:.1e} {unit}" for unit, e in found.left.items() if e and unit in found.units()]
+    within = f", good to {' and '.join(left)}" if left else ""
+    parts += [f"Errors are against the {found.reference}{within}.", *found.notes]
+    return "\n\n".join(parts)
+
+
+def accuracy_page(found: Ladder) -> str:
+    """The ladder as a page in Markdown: the figure, the cheapest settings, all settings.
+
+    Args:
+        found: the ladder.
+    """
+    rows = [
+        [
+            x.series,
+            f"{x.dt:.3g}",
+            _error(found, x, "s"),
+            _error(found, x, "m"),
+            "-" if x.wall is None else f"{x.wall:.2g}",
+            x.status,
+        ]
+        for x in found.settings
+    ]
+    head = ["method", "dt [s]", "border times [s]", "position [m]", "run time [s]", "status"]
+    return "\n\n".join(
+        [
+            f"# Error against run time: {found.scenario.name}",
+            "![error against run time](accuracy.png)",
+            f"{found.simulated:.4g} s simulated, engine {found.engine}.",
+            cheapest_tables(found, markdown=True),
+            "All settings:",
+            console.text_table(rows, head, "lrrrrl", "pipe"),
+        ]
+    )
+
+
+def _error(found: Ladder, x: Any, unit: str) -> str:
+    """An error as text; "<" where it is not clear of that of the reference."""
+    from ..studies.accuracy import CLEAR
+
+    error, left = x.error(unit), found.left[unit]
+    if error is None:
+        return "-"
+    return f"{error:.1e}" if found.shown(x, unit) else f"< {CLEAR * (left or 0.0):.1e}"
