@@ -35,7 +35,9 @@ ORDER_GAP = 0.5  # from the order of the integrator, up to which an observed ord
 CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order
 DOUBTS = 4  # comparisons that may fail to confirm the order before a plain bound is taken
 ROUNDING_LEFT = 1e-12  # [s], [m] that is left of rounding at any step
-CLEAR = 1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
+FINEST_GAP = (
+    1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
+)
 LEAST_SAMPLES = 2000  # of a run to t_max at which positions are compared, however few are kept
 TOLD_APART = 1e-13  # [m] a border is passed when the handle is so far beyond it
 
@@ -450,7 +452,7 @@ def compare_positions(coarse: Trace, middle: Trace, fine: Trace, *, order: int) 
     seen = math.log2(first / second - 1.0) if first > second > 0.0 else None
     confirmed = second <= CLOSER * first
     sharp = first / (1.0 - 4.0**-order)
-    finest = second / (CLEAR if confirmed else 1.0)
+    finest = second / (FINEST_GAP if confirmed else 1.0)
     return Comparison(
         sharp if confirmed else max(first, second), seen, confirmed, "", False, finest
     )
