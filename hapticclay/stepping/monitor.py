@@ -296,17 +296,18 @@ class StabilityMonitor:
 def is_quiet(rows, n, limit1, limit2, swings, seen):
     """Whether the monitor can have nothing to report on the next n rows: a cheaper test.
 
-    False where a row is no longer good, or where as many swings in a row did not shrink as an
-    unstable run takes.
+    False where a row is no longer good, or where swings in a row have grown together, or have
+    driven a motor into its limit, by as much as an unstable run takes.
 
     Args:
         rows: shape (m, 14), m >= n.
         n: number of rows.
         limit1: torque limit of the shoulder [N.m].
         limit2: torque limit of the elbow [N.m].
-        swings: of each axis, shape (2, 6): last two velocities, velocity at the last turning point
+        swings: of each axis, shape (2, 8): last two velocities, velocity at the last turning point
             [m/s], size of the last swing [m/s], number of swings that did not shrink, samples since
-            the turn with a motor at its limit.
+            the turn with a motor at its limit, growth of those swings together, at least, and how
+            many of the last ones had a motor at its limit.
         seen: counts of the monitor, shape (4,): seen, moved, unbound, often.
     """
     for j in range(n):
@@ -330,8 +331,14 @@ def is_quiet(rows, n, limit1, limit2, swings, seen):
                 grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
                 if size < FLOOR:
                     grown = 0.0
+                if grown > 1.0 and s[3] > 0.0:
+                    s[6] *= max(1.0, min(size / s[3], STEP_GROWTH))
+                else:
+                    s[6], s[7] = 1.0, 0.0
+                s[7] = s[7] + 1.0 if s[5] else 0.0
                 s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
-                if grown >= SWINGS:
+                # but for rounding of the product
+                if (grown >= SWINGS and s[6] > 0.999 * SWING_GROWTH) or s[7] >= CYCLE:
                     return False
             s[1] = s[0]
             s[0] = v

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import functools
 import hashlib
@@ -242,13 +243,11 @@ class Run:
         self.muscle, self.command = _build_signal(scenario.muscle), _build_signal(scenario.command)
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
         self.table = clay.region_table(scenario.clay, scenario.length)
-        grows = bool(self.table[clay.RATE_ROW : clay.RATE_ROW + 2].any())
+        grows = scenario.clay and (scenario.clay.x.growth or scenario.clay.y.growth)
         self.varies = bool(self.muscle or self.command or grows)  # from step to step
-        self._arrays(
-            table=self.table,
-            muscle=_signal_lines(self.muscle),
-            command=_signal_lines(self.command),
-        )
+        driven = {"muscle": self.muscle, "command": self.command}
+        lines = {name: signal.lines for name, signal in driven.items() if signal}
+        self._arrays(table=self.table, **lines)
         self.s = self.store.state(type(self))
         self.pause = math.inf
         self.watch = monitor.StabilityMonitor(scenario)
@@ -260,7 +259,7 @@ class Run:
         self.without_samples = brief
         # nothing to report so far; later the monitor may want all rows once more
         self.calm = kernel.quiet is not None and scenario.stop and (brief or every == 1)
-        self.swings, self.seen = np.zeros((2, 6)), np.array([0, -1, -1, 0])
+        self.swings, self.seen = np.zeros((2, 8)), np.array([0, -1, -1, 0])
         self._start()
 
     def _arrays(self, **arrays: Any) -> None:
@@ -279,8 +278,8 @@ class Run:
         self._put(q=data.qpos, w=data.qvel)
         now["fine"], now["struck"], now["first"] = math.inf, 1, -1
         for i in (0, 1):
-            edges = self.table[clay.EDGE_ROW + i][1:]
-            now["index"][i] = int(np.searchsorted(edges, s.start[i], side="right"))
+            edges = self.table[clay.EDGE_ROW + i].tolist()
+            now["index"][i] = bisect.bisect_right(edges, s.start[i], 1) - 1
         path.settle(now, self.e.table)
         self._put(old=(*now["base"], *now["rate"]))
         w1, w2 = now["w"]
@@ -299,8 +298,10 @@ class Run:
         now["landings_most"] = path.LANDINGS
 
     def _put(self, **arrays: Any) -> None:
-        for name, x in arrays.items():
-            np.asarray(self.s[name])[:] = x
+        for name, values in arrays.items():
+            array = self.s[name]
+            for j, x in enumerate(values):
+                array[j] = x
 
     @property
     def t(self) -> float:
@@ -333,7 +334,7 @@ class Run:
         Args:
             room: largest number of rows.
         """
-        if not self.filled and not self.without_samples:
+        if not self.filled and not (self.without_samples and self.looked):
             self._snapshot = self._save()  # of what has been judged
         self._make(room)
         for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
@@ -431,14 +432,16 @@ class Run:
     def flush(self) -> None:
         """Judges the rows since the last look."""
         n, self.s["filled"] = self.filled, 0
-        if self.without_samples:
-            if not n or not self._still_calm(n):
-                raise NeedsMonitor
+        if self.without_samples and n and self._still_calm(n):
             if self.outcome is not None:
                 self.outcome = self.watch.end(self.outcome)
                 self.last_row = self.store.rows[n - 1].tolist()
             self.looked += n
             return
+        if self.without_samples and self.looked:
+            raise NeedsMonitor
+        if self.without_samples:  # the monitor can have all rows so far
+            self.without_samples = self.calm = False
         good = self.judge(self.store.rows[:n])
         if self.outcome is not None and self.end_time is None and good < n:
             made = self.steps
@@ -544,10 +547,6 @@ def _build_signal(multisine: Multisine | None) -> Any:
     from ..model.signals import Signal  # only a run that has one pays for it
 
     return Signal(multisine)
-
-
-def _signal_lines(signal: Any) -> np.ndarray:
-    return np.zeros((0, 5)) if signal is None else signal.lines
 
 
 class LeapfrogRun(Run):
