@@ -26,6 +26,7 @@ CYCLE = 30  # consecutive swings into the torque limits that do not decay are a 
 MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
 WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
+QUIET = 9 + SWINGS + 1  # numbers of an axis that `is_quiet` goes on with
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -304,10 +305,11 @@ def is_quiet(rows, n, limit1, limit2, swings, seen):
         n: number of rows.
         limit1: torque limit of the shoulder [N.m].
         limit2: torque limit of the elbow [N.m].
-        swings: of each axis, shape (2, 8): last two velocities, velocity at the last turning point
+        swings: of each axis, shape (2, QUIET): last two velocities, velocity at the last turn
             [m/s], size of the last swing [m/s], number of swings that did not shrink, samples since
-            the turn with a motor at its limit, growth of those swings together, at least, and how
-            many of the last ones had a motor at its limit.
+            the turn with a motor at its limit, growth of those swings together, at least, how many
+            of the last ones had a motor at its limit; samples up to the last turn and to those
+            before it, one a swing.
         seen: counts of the monitor, shape (4,): seen, moved, unbound, often.
     """
     for j in range(n):
@@ -334,11 +336,16 @@ def is_quiet(rows, n, limit1, limit2, swings, seen):
                 if grown > 1.0 and s[3] > 0.0:
                     s[6] *= max(1.0, min(size / s[3], STEP_GROWTH))
                 else:
-                    s[6], s[7] = 1.0, 0.0
+                    s[6], s[7], s[9] = 1.0, 0.0, s[8]
                 s[7] = s[7] + 1.0 if s[5] else 0.0
+                s[8] = float(seen[0])
+                s[9 + int(grown) % (SWINGS + 1)] = s[8]
+                slow = s[8] - s[9 + (int(grown) + 1) % (SWINGS + 1)] + 2.0 >= SWING_SPACING * SWINGS
                 s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
                 # but for rounding of the product
-                if (grown >= SWINGS and s[6] > 0.999 * SWING_GROWTH) or s[7] >= CYCLE:
+                if grown >= SWINGS and slow and s[6] > 0.999 * SWING_GROWTH:
+                    return False
+                if s[7] >= CYCLE:
                     return False
             s[1] = s[0]
             s[0] = v

@@ -259,7 +259,7 @@ class Run:
         self.without_samples = brief
         # nothing to report so far; later the monitor may want all rows once more
         self.calm = kernel.quiet is not None and scenario.stop and (brief or every == 1)
-        self.swings, self.seen = np.zeros((2, 8)), np.array([0, -1, -1, 0])
+        self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self._start()
 
     def _arrays(self, **arrays: Any) -> None:

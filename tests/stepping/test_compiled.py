@@ -340,7 +340,7 @@ def test_what_the_filter_passes_the_monitor_passes(data):
     if data.draw(st.booleans(), "bent"):
         rows[data.draw(st.integers(0, n - 1)), 1] = data.draw(st.floats(-3.2, 0.0))
     s = hc.constant_cut(gain=(data.draw(st.sampled_from([0.1, 30.0])), 0.2))
-    swings, seen = np.zeros((2, 8)), np.array([0, -1, -1, 0])
+    swings, seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
     watch = monitor.StabilityMonitor(s)
     parts = sorted({0, n, data.draw(st.integers(0, n), "cut")})
     for first, last in zip(parts, parts[1:], strict=False):
