@@ -20,8 +20,8 @@ from . import record
 
 ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step [us]; that it takes to load, and to compile [s]
-SAVED = {"LeapfrogRun": 4.0, "RungeKuttaRun": 10.0, "SampledRun": 20.0}
-LOADING, COMPILING = 0.6, {"LeapfrogRun": 3.5, "RungeKuttaRun": 4.0, "SampledRun": 9.0}
+SAVED = {"LeapfrogRun": 2.5, "RungeKuttaRun": 10.0, "SampledRun": 20.0}
+LOADING, COMPILING = 0.6, {"LeapfrogRun": 3.5, "RungeKuttaRun": 4.0, "SampledRun": 10.0}
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
 
@@ -110,7 +110,7 @@ def _pays(scenario: Scenario) -> bool:
     if compiled is not None and compiled.is_warm(kind):
         return True
     name, steps = kind.__name__, scenario.t_max / scenario.dt
-    wait = LOADING if any(cache_folder().glob("*/*.nbi")) else COMPILING[name]
+    wait = LOADING if any(cache_folder().glob(f"{name}.*")) else COMPILING[name]
     return 1e-6 * SAVED[name] * steps >= 2.0 * wait  # runs tend to end before t_max
 
 

@@ -36,8 +36,7 @@ LOOPS = (leapfrog.Leapfrog, runge_kutta.RungeKutta, sampled.Sampled)
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 NOTICE = "hapticclay: compiling, this once"
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
-# borders that a run has met from which it pays to load the whole path, and to compile it
-BORDERS = 60, 2000
+BORDERS = 2000  # that a run has met from which it pays to compile the whole path
 BLOCK = 256  # whole steps between two entries into the record: they stay in the cache
 
 
@@ -84,9 +83,9 @@ def _put_row(rows, at, *row):
         rows[i, j] = row[j]
 
 
-def _kept(entry: str) -> bool:
-    """Whether machine code of a function is kept on disk."""
-    return any(run.cache_folder().rglob(f"*{entry}-*.nbi"))
+def _mark(kind: type[run.Run], whole: bool) -> Path:
+    """A file that says that this machine code is kept on disk."""
+    return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
 
 
 def _compiled(*functions: Any) -> list[Any]:
@@ -155,7 +154,7 @@ MIXED_OF: dict[type, Any] = {
 
 def _mixed(run: Any, room: int) -> None:
     met = len(run.crossings)
-    if met >= BORDERS[1] or (met >= BORDERS[0] and _kept("path.advance")):
+    if met >= BORDERS:
         warm(type(run))
         run.kernel = WHOLE
         return _whole(run, room)
@@ -232,8 +231,8 @@ def kernel(scenario: Scenario) -> run.Kernel:
         scenario: the scenario.
     """
     kind = run.kind_of(scenario)
-    if _mixes(kind) and kind not in WARM:  # what surrounds its whole steps is rare
-        warm(kind, False)
+    if _mixes(kind) and not (kind in WARM or _mark(kind, True).exists()):
+        warm(kind, False)  # what surrounds the whole steps is rare, and takes longest to compile
         return MIXED
     warm(kind)
     return WHOLE
@@ -263,8 +262,8 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
         kind: of the run.
         whole: the whole path, or the whole steps alone.
     """
-    entry = "path.advance" if whole else MIXED_OF[type(kind.method)].law.py_func.__name__
-    told = NOTICE if sys.stderr and sys.stderr.isatty() and not _kept(entry) else ""
+    mark = _mark(kind, whole)
+    told = NOTICE if sys.stderr and sys.stderr.isatty() and not mark.exists() else ""
     print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
@@ -277,6 +276,8 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
             signal.signal(signal.SIGINT, before)
     if whole:
         WARM.add(kind)
+    with contextlib.suppress(OSError):  # nowhere to keep it
+        mark.touch()
     if caught:
         raise KeyboardInterrupt
 
