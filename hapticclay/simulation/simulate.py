@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import ParameterError, choice, integer
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
-from ..stepping.run import PLAIN, Kernel, borrowed_store, cache_folder, kind_of
+from ..stepping.run import PLAIN, Kernel, NeedsMonitor, borrowed_store, cache_folder, kind_of
 from . import record
 
 ENGINES = ("auto", "python", "native")
@@ -67,12 +67,25 @@ def simulate(
     _check_memory(scenario, every)
     with warnings_caught():
         kernel = _kernel(scenario, choice("engine", engine, ENGINES))
-        with borrowed_store(kernel) as store:
-            run = kind_of(scenario)(scenario, every, kernel, store)
-            begin = time.perf_counter()
-            run.go(progress)
-            wall = time.perf_counter() - begin
-            return record.Record.of(run, wall)
+        watched = every > 1 and progress is not None  # which must not begin anew
+        with contextlib.suppress(NeedsMonitor):
+            return _run(scenario, every, kernel, progress, watched)
+        return _run(scenario, every, kernel, progress, True)
+
+
+def _run(
+    scenario: Scenario,
+    every: int,
+    kernel: Kernel,
+    progress: Callable[[float, float], bool | None] | None,
+    watched: bool,
+) -> record.Record:
+    """The record of a run; the last argument as in Run."""
+    with borrowed_store(kernel) as store:
+        run = kind_of(scenario)(scenario, every, kernel, store, False, watched)
+        begin = time.perf_counter()
+        run.go(progress)
+        return record.Record.of(run, time.perf_counter() - begin)
 
 
 def _check_memory(scenario: Scenario, every: int) -> None:

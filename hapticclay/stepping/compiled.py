@@ -188,12 +188,14 @@ class BatchPool:
         self.every = every
         self.own = threading.local()
 
-    def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[run.Run, float]:
+    def _go(
+        self, scenario: Scenario, every: int, brief: bool, watched: bool = False
+    ) -> tuple[run.Run, float]:
         """The run, made, and the seconds it took."""
         kind = run.kind_of(scenario)
         if not hasattr(self.own, "store"):
             self.own.store = run.EngineStore(WHOLE)
-        made = kind(scenario, every, WHOLE, self.own.store, brief)
+        made = kind(scenario, every, WHOLE, self.own.store, brief, watched)
         begin = time.perf_counter()
         made.go(None)
         return made, time.perf_counter() - begin
@@ -207,7 +209,9 @@ class BatchPool:
         Returns:
             The run, and the seconds it took.
         """
-        return self._go(scenario, self.every, False)
+        with contextlib.suppress(run.NeedsMonitor):
+            return self._go(scenario, self.every, False)
+        return self._go(scenario, self.every, False, True)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
         """The end of a run, without its samples.
@@ -221,7 +225,7 @@ class BatchPool:
         if scenario.stop:
             with contextlib.suppress(run.NeedsMonitor):
                 return self._go(scenario, LAST_ONLY, True)[0].brief()
-        return self._go(scenario, LAST_ONLY, False)[0].brief()
+        return self._go(scenario, LAST_ONLY, False, True)[0].brief()
 
 
 def kernel(scenario: Scenario) -> run.Kernel:

@@ -212,8 +212,9 @@ class Run:
         every: keep each every-th sample, and the last.
         kernel: how the loops are run.
         store: engines to use; None for its own.
-        brief: keep no samples, for `brief` alone; NeedsMonitor is raised where the monitor would
-            look at them.
+        brief: keep no samples, for `brief` alone.
+        watched: let the monitor look at all rows; else NeedsMonitor is raised where it has to look
+            at rows that are not kept.
 
     Raises:
         ParameterError: a control callback is installed in the engine, which would interfere.
@@ -233,6 +234,7 @@ class Run:
         kernel: Kernel = PLAIN,
         store: EngineStore | None = None,
         brief: bool = False,
+        watched: bool = False,
     ):
         if mujoco.get_mjcb_control() is not None:
             bound = "the engine must be free of control callbacks"
@@ -258,7 +260,7 @@ class Run:
         self.end_time: float | None = None
         self.without_samples = brief
         # nothing to report so far; later the monitor may want all rows once more
-        self.calm = kernel.quiet is not None and scenario.stop and (brief or every == 1)
+        self.calm = kernel.quiet is not None and scenario.stop and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self._start()
 
@@ -459,6 +461,8 @@ class Run:
         if self.calm:
             if self._still_calm(len(rows)):
                 return len(rows), None
+            if self.looked and self.every != 1:
+                raise NeedsMonitor
             self.calm = False
             for index, earlier in self.kept:
                 self.watch.look(_columns(earlier), int(index[0]))

@@ -120,6 +120,10 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
     same(Record.of(late, 0.0), Record.of(watched, 0.0))
     assert late.watch.seen == watched.watch.seen >= late.looked
+    thin = hc.simulate(s, every=7, engine="python")
+    same(hc.simulate(s, every=7, engine="native"), thin)
+    same(hc.simulate_batch([s], every=7)[0], thin)
+    assert hc.simulate_batch([s], keep="summaries")["code"][0] == "diverged"
     calm = run.LeapfrogRun(hc.constant_cut(), 1, compiled.WHOLE)
     calm.watch.look = None  # is not called
     calm.go(None)
