@@ -69,11 +69,11 @@ def simulate(
         kernel = _kernel(scenario, choice("engine", engine, ENGINES))
         watched = every > 1 and progress is not None  # which must not begin anew
         with contextlib.suppress(NeedsMonitor):
-            return _run(scenario, every, kernel, progress, watched)
-        return _run(scenario, every, kernel, progress, True)
+            return _run_once(scenario, every, kernel, progress, watched)
+        return _run_once(scenario, every, kernel, progress, True)
 
 
-def _run(
+def _run_once(
     scenario: Scenario,
     every: int,
     kernel: Kernel,
