@@ -16,11 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, number
-from ..model import arm
-from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from ..stepping.run import Crossing
-from ..stepping.runge_kutta import STABLE_STEP
+from ..stepping.runge_kutta import STABLE_STEP, fastest_rate
 from .record import ARRAYS, Record
 from .simulate import has_numba, simulate
 
@@ -273,7 +271,9 @@ def first_choice(scenario: Scenario, asked: float, unit: str) -> tuple[str, floa
     if not has_numba():  # the accurate run in Python takes too long to pay
         return "fast", steps["fast"]
     # beyond, the explicit method divides its steps, and other steps are no other runs
-    steps["accurate"] = min(steps["accurate"], STABLE_STEP / _fastest_rate(scenario) / RATIO)
+    steps["accurate"] = min(
+        steps["accurate"], STABLE_STEP / max(fastest_rate(scenario), STABLE_STEP) / RATIO
+    )
     cost = {name: METHODS[name].cost / step for name, step in steps.items()}
     if steps["accurate"] < SMALLEST or cost["fast"] <= cost["accurate"]:
         return "fast", steps["fast"]
@@ -290,14 +290,6 @@ def _divided(Ts: float, dt: float) -> float:
         bound = f"must be at least {RATIO * SMALLEST:g} s where an error is asked for"
         raise ParameterError("Ts", Ts, bound)
     return Ts / n
-
-
-def _fastest_rate(scenario: Scenario) -> float:
-    """Fastest rate by which the explicit integrator divides its steps [1/s]."""
-    hand, clay = scenario.operator or NO_HAND, scenario.clay
-    b = max((*clay.x.values, *clay.y.values)) if clay else 0.0
-    rate = (b + hand.damper) * arm.TRACE_W + math.sqrt(hand.spring * arm.TRACE_W)
-    return max(rate, STABLE_STEP)
 
 
 class Trial:
@@ -351,7 +343,9 @@ class Trial:
             return record, compare_times(*traces.values(), order=order)
         compared = compare_positions(*traces.values(), order=order)
         # decays that no step resolves leave their error in one sample, which may not show it
-        if _fastest_rate(self.scenario) * dt > STABLE_STEP and _hides(*traces.values()):
+        if fastest_rate(self.scenario) * dt > STABLE_STEP and _hides(
+            *traces.values()
+        ):
             compared = compared._replace(confirmed=False)
         return self._thinned(record), compared
 

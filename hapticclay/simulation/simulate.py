@@ -7,7 +7,6 @@ import importlib.util
 import math
 import os
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 from ..errors import ParameterError, choice, integer
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
-from ..stepping.run import PLAIN, Kernel, NeedsMonitor, borrowed_store, cache_folder, kind_of
+from ..stepping.run import PLAIN, Kernel, borrowed_store, cache_folder, completed, kind_of
 from . import record
 
 ENGINES = ("auto", "python", "native")
@@ -67,25 +66,8 @@ def simulate(
     _check_memory(scenario, every)
     with warnings_caught():
         kernel = _kernel(scenario, choice("engine", engine, ENGINES))
-        watched = every > 1 and progress is not None  # which must not begin anew
-        with contextlib.suppress(NeedsMonitor):
-            return _run_once(scenario, every, kernel, progress, watched)
-        return _run_once(scenario, every, kernel, progress, True)
-
-
-def _run_once(
-    scenario: Scenario,
-    every: int,
-    kernel: Kernel,
-    progress: Callable[[float, float], bool | None] | None,
-    watched: bool,
-) -> record.Record:
-    """The record of a run; the last argument as in Run."""
-    with borrowed_store(kernel) as store:
-        run = kind_of(scenario)(scenario, every, kernel, store, False, watched)
-        begin = time.perf_counter()
-        run.go(progress)
-        return record.Record.of(run, time.perf_counter() - begin)
+        with borrowed_store(kernel) as store:
+            return record.Record.of(*completed(scenario, every, kernel, store, progress))
 
 
 def _check_memory(scenario: Scenario, every: int) -> None:
@@ -117,14 +99,17 @@ def _kernel(scenario: Scenario, engine: str) -> Kernel:
 
 def _pays(scenario: Scenario) -> bool:
     """Whether compiled loops are likely to end this run sooner than Python, loading included."""
-    if not has_numba():
-        return False
     compiled, kind = sys.modules.get("hapticclay.stepping.compiled"), kind_of(scenario)
     if compiled is not None and compiled.is_warm(kind):
         return True
     name, steps = kind.__name__, scenario.t_max / scenario.dt
-    wait = LOADING if any(cache_folder().glob(f"{name}.*")) else COMPILING[name]
-    return 1e-6 * SAVED[name] * steps >= 2.0 * wait  # runs tend to end before t_max
+    saved = 0.5e-6 * SAVED[name] * steps  # half: runs tend to end before t_max
+    if saved < LOADING or not has_numba():
+        return False
+    with contextlib.suppress(OSError, RuntimeError):  # no home: nothing is kept
+        if any(cache_folder().glob(f"{name}.*")):
+            return True
+    return saved >= COMPILING[name]
 
 
 def load_compiled() -> Any:

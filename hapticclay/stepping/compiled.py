@@ -10,11 +10,11 @@ import contextlib
 import ctypes
 import functools
 import inspect
+import os
 import re
 import signal
 import sys
 import threading
-import time
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -84,8 +84,11 @@ def _put_row(rows, at, *row):
 
 
 def _mark(kind: type[run.Run], whole: bool) -> Path:
-    """A file that says that this machine code is kept on disk."""
-    return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
+    """A file that says that this machine code is kept on disk; the null device without a home."""
+    try:
+        return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
+    except (OSError, RuntimeError):
+        return Path(os.devnull, "nothing")
 
 
 def _compiled(*functions: Any) -> list[Any]:
@@ -188,17 +191,11 @@ class BatchPool:
         self.every = every
         self.own = threading.local()
 
-    def _go(
-        self, scenario: Scenario, every: int, brief: bool, watched: bool = False
-    ) -> tuple[run.Run, float]:
-        """The run, made, and the seconds it took."""
-        kind = run.kind_of(scenario)
+    def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[run.Run, float]:
+        """The run, made by this thread's engines, and the seconds it took."""
         if not hasattr(self.own, "store"):
             self.own.store = run.EngineStore(WHOLE)
-        made = kind(scenario, every, WHOLE, self.own.store, brief, watched)
-        begin = time.perf_counter()
-        made.go(None)
-        return made, time.perf_counter() - begin
+        return run.completed(scenario, every, WHOLE, self.own.store, None, brief)
 
     def run(self, scenario: Scenario) -> tuple[run.Run, float]:
         """Makes a run.
@@ -209,9 +206,7 @@ class BatchPool:
         Returns:
             The run, and the seconds it took.
         """
-        with contextlib.suppress(run.NeedsMonitor):
-            return self._go(scenario, self.every, False)
-        return self._go(scenario, self.every, False, True)
+        return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
         """The end of a run, without its samples.
@@ -222,10 +217,7 @@ class BatchPool:
         Returns:
             As Run.brief.
         """
-        if scenario.stop:
-            with contextlib.suppress(run.NeedsMonitor):
-                return self._go(scenario, LAST_ONLY, True)[0].brief()
-        return self._go(scenario, LAST_ONLY, False, True)[0].brief()
+        return self._go(scenario, LAST_ONLY, True)[0].brief()
 
 
 def kernel(scenario: Scenario) -> run.Kernel:

@@ -9,6 +9,7 @@ import hashlib
 import math
 import os
 import struct
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -585,6 +586,39 @@ def kind_of(scenario: Scenario) -> type[Run]:
 
         return RungeKuttaRun
     return LeapfrogRun
+
+
+def completed(  # noqa: PLR0913  # one a condition of the run
+    scenario: Scenario,
+    every: int,
+    kernel: Kernel,
+    store: EngineStore,
+    progress: Callable[[float, float], bool | None] | None = None,
+    brief: bool = False,
+) -> tuple[Run, float]:
+    """Makes a run; a second time if the monitor has to look at rows that are not kept.
+
+    Args:
+        scenario: what to run.
+        every: as in Run.
+        kernel: as in Run.
+        store: as in Run.
+        progress: as in Run.go.
+        brief: as in Run.
+
+    Returns:
+        The run, and the seconds it took.
+    """
+    kind, brief = kind_of(scenario), brief and scenario.stop
+    watched = every > 1 and progress is not None  # which must not begin anew
+    while True:
+        run = kind(scenario, every, kernel, store, brief, watched)
+        begin = time.perf_counter()
+        try:
+            run.go(progress)
+            return run, time.perf_counter() - begin
+        except NeedsMonitor:
+            brief, watched = False, True
 
 
 @functools.cache

@@ -18,10 +18,12 @@ from ..errors import ParameterError
 from ..model import arm, clay, controller
 from ..model.arm import I1, I2, TRACE_W
 from ..model.constants import C_POLE, L1, L2, G, S
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
 from . import loop, path
 from .loop import SXX, SYY
 from .path import INF, OPEN, ROW, TOUCH, put5, put6, put8, put10, put17
-from .run import CROSSINGS_ROOM, Run
+from .run import Run
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most of them for one sample
@@ -450,6 +452,17 @@ class RungeKutta(NamedTuple):
         return vy if i else vx
 
 
+def fastest_rate(scenario: Scenario) -> float:
+    """Fastest rate of a scene, by which the explicit method divides its steps [1/s].
+
+    Args:
+        scenario: the scene.
+    """
+    th, clay = scenario.operator or NO_HAND, scenario.clay
+    b = max((*clay.x.values, *clay.y.values)) if clay else 0.0
+    return (b + th.damper) * TRACE_W + math.sqrt(th.spring * TRACE_W)
+
+
 class RungeKuttaRun(Run):
     """A run by `RungeKutta`.
 
@@ -462,10 +475,7 @@ class RungeKuttaRun(Run):
     def _start(self) -> None:
         super()._start()
         s, now = self.scenario, self.s
-        _, damper, spring = now["hand"]
-        b = max((*s.clay.x.values, *s.clay.y.values)) if s.clay else 0.0
-        fastest = (b + damper) * TRACE_W + math.sqrt(spring * TRACE_W)
-        parts = max(1, math.ceil(s.dt * fastest / STABLE_STEP))
+        parts = max(1, math.ceil(s.dt * fastest_rate(s) / STABLE_STEP))
         if parts > SUBSTEPS:
             bound = f"explicit: would take {parts} steps a sample in so stiff a scene"
             raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
@@ -478,9 +488,7 @@ class RungeKuttaRun(Run):
             return
         now, parts = self.s, self.s["substeps"]
         most = max(1, COSINES // (2 * parts * max(1, len(self.e.muscle), len(self.e.command))))
-        now["crossed"] = 0
-        while now["code"] == OPEN and now["filled"] < room and now["crossed"] < CROSSINGS_ROOM - 3:
-            n = max(0, min(room - now["filled"], self.last - self.i, most))
-            now["first"] = self.i
-            self._arrays(ahead=stages_ahead(self, self.i, n + 1, parts))
-            self.kernel.advance(self, min(room, now["filled"] + max(n, 1)))
+        n = max(0, min(room - now["filled"], self.last - self.i, most))
+        now["first"] = self.i
+        self._arrays(ahead=stages_ahead(self, self.i, n + 1, parts))
+        super()._make(min(room, now["filled"] + max(n, 1)))
