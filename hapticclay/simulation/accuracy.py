@@ -343,9 +343,7 @@ class Trial:
             return record, compare_times(*traces.values(), order=order)
         compared = compare_positions(*traces.values(), order=order)
         # decays that no step resolves leave their error in one sample, which may not show it
-        if fastest_rate(self.scenario) * dt > STABLE_STEP and _hides(
-            *traces.values()
-        ):
+        if fastest_rate(self.scenario) * dt > STABLE_STEP and _hides(*traces.values()):
             compared = compared._replace(confirmed=False)
         return self._thinned(record), compared
 
