@@ -21,6 +21,7 @@ import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.model.arm import PAPER
 from hapticclay.model.hardware import Coupling, Interface
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import simulate
@@ -32,14 +33,14 @@ from . import common
 
 def arm(*files: str, change: Callable[[Any], None] | None = None) -> mujoco.MjModel:
     """The arm with these parts of mjcf/, and what change adds."""
-    spec = engine.compose_spec(["arm.xml", *files])
+    spec = engine.compose_spec(["arm.xml", *files], PAPER)
     if change:
         change(spec)
     return spec.compile()
 
 
 def _skin(spec: Any) -> None:
-    for body, *skin in stage.SKIN:
+    for body, *skin in stage.arm_skin(PAPER):
         stage._skin(spec.body(body) if body else spec.worldbody, *skin[:-1], "")
 
 

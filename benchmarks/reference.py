@@ -234,9 +234,7 @@ def _solve(m: float, S, x: float, y: float) -> tuple[float, float]:
 def _signal(multisine) -> Callable[[float], Any] | None:
     if multisine is None:
         return None
-    from hapticclay.model.signals import Signal  # its phases are the scenario's, by definition
-
-    s = Signal(multisine)
+    s = multisine  # its phases are the scenario's, by definition
     return lambda t: [
         float(np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))) for i in (0, 1)
     ]

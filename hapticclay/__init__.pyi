@@ -2,9 +2,14 @@
 
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
+from .model.arm import Arm as Arm
 from .model.clay import Clay as Clay
+from .model.clay import Grid as Grid
 from .model.clay import Profile as Profile
-from .model.controller import Compensator as Compensator
+from .model.clay import Smooth as Smooth
+from .model.compensator import Compensator as Compensator
+from .model.constants import SecondOrder as SecondOrder
+from .model.controller import Servo as Servo
 from .model.experiments import EXPERIMENTS as EXPERIMENTS
 from .model.experiments import SCENARIOS as SCENARIOS
 from .model.experiments import Experiment as Experiment
@@ -12,11 +17,22 @@ from .model.experiments import constant_cut as constant_cut
 from .model.experiments import free as free
 from .model.experiments import stability_test as stability_test
 from .model.experiments import variable_cut as variable_cut
+from .model.fields import with_fields as with_fields
 from .model.hardware import Coupling as Coupling
 from .model.hardware import Interface as Interface
 from .model.operator import Operator as Operator
+from .model.sampled_controller import Controller as Controller
+from .model.samples import Function as Function
+from .model.samples import Samples as Samples
 from .model.scenario import Scenario as Scenario
+from .model.shapes import Chirp as Chirp
+from .model.shapes import Constant as Constant
+from .model.shapes import Pulse as Pulse
+from .model.shapes import Ramp as Ramp
+from .model.shapes import Step as Step
 from .model.signals import Multisine as Multisine
+from .model.signals import Signal as Signal
+from .model.signals import Sum as Sum
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record
@@ -24,12 +40,16 @@ from .simulation.record import irregularity as irregularity
 from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import port_energy as port_energy
 from .simulation.simulate import simulate as simulate
+from .simulation.stepwise import Sample as Sample
+from .simulation.stepwise import Simulation as Simulation
 from .stepping.engine import build as build
 from .stepping.monitor import Outcome as Outcome
 from .stepping.run import Crossing as Crossing
 from .studies.identification import Identified as Identified
 from .studies.identification import Noise as Noise
 from .studies.identification import identify as identify
+from .studies.measurement import Measurement as Measurement
+from .studies.measurement import identify_data as identify_data
 from .studies.removal import removed as removed
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map
@@ -38,6 +58,7 @@ from .theory.design import compare as compare
 from .theory.design import design_gain as design_gain
 from .theory.design import transparency_error as transparency_error
 from .theory.gain_limit import gain_limit as gain_limit
+from .theory.linear_loop import Loop as Loop
 from .theory.linear_loop import closed_loop_poles as closed_loop_poles
 from .theory.margins import Box as Box
 from .theory.margins import Margins as Margins
@@ -52,5 +73,6 @@ from .theory.margins import transparency as transparency
 from .theory.margins import worst_case as worst_case
 from .theory.passivity import clay_passivity as clay_passivity
 from .theory.passivity import passivity as passivity
+from .views.images import gray_image as gray_image
 
 __version__: str

@@ -150,6 +150,45 @@ def numbers_of(
     )
 
 
+def table_of(
+    field: str,
+    value: object,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    above: bool = False,
+    unit: str = "",
+) -> tuple[tuple[float, ...], ...]:
+    """Returns value as rows of floats of one length, each checked as by `number`.
+
+    Args:
+        field: name for the error.
+        value: the numbers to check [unit], rows of them or an array, shape (n, m); may be empty.
+        low: smallest value.
+        high: largest value.
+        above: whether low itself is refused.
+        unit: unit for the error.
+
+    Raises:
+        ParameterError: no such table, or one of the numbers was refused.
+    """
+    import numpy as np
+
+    bound = "must be rows of numbers, all of one length"
+    try:
+        table = np.asarray(value)
+    except ValueError:
+        raise ParameterError(field, value, bound) from None
+    if table.size == 0 and table.dtype.kind == "f":
+        return ()
+    if table.ndim != 2 or table.dtype.kind not in "fiu":
+        raise ParameterError(field, value, bound)
+    good = np.isfinite(table) & (table >= low) & (table <= high)
+    for i, j in np.argwhere(~good | (table == low) if above else ~good)[:1].tolist():
+        number(f"{field}[{i}, {j}]", table[i, j].item(), low, high, above=above, unit=unit)
+    return tuple(map(tuple, table.astype(float).tolist()))
+
+
 def pair(
     field: str,
     value: object,
@@ -219,9 +258,9 @@ Check = Callable[[str, Any, Any], Any]  # (name for the error, value, the part i
 def check_fields(part: Any, prefix: str = "") -> None:
     """Checks each field of a frozen dataclass by its annotation.
 
-    Numbers become floats, sequences of numbers become tuples. Fields may be float, int, bool, str,
-    Literal, tuples of floats, other dataclasses, or a union of these with None; float and int take
-    a `Bound`.
+    Numbers become floats, sequences become tuples. Fields may be float, int, bool, str, Literal,
+    tuples of floats, other dataclasses, pairs (x, y) of them, or a union of these with None; float
+    and int take a `Bound`.
 
     Args:
         part: the dataclass; call this first in its __post_init__.
@@ -271,6 +310,8 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
         return _check_union(args, bound)
     if origin is Literal:
         return lambda field, value, part: choice(field, value, args)
+    if _is_pair(hint):
+        return _check_each_axis(hint, [], bound)
     if origin is tuple:
         return _check_tuple(args, bound)
     if hint is float:
@@ -284,6 +325,8 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
         return lambda field, value, part: flag(field, value)
     if hint is str:
         return _check_text
+    if hint is Any:  # the part itself checks it
+        return lambda field, value, part: value
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         article = "an" if hint.__name__[0] in "AEIOU" else "a"
         return _check_part(hint, f"must be {article} {hint.__name__}{optional}")
@@ -299,7 +342,13 @@ def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
     """None, a word, or the one other type."""
     nullable, words = type(None) in kinds, [k for k in kinds if get_origin(k) is Literal]
     others = [k for k in kinds if k is not type(None) and k not in words]
+    pairs = [k for k in others if _is_pair(k)]
+    if pairs:  # of parts, or one part for both axes
+        return _check_each_axis(pairs[0], [k for k in kinds if k not in pairs], bound)
     other = _check_of((others or words)[0], bound, " or None" if nullable else "")
+    if len(others) > 1:
+        told = " or ".join(f"a {k.__name__}" for k in others) + " or None" * nullable
+        other = _check_part(tuple(others), f"must be {told}")
     word = _check_of(words[0], bound) if words else other
 
     def check(field: str, value: Any, part: Any) -> Any:
@@ -310,13 +359,46 @@ def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
     return check
 
 
+def _is_pair(hint: Any) -> bool:
+    """Whether a type is a pair of parts, one an axis."""
+    kinds = get_args(hint)
+    return get_origin(hint) is tuple and len(kinds) == 2 and _part_of(kinds[0]) is not None
+
+
+def _part_of(hint: Any) -> Any:
+    """The dataclass in a type, or in its union with None; None if there is none."""
+    kinds = get_args(hint) or (hint,)
+    return next((k for k in kinds if isinstance(k, type) and dataclasses.is_dataclass(k)), None)
+
+
+def _check_each_axis(pair_hint: Any, single: list[Any], bound: Bound) -> Check:
+    """A pair (x, y) of parts; or one of the single types, where there are any."""
+    each = _check_of(get_args(pair_hint)[0], bound)
+    whole = _check_of(Union[tuple(single)], bound) if single else None  # noqa: UP007
+    part = _part_of(get_args(pair_hint)[0]).__name__
+
+    def check(field: str, value: Any, owner: Any) -> Any:
+        if isinstance(value, tuple | list):
+            if len(value) != 2:
+                raise ParameterError(field, value, f"must be a pair (x, y) of {part}")
+            x, y = (each(f"{field}.{axis}", v, owner) for axis, v in zip("xy", value, strict=True))
+            return (x, y)
+        if whole is None:
+            raise ParameterError(field, value, f"must be a pair (x, y) of {part}")
+        return whole(field, value, owner)
+
+    return check
+
+
 def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
-    """As many floats as the bound names, or any number of them."""
+    """As many floats as the bound names, or any number of them, or any number of rows of them."""
+    if get_origin(kinds[0]) is tuple:
+        return lambda field, value, part: table_of(field, value, **_bound_limits(bound, part))
 
     def check(field: str, value: Any, part: Any) -> Any:
         names: Sequence[str] = bound.names
         if kinds[1:] == (...,):
-            if not hasattr(value, "__len__"):
+            if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
             names = [str(i) for i in range(len(value))]
         return numbers_of(field, value, names, **_bound_limits(bound, part))
@@ -324,7 +406,7 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
     return check
 
 
-def _check_part(kind: type, told: str) -> Check:
+def _check_part(kind: type | tuple[type, ...], told: str) -> Check:
     def check(field: str, value: Any, part: Any) -> Any:
         if not isinstance(value, kind):
             raise ParameterError(field, value, told)

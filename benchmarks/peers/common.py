@@ -13,11 +13,12 @@ from math import cos, sin
 import numpy as np
 
 from hapticclay import build, free
-from hapticclay.model.arm import I1, I2, inverse_kinematics
+from hapticclay.model.arm import PAPER, inverse_kinematics
 from hapticclay.model.constants import C_POLE, L1, L2, G, S
 
 from ..problems import EDGES, PROBLEMS, Result
 
+I1, I2 = PAPER.I1, PAPER.I2
 WALL_LIMIT = 60.0  # [s] of wall time for one run
 MASS1, MASS2 = (
     float(m) for m in build(free()).body_mass[1:]
@@ -56,7 +57,13 @@ class Job:
         o = s.operator
         th = (o.mass, o.damper, o.spring) if o else (0.0, 0.0, 0.0)
         return cls(
-            s.force, s.gain, th, s.clay.x.values, s.origin, inverse_kinematics(*s.origin), s.t_max
+            s.force,
+            s.gain,
+            th,
+            s.clay.x.values,
+            s.origin,
+            inverse_kinematics(*s.origin, s.arm.links),
+            s.t_max,
         )
 
 

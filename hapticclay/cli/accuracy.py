@@ -25,7 +25,7 @@ class AccuracyCommand:
     The experiment runs at a ladder of steps, with both integrators, and under sampled control.
 
     Attributes:
-        scenario: The experiment; its dt and integrator are replaced.
+        scenario: The experiment, or a scenario file; its dt and integrator are replaced.
         out: Folder for accuracy.png, accuracy.md and accuracy.json.
         quick: Run fewer steps, once each.
     """
@@ -39,7 +39,7 @@ class AccuracyCommand:
     def __call__(self) -> int:
         from ..studies.accuracy import accuracy_ladder
 
-        out = self.out or Path("out/accuracy", self.scenario.name)
+        out = self.out or console.default_folder("accuracy", self.scenario)
         writable(out)
 
         def bar(runs: Iterable) -> Iterable:

@@ -33,10 +33,12 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
     "bench": "hapticclay.cli.bench:BenchCommand",
+    "fields": "hapticclay.cli.fields:FieldsCommand",
     "view": "hapticclay.cli.view:ViewCommand",
     "video": "hapticclay.cli.video:VideoCommand",
     "version": "hapticclay.cli.app:VersionCommand",
 }
+PATHS = ("file", "record")  # words behind a command before the path of a scenario or a record
 MARKERS = (
     tyro.conf.OmitSubcommandPrefixes,
     tyro.conf.OmitArgPrefixes,
@@ -154,9 +156,10 @@ KINDS: dict[Any, str] = {float: "number", int: "whole number"}
 
 
 def ordered(words: Sequence[str]) -> list[str]:
-    """Moves the experiment, or "record" and its path, right behind the command.
+    """Moves the experiment, or "file" or "record" and its path, right behind the command.
 
-    Commands that take a record take the constant cut by default, and a path without "record".
+    A path needs neither "file" nor "record". Commands that take a record take the constant cut by
+    default.
 
     Args:
         words: the command line.
@@ -176,25 +179,31 @@ def ordered(words: Sequence[str]) -> list[str]:
     if "scenario" not in own:
         return list(words)
     from ..model.experiments import EXPERIMENTS
+    from ..model.scenario_file import is_scenario_file
 
     recorded = scenario_words in (m.constructor_factory for m in own["scenario"].__metadata__)
-    at = _positional(rest, own, EXPERIMENTS)
+    at = _positional(rest, own, lambda w: w in EXPERIMENTS or is_scenario_file(w) and "=" not in w)
     if at is None:
         bare = not recorded or {"-h", "--help"} & set(rest)
         return [command, *rest] if bare else [command, "constant", *rest]
     word = rest.pop(at)
-    if recorded and word == "record":
+    if word == "file" or (recorded and word == "record"):
         return [command, word, *rest]
+    if is_scenario_file(word):
+        return [command, "file", word, *rest]
     if recorded and (os.sep in word or Path(word).exists()) and word not in EXPERIMENTS:
         return [command, "record", word, *rest]
     try:
         return [command, choice("experiment", word, tuple(EXPERIMENTS)), *rest]
     except ParameterError as error:
-        more = " (or give the folder of a record)" if recorded else ""
+        more = " (or give a scenario file, .toml or .json"
+        more += ", or the folder of a record)" if recorded else ")"
         raise ParameterError(error.field, error.value, error.bound + more) from None
 
 
-def _positional(words: list[str], own: dict[str, Any], experiments: Any) -> int | None:
+def _positional(
+    words: list[str], own: dict[str, Any], is_scenario: Callable[[str], bool]
+) -> int | None:
     """Index of the first word that is neither an option nor the value of one."""
     i = 0
     while i < len(words):
@@ -203,10 +212,10 @@ def _positional(words: list[str], own: dict[str, Any], experiments: Any) -> int 
             return i
         name, given, _ = word.partition("=")
         i += 1
-        if _plain(name) in own:
+        if _plain(name) in own and _plain(name) != "set":
             i += 0 if given else _count(own[_plain(name)])
-        else:  # an option of the experiment, which comes later
-            while i < len(words) and not _is_option(words[i]) and words[i] not in experiments:
+        else:  # --set, or an option of the experiment, which comes later
+            while i < len(words) and not _is_option(words[i]) and not is_scenario(words[i]):
                 i += 1
     return None
 
@@ -227,6 +236,8 @@ def options(words: Sequence[str]) -> dict[str, Any]:
 
         if len(words) > 1 and words[1] in EXPERIMENTS:
             out |= {name: p.kind for name, p in parameters(EXPERIMENTS[words[1]]).items()}
+        if words[1:2] != ["record"]:
+            out["set"] = tuple[str, ...]
     return {name.replace("_", "-"): kind for name, kind in out.items()}
 
 
@@ -247,7 +258,7 @@ def _unknown(words: Sequence[str], word: str) -> ParameterError:
     """The error for a word that was left over."""
     known = options(words)
     with_experiment = "scenario" in known and words[1:2] and not _is_option(words[1])
-    path = " ".join(words[: 2 if with_experiment and words[1] != "record" else 1])
+    path = " ".join(words[: 2 if with_experiment and words[1] not in PATHS else 1])
     word = word.partition("=")[0]
     if not _is_option(word):
         return ParameterError("arguments", "", f"{word!r}: one word too many for {path}")
@@ -264,8 +275,9 @@ def _refusal(words: Sequence[str], complaint: str) -> ParameterError:
         if _is_option(word) and _plain(word.partition("=")[0]) not in names:
             return _unknown(words, word)
     if missing := re.match(r"Expected one of {(.*)}", text):
-        what = "an experiment" if words else "a command"
-        return ParameterError("arguments", "", f"give {what}: {missing[1]}")
+        what = "an experiment or a scenario file" if words else "a command"
+        names = missing[1].removesuffix(", file")
+        return ParameterError("arguments", "", f"give {what}: {names}")
     found = re.match(r"(?:Error parsing|invalid choice|Missing value).*?--([\w-]+)", text)
     if not found or _plain(found[1]) not in known:
         return ParameterError("arguments", "", text)

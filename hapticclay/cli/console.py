@@ -6,6 +6,7 @@ import contextlib
 import inspect
 import json
 import math
+import re
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,20 +22,71 @@ if TYPE_CHECKING:
     from ..model.scenario import Scenario
 
 
+SET_HELP = (
+    "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
+    "compensator.den=1,40,0 operator.mass=500g; hapticclay fields lists the names."
+)
+Changes = Annotated[  # words NAME=VALUE behind each --set
+    tuple[tuple[str, ...], ...],
+    tyro.conf.arg(name="set", metavar="NAME=VALUE", help=SET_HELP),
+    tyro.conf.UseAppendAction,
+]
+
+
 def experiment_words() -> Any:
-    """The experiments as subcommands of a command: the type of its field `scenario`."""
+    """The experiments, and scenario files, as subcommands: the type of a command's `scenario`."""
     from ..model.experiments import EXPERIMENTS
 
+    file = Annotated[Any, tyro.conf.subcommand("file", constructor=load_scenario_words)]
     return Union[  # noqa: UP007
-        tuple(
-            Annotated[Any, tyro.conf.subcommand(name, constructor=_scenario_parser(kind))]
-            for name, kind in EXPERIMENTS.items()
+        (
+            *(
+                Annotated[Any, tyro.conf.subcommand(name, constructor=_scenario_parser(kind))]
+                for name, kind in EXPERIMENTS.items()
+            ),
+            file,
         )
     ]
 
 
+def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ()) -> Any:
+    """A scenario in a file, .toml or .json; the word "file" may be left out.
+
+    Args:
+        path: the file.
+        changes: fields that differ from those of the file.
+    """
+    from ..model.scenario_file import load_scenario
+
+    return load_scenario(path, named_changes(changes))
+
+
+def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """Values by dotted name that were given behind --set.
+
+    Args:
+        words: name=value, a sequence each --set.
+
+    Raises:
+        ParameterError: a word is not name=value, or a name stands twice.
+    """
+    from ..model.fields import named_values
+
+    return named_values("--set", (word for some in words for word in some))
+
+
+def default_folder(command: str, scenario: Scenario) -> Path:
+    """The folder for what a command writes about a scenario.
+
+    Args:
+        command: its name.
+        scenario: the scenario, whose name is that of the folder.
+    """
+    return Path("out", command, re.sub(r"[^\w.+-]+", "-", scenario.name).strip(".-") or "scenario")
+
+
 def scenario_words() -> Any:
-    """The experiments and saved records as subcommands of a command."""
+    """The experiments, scenario files and saved records as subcommands of a command."""
     record = Annotated[Any, tyro.conf.subcommand("record", constructor=load_record)]
     return Union[experiment_words(), record]  # noqa: UP007
 
@@ -54,19 +106,20 @@ def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
     """A function whose signature tells tyro the parameters of an experiment."""
     from ..model.experiments import from_words, parameters
 
-    def scenario(**words: Any) -> Scenario:
-        return from_words(kind, words)
+    def scenario(changes: Sequence[Sequence[str]] = (), **words: Any) -> Scenario:
+        return from_words(kind, words, named_changes(changes))
 
     scenario.__doc__ = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
     scenario.__annotations__ = {
         name: Annotated[p.kind, tyro.conf.arg(help=p.about[:1].upper() + p.about[1:])]
         for name, p in parameters(kind).items()
-    }
+    } | {"changes": Changes}
     scenario.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=p.default)
             for name, p in parameters(kind).items()
         ]
+        + [inspect.Parameter("changes", inspect.Parameter.KEYWORD_ONLY, default=())]
     )
     return scenario
 

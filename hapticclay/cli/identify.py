@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..errors import ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console
@@ -21,21 +22,33 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
+SIMULATED_ONLY = ("noise", "map", "quick", "seed", "control")
+MEASURED_ONLY = ("what", "columns", "band", "held")
 
 
 @dataclass(frozen=True)
 class IdentifyCommand:
     """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6): half a minute.
 
+    With --csv, identify one of them from measured columns instead, in SI units.
+
     Attributes:
         out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png.
-        axis: Axis to identify.
+        axis: Axis to identify; with --csv that of the printed equation, x unless given.
         noise: Add sensor noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms.
         map: Also map G and Sh over the workspace, with and without inertia shaping: two minutes
             more.
         quick: Use shorter signals and a coarser map.
         seed: Seed of the signals' phases and of the noise.
         control: Control of the runs; "sampled" takes some ten minutes, two with --quick.
+        csv: File of measured columns, the names of which are in its first line: time [s], input
+            (for G the command [m], for S and Th the force of the hand on the handle [N]) and
+            output (position of the handle [m]).
+        what: Block of the file, G unless given.
+        columns: Names in the file, as in t=time input=cmd output=pos; reference=NAME adds what
+            drives the experiment, for a position or force that is noisy or part of a loop.
+        band: Lowest and highest frequency to fit [Hz].
+        held: Say that a computer holds the input of the file from sample to sample.
     """
 
     out: Path = Path("out/identify")
@@ -45,8 +58,16 @@ class IdentifyCommand:
     quick: bool = False
     seed: int = 0
     control: Literal["continuous", "sampled"] = "continuous"
+    csv: Path | None = None
+    what: Literal["G", "S", "Th"] | None = None
+    columns: tuple[str, ...] = ()
+    band: tuple[float, float] | None = None
+    held: bool = False
 
     def __call__(self) -> int:
+        self._check_words()
+        if self.csv:
+            return self._measured(self.csv)
         writable(self.out)
         with console.fraction_bar("identify") as show:
             results = self._blocks(show)
@@ -57,6 +78,29 @@ class IdentifyCommand:
             print(coefficient_table(results))
             if found:
                 print("\n" + drift_table(found))
+        print(f"written to {self.out}")
+        return 0
+
+    def _check_words(self) -> None:
+        """Refuse options of the simulated arm with a file, and of a file without one."""
+        names, bound = SIMULATED_ONLY, "is for the simulated arm: leave it out with --csv"
+        if not self.csv:
+            names, bound = MEASURED_ONLY, "is for measured columns: give --csv FILE too"
+        for name in names:
+            if (value := getattr(self, name)) != getattr(type(self), name):
+                raise ParameterError(name, value, bound)
+
+    def _measured(self, file: Path) -> int:
+        from ..studies.measurement import Measurement, identify_data
+
+        writable(self.out)
+        data = Measurement.load(file, column_names(self.columns))
+        axis = "x" if self.axis == "both" else self.axis
+        result = identify_data(data, self.what or "G", axis, band=self.band, held=self.held)
+        try:
+            self._save([result], None)
+        finally:  # a full disk must not hide the result
+            print(coefficient_table([result]))
         print(f"written to {self.out}")
         return 0
 
@@ -98,12 +142,36 @@ class IdentifyCommand:
         }
         console.save_json(data, self.out / "identify.json")
         figures = {
-            block.figure: study_plots.identification_plot([r for r in results if r.what == what])
+            block.figure: study_plots.identification_plot(same)
             for what, block in study_plots.BLOCKS.items()
+            if (same := [r for r in results if r.what == what])
         }
         if found:
             figures["map"] = study_plots.workspace_plot(found)
         console.save_figures(figures, self.out)
+
+
+def column_names(words: Sequence[str]) -> dict[str, str]:
+    """Names of columns from words such as "input=cmd".
+
+    Args:
+        words: of the command line.
+
+    Raises:
+        ParameterError: a word has another form, or a column stands twice.
+    """
+    from ..studies.measurement import COLUMNS
+
+    out: dict[str, str] = {}
+    for word in words:
+        key, _, name = word.partition("=")
+        if not name:
+            bound = "must be words such as t=time input=cmd output=pos"
+            raise ParameterError("columns", word, bound)
+        if choice("columns", key, tuple(COLUMNS)) in out:
+            raise ParameterError("columns", word, f"must give {key} once")
+        out[key] = name
+    return out
 
 
 def coefficient_table(results: Sequence[Identified]) -> str:
@@ -129,7 +197,8 @@ def coefficient_table(results: Sequence[Identified]) -> str:
     low = min(float(r.coherence.min()) for r in results)
     counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
     table = console.text_table(rows, head, "lllrrrr")
-    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}"
+    way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
+    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}{way}"
 
 
 def drift_table(found: Drift) -> str:

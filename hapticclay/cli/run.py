@@ -1,4 +1,4 @@
-"""`hapticclay run`: simulates one experiment."""
+"""`hapticclay run`: simulates one experiment, or the scenario of a file."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ MOST_ROWS = 6  # of a kind that the table shows
 
 @dataclass(frozen=True)
 class RunCommand:
-    """Run one experiment: print a table, write the record, its summary and its plots.
+    """Run one experiment, or a scenario file: print a table, write record, summary and plots.
 
-    Ctrl-C ends the run and keeps the samples recorded so far.
+    --set changes any part by name, as in --set arm.l1=0.3 servo.x.G.damping=50; hapticclay fields
+    lists the names. Ctrl-C ends the run and keeps the samples recorded so far.
 
     Attributes:
-        scenario: The experiment.
-        out: Folder for record.npz, summary.json and the plots.
+        scenario: The experiment, or a scenario file.
+        out: Folder for record.npz, scenario.toml, summary.json and the plots.
         every: Keep every n-th sample in the record.
         error: Largest error to allow, as in 1e-6 (seconds, of the times at which borders are
             crossed) or 1e-7m (of positions): dt and integrator are then chosen, and verified by
@@ -45,7 +46,7 @@ class RunCommand:
     plots: bool = True
 
     def __call__(self) -> int:
-        out = self.out or Path("out/run", self.scenario.name)
+        out = self.out or console.default_folder("run", self.scenario)
         writable(out)
         with console.ctrl_c() as asked:
             record = simulate_with_progress(self.scenario, self.every, asked, self.error)
@@ -112,11 +113,11 @@ def run_table(record: Record) -> str:
     Args:
         record: the run.
     """
+    from ..model.signals import Multisine
+
     s = record.scenario
-    ways = s.clay.x.along if s.clay else "x"
-    if s.clay and s.clay.y.along != ways:
-        ways = "xy"
-    elif not s.clay and abs(s.force[1]) > abs(s.force[0]):
+    ways = s.clay.along if s.clay else "x"
+    if not s.clay and abs(s.force[1]) > abs(s.force[0]):
         ways = "y"
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
     head = ("path\n[cm]", "b\n[N.s/m]", "fe/v\n[N.s/m]", "fh/v\n[N.s/m]", "steady v\n[m/s]",
@@ -130,7 +131,7 @@ def run_table(record: Record) -> str:
         lines.append(f"{at} crossed at {c.time:.6f} s with {console.fixed(c.speed, 6)} m/s")
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
-    if s.muscle is not None and len(record.t) >= 32:  # the fewest that irregularity() takes
+    if isinstance(s.muscle, Multisine) and len(record.t) >= 32:  # the fewest for irregularity()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
     if record.outcome.advice:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..files import versions, writable
-from ..model.constants import AXES, B_CONSTANT, GAIN, TS
+from ..model.constants import AXES, B_CONSTANT, C_DEN, C_NUM, GAIN, TS, SecondOrder
 from . import console
 
 if TYPE_CHECKING:
-    from ..studies.boundary import Loop
+    from ..model.controller import Servo
+    from ..studies.boundary import PushedLoop
     from ..studies.stability_map import StabilityMap
     from ..theory.margins import Verdict
 
@@ -37,6 +38,11 @@ class StabilityCommand:
         gain: K of the compensator; by default 1 on x and 0.5 on y.
         Ts: Control sample [s]; None for runs in continuous time.
         delay: From a measurement to the torque computed from it [s].
+        num: Numerator of the compensator, descending powers of s.
+        den: Denominator of the compensator, descending powers of s.
+        G: Gain, damping and stiffness of the position loop G; by default as printed.
+        S: Gain, damping and stiffness of Sh, by default as printed; the gain with --shaping, else
+            it is that of the arm.
         impedance: Put the operator's arm Th (Eq. 19) in the loop.
         shaping: Let the servo of the runs shape the inertia, so that Sh holds at every pose.
         map: Plane of the map: a boundary in K or b over clay, delay or pose.
@@ -49,6 +55,10 @@ class StabilityCommand:
     gain: float | None = None
     Ts: float | None = TS
     delay: float = 0.0
+    num: tuple[float, ...] = C_NUM
+    den: tuple[float, ...] = C_DEN
+    G: tuple[float, float, float] | None = None
+    S: tuple[float, float, float] | None = None
     impedance: bool = True
     shaping: bool = False
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose"] = "none"
@@ -56,23 +66,28 @@ class StabilityCommand:
     quick: bool = False
 
     def __call__(self) -> int:
+        from ..model.compensator import Compensator
         from ..model.operator import Operator
-        from ..studies.boundary import Loop
+        from ..studies.boundary import PushedLoop
 
         writable(self.out)
-        loop = Loop(
+        i = AXES.index(self.axis)
+        loop = PushedLoop(
             self.axis,
-            GAIN[AXES.index(self.axis)] if self.gain is None else self.gain,
-            self.b,
-            Operator() if self.impedance else None,
-            self.Ts,
-            self.delay if self.Ts else 0.0,
-            self.shaping,
+            b=self.b,
+            K=GAIN[i] if self.gain is None else self.gain,
+            operator=Operator() if self.impedance else None,
+            servo=self._servo(i),
+            compensator=Compensator(self.num, self.den),
+            Ts=self.Ts,
+            delay=self.delay if self.Ts else 0.0,
+            shaping=self.shaping,
         )
         rows = verdicts(loop, self.delay)
         print(verdict_table(rows))
         operator = loop.operator and asdict(loop.operator)
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": operator, "Ts": self.Ts,
+                 "compensator": asdict(loop.compensator), "servo": asdict(loop.servo),
                  "delay": self.delay, "shaping": self.shaping, "map": self.map,
                  "quick": self.quick}  # fmt: skip
         chart = self._map(loop)
@@ -83,7 +98,17 @@ class StabilityCommand:
         print(f"written to {self.out}")
         return 0
 
-    def _map(self, loop: Loop) -> StabilityMap | None:
+    def _servo(self, i: int) -> Servo:
+        from ..model.controller import SERVO
+
+        printed = SERVO[i]
+        return replace(
+            printed,
+            G=SecondOrder(*self.G) if self.G else printed.G,
+            S=SecondOrder(*self.S) if self.S else printed.S,
+        )
+
+    def _map(self, loop: PushedLoop) -> StabilityMap | None:
         if self.map == "none":
             return None
         from ..studies.stability_map import stability_map
@@ -99,7 +124,7 @@ class StabilityCommand:
         return chart
 
 
-def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
+def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     """Verdicts of the analysis on a loop: question, answer, value, meaning, omega [rad/s].
 
     Margins and transparency are those of continuous time; NaN where the loop is unstable there.
@@ -111,9 +136,10 @@ def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     import numpy as np
 
     from ..theory import margins, passivity
+    from ..theory.linear_loop import TIMING
 
-    axis, K, b, Ts = loop.axis, loop.K, loop.b, loop.Ts or TS
-    kw: dict[str, Any] = dict(operator=loop.operator)
+    K, Ts = loop.K, loop.Ts or TS
+    linear = replace(loop.linear, **TIMING)
     rows: list[dict[str, Any]] = []
 
     def add(question: str, answer: bool | None, value: float, what: str, omega: float) -> None:
@@ -125,7 +151,7 @@ def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
         add(question, v.verdict, v.margin, what, v.omega)
 
     def stable(question: str, **late: Any) -> None:
-        v = margins.coupled_stability(axis, K, b, **late, **kw)
+        v = margins.coupled_stability(replace(linear, **late))
         add(question, v.verdict, v.margin * K, "largest stable K", v.omega)
 
     stable("stable with this hand")
@@ -133,7 +159,7 @@ def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     if delay:
         stable(f"... {1e3 * delay:g} ms late", delay=delay)
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
-    m = margins.margins(axis, K, b, **kw)
+    m = margins.margins(linear)
 
     def response(question: str, value: float, what: str, omega: float) -> None:
         # an unstable loop has no steady state
@@ -144,16 +170,15 @@ def verdicts(loop: Loop, delay: float = 0.0) -> list[dict[str, Any]]:
     response("delay margin of the compensator", 1e3 * m.delay, "ms", m.delay_omega)
     response("disk margin", m.disk, "alpha", m.disk_omega)
     for equation in (11, 13):
-        small = margins.small_gain(axis, K, b, equation=equation, **kw)
+        small = margins.small_gain(linear, equation=equation)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
-    judge("passive: stable with every hand", passivity.passivity(axis, K, b), "least Re Z [N.s/m]")
-    damper = loop.operator.damper if loop.operator else 0.0
+    judge("passive: stable with every hand", passivity.passivity(linear), "least Re Z [N.s/m]")
     judge(
         "held clay passive with this hand",
-        passivity.clay_passivity(b, Ts, damper),
+        passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
         "N.s/m to spare",
     )
-    felt = margins.transparency(axis, K, b, np.array([ONE_HZ]))[0]
+    felt = margins.transparency(linear, np.array([ONE_HZ]))[0]
     response("transparency |fe/fh| at 1 Hz", float(abs(felt)), "1 at best", ONE_HZ)
     return rows
 

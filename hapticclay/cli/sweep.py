@@ -34,13 +34,14 @@ class SweepCommand:
     Give either a SPEC.toml or --grid. The results are one Parquet data set, a row a run, and maps.
 
     Attributes:
-        spec: TOML file: experiment, design, runs, seed, chunk; tables [vary] (name =
-            "low:high:n", "low:high:nlog" or [a, b], and "low:high" or "low:highlog" where design
-            samples) and [fixed].
+        spec: TOML file: experiment (or scenario, a file), design, runs, seed, chunk; tables [vary]
+            (name = "low:high:n", "low:high:nlog" or [a, b], and "low:high" or "low:highlog" where
+            design samples) and [fixed].
         grid: Parameters to vary, as in "b=1:1000:50log gain=0.2:2:20", or, to sample,
-            "b=1:1000log gain=0.2:2"; gain.x is one axis, operator.mass the hand's.
-        fixed: Fixed parameters, as in "t_max=2 shaping=true".
-        experiment: Name of an experiment, as in hapticclay run.
+            "b=1:1000log gain=0.2:2"; gain.x is one axis, arm.l1 and servo.x.G.damping numbers of
+            parts: hapticclay fields lists them all.
+        fixed: Fixed parameters, as in "t_max=2 shaping=true arm.l2=0.4".
+        experiment: Name of an experiment, as in hapticclay run, or a scenario file.
         design: All combinations, a Latin hypercube or a Sobol sequence.
         runs: Number of runs of a Latin hypercube or Sobol sequence.
         seed: Seed of that sample.
@@ -96,20 +97,23 @@ class SweepCommand:
         return 0
 
     def _plan(self) -> Sweep:
+        from ..model.scenario_file import is_scenario_file, read_settings
         from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
 
         if (self.spec is None) == (self.grid is None):
             raise ParameterError("arguments", "", "give either a SPEC.toml or --grid")
         if self.spec is not None:
             return Sweep(**load_sweep(self.spec))
+        file = is_scenario_file(self.experiment)
         return Sweep(
-            self.experiment,
+            "constant" if file else self.experiment,
             parse_grid(self.grid or ""),
             parse_fixed(self.fixed or ""),
             self.design,
             self.runs,
             self.seed,
             self.chunk,
+            read_settings(self.experiment) if file else {},
         )
 
     def _estimate(self, plan: Sweep, left: int, todo: list[int]) -> None:
@@ -162,6 +166,6 @@ def _status(plan: Sweep, done: int) -> Iterator[Callable[[int], object]]:
             text = tqdm.format_meter(now, total, at - begin, initial=done, bar_format=STATUS_LINE)
             print(text, file=sys.stderr, flush=True)
 
-    look: dict[str, Any] = {"unit": "run", "desc": plan.experiment, "delay": 0.0, "leave": True}
+    look: dict[str, Any] = {"unit": "run", "desc": plan.title, "delay": 0.0, "leave": True}
     with console.progress_bar(total=total, initial=done, **look) as bar:
         yield line if bar.disable else bar.update

@@ -20,7 +20,7 @@ class VideoCommand:
     """Film an experiment or a saved record: arm, clay and running plots side by side.
 
     Attributes:
-        scenario: The experiment, or the folder of a record.
+        scenario: The experiment, a scenario file, or the folder of a record.
         out: The file: .mp4, .webp or .gif.
         camera: Point of view.
         speed: Playing speed: 1 is real time, 2 twice as fast.

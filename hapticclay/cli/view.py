@@ -44,7 +44,7 @@ class ViewCommand:
     the record, its summary and its plots are written.
 
     Attributes:
-        scenario: The experiment, or the folder of a record.
+        scenario: The experiment, a scenario file, or the folder of a record.
         stiffness: Stiffness of the hand as a multiple of the spring of Th (Eq. 19); 1 is the
             paper's arm at rest.
         tool_width: Width of the tool [m].
@@ -89,7 +89,7 @@ class ViewCommand:
         if record is None:
             print("nothing was recorded")
             return 0
-        deliver(record, self.out or Path("out/view", record.scenario.name), self.plots)
+        deliver(record, self.out or console.default_folder("view", record.scenario), self.plots)
         return 0
 
     def _session(self, tool: Tool) -> Record | None:

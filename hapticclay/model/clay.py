@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import bisect
+import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..errors import Bound, ParameterError, check_fields, numbers_of
+from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
 from .constants import AXES, B_MAX
 
 
-def split_damping(b0, b1, H, L, R, W, damper):
+def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # plain numbers
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     A step gives half of its clay to the kick before it and half to the kick after it:
@@ -29,7 +30,8 @@ def split_damping(b0, b1, H, L, R, W, damper):
         L: share of the kick before the sample.
         R: share of the kick after the sample.
         W: largest acceleration per unit of force over all directions [1/kg].
-        damper: of the operator's arm, which acts beside the clay [N.s/m].
+        damperx: of the operator's arm, which acts beside the clay, x [N.s/m].
+        dampery: the same, y [N.s/m].
 
     Returns:
         (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on
@@ -44,11 +46,11 @@ def split_damping(b0, b1, H, L, R, W, damper):
     if x0 > most or y0 > most or x1 > most or y1 > most:
         stiff = 1.0
         if x1 > most:
-            sharex = (x1 - most) / (b1[0] + damper)
+            sharex = (x1 - most) / (b1[0] + damperx)
             softx = 1.0 / b1[0] if x0 > most else 0.0
             x1 += x1 - most
         if y1 > most:
-            sharey = (y1 - most) / (b1[1] + damper)
+            sharey = (y1 - most) / (b1[1] + dampery)
             softy = 1.0 / b1[1] if y0 > most else 0.0
             y1 += y1 - most
         x0, y0 = min(x0, most), min(y0, most)
@@ -97,6 +99,39 @@ def viscous_force(bx, by, vx, vy):
     return bx * vx, by * vy
 
 
+def turned_force(c, s, bx, by, vx, vy):  # noqa: PLR0913  # plain numbers, for speed
+    """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
+
+    Args:
+        c: cosine of the angle by which it is turned.
+        s: sine of that angle.
+        bx: damping along its first axis [N.s/m].
+        by: damping along its second axis [N.s/m].
+        vx: velocity, x [m/s].
+        vy: velocity, y [m/s].
+
+    Returns:
+        (fex, fey) [N].
+    """
+    first, second = bx * (c * vx + s * vy), by * (c * vy - s * vx)
+    return c * first - s * second, s * first + c * second
+
+
+def turned_damping(c, s, bx, by):
+    """The damping tensor of clay that is turned, R diag(bx, by) R'.
+
+    Args:
+        c: cosine of the angle by which it is turned.
+        s: sine of that angle.
+        bx: damping along its first axis [N.s/m].
+        by: damping along its second axis [N.s/m].
+
+    Returns:
+        (xx, yy, xy) [N.s/m].
+    """
+    return c * c * bx + s * s * by, s * s * bx + c * c * by, c * s * (bx - by)
+
+
 def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"] = "x") -> Profile:
     """Constant damping in one interval of a coordinate, none elsewhere.
 
@@ -137,14 +172,12 @@ def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
     Returns:
         Disjoint intervals (low, high) [m], ascending, possibly infinite.
     """
-    inf = float("inf")
     out: list[tuple[float, float]] = []
-    for profile in (clay.x, clay.y) if clay else ():
-        if profile.along == AXES[i]:
-            edges = (-inf, *profile.edges, inf)
-            grown = profile.growth or (0.0,) * len(profile.values)
-            spans = zip(edges, edges[1:], profile.values, grown, strict=False)
-            out += [(low, high) for low, high, b, g in spans if b > 0.0 or g > 0.0]
+    for law in clay.laws if clay else ():
+        if AXES[i] in law.along:
+            edges = (-math.inf, *law.lines[i], math.inf)
+            some = np.any(law.some, axis=1 - i)
+            out += [(edges[k], edges[k + 1]) for k in np.flatnonzero(some).tolist()]
     merged: list[tuple[float, float]] = []
     for low, high in sorted(out):
         if merged and low <= merged[-1][1]:
@@ -152,75 +185,6 @@ def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
             merged.pop()
         merged.append((low, high))
     return merged
-
-
-# Rows of a region table, two each (x, y): borders between -inf and inf [m]; damping [N.s/m] and its
-# growth [N.s/m per s], by region of the coordinate that decides; region of the axis's own profile;
-# time of its first entry [s], NaN before. The last row: the coordinate that decides on the x axis,
-# that on the y axis, and the end of the path [m], inf for none.
-EDGE_ROW, VALUE_ROW, RATE_ROW, OWN_ROW, ENTERED_ROW, AXIS_ROWS = 0, 2, 4, 6, 8, 10
-
-
-def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
-    """Tabulates clay and the end of the path for `enter_region`.
-
-    Args:
-        clay: the clay; None for none.
-        length: the run ends when p_x reaches this [m]; None for no end.
-
-    Returns:
-        Array of shape (11, n); its rows are named above.
-    """
-    profiles = (clay.x, clay.y) if clay else ()
-    end = math.inf if length is None else length
-    edges = [sorted({e for f in profiles if f.along == axis for e in f.edges}) for axis in AXES]
-    if length is not None:
-        edges[0] = sorted({e for e in edges[0] if e < end} | {end})
-    width = max(map(len, edges)) + 3
-    out = [[-math.inf, *e] + [math.inf] * (width - 1 - len(e)) for e in edges]
-    out += (
-        [[0.0] * width for _ in range(ENTERED_ROW - VALUE_ROW)]
-        + [[math.nan] * width for _ in AXES]
-        + [[0.0] * width]
-    )
-    for i, f in enumerate(profiles):
-        along = AXES.index(f.along)
-        out[AXIS_ROWS][i] = float(along)
-        for k, low in enumerate([-math.inf, *edges[along]]):
-            j = bisect.bisect_right(f.edges, low)
-            out[VALUE_ROW + i][k], out[OWN_ROW + i][k] = f.values[j], float(j)
-            out[RATE_ROW + i][k] = f.growth[j] if f.growth else 0.0
-    out[AXIS_ROWS][2] = end
-    return np.array(out)
-
-
-def enter_region(table, ix, iy, t):
-    """The region that the handle enters.
-
-    Args:
-        table: from `region_table`; notes the time of first entry where the clay grows.
-        ix: index of the region along x.
-        iy: index of the region along y.
-        t: time of entry [s].
-
-    Returns:
-        (low, high, base, rate), a pair (x, y) each: borders [m] and clay, as in `damping_at`.
-    """
-    basex, ratex = _region_law(table, 0, iy if table[AXIS_ROWS, 0] else ix, t)
-    basey, ratey = _region_law(table, 1, iy if table[AXIS_ROWS, 1] else ix, t)
-    low = (table[EDGE_ROW, ix], table[EDGE_ROW + 1, iy])
-    high = (table[EDGE_ROW, ix + 1], table[EDGE_ROW + 1, iy + 1])
-    return low, high, (basex, basey), (ratex, ratey)
-
-
-def _region_law(table, axis, k, t):
-    value, rate = table[VALUE_ROW + axis, k], table[RATE_ROW + axis, k]
-    if rate:
-        j = int(table[OWN_ROW + axis, k])
-        if table[ENTERED_ROW + axis, j] != table[ENTERED_ROW + axis, j]:
-            table[ENTERED_ROW + axis, j] = t
-        value -= rate * table[ENTERED_ROW + axis, j]
-    return value, rate
 
 
 def damping_at(
@@ -242,8 +206,101 @@ def damping_at(
     return x, y
 
 
+def smooth_damping(table, at, x, y):
+    """Damping at a place by a cubic B-spline in each coordinate; its tangents are continuous.
+
+    Never below the least of its control points nor above the largest.
+
+    Args:
+        table: from `regions.region_table`; at `at` it holds `Smooth.numbers`.
+        at: where in it.
+        x: place, x [m].
+        y: place, y [m].
+
+    Returns:
+        [N.s/m].
+    """
+    most, rows = table[at + 2], table[at + 5]
+    u = (x - table[at]) * table[at + 1]
+    v = (y - table[at + 3]) * table[at + 4]
+    # beyond, all four control points are alike; NaN is put there too
+    u = 0.0 if not u > 0.0 else most if u > most else u
+    v = 0.0 if not v > 0.0 else rows if v > rows else v
+    i, j = int(u), int(v)
+    u, v = u - i, v - j
+    n = int(rows) + 4
+    a = at + 6 + i * n + j
+    b = a + n
+    c = b + n
+    d = c + n
+    w = 1.0 - v
+    k0, k3 = w * w * w, v * v * v
+    k1 = 4.0 - 6.0 * v * v + 3.0 * k3
+    k2 = 6.0 - k0 - k1 - k3
+    w = 1.0 - u
+    h0, h3 = w * w * w, u * u * u
+    h1 = 4.0 - 6.0 * u * u + 3.0 * h3
+    h2 = 6.0 - h0 - h1 - h3
+    return (
+        h0 * (k0 * table[a] + k1 * table[a + 1] + k2 * table[a + 2] + k3 * table[a + 3])
+        + h1 * (k0 * table[b] + k1 * table[b + 1] + k2 * table[b + 2] + k3 * table[b + 3])
+        + h2 * (k0 * table[c] + k1 * table[c + 1] + k2 * table[c + 2] + k3 * table[c + 3])
+        + h3 * (k0 * table[d] + k1 * table[d + 1] + k2 * table[d + 2] + k3 * table[d + 3])
+    ) / 36.0
+
+
+class CellLaw:
+    """What the laws of one axis share: damping that is constant in each cell of a grid.
+
+    They have `borders`, `damping`, `rates` and `along`, as `Grid`.
+    """
+
+    @property
+    def lines(self: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lines along x and along y between cells [m]."""
+        return self.borders
+
+    @property
+    def some(self: Any) -> np.ndarray:
+        """Whether each cell between the lines holds clay, shape (n, m)."""
+        return (self.damping > 0.0) | (self.rates > 0.0)
+
+    def at(self: Any, x: Any, y: Any) -> np.ndarray:
+        """Damping at some places, growth aside [N.s/m].
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        return self.damping[self.index(x, y)]
+
+    def index(self: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Cells of some places; on a line between them, the one beyond it.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+
+        Returns:
+            Indices along x and along y.
+        """
+        at = zip(self.lines, (x, y), strict=True)
+        i, j = (np.searchsorted(edges, place, side="right") for edges, place in at)
+        return i, j
+
+    def within(self: Any, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
+        """Damping of the cells in a box [N.s/m].
+
+        Args:
+            low: its lowest corner [m].
+            high: its highest corner [m].
+        """
+        (i, j), (k, m) = self.index(*low), self.index(*high)
+        return self.damping[i : k + 1, j : m + 1].ravel().tolist()
+
+
 @dataclass(frozen=True)
-class Profile:
+class Profile(CellLaw):
     """Damping b of one axis as a piecewise constant function of one coordinate.
 
     Attributes:
@@ -265,23 +322,400 @@ class Profile:
         regions = [str(i) for i in range(len(self.edges) + 1)]
         numbers_of("clay.values", self.values, regions)
         numbers_of("clay.growth", self.growth, regions if self.growth else ())
-        if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
-            raise ParameterError("clay.edges", self.edges, "must be strictly ascending")
+        check_ascending("clay.edges", self.edges)
         if not any(self.growth):
             object.__setattr__(self, "growth", ())
+
+    @property
+    def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Borders along x and along y [m]."""
+        return (self.edges, ()) if self.along == "x" else ((), self.edges)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """As `Grid.damping`."""
+        return self._cells(self.values)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """As `Grid.rates`."""
+        return self._cells(self.growth or (0.0,) * len(self.values))
+
+    def _cells(self, values: tuple[float, ...]) -> np.ndarray:
+        return np.array([values]).T if self.along == "x" else np.array([values])
+
+
+@dataclass(frozen=True)
+class Grid(CellLaw):
+    """Damping b of one axis on a grid of cells, constant in each.
+
+    A border between cells alike is none: no step ends on it, and no crossing is reported.
+
+    Attributes:
+        x_edges: borders along x [m], ascending, shape (n,).
+        y_edges: borders along y [m], ascending, shape (m,).
+        values: b in each cell [N.s/m], shape (n + 1, m + 1), 0 to 1e9; cell (i, j) lies between
+            x_edges i - 1 and i and y_edges j - 1 and j; the outer cells have no end.
+        growth: rate at which b of each cell grows from when the handle first enters it
+            [N.s/m per s], as values, 0 to 1e9; empty for none.
+    """
+
+    x_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    y_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+    growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+
+    def __post_init__(self):
+        check_fields(self, "clay.")
+        check_ascending("clay.x_edges", self.x_edges)
+        check_ascending("clay.y_edges", self.y_edges)
+        shape = len(self.x_edges) + 1, len(self.y_edges) + 1
+        for name, table in (("values", self.values), ("growth", self.growth)):
+            got = len(table), len(table[0]) if table else 0
+            if got != shape and (name == "values" or table):
+                bound = f"must have shape {shape}, one more than borders each way, has {got}"
+                raise ParameterError(f"clay.{name}", table, bound)
+        if not np.any(self.growth):
+            object.__setattr__(self, "growth", ())
+
+    @property
+    def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Borders along x and along y [m]."""
+        return self.x_edges, self.y_edges
+
+    @functools.cached_property
+    def damping(self) -> np.ndarray:
+        """Damping on entry, a line of cells along y for each along x [N.s/m], shape (n, m)."""
+        return np.array(self.values)
+
+    @functools.cached_property
+    def rates(self) -> np.ndarray:
+        """Rates at which it grows [N.s/m per s], as damping."""
+        return np.array(self.growth) if self.growth else np.zeros(self.damping.shape)
+
+    @property
+    def along(self) -> str:
+        """Coordinates that decide, "x", "y" or "xy"."""
+        return "".join(a for a, e in zip(AXES, self.borders, strict=True) if e) or "x"
+
+    @classmethod
+    def of_function(
+        cls,
+        b: Callable[[float, float], float],
+        x_edges: Sequence[float],
+        y_edges: Sequence[float],
+        outside: float = 0.0,
+    ) -> Grid:
+        """A grid with the values of a function at the centres of its cells.
+
+        Args:
+            b: damping at a place (x, y) [m] [N.s/m].
+            x_edges: borders along x [m], two or more; the first and the last are the outline.
+            y_edges: the same along y.
+            outside: b beyond the outline [N.s/m].
+
+        Raises:
+            ParameterError: there are fewer borders than two, or the function has a value that is
+                out of bounds.
+        """
+        names = ("clay.x_edges", x_edges), ("clay.y_edges", y_edges)
+        x, y = (
+            numbers_of(field, edges, [str(i) for i in range(len(edges))], unit="m")
+            for field, edges in names
+        )
+        for field, edges in names:
+            if len(edges) < 2:
+                raise ParameterError(field, edges, "must be two borders or more, an outline")
+        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in (x, y)]
+        inner = [[b(at, across) for across in middles[1]] for at in middles[0]]
+        return cls(x, y, _framed(inner, outside))
+
+    @classmethod
+    def of_image(
+        cls,
+        image: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        b: tuple[float, float],
+        outside: float = 0.0,
+    ) -> Grid:
+        """A grid with a cell for each pixel of an image; see also `gray_image`.
+
+        Args:
+            image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
+                that of the largest y.
+            x: where the image begins and ends along x [m].
+            y: the same along y.
+            b: damping at black and at white [N.s/m].
+            outside: b beyond the image [N.s/m].
+
+        Raises:
+            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
+                of bounds.
+        """
+        (x0, x1), (y0, y1) = _outline(x, y)
+        inner = _pixels(image, b)
+        columns, rows = inner.shape
+        edges = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+        along_x, along_y = (tuple(e.tolist()) for e in edges)
+        return cls(along_x, along_y, _framed(inner, outside))
+
+
+@dataclass(frozen=True)
+class Smooth(CellLaw):
+    """Damping b of one axis that changes smoothly with the place, by a cubic B-spline.
+
+    The values are control points at the nodes of an even grid: b is a mean of the sixteen around a
+    place, never below the least of them nor above the largest, twice continuously differentiable,
+    and constant from one spacing beyond the outline on. It has no borders: no step ends in it.
+
+    Attributes:
+        x: first and last node along x [m], ascending.
+        y: first and last node along y [m], ascending.
+        values: control points [N.s/m], shape (n, m), 0 to 1e9; b is the same all along an axis with
+            one node.
+    """
+
+    x: Annotated[tuple[float, float], Bound(unit="m")]
+    y: Annotated[tuple[float, float], Bound(unit="m")]
+    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+
+    def __post_init__(self):
+        check_fields(self, "clay.")
+        _outline(self.x, self.y, "clay.")
+        if not self.values or not self.values[0]:
+            raise ParameterError("clay.values", self.values, "must have a node or more each way")
+
+    borders = ((), ())
+    growth = ()
+
+    @functools.cached_property
+    def damping(self) -> np.ndarray:
+        """The control points, a line along y for each along x [N.s/m], shape (n, m)."""
+        return np.array(self.values)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """As `Grid.rates`: zeros."""
+        return np.zeros(self.damping.shape)
+
+    @property
+    def along(self) -> str:
+        """As `Grid.along`."""
+        return "".join(a for a, n in zip(AXES, self.damping.shape, strict=True) if n > 1) or "x"
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """What `smooth_damping` takes.
+
+        Along x, then along y: begin [m], nodes per length [1/m], intervals; control points, with
+        those of the outline beyond it: two lines before the first node, three behind the last.
+        """
+        head = []
+        for (low, high), n in zip((self.x, self.y), self.damping.shape, strict=True):
+            per = (n - 1) / (high - low)
+            head += [low - 1.0 / per if per else low, per, n + 1.0]
+        return np.append(head, np.pad(self.damping, ((2, 3), (2, 3)), mode="edge"))
+
+    @property
+    def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Knots along x and along y [m]: the nodes, and one more at each end."""
+        begin_x, per_x, most_x, begin_y, per_y, most_y = self.numbers[:6].tolist()
+        ways = (begin_x, per_x, most_x), (begin_y, per_y, most_y)
+        x, y = (
+            tuple(low + k / per for k in range(int(most) + 1)) if per else ()
+            for low, per, most in ways
+        )
+        return x, y
+
+    @property
+    def some(self) -> np.ndarray:
+        """Whether there is clay between the knots, shape (n + 3, m + 3), or 1 where n or m is."""
+        near = np.pad(self.damping, 3, mode="edge")
+        n, m = (len(e) + 1 for e in self.lines)
+        windows = np.lib.stride_tricks.sliding_window_view(near, (4, 4))[:n, :m]
+        return windows.max(axis=(2, 3)) > 0.0
+
+    def at(self, x: Any, y: Any) -> np.ndarray:
+        """Damping at some places [N.s/m].
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        numbers: Any = self.numbers
+        table = memoryview(numbers)
+        return np.vectorize(lambda x, y: smooth_damping(table, 0, x, y), otypes=[float])(x, y)
+
+    def within(self, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
+        """Control points of the damping in a box [N.s/m].
+
+        Args:
+            low: its lowest corner [m].
+            high: its highest corner [m].
+        """
+        (i, j), (k, m) = self.index(*low), self.index(*high)
+        last = np.array(self.damping.shape) - 1
+        first, end = np.clip((i - 3, j - 3), 0, last), np.clip((k, m), 0, last) + 1
+        return self.damping[first[0] : end[0], first[1] : end[1]].ravel().tolist()
+
+    @classmethod
+    def of_function(
+        cls,
+        b: Callable[[float, float], float],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        nodes: tuple[int, int],
+    ) -> Smooth:
+        """Smooth clay whose control points are the values of a function at its nodes.
+
+        Args:
+            b: damping at a place (x, y) [m] [N.s/m].
+            x: first and last node along x [m].
+            y: the same along y.
+            nodes: how many there are along x and along y, one or more.
+
+        Raises:
+            ParameterError: an argument, or a value of the function, is out of bounds.
+        """
+        ends = _outline(x, y)
+        count = pair("nodes", nodes, 1.0, 1e6)
+        for name, k in zip(AXES, count, strict=True):
+            if k != int(k):
+                raise ParameterError(f"nodes[{name}]", k, "must be a whole number")
+        at_x, at_y = (np.linspace(*e, int(k)).tolist() for e, k in zip(ends, count, strict=True))
+        return cls(*ends, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
+
+    @classmethod
+    def of_image(
+        cls,
+        image: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        b: tuple[float, float],
+    ) -> Smooth:
+        """Smooth clay with a node at the centre of each pixel of an image; see also `gray_image`.
+
+        Args:
+            image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
+                that of the largest y.
+            x: where the image begins and ends along x [m].
+            y: the same along y.
+            b: damping at black and at white [N.s/m].
+
+        Raises:
+            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
+                of bounds.
+        """
+        spans, values = _outline(x, y), _pixels(image, b)
+        ends = []
+        for (low, high), n in zip(spans, values.shape, strict=True):
+            half = 0.5 * (high - low) / n if n > 1 else 0.0
+            ends.append((low + half, high - half))
+        return cls(ends[0], ends[1], values)  # pyright: ignore[reportArgumentType]
+
+
+def _outline(
+    x: tuple[float, float], y: tuple[float, float], prefix: str = ""
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Begin and end along x and along y [m], checked."""
+    spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
+    for field, span in zip(AXES, spans, strict=True):
+        check_ascending(prefix + field, span)
+    return spans
+
+
+def _pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
+    """Damping of the pixels of an image [N.s/m], from the lowest x and y on, along x first."""
+    gray = np.array(table_of("image", image, 0.0, 1.0))
+    black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
+    if not gray.size:
+        raise ParameterError("image", image, "must have pixels")
+    return ((1.0 - gray) * black + gray * white)[::-1].T
+
+
+def _framed(inner: Any, outside: float) -> Any:
+    """Values of cells, with those of the outer cells around them."""
+    value = number("outside", outside, 0.0, B_MAX, unit="N.s/m")
+    return np.pad(np.asarray(inner), 1, constant_values=value)
+
+
+def check_ascending(field: str, edges: tuple[float, ...]) -> None:
+    """Refuses borders that do not ascend.
+
+    Args:
+        field: name for the error.
+        edges: the borders [m].
+
+    Raises:
+        ParameterError: they do not.
+    """
+    if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+        raise ParameterError(field, edges, "must be strictly ascending")
 
 
 @dataclass(frozen=True)
 class Clay:
-    """Viscous clay: fe = b(p) v on each axis (Eqs. 3, 4 with m = k = 0).
+    """Viscous clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1).
 
     Attributes:
-        x: damping of motion along x.
-        y: damping of motion along y.
+        x: damping bx of motion along x, or along the clay's own first axis where it is turned.
+        y: damping by of motion along y, or along the clay's own second axis.
+        angle: by which those axes are turned from x and y, counterclockwise [rad], -pi to pi.
     """
 
-    x: Profile
-    y: Profile
+    x: Profile | Grid | Smooth
+    y: Profile | Grid | Smooth
+    angle: Annotated[float, Bound(-math.pi, math.pi, "rad")] = 0.0
 
     def __post_init__(self):
         check_fields(self, "clay.")
+
+    @property
+    def laws(self) -> tuple[Profile | Grid | Smooth, Profile | Grid | Smooth]:
+        """Of x and of y."""
+        return self.x, self.y
+
+    @property
+    def smooth(self) -> int:
+        """Which axes have smooth clay: 0 for none, 1 for x, 2 for y, 3 for both."""
+        return sum(k for k, law in zip((1, 2), self.laws, strict=True) if isinstance(law, Smooth))
+
+    @property
+    def along(self) -> str:
+        """Coordinates that decide, "x", "y" or "xy"."""
+        return "".join(a for a in AXES if any(a in law.along for law in self.laws))
+
+    @property
+    def edges(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Borders along x and along y [m], ascending."""
+        x, y = (tuple(sorted({e for f in self.laws for e in f.borders[i]})) for i in (0, 1))
+        return x, y
+
+    @property
+    def largest(self) -> float:
+        """Largest damping, growth aside [N.s/m]."""
+        return float(max(law.damping.max() for law in self.laws))
+
+    @property
+    def fastest(self) -> float:
+        """Largest rate at which it grows [N.s/m per s]."""
+        return float(max(law.rates.max() for law in self.laws))
+
+    @property
+    def grows(self) -> bool:
+        """Whether it grows anywhere."""
+        return bool(self.x.growth or self.y.growth)
+
+    def at(self, x: Any, y: Any) -> np.ndarray:
+        """Damping of both axes at some places, growth aside.
+
+        Args:
+            x: coordinates [m], any shape.
+            y: coordinates [m], any shape that goes with it.
+
+        Returns:
+            [N.s/m], shape (2, ...).
+        """
+        b = self.x.at(x, y)
+        return np.stack([b, b if self.y is self.x else self.y.at(x, y)])

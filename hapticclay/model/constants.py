@@ -6,23 +6,30 @@ Virtual Reality", Journal of Intelligent and Robotic Systems 35 (2002) 247-264.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated
+
+from ..errors import Bound, check_fields
 
 AXES = ("x", "y")
 
 
-class SecondOrder(NamedTuple):
-    """The transfer function gain / (s^2 + damping s + stiffness).
+@dataclass(frozen=True)
+class SecondOrder:
+    """The transfer function gain / (s^2 + damping s + stiffness), stable.
 
     Attributes:
-        gain: its numerator [unit of the output per unit of the input and s^2].
-        damping: coefficient of s [1/s].
-        stiffness: constant coefficient [1/s^2].
+        gain: its numerator, > 0, at most 1e12: for G in 1/s^2, for Sh in 1/kg.
+        damping: coefficient of s [1/s], > 0, at most 1e6.
+        stiffness: constant coefficient [1/s^2], > 0, at most 1e12.
     """
 
-    gain: float
-    damping: float
-    stiffness: float
+    gain: Annotated[float, Bound(0.0, 1e12, above=True)]
+    damping: Annotated[float, Bound(0.0, 1e6, "1/s", above=True)]
+    stiffness: Annotated[float, Bound(0.0, 1e12, "1/s^2", above=True)]
+
+    def __post_init__(self):
+        check_fields(self, "servo.")
 
 
 CM = 1e-2  # the paper prints lengths in centimetres
@@ -38,6 +45,7 @@ S = (
 )  # [m/N], Eqs. 17, 18
 
 C_POLE = 10.0  # C = K/(s^2 + 10 s) [m/N], Eqs. 20, 22, 27: virtual mass 1/K, damper 10/K
+C_NUM, C_DEN = (1.0,), (1.0, C_POLE, 0.0)  # C/K, in descending powers of s
 B_CONSTANT = 90.0  # clay of the constant cut [N.s/m], Eq. 21
 CLAY_X = (0.05, 0.15)  # the clay lies 5 cm ahead of the tool and is 10 cm long [m], Sec. 4.1
 PATH_LENGTH = 0.20  # the records of Fig. 8 run to 20 cm [m]
@@ -60,3 +68,12 @@ GAIN = (1.0, 0.5)  # K = 1 on y is unstable in the printed model for 62 < b < 39
 TORQUE_LIMIT = (40.0, 40.0)  # [N.m], ours: direct-drive motors for such inertias
 
 B_MAX = 1e9  # [N.s/m]; the engine refuses controls above 1e10
+
+
+def each_axis(part):
+    """A part that both axes share, or a pair of parts, as a pair (x, y).
+
+    Args:
+        part: the part, or a tuple of two.
+    """
+    return part if isinstance(part, tuple) else (part, part)

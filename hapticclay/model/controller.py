@@ -10,25 +10,51 @@ pose. The functions below are one kick of that law (docs/equations.md, section 4
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
-from ..errors import Bound, check_fields, choice
+from ..errors import check_fields
 from . import arm
-from .constants import AXES, C_POLE, G, S, SecondOrder
+from .compensator import Compensator
+from .constants import G, S, SecondOrder
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The servo of one axis: what it makes of the commanded displacement and of the hand's force.
+
+    Attributes:
+        G: closed position loop, handle over compensator output [1/s^2 in its gain] (Eqs. 15, 16).
+        S: sensitivity Sh, handle over net hand force (Eqs. 17, 18). Its gain [1/kg] is imposed
+            where inertia is shaped; else the handle has that of the arm.
+    """
+
+    G: SecondOrder
+    S: SecondOrder
+
+    def __post_init__(self):
+        check_fields(self, "servo.")
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, float]:
+        """Static gain, damping and stiffness of G; gain, damping and stiffness of Sh."""
+        g, s = self.G, self.S
+        return g.gain / g.stiffness, g.damping, g.stiffness, s.gain, s.damping, s.stiffness
+
+
+SERVO = (Servo(G[0], S[0]), Servo(G[1], S[1]))  # as printed, of x and y
 
 
 def servo_coefficients(
-    g: SecondOrder, s: SecondOrder, H: float, L: float, R: float
+    servo: Sequence[float], H: float, L: float, R: float
 ) -> tuple[float, float, float, float, float]:
     """Coefficients of one axis of the servo in one kick.
 
     Args:
-        g: closed position loop G (Eqs. 15, 16).
-        s: sensitivity Sh (Eqs. 17, 18).
+        servo: numbers of the axis, see `Servo.numbers`.
         H: length of the kick [s].
         L: share of the kick before the sample.
         R: share of the kick after the sample.
@@ -37,8 +63,9 @@ def servo_coefficients(
         (keep, take, after, before, spring): the first two of the reference model, as in
         `compensator_coefficients`; the others of the handle, as in `servo_acceleration`.
     """
-    keep, take = compensator_coefficients(g.damping, H, L, R)
-    return keep, take * g.stiffness, 1.0 / H + s.damping * R, 1.0 / H - s.damping * L, s.stiffness
+    keep, take = compensator_coefficients(servo[1], H, L, R)
+    damping = servo[4]
+    return keep, take * servo[2], 1.0 / H + damping * R, 1.0 / H - damping * L, servo[5]
 
 
 def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PLR0913  # of one axis
@@ -61,12 +88,11 @@ def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PL
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
-def feedback_law(g, s, delta, y, yd, p, v, c):
+def feedback_law(servo, delta, y, yd, p, v, c):
     """Servo acceleration of one axis at an instant, without forces; `feedback_vector` as a law.
 
     Args:
-        g: closed position loop G (Eqs. 15, 16).
-        s: sensitivity Sh (Eqs. 17, 18).
+        servo: numbers of the axis, see `Servo.numbers`.
         delta: compensator output [m].
         y: reference position [m].
         yd: reference velocity [m/s].
@@ -77,9 +103,9 @@ def feedback_law(g, s, delta, y, yd, p, v, c):
     Returns:
         (acceleration of the handle, acceleration of the reference) [m/s^2].
     """
-    ydd = g.stiffness * (delta - y) - g.damping * yd
+    ydd = servo[2] * (servo[0] * delta - y) - servo[1] * yd
     # a kick of one second from rest, in which the velocity after it is the acceleration
-    a = servo_acceleration(1.0, -s.damping, s.stiffness, ydd, yd, v, y, p, c)
+    a = servo_acceleration(1.0, -servo[4], servo[5], ydd, yd, v, y, p, c)
     return a, ydd
 
 
@@ -115,13 +141,33 @@ def solve_velocity(n, a, W, f, d):
     return ux, uy
 
 
-def velocity_under_torque(H, v, u, tau, f, d):
+def solve_turned(n, g, W, d):
+    """Solves n u = g - W d u, d a tensor, for the handle velocity u after a kick.
+
+    Args:
+        n: weight of u in the servo's law, (x, y) [1/s].
+        g: acceleration without the damping, (x, y) [m/s^2].
+        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
+        d: resisting force per unit of u, (xx, yy, xy) [N.s/m].
+
+    Returns:
+        (ux, uy) [m/s].
+    """
+    xx, xy = n[0] + W[0] * d[0] + W[1] * d[2], W[0] * d[2] + W[1] * d[1]
+    yx, yy = W[1] * d[0] + W[2] * d[2], n[1] + W[1] * d[2] + W[2] * d[1]
+    r = yx / xx
+    uy = (g[1] - r * g[0]) / (yy - r * xy)
+    return (g[0] - xy * uy) / xx, uy
+
+
+def velocity_under_torque(H, v, u, links, tau, f, d):
     """Handle velocity after a kick under given motor torques.
 
     Args:
         H: length of the kick [s].
         v: handle velocity before the kick, (x, y) [m/s].
         u: from `arm.jacobian` [m].
+        links: of the arm, as `Arm.links`.
         tau: motor torques, (shoulder, elbow) [N.m].
         f: hand force without the velocity after the kick, (x, y) [N].
         d: resisting force per unit of that velocity, (x, y) [N.s/m].
@@ -131,20 +177,21 @@ def velocity_under_torque(H, v, u, tau, f, d):
     """
     vx, vy = v
     t1, t2 = tau
-    ax, ay = arm.handle_velocity((t1 - t2) / arm.I1, t2 / arm.I2, u)
+    ax, ay = arm.handle_velocity((t1 - t2) / links[2], t2 / links[3], u)
     n = 1.0 / H
-    W = arm.mobility(u)
+    W = arm.mobility(u, links)
     ux, uy = solve_velocity((n, n), (n * vx + ax, n * vy + ay), W, f, d)
     return ux, uy
 
 
-def kick_at_limit(H, v, u, f, d, tau, limit):
+def kick_at_limit(H, v, u, links, f, d, tau, limit):  # noqa: PLR0913  # plain numbers
     """The kick under torques that the limits of the motors cut.
 
     Args:
         H: length of the kick [s].
         v: handle velocity before the kick, (x, y) [m/s].
         u: from `arm.jacobian` [m].
+        links: of the arm, as `Arm.links`.
         f: as in `solve_velocity` [N].
         d: as in `solve_velocity` [N.s/m].
         tau: torques that the servo asks for, (shoulder, elbow) [N.m].
@@ -159,11 +206,56 @@ def kick_at_limit(H, v, u, f, d, tau, limit):
     dx, dy = d
     t1 = min(max(tau[0], -limit[0]), limit[0])
     t2 = min(max(tau[1], -limit[1]), limit[1])
-    ux, uy = velocity_under_torque(H, v, u, (t1, t2), f, d)
+    ux, uy = velocity_under_torque(H, v, u, links, (t1, t2), f, d)
     ffx = fx - dx * ux
     ffy = fy - dy * uy
     g1, g2 = arm.joint_velocity(ux - vx, uy - vy, u, H)
     return ux, uy, g1, g2, ffx, ffy, t1, t2
+
+
+def turned_kick_at_limit(H, v, u, links, f, d, tau, limit):  # noqa: PLR0913  # plain numbers
+    """As `kick_at_limit`, against a damping tensor: worked out along its principal axes.
+
+    Args:
+        H: length of the kick [s].
+        v: handle velocity before the kick, (x, y) [m/s].
+        u: from `arm.jacobian` [m].
+        links: of the arm, as `Arm.links`.
+        f: as in `solve_velocity` [N].
+        d: resisting force per unit of the velocity after the kick, (xx, yy, xy) [N.s/m].
+        tau: torques that the servo asks for, (shoulder, elbow) [N.m].
+        limit: torque limits, (shoulder, elbow) [N.m].
+
+    Returns:
+        As `kick_at_limit`.
+    """
+    angle = 0.5 * math.atan2(2.0 * d[2], d[0] - d[1])
+    c, s = math.cos(angle), math.sin(angle)
+    first = c * c * d[0] + 2.0 * c * s * d[2] + s * s * d[1]
+    second = s * s * d[0] - 2.0 * c * s * d[2] + c * c * d[1]
+    u1, u2 = along_axes(c, s, u[0], u[1]), along_axes(c, s, u[2], u[3])
+    ux, uy, g1, g2, fx, fy, t1, t2 = kick_at_limit(
+        H, along_axes(c, s, v[0], v[1]), (u1[0], u1[1], u2[0], u2[1]), links,
+        along_axes(c, s, f[0], f[1]), (first, second), tau, limit,
+    )  # fmt: skip
+    ux, uy = along_axes(c, -s, ux, uy)
+    fx, fy = along_axes(c, -s, fx, fy)
+    return ux, uy, g1, g2, fx, fy, t1, t2
+
+
+def along_axes(c, s, x, y):
+    """Components of a vector along axes that are turned.
+
+    Args:
+        c: cosine of the angle by which they are turned.
+        s: sine of that angle.
+        x: component along x.
+        y: component along y.
+
+    Returns:
+        (along the first axis, along the second).
+    """
+    return c * x + s * y, c * y - s * x
 
 
 def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tuple[float, float]:
@@ -184,56 +276,66 @@ def compensator_coefficients(damping: float, H: float, L: float, R: float) -> tu
     return (1.0 / H - damping * L) / n, 1.0 / n
 
 
-def feedback_vector(axis: str) -> np.ndarray:
+def feedback_vector(servo: Servo) -> np.ndarray:
     """Servo acceleration of the law above, without forces, as a row over the state of one axis.
 
     Args:
-        axis: "x" or "y".
+        servo: of the axis.
 
     Returns:
         Shape (6,): p'' = feedback @ (p, p', delta, delta', y, y').
     """
-    i = AXES.index(choice("axis", axis, AXES))
-    g, s = G[i], S[i]
+    g, s = servo.G, servo.S
     reference = [g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
     return np.array([-s.stiffness, -s.damping, *reference])
 
 
-def controller_matrices(axis: str, K: float) -> tuple[np.ndarray, np.ndarray]:
+def controller_matrices(
+    servo: Servo, compensator: Compensator, K: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
 
     Args:
-        axis: "x" or "y".
+        servo: of the axis.
+        compensator: shape of C, of order n.
         K: gain of the compensator.
 
     Returns:
-        A, shape (4, 4), and B, shape (4,), with z = (delta, delta', y, y') and y = G delta.
+        A, shape (n + 2, n + 2), and B, shape (n + 2,); z holds the states of
+        `Compensator.state_space`, with K in its input, then y = G delta and y'. As printed, the
+        states of the compensator are delta and delta'.
     """
-    g = G[AXES.index(choice("axis", axis, AXES))]
-    A, B = np.zeros((4, 4)), np.zeros(4)
-    A[0, 1] = A[2, 3] = 1.0
-    A[1, 1], B[1] = -PRINTED.pole, K
-    A[3] = g.gain, 0.0, -g.stiffness, -g.damping
+    g, n = servo.G, compensator.order
+    own, drive, out, through = compensator.state_space()
+    A, B = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
+    A[:n, :n], A[n, n + 1] = own, 1.0
+    A[n + 1, :n], A[n + 1, n:] = g.gain * out, (-g.stiffness, -g.damping)
+    B[:n], B[n + 1] = K * drive, K * (g.gain * through)
     return A, B
 
 
-def held_compensator(axis: str, K: float, T: float) -> tuple[np.ndarray, np.ndarray]:
+def held_compensator(
+    servo: Servo, compensator: Compensator, K: float, T: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Compensator and reference model over a sample in which the net force is held: z+ = A z + B f.
 
     Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
 
     Args:
-        axis: "x" or "y".
+        servo: of the axis.
+        compensator: shape of C, of order n.
         K: gain of the compensator.
         T: length of the sample [s].
 
     Returns:
-        A, shape (4, 4), and B, shape (4,); z as in `controller_matrices`.
+        A, shape (n + 2, n + 2), and B, shape (n + 2,); z as in `controller_matrices`.
     """
-    m = np.zeros((5, 5))
-    m[:4, :4], m[:4, 4] = controller_matrices(axis, K)
+    A, B = controller_matrices(servo, compensator, K)
+    n = len(B)
+    m = np.zeros((n + 1, n + 1))
+    m[:n, :n], m[:n, n] = A, B
     e = matrix_exponential(T * m)
-    return e[:4, :4], e[:4, 4]
+    return e[:n, :n], e[:n, n]
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
@@ -248,28 +350,3 @@ def matrix_exponential(a: np.ndarray) -> np.ndarray:
     from scipy.linalg import expm
 
     return expm(a)
-
-
-@dataclass(frozen=True)
-class Compensator:
-    """Shape of the compensator: C = K (s + zero)/(s (s + pole)), or K/(s (s + pole)) with no zero.
-
-    Attributes:
-        pole: its pole [rad/s], > 0; as printed 10 (Eqs. 20, 22, 27).
-        zero: its zero [rad/s], > 0, a lead if below the pole; None for none.
-    """
-
-    pole: Annotated[float, Bound(0.0, unit="rad/s", above=True)] = C_POLE
-    zero: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
-
-    def __post_init__(self):
-        check_fields(self, "compensator.")
-
-    @property
-    def fraction(self) -> tuple[Polynomial, Polynomial]:
-        """Numerator and denominator of C/K in s."""
-        numerator = Polynomial([1.0] if self.zero is None else [self.zero, 1.0])
-        return numerator, Polynomial([0.0, self.pole, 1.0])
-
-
-PRINTED = Compensator()

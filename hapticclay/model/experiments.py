@@ -6,6 +6,7 @@ sweeps and plots read its parameters, bounds, units and descriptions from the cl
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import inspect
@@ -13,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import cos, radians
-from typing import Annotated, Any, Literal, NamedTuple, ParamSpec
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..errors import Bound, ParameterError, check_fields, field_types, flag
 from .clay import Clay, Profile, slab
@@ -37,6 +38,19 @@ from .constants import (
     TORQUE_LIMIT,
     TS,
 )
+from .fields import (
+    ENTIRE,
+    Field,
+    bounds_at,
+    dotted_names,
+    field_descriptions,
+    laid_over,
+    make_part,
+    merged_values,
+    nested,
+    no_field,
+    values_of,
+)
 from .operator import Operator
 from .scenario import (
     Control,
@@ -48,7 +62,7 @@ from .scenario import (
     Render,
     SamplePeriod,
     Scenario,
-    Step,
+    StepLength,
     TorqueLimit,
 )
 from .signals import Multisine
@@ -84,13 +98,14 @@ class Experiment:
 
     operator: Operator | None = None
     shaping: bool = False
-    dt: Step = TS
+    dt: StepLength = TS
     t_max: Duration = 60.0
     origin: Position = ORIGIN
     torque_limit: TorqueLimit = TORQUE_LIMIT
     control: Control = "continuous"
     Ts: SamplePeriod = None
     render: Render = "held"
+    _changes: ClassVar[tuple[Mapping[Any, Any], ...]] = ()
 
     def __post_init__(self):
         check_fields(self)
@@ -112,7 +127,28 @@ class Experiment:
         """
         known = field_types(Scenario)
         shared = {k: getattr(self, k) for k in field_types(type(self)) if k in known}
-        return Scenario(name=name, **{**shared, **own})
+        values = {"name": name, **shared, **own}
+        for changes in self._changes:
+            values = merged_values(Scenario, changes, values)
+        return Scenario(**values)
+
+    def changed(self, *changes: Mapping[Any, Any]) -> Scenario:
+        """The scenario of these parameters with any of its fields changed.
+
+        The changes are made before the scenario is checked, so that another arm may go another way.
+
+        Args:
+            *changes: plain data of the fields (`model/fields.py`), the later ones on top.
+
+        Raises:
+            ParameterError: as `scenario`; or there is no such field.
+        """
+        other = copy.copy(self)
+        object.__setattr__(other, "_changes", changes)
+        scenario = other.scenario()
+        for data in changes:  # again, for experiments that do without build_scenario
+            scenario = make_part(Scenario, data, values_of(scenario))
+        return scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,7 +321,7 @@ def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
     Args:
         kind: the experiment.
     """
-    types, told, out = field_types(kind), _descriptions(kind), {}
+    types, told, out = field_types(kind), field_descriptions(kind), {}
     for name, given in inspect.signature(kind).parameters.items():
         hint, bound = types[name]
         if name == "operator":
@@ -297,30 +333,99 @@ def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
     return out
 
 
-def from_words(kind: type[Experiment], words: Mapping[str, Any]) -> Scenario:
+def from_words(
+    kind: type[Experiment], words: Mapping[str, Any], *changes: Mapping[str, Any]
+) -> Scenario:
     """The scenario of an experiment whose parameters are given as in `parameters`.
 
     Args:
         kind: the experiment.
         words: parameters by name; those left out keep their defaults.
+        *changes: parameters, and fields of the scenario, by dotted name; the later ones on top.
 
     Raises:
-        ParameterError: as `Experiment.scenario`.
+        ParameterError: as `Experiment.scenario`; or there is no such parameter or field.
     """
-    given = dict(words)
-    if "impedance" in given:
-        given["operator"] = Operator() if flag("impedance", given.pop("impedance")) else None
-    return kind(**given).scenario()
+    values, others = dict(words), []
+    if "impedance" in values:
+        values["operator"] = _impedance(values.pop("impedance"))
+    for given in changes:
+        own, other = _split_names(kind, nested(given))
+        values = merged_values(kind, own, values)
+        others += [other] if other else []
+    experiment = kind(**values)
+    return experiment.changed(*others) if others else experiment.scenario()
 
 
-def _descriptions(kind: type) -> dict[str, str]:
-    """What the docstrings of a dataclass and its bases say of each field, on one line."""
-    out: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        _, _, section = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")
-        for name, text in re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", section, re.M):
-            out[name] = " ".join(text.split())
-    return dict.fromkeys(field_types(kind), "") | out
+def _impedance(given: Any) -> Operator | None:
+    on = bool(given) if given in (0.0, 1.0) and isinstance(given, float) else given
+    return Operator() if flag("impedance", on) else None
+
+
+def _split_names(
+    kind: type[Experiment], data: dict[Any, Any]
+) -> tuple[dict[Any, Any], dict[Any, Any]]:
+    """Plain data of the parameters of an experiment, and of other fields of the scenario."""
+    types, known = field_types(kind), field_types(Scenario)
+    data, own, other = dict(data), {}, {}
+    if "impedance" in data:
+        hand = _impedance(data.pop("impedance"))
+        data["operator"] = laid_over({ENTIRE: hand}, data.get("operator", {}))
+    for name, value in data.items():
+        if name in types and (name not in known or _reaches(types[name], value)):
+            own[name] = value
+        elif name in known:
+            other[name] = value
+        else:
+            raise no_field(name, value, parameter_names(kind))
+    return own, other
+
+
+def _reaches(field: tuple[Any, Bound | None], value: Any, *names: str) -> bool:
+    """Whether all that plain data names lies below a field."""
+    if isinstance(value, Mapping):
+        return all(
+            _reaches(field, v, *names, *([] if k is ENTIRE else [k])) for k, v in value.items()
+        )
+    return bool(bounds_at(*field, names))
+
+
+def parameter_names(kind: type[Experiment] | None) -> list[str]:
+    """Names of all that can be set of an experiment: its parameters, and fields of the scenario.
+
+    Args:
+        kind: the experiment; None for a scenario alone.
+    """
+    own = parameters(kind) if kind else {}
+    return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
+
+
+def parameter_fields(kind: type[Experiment]) -> list[Field]:
+    """The parameters of an experiment as fields.
+
+    Args:
+        kind: the experiment.
+    """
+    bounds = {name: bound or Bound() for name, (_, bound) in field_types(kind).items()}
+    return [
+        Field(name, p.kind, bounds.get(name, Bound()), p.default, p.about)
+        for name, p in parameters(kind).items()
+    ]
+
+
+def parameter_unit(name: str) -> str:
+    """Unit of a parameter of any experiment, or of a field of a scenario; "" for none.
+
+    Args:
+        name: the parameter, or the dotted name.
+    """
+    head, *rest = name.split(".")
+    for kind in (*EXPERIMENTS.values(), Scenario):
+        if head in field_types(kind):
+            units = [b.unit for b in bounds_at(*field_types(kind)[head], rest)]
+            if any(units):
+                return next(filter(None, units))
+    return ""
 
 
 P = ParamSpec("P")
@@ -337,7 +442,7 @@ def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
     def make(*args: P.args, **parameters: P.kwargs) -> Scenario:
         return kind(*args, **parameters).scenario()
 
-    signature, told = inspect.signature(kind), _descriptions(kind)
+    signature, told = inspect.signature(kind), field_descriptions(kind)
     make.__name__ = make.__qualname__ = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
     make.__signature__ = signature.replace(return_annotation=Scenario)  # type: ignore[attr-defined]
     summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
 
 from ..errors import Bound, ParameterError, check_fields, number
-from .clay import Clay
-from .constants import GAIN, L1, L2, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS
+from . import samples, shapes  # noqa: F401  # so that files and options know every Signal
+from .arm import PAPER, Arm
+from .clay import Clay, Smooth
+from .compensator import PRINTED, Compensator
+from .constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
+from .controller import SERVO, Servo
 from .hardware import JOINTS, Interface
 from .operator import Operator
-from .signals import Multisine
+from .sampled_controller import Controller
+from .signals import Signal
 
+SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
 REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no force can be rendered
+FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
 
 # Types of the fields that experiments share with scenarios.
 Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
-Step = Annotated[float, Bound(1e-6, 0.02, "s")]
+StepLength = Annotated[float, Bound(1e-6, 0.02, "s")]
 Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
 Length = Annotated[float, Bound(-10.0, 10.0, "m")]
 Position = Annotated[tuple[float, float], Bound(unit="m")]
@@ -33,15 +42,16 @@ RENDERS = get_args(Render)
 class Scenario:
     """One run, complete: simulate(scenario) needs nothing else.
 
-    Change it with dataclasses.replace.
+    Change it with dataclasses.replace, or, by dotted name, with `with_fields`.
 
     Attributes:
         name: label used in files and plots.
         clay: the virtual clay; None for free space.
-        gain: compensator gain K on each axis [1/kg], C = K/(s^2 + 10 s), 0 to 1e6; 0 turns the
-            compensator off.
+        gain: compensator gain K on each axis, 0 to 1e6 [1/kg] for the printed compensator, whose
+            virtual mass is 1/K; 0 turns the compensator off.
         force: constant part of the operator's muscle force uh on each axis [N].
-        operator: impedance Th of the operator's arm; None for a pure force (Th = 0).
+        operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
+            pure force (Th = 0).
         shaping: whether the servo shapes the handle's inertia, so that Sh holds at every pose.
         dt: physics and control step [s], 1e-6 to 0.02.
         t_max: the run ends at this time [s], > 0, at most 1e5 ...
@@ -58,21 +68,27 @@ class Scenario:
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
         render: where control is sampled, the clay is "held" (the motors hold its force, computed
             from the sample) or "implicit" (physical, there all the time).
-        muscle: variable part of uh [N]; None for none.
-        command: displacement added to the compensator's output [m]: the multisine less its value
-            at t = 0, so that the run starts without a jump; None for none.
+        muscle: variable part of uh [N], any signal or sum of signals; None for none.
+        command: displacement added to the compensator's output [m]: the signal less its value at
+            t = 0, so that the run starts without a jump; None for none.
         stop: whether the run ends when an axis is judged unstable; False lets it go on against
             the torque limits.
         interface: hardware of a sampled loop; None for an ideal one.
+        arm: the two-link arm.
+        servo: G and Sh of each axis, (x, y).
+        compensator: shape of C, of both axes or a pair (x, y); K/(s^2 + 10 s) as printed. Systems
+            of python-control and scipy.signal are taken as well.
+        controller: a sampled controller of one's own in place of compensator and servo; None for
+            those.
     """
 
     name: str = "free"
     clay: Clay | None = None
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
     force: Force = (1.0, 0.0)
-    operator: Operator | None = None
+    operator: Operator | None | tuple[Operator | None, Operator | None] = None
     shaping: bool = False
-    dt: Step = TS
+    dt: StepLength = TS
     t_max: Duration = 60.0
     length: Annotated[float | None, Bound(-10.0, 10.0, "m")] = PATH_LENGTH
     start: Position = (0.0, 0.0)
@@ -83,12 +99,18 @@ class Scenario:
     control: Control = "continuous"
     Ts: SamplePeriod = None
     render: Render = "held"
-    muscle: Multisine | None = None
-    command: Multisine | None = None
+    muscle: Signal | None = None
+    command: Signal | None = None
     stop: bool = True
     interface: Interface | None = None
+    arm: Arm = PAPER
+    servo: tuple[Servo, Servo] = SERVO
+    compensator: Compensator | tuple[Compensator, Compensator] = PRINTED
+    controller: Controller | None = None
 
     def __post_init__(self):
+        if not isinstance(self.compensator, Compensator):
+            object.__setattr__(self, "compensator", _compensators(self.compensator))
         check_fields(self)
         if self.control == "sampled" and self.integrator != "fast":
             raise ParameterError(
@@ -101,7 +123,18 @@ class Scenario:
                 raise ParameterError(
                     "Ts", self.Ts, f"must be a whole multiple of dt = {self.dt:g} s"
                 )
+        if self.controller is not None and self.control != "sampled":
+            raise ParameterError(
+                "control", self.control, "must be 'sampled' with a controller of one's own"
+            )
+        if self.controller is not None and self.shaping:
+            raise ParameterError(
+                "shaping", self.shaping, "must be False with a controller, which replaces the servo"
+            )
+        self._check_servo()
         self._check_interface()
+        self._check_turned_clay()
+        self._check_smooth_clay()
         self._check_reach("start", self.start)
         if self.length is not None:
             if self.length <= self.start[0]:
@@ -109,6 +142,62 @@ class Scenario:
                     "length", self.length, f"must lie ahead of start x = {self.start[0]:g} m"
                 )
             self._check_reach("length", (self.length, self.start[1]))
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Scenario:
+        """Reads a scenario from a file (docs/scenarios.md).
+
+        Args:
+            path: the file, .toml or .json.
+
+        Raises:
+            ParameterError: the file cannot be read, or a field was refused.
+        """
+        from .scenario_file import load_scenario
+
+        return load_scenario(path)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the fields that differ from the defaults, whole or not at all.
+
+        Args:
+            path: the file, .toml or .json.
+
+        Returns:
+            The file.
+
+        Raises:
+            ParameterError: the file cannot be written, or a part is no data, as a function.
+        """
+        from .scenario_file import save_scenario
+
+        return save_scenario(self, path)
+
+    @property
+    def operators(self) -> tuple[Operator | None, Operator | None]:
+        """Th of x and of y, None for Th = 0."""
+        return each_axis(self.operator)
+
+    @property
+    def compensators(self) -> tuple[Compensator, Compensator]:
+        """Shape of C of x and of y."""
+        return each_axis(self.compensator)
+
+    @property
+    def driven(self) -> bool:
+        """Whether the muscle force or the command varies."""
+        return any(x is not None and x.varies for x in (self.muscle, self.command))
+
+    def _check_servo(self) -> None:
+        """Refuses a servo too fast for the step, which would diverge by itself."""
+        fastest = max(x.stiffness for servo in self.servo for x in (servo.G, servo.S)) ** 0.5
+        fast = self.control == "continuous" and self.integrator == "fast"
+        if fast and self.dt * fastest >= SERVO_STEP:
+            bound = (
+                f"must be < {SERVO_STEP / fastest:.3g} s: the servo's fastest mode has "
+                f"{fastest:.3g} rad/s; integrator='accurate' divides its steps"
+            )
+            raise ParameterError("dt", self.dt, bound)
 
     def _check_interface(self) -> None:
         given, Ts = self.interface, self.Ts or self.dt
@@ -120,8 +209,54 @@ class Scenario:
             raise ParameterError(
                 "render", self.render, "must be 'held' for a passivity controller or a coupling"
             )
+        if self.controller and (given.passivity or given.coupling):
+            bound = "must be without passivity controller and coupling where the law is one's own"
+            raise ParameterError("interface", given, bound)
         number("interface.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("interface.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
+
+    @property
+    def turned(self) -> bool:
+        """Whether clay ties the axes together, its own not being x and y."""
+        return self.clay is not None and self.clay.angle != 0.0
+
+    def _check_turned_clay(self) -> None:
+        """Refuses turned clay where no law of it is known: see docs/equations.md, section 4."""
+        given, clay = self.interface, self.clay
+        if clay is None or not self.turned:
+            return
+        if given and (given.passivity or given.coupling):
+            bound = "must be 0 for a passivity controller or a coupling, which act along x and y"
+            raise ParameterError("clay.angle", clay.angle, bound)
+        b, most = clay.largest + self.t_max * clay.fastest, self._soft_damping()
+        if b > most:
+            bound = (
+                f"must be 0 where clay is stiff: b grows to {b:.4g} N.s/m in t_max, at dt = "
+                f"{self.dt:g} s it may have {most:.4g}; or dt at most {self.dt * most / b:.3g} s, "
+                "or integrator 'accurate'"
+            )
+            raise ParameterError("clay.angle", clay.angle, bound)
+
+    def _soft_damping(self) -> float:
+        """Damping of clay up to which no kick has to be split: see clay.split_damping [N.s/m]."""
+        held = self.control == "sampled" and self.render == "held"
+        if held or self.integrator == "accurate":
+            return math.inf
+        trace = self.arm.links[4]
+        mobility = trace / (1.0 + min(th.mass if th else 0.0 for th in self.operators) * trace)
+        return 2.0 / (self.dt * mobility)
+
+    def _check_smooth_clay(self) -> None:
+        """Refuses smooth clay that is stiff, which the steps would have to land on."""
+        laws = self.clay.laws if self.clay else ()
+        b = max((float(x.damping.max()) for x in laws if isinstance(x, Smooth)), default=0.0)
+        most = self._soft_damping() if b else math.inf
+        if b > most:
+            bound = (
+                f"must be at most {self.dt * most / b:.3g} s in smooth clay of {b:.4g} N.s/m, "
+                f"which may have {most:.4g} at this dt; or integrator 'accurate', or clay of cells"
+            )
+            raise ParameterError("dt", self.dt, bound)
 
     def _check_reach(self, field: str, p: tuple[float, float]) -> None:
         """Refuses p, or a straight path from start to p, out of the arm's reach."""
@@ -131,7 +266,10 @@ class Scenario:
             x0 = self.origin[0] + self.start[0]
             if x0 < 0.0 < x:
                 r = min(r, abs(y))
-        low, high = abs(L2 - L1) + REACH_MARGIN, L1 + L2 - REACH_MARGIN
+        folded, stretched = self.arm.reach
+        bent = 4.0 * self.arm.l1 * self.arm.l2 * math.sin(0.5 * FOLD_MARGIN) ** 2  # law of cosines
+        low = max(folded + REACH_MARGIN, math.sqrt(folded * folded + bent))
+        high = min(stretched - REACH_MARGIN, math.sqrt(stretched * stretched - bent))
         if not low <= r <= high:
             raise ParameterError(
                 field,
@@ -139,3 +277,10 @@ class Scenario:
                 f"unreachable: {r:.4g} m from the shoulder, must be {low:.4g} to {high:.4g} m "
                 f"(origin {self.origin[0]:g}, {self.origin[1]:g} m)",
             )
+
+
+def _compensators(given: Any) -> Any:
+    """Compensators of what may be systems of other packages: one, or a pair."""
+    if isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], list | tuple):
+        return Compensator.of(given[0]), Compensator.of(given[1])
+    return Compensator.of(given)

@@ -1,14 +1,21 @@
-"""Signals that drive a run: multisines, their values and their exact means."""
+"""Signals that drive a run: what every signal can do, sums and multiples, and multisines.
+
+`shapes` has steps, ramps, pulses and chirps, `samples` measured and computed signals.
+"""
 
 from __future__ import annotations
 
 import math
+import numbers
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..errors import Bound, ParameterError, check_fields, integer
+from ..errors import Bound, ParameterError, check_fields, integer, numbers_of
+from . import pieces
 
 MOST_LINES = 100_000
 
@@ -28,53 +35,50 @@ def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
 
-def mean_of_lines(lines, t, h):
-    """Mean of a multisine over [t - h, t + h], line by line; zero without lines.
+@dataclass(frozen=True)
+class Signal(ABC):
+    """A force or a displacement over time, (x, y): `a + b`, `a - b`, `2 * a`, `a(t)`.
 
-    Args:
-        lines: from `Signal.lines`.
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        (x, y).
-    """
-    x, y = 0.0, 0.0
-    for j in range(len(lines)):
-        a = lines[j, 0] * h
-        share = math.sin(a) / a if a else 1.0
-        x += lines[j, 3] * (share * math.cos(lines[j, 0] * t + lines[j, 1]))
-        y += lines[j, 4] * (share * math.cos(lines[j, 0] * t + lines[j, 2]))
-    return x, y
-
-
-class Signal:
-    """A multisine in a form ready for evaluation.
-
-    Args:
-        multisine: the signal.
-
-    Attributes:
-        omega: angular frequency of each line [rad/s], shape (n,).
-        phase: of each line on each axis [rad], shape (n, 2).
-        amplitude: of each line on each axis, shape (2,).
+    Where it jumps, its value is the one from the jump on. A run takes it as cosines and as pieces
+    (`model.pieces`); a new kind of signal is a frozen dataclass that has `pieces`.
     """
 
-    def __init__(self, multisine: Multisine):
-        m = multisine
-        k = np.arange(np.ceil(m.low * m.period - 1e-9), np.floor(m.high * m.period + 1e-9) + 1.0)
-        if m.lines is not None:
-            want = np.geomspace(k[0], k[-1], m.lines)
-            k = k[np.unique(np.abs(k[:, None] - want).argmin(axis=0))]
-        self.omega = 2.0 * np.pi * k / m.period
-        self.phase = np.random.default_rng(m.seed).uniform(0.0, 2.0 * np.pi, (len(k), 2))
-        self.amplitude = np.array(m.rms) * np.sqrt(2.0 / len(k))
+    __array_ufunc__ = None  # so that NumPy's numbers leave the product to __rmul__
 
     @property
-    def lines(self) -> np.ndarray:
-        """One row a line: omega [rad/s], phase x, y [rad], amplitude x, y; shape (n, 5)."""
-        amplitude = np.tile(self.amplitude, (len(self.omega), 1))
-        return np.column_stack((self.omega, self.phase, amplitude))
+    def varies(self) -> bool:
+        """Whether it changes with time."""
+        return True
+
+    @property
+    def cosines(self) -> np.ndarray:
+        """Its multisines: omega [rad/s], phase x, y [rad], amplitude x, y; shape (n, 5)."""
+        return pieces.NO_LINES
+
+    @abstractmethod
+    def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
+        """All of it but multisines, as cubics in time; more than those of the interval may come.
+
+        Args:
+            begin: of the interval [s].
+            end: of the interval [s]; what has no pieces of its own is not evaluated beyond.
+            step: of the run [s]; cubics through single values are half as long.
+
+        Returns:
+            Shape (n, pieces.PIECE).
+        """
+
+    def breaks(self, begin: float, end: float) -> np.ndarray:
+        """Times at which value or slope may jump.
+
+        Args:
+            begin: of the interval [s].
+            end: of the interval [s].
+
+        Returns:
+            Ascending [s], shape (n,); some may lie outside the interval.
+        """
+        return self.pieces(begin, end, math.inf)[1:, 0]
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
         """Mean over [t - h, t + h]; the value at t for h = 0.
@@ -86,9 +90,24 @@ class Signal:
         Returns:
             Shape (2,) or (n, 2).
         """
-        t, h = np.asarray(t)[..., None], np.asarray(h)[..., None]
-        lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
-        return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
+        t, h = np.broadcast_arrays(np.asarray(t, float), np.asarray(h, float))
+        return self._means(t.ravel(), h.ravel()).reshape(*t.shape, 2)
+
+    def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """As `mean`, for arrays of one shape (n,)."""
+        if not len(t):
+            return np.zeros((0, 2))
+        low, high = float((t - h).min()), float((t + h).max())
+        return pieces.pieces_mean(self.pieces(low, high, math.inf), t, h)
+
+    def mean_of_multisines(self, t: Any, h: Any) -> Any:
+        """As `mean`, of its multisines alone; 0 if there are none.
+
+        Args:
+            t: centre of the interval [s], a number or shape (n,).
+            h: half its length [s], a number or shape (n,).
+        """
+        return 0.0
 
     def __call__(self, t: Any) -> np.ndarray:
         """Value at a time.
@@ -101,9 +120,113 @@ class Signal:
         """
         return self.mean(t, 0.0)
 
+    def __add__(self, other: Any) -> Signal:
+        return Sum((self, other)) if isinstance(other, Signal) else NotImplemented
+
+    def __radd__(self, other: Any) -> Signal:
+        return self if other == 0 else NotImplemented  # the start of sum(...)
+
+    def __neg__(self) -> Signal:
+        return Sum((self,), (-1.0,))
+
+    def __sub__(self, other: Any) -> Signal:
+        return self + -other if isinstance(other, Signal) else NotImplemented
+
+    def __mul__(self, factor: Any) -> Signal:
+        return (
+            Sum((self,), (float(factor),)) if isinstance(factor, numbers.Real) else NotImplemented
+        )
+
+    __rmul__ = __mul__
+
 
 @dataclass(frozen=True)
-class Multisine:
+class Sum(Signal):
+    """Signals added up: `a + b - 2 * c`.
+
+    Attributes:
+        parts: the signals; sums among them are taken apart.
+        factors: on each part, -1e6 to 1e6; None for 1.
+    """
+
+    parts: tuple[Signal, ...]
+    factors: tuple[float, ...] | None = None
+
+    def __post_init__(self):
+        parts, factors = self.parts, self.factors
+        if not isinstance(parts, tuple | list) or not parts:
+            raise ParameterError("sum.parts", parts, "must be a sequence of signals")
+        for i, part in enumerate(parts):
+            if not isinstance(part, Signal):
+                raise ParameterError(f"sum.parts[{i}]", part, "must be a Signal")
+        factors = (1.0,) * len(parts) if factors is None else factors
+        names = [str(i) for i in range(len(parts))]
+        factors = numbers_of("sum.factors", factors, names, -1e6, 1e6)
+        flat = [x for pair in zip(parts, factors, strict=True) for x in _scaled_parts(*pair)]
+        object.__setattr__(self, "parts", tuple(part for part, _ in flat))
+        factors = tuple(k for _, k in flat)
+        object.__setattr__(self, "factors", factors if set(factors) != {1.0} else None)
+
+    def _terms(self) -> list[tuple[Signal, float]]:
+        return list(zip(self.parts, self.factors or (1.0,) * len(self.parts), strict=True))
+
+    @property
+    def varies(self) -> bool:
+        """Whether any of them changes with time."""
+        return any(part.varies for part in self.parts)
+
+    @property
+    def cosines(self) -> np.ndarray:
+        """Those of all parts, shape (n, 5)."""
+        return np.concatenate([x.cosines * (1.0, 1.0, 1.0, k, k) for x, k in self._terms()])
+
+    def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
+        """As Signal.pieces.
+
+        Args:
+            begin: as there.
+            end: as there.
+            step: as there.
+        """
+        terms = self._terms()
+        return pieces.added_pieces(
+            [x.pieces(begin, end, step) for x, _ in terms], [k for _, k in terms]
+        )
+
+    def breaks(self, begin: float, end: float) -> np.ndarray:
+        """As Signal.breaks.
+
+        Args:
+            begin: as there.
+            end: as there.
+        """
+        return np.unique(np.concatenate([x.breaks(begin, end) for x in self.parts]))
+
+    def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        out = np.zeros((len(t), 2))
+        for part, k in self._terms():
+            out += k * part.mean(t, h)
+        return out
+
+    def mean_of_multisines(self, t: Any, h: Any) -> Any:
+        """As Signal.mean_of_multisines.
+
+        Args:
+            t: as there.
+            h: as there.
+        """
+        return sum(k * x.mean_of_multisines(t, h) for x, k in self._terms())
+
+
+def _scaled_parts(part: Signal, factor: float) -> list[tuple[Signal, float]]:
+    """Parts of a multiple of a signal, with their factors."""
+    if isinstance(part, Sum):
+        return [(x, k * factor) for x, k in part._terms()]
+    return [(part, factor)]
+
+
+@dataclass(frozen=True)
+class Multisine(Signal):
     """A periodic signal: cosines of random phases at multiples of 1/period between low and high.
 
     All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System
@@ -138,3 +261,59 @@ class Multisine:
             raise ParameterError("multisine.high", self.high, bound)
         if self.lines is not None:
             integer("multisine.lines", self.lines, 1, most)
+
+    @cached_property
+    def omega(self) -> np.ndarray:
+        """Angular frequency of each line [rad/s], shape (n,)."""
+        low, high = self.low * self.period, self.high * self.period
+        k = np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1.0)
+        if self.lines is not None:
+            want = np.geomspace(k[0], k[-1], self.lines)
+            k = k[np.unique(np.abs(k[:, None] - want).argmin(axis=0))]
+        return 2.0 * np.pi * k / self.period
+
+    @cached_property
+    def phase(self) -> np.ndarray:
+        """Phase of each line on each axis [rad], shape (n, 2)."""
+        return np.random.default_rng(self.seed).uniform(0.0, 2.0 * np.pi, (len(self.omega), 2))
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """Amplitude of each line on each axis, shape (2,)."""
+        return np.array(self.rms) * np.sqrt(2.0 / len(self.omega))
+
+    @property
+    def cosines(self) -> np.ndarray:
+        """As Signal.cosines."""
+        amplitude = np.tile(self.amplitude, (len(self.omega), 1))
+        return np.column_stack((self.omega, self.phase, amplitude))
+
+    def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
+        """None.
+
+        Args:
+            begin: as Signal.pieces.
+            end: as Signal.pieces.
+            step: as Signal.pieces.
+        """
+        return pieces.NO_PIECES
+
+    def mean(self, t: Any, h: Any) -> np.ndarray:
+        """As Signal.mean.
+
+        Args:
+            t: as there.
+            h: as there.
+        """
+        t, h = np.asarray(t)[..., None], np.asarray(h)[..., None]
+        lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
+        return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
+
+    def mean_of_multisines(self, t: Any, h: Any) -> Any:
+        """As Signal.mean.
+
+        Args:
+            t: as there.
+            h: as there.
+        """
+        return self.mean(t, h)

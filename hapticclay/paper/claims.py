@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..model import arm
+from ..model.arm import Arm
 from ..model.constants import (
     AXES,
     B_CONSTANT,
@@ -34,11 +35,13 @@ from ..model.constants import (
 )
 from ..model.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
 from ..model.operator import Operator
+from ..model.signals import Multisine
 from ..simulation.record import Record, irregularity
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at
 from ..studies.identification import Identified, identify
 from ..theory import gain_limit, linear_loop, margins
+from ..theory.linear_loop import Loop
 
 STATUSES = {
     "given": "printed, and reproduced",
@@ -256,7 +259,8 @@ def machine(runs: Runs) -> Iterator[Row]:
         "half the difference",
     )
     q = (1.2, -0.9)
-    u1x, u1y, u2x, u2y = arm.jacobian(*q)
+    links = Arm().links
+    u1x, u1y, u2x, u2y = arm.jacobian(*q, links)
     eq14 = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
     yield row(
         "Jacobian J(q) | Eq. 14 | four entries | m",
@@ -264,7 +268,7 @@ def machine(runs: Runs) -> Iterator[Row]:
         "given",
         "largest difference between the printed formula and the engine's own at q = (1.2, -0.9)",
     )
-    _, J, M = arm_at(arm.inverse_kinematics(*NOMINAL))
+    _, J, M = arm_at(arm.inverse_kinematics(*NOMINAL, links))
     Lambda = np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
     for i, axis in enumerate(AXES):
         yield row(
@@ -305,9 +309,9 @@ def machine(runs: Runs) -> Iterator[Row]:
 
 def _lambda_x(x: float, y: float) -> float:
     """Inertia of the arm along x with its handle at world (x, y) [kg]."""
-    q1, q2 = arm.inverse_kinematics(x, y)
-    u = arm.jacobian(q1, q2)
-    xx, xy, yy = arm.mobility(u)
+    links = Arm().links
+    q1, q2 = arm.inverse_kinematics(x, y, links)
+    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
     return float(np.linalg.inv(np.array([[xx, xy], [xy, yy]]))[0, 0])
 
 
@@ -488,7 +492,8 @@ def constant(runs: Runs) -> Iterator[Row]:
         "part",
     )
     first = runs.constant(shaping=True)
-    exact = linear_loop.crossing_times("x", 1.0, r.scenario.force[0], edges, (0.0, B_CONSTANT, 0.0))
+    dampings = (0.0, B_CONSTANT, 0.0)
+    exact = linear_loop.crossing_times(Loop(K=1.0), r.scenario.force[0], edges, dampings)
     for c, when, name in zip(first.crossings, exact, ("enters", "leaves", "ends"), strict=True):
         plain = next(x for x in r.crossings if x.border == c.border)
         yield row(
@@ -567,7 +572,7 @@ def variable(runs: Runs) -> Iterator[Row]:
             )
     for i, axis in enumerate(AXES):
         (exact,) = linear_loop.crossing_times(
-            axis, r.scenario.gain[i], r.scenario.force[i], (BORDER,), B_VARIABLE[:1]
+            Loop.of(r.scenario, axis, 0.0), r.scenario.force[i], (BORDER,), B_VARIABLE[:1]
         )
         mine, other = (
             next(c.time for c in x.crossings if (c.axis, c.border) == (axis, BORDER))
@@ -675,9 +680,10 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         f"run in x; in y K = 3 is unstable as well ({other.status}), so the figure's two cases "
         "tell apart in x only",
     )
+    muscle = small.scenario.muscle
     yield row(
         "maneuver of the stability test | Sec. 4.3 | arbitrary, random | N",
-        (None, small.scenario.muscle.rms[0] if small.scenario.muscle else 0.0, None),
+        (None, muscle.rms[0] if isinstance(muscle, Multisine) else 0.0, None),
         "not recoverable",
         "a seeded multisine of 0.1 to 2 Hz; rms of the muscle force",
     )

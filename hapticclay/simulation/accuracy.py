@@ -234,7 +234,7 @@ def simulate_within(
 
 def _has_border(scenario: Scenario) -> bool:
     clay = scenario.clay
-    return scenario.length is not None or (clay is not None and bool(clay.x.edges or clay.y.edges))
+    return scenario.length is not None or (clay is not None and any(clay.edges))
 
 
 def _finer(dt: float, found: Comparison, most: float, order: int) -> float:

@@ -15,10 +15,8 @@ import numpy as np
 
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
-from ..model.clay import Clay, Profile
 from ..model.constants import AXES
-from ..model.hardware import Coupling, Interface
-from ..model.operator import Operator
+from ..model.fields import make_part, plain_data
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..stepping.monitor import Outcome
@@ -167,8 +165,8 @@ class Record:
             Arrays of indices, in order.
         """
         s = self.scenario
-        if s.clay and (s.clay.x.growth or s.clay.y.growth):
-            along = {getattr(s.clay, a).along for a in ([axis] if axis else AXES)}
+        if s.clay and (s.clay.grows or s.clay.smooth):
+            along = "".join(getattr(s.clay, a).along for a in ([axis] if axis else AXES))
             cuts = np.searchsorted(self.t, [c.time for c in self.crossings if c.axis in along])
             change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t) - 1)])
         else:
@@ -201,6 +199,7 @@ class Record:
                 i = AXES.index(name)
                 s = piece[steady[piece, i]]
                 b, last = float(self.b[piece[0], i]), float(self.b[piece[-1], i])
+                constant = bool(np.all(self.b[piece, i] == b))
                 entry[name] = {
                     "from_m": float(self.p[piece[0], i]),
                     "to_m": float(self.p[piece[-1], i]),
@@ -208,7 +207,7 @@ class Record:
                     "b_end": last,
                     "fe_over_v": _mean_and_std(fe_v[piece, i]),
                     "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
-                    "expected_speed": self._expected(i, b) if b == last else None,
+                    "expected_speed": self._expected(i, b) if constant else None,
                     "steady_fe_over_v": _mean_and_std(fe_v[s, i]),
                     "steady_fh_over_v": _mean_and_std(fh_v[s, i]),
                 }
@@ -217,16 +216,18 @@ class Record:
 
     def _expected(self, i: int, b: float) -> float | None:
         s = self.scenario
-        return (
-            linear_loop.steady_speed(s.gain[i], s.force[i], b)
-            if s.operator is None and s.muscle is None
-            else None
-        )
+        alone = s.operators[i] is None and s.muscle is None and not s.driven
+        if not alone or s.controller is not None or s.turned:
+            return None
+        return linear_loop.steady_speed(s.gain[i], s.force[i], b, s.compensators[i], s.servo[i])
 
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
         end = float(self.t[-1]) if len(self.t) else 0.0
-        more = {"notes": self.notes} if self.notes else {}
+        left_out: list[str] = []
+        scenario = plain_data(self.scenario, left_out=left_out)
+        notes = {**self.notes, "left_out": left_out} if left_out else self.notes
+        more: dict[str, Any] = {"notes": notes} if notes else {}
         if self.error is not None:
             more["error"] = dataclasses.asdict(self.error)
         extra = {name: EXTRA[name] for name in self.extra}
@@ -234,7 +235,7 @@ class Record:
             "schema": RECORD_SCHEMA,
             "status": self.status,
             "outcome": dataclasses.asdict(self.outcome),
-            "scenario": dataclasses.asdict(self.scenario),
+            "scenario": scenario,
             "crossings": [dataclasses.asdict(c) for c in self.crossings],
             "energy": self.energy,
             "regions": self.regions(),
@@ -255,7 +256,7 @@ class Record:
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes record.npz and summary.json, each whole or not at all.
+        """Writes record.npz, summary.json and scenario.toml, each whole or not at all.
 
         Args:
             path: the folder.
@@ -273,6 +274,10 @@ class Record:
             np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
             f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
+        if "left_out" in head.get("notes", {}):  # a function is no file, and an older one misleads
+            (folder / "scenario.toml").unlink(missing_ok=True)
+        else:
+            self.scenario.save(folder / "scenario.toml")
         return folder
 
     @classmethod
@@ -281,6 +286,8 @@ class Record:
 
         Args:
             path: the folder, or its record.npz.
+
+        A function that was no data, or is not found here, is left out of the scenario; notes tell.
 
         Raises:
             ParameterError: there is no record, or it has another schema.
@@ -297,9 +304,10 @@ class Record:
             _check(arrays | extra)
             schema = head["schema"]
             if schema == RECORD_SCHEMA:
+                scenario, lost = _scenario(head["scenario"])
                 return cls(
                     **arrays,
-                    scenario=_scenario(head["scenario"]),
+                    scenario=scenario,
                     outcome=Outcome(**head["outcome"]),
                     crossings=tuple(Crossing(**c) for c in head["crossings"]),
                     energy=head["energy"],
@@ -307,7 +315,7 @@ class Record:
                     wall_time=head["wall_time_s"],
                     versions=head["versions"],
                     extra=extra,
-                    notes=head.get("notes", {}),
+                    notes=head.get("notes", {}) | ({"left_out": lost} if lost else {}),
                     error=_accuracy(head.get("error")),
                 )
         except (
@@ -339,6 +347,16 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
         raise ValueError("array t must not go back")
 
 
+def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
+    """A scenario of its plain data, and what is left out: a controller that is not found here."""
+    try:
+        return make_part(Scenario, data), []
+    except ParameterError as error:
+        if error.field != "controller.law":
+            raise
+    return make_part(Scenario, {**data, "controller": None}), ["controller"]
+
+
 def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
     if d is None:
         return None
@@ -363,22 +381,6 @@ def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dic
 def _mean_and_std(x: np.ndarray) -> dict[str, float] | None:
     x = x[np.isfinite(x)]
     return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
-
-
-def _scenario(d: dict[str, Any]) -> Scenario:
-    if d.get("clay"):
-        d["clay"] = Clay(**{axis: Profile(**d["clay"][axis]) for axis in AXES})
-    if d.get("operator"):
-        d["operator"] = Operator(**d["operator"])
-    for field in ("muscle", "command"):
-        if d.get(field):
-            d[field] = Multisine(**d[field])
-    if d.get("interface"):
-        coupling = d["interface"].get("coupling")
-        d["interface"] = Interface(
-            **{**d["interface"], "coupling": Coupling(**coupling) if coupling else None}
-        )
-    return Scenario(**d)
 
 
 def port_energy(record: Record) -> np.ndarray:
@@ -443,20 +445,20 @@ def irregularity(record: Record, axis: str = "x") -> float:
     The second half of the record counts, under a Hann window.
 
     Args:
-        record: of a run with a varying muscle force.
+        record: of a run with a multisine as its muscle force.
         axis: "x" or "y".
 
     Returns:
         The share, 0 to 1.
 
     Raises:
-        ParameterError: the muscle force of the run does not vary, or fewer than 32 samples were
+        ParameterError: the muscle force of the run is no multisine, or fewer than 32 samples were
             kept.
     """
     i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
-    if muscle is None or len(record.t) < 32:
+    if not isinstance(muscle, Multisine) or len(record.t) < 32:
         raise ParameterError(
-            "record", record.scenario.name, "must be of a run with a varying muscle force"
+            "record", record.scenario.name, "must be of a run with a multisine as its muscle force"
         )
     n = len(record.t) // 2
     t, f = record.t[-n:-1], record.fh[-n:-1, i]  # the last step may be short

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..model import arm
-from ..model.operator import Operator
+from ..model.operator import NO_HAND
+from ..model.scenario import Scenario
 
 HARDWARE_WORK = (
     "friction",
@@ -15,12 +15,12 @@ HARDWARE_WORK = (
 
 
 def stored_energy(
-    th: Operator, r1: float, r2: float, p: Sequence[float], v: Sequence[float]
+    scenario: Scenario, r1: float, r2: float, p: Sequence[float], v: Sequence[float]
 ) -> tuple[float, float]:
     """Energy of the arm, and of mass and spring of the operator's arm.
 
     Args:
-        th: the operator's arm.
+        scenario: for the arm, and the operator's arm.
         r1: rate of link 1 [rad/s].
         r2: absolute rate of link 2 [rad/s].
         p: handle position, (x, y) [m].
@@ -29,10 +29,24 @@ def stored_energy(
     Returns:
         (arm, operator) [J].
     """
+    a, (x, y) = scenario.arm, (th or NO_HAND for th in scenario.operators)
     at_hand = 0.5 * (
-        th.mass * (v[0] * v[0] + v[1] * v[1]) + th.spring * (p[0] * p[0] + p[1] * p[1])
+        both_axes(x.mass, y.mass, v[0] * v[0], v[1] * v[1])
+        + both_axes(x.spring, y.spring, p[0] * p[0], p[1] * p[1])
     )
-    return 0.5 * float(arm.I1 * r1 * r1 + arm.I2 * r2 * r2), float(at_hand)
+    return 0.5 * float(a.I1 * r1 * r1 + a.I2 * r2 * r2), float(at_hand)
+
+
+def both_axes(x, y, ax, ay):
+    """x ax + y ay, which for a hand that is the same on both axes is x (ax + ay) to the last bit.
+
+    Args:
+        x: factor of x.
+        y: factor of y.
+        ax: what it multiplies.
+        ay: the same, y.
+    """
+    return x * (ax + ay) + (y - x) * ay
 
 
 def energy_balance(
@@ -62,7 +76,7 @@ def energy_balance(
     }
 
 
-def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damper):  # noqa: PLR0913  # plain numbers, for speed
+def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damperx, dampery):  # noqa: PLR0913  # plain numbers, for speed
     """Work done in a kick. Floats, or arrays over kicks.
 
     Args:
@@ -78,7 +92,8 @@ def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damper):  
         t2: torque of the elbow motor [N.m].
         w1: mean rate of joint 1 [rad/s].
         w2: mean rate of joint 2 [rad/s].
-        damper: of the operator's arm [N.s/m].
+        damperx: of the operator's arm, x [N.s/m].
+        dampery: the same, y [N.s/m].
 
     Returns:
         (muscle, motors, clay, damper of the hand, throughput) [J].
@@ -88,5 +103,5 @@ def kick_work(H, k, restx, resty, v0x, v0y, v1x, v1y, t1, t2, w1, w2, damper):  
     muscle = H * (k[5] * vx + k[6] * vy)
     motors = H * (t1 * w1 + t2 * w2)
     clay = H * ((k[0] * v0x + k[1] * v1x + restx) * vx + (k[2] * v0y + k[3] * v1y + resty) * vy)
-    hand = H * damper * (vx * vx + vy * vy)
+    hand = both_axes(H * damperx, H * dampery, vx * vx, vy * vy)
     return muscle, motors, clay, hand, abs(muscle) + abs(motors)

@@ -7,6 +7,7 @@ import contextlib
 import copy
 import ctypes
 import functools
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model import arm
-from ..model.constants import L1, L2
+from ..model.arm import PAPER, Arm
 from ..model.scenario import Scenario
 
 try:
@@ -31,6 +31,8 @@ except (AttributeError, ImportError, OSError, RuntimeError):  # each backend has
         os.environ["MUJOCO_GL"] = wanted
 
 __all__ = ["mujoco"]
+
+LINK2_SHARE = 0.4  # of I1, at most, that the mass of link 2 at the elbow takes; 0.396 in arm.xml
 
 
 def mjcf_folder() -> Path:
@@ -64,35 +66,52 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     Raises:
         RuntimeError: the engine warned while compiling; the parts in mjcf/ do not fit together.
     """
-    parts = scenario.clay is not None, mjcf_folder(), (L1, L2, arm.I1, arm.I2)
+    parts = scenario.clay is not None, mjcf_folder(), scenario.arm
     model = copy.copy(_compiled_model(*parts))
     model.opt.timestep = scenario.dt
     for i, limit in enumerate(scenario.torque_limit):
         model.actuator_ctrlrange[i] = -limit, limit
+    turn_dampers(model, scenario)
     return model
 
 
-@functools.cache
-def _compiled_model(dampers: bool, folder: Path, numbers: tuple[float, ...]) -> mujoco.MjModel:
+def turn_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
+    """Turns the engine's dampers, which act along the axes of a site, with the clay.
+
+    Args:
+        model: as from `build`.
+        scenario: whose clay.
+    """
+    if scenario.clay is not None:
+        half, site = 0.5 * scenario.clay.angle, model.site("clay").id
+        model.site_quat[site] = math.cos(half), 0.0, 0.0, math.sin(half)
+        model.site_sameframe[site] = 0  # its axes are not those of the world
+
+
+@functools.lru_cache(maxsize=32)
+def _compiled_model(dampers: bool, folder: Path, arm: Arm) -> mujoco.MjModel:
     """The model, to be copied: composing and compiling it takes as long as a thousand steps."""
     with warnings_caught() as caught:
-        model = compose_spec(["arm.xml"] + ["clay.xml"] * dampers).compile()
+        model = compose_spec(["arm.xml"] + ["clay.xml"] * dampers, arm).compile()
     return checked_model(model, caught)
 
 
-def compose_spec(parts: list[str]) -> mujoco.MjSpec:
-    """The specification of a model from files of mjcf/, with the arm of model.constants.
+def compose_spec(parts: list[str], arm: Arm) -> mujoco.MjSpec:
+    """The specification of a model from files of mjcf/, with the lengths and inertias of an arm.
 
     Args:
         parts: names of the files.
+        arm: the arm, whatever numbers the files have.
     """
     text = "".join(f'<include file="{part}"/>' for part in parts)
     files = {part: (mjcf_folder() / part).read_bytes() for part in parts}
     spec = mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
-    # the arm of model.constants, whatever lengths and inertias the file has
     upper, lower = spec.body("link1"), spec.body("link2")
-    lower.pos[0], spec.site("handle").pos[0] = L1, L2
-    for body, inertia in ((upper, arm.I1 - lower.mass * L1 * L1), (lower, arm.I2)):
+    lower.pos[0], spec.site("handle").pos[0] = arm.l1, arm.l2
+    # any mass that leaves link 1 an inertia of its own: I1 is all that moves
+    lower.mass = min(lower.mass, LINK2_SHARE * arm.I1 / (arm.l1 * arm.l1))
+    inertias = (upper, arm.I1 - lower.mass * arm.l1 * arm.l1), (lower, arm.I2)
+    for body, inertia in inertias:
         # the other two do not matter in the plane, but no body has less than half of the third
         body.inertia = *(max(x, 0.5 * inertia) for x in body.inertia[:2]), inertia
     return spec
@@ -113,18 +132,19 @@ def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
     return model
 
 
-def arm_at(q: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Kinematics and inertia of the arm by the engine, independent of the formulas of `model.arm`.
 
     Args:
         q: joint angles, shoulder and elbow [rad].
+        arm: the arm.
 
     Returns:
         Handle position [m], shape (2,); Jacobian J(q) [m], shape (2, 2); M(q) [kg.m^2], shape
         (2, 2).
     """
     with warnings_caught() as caught:
-        model = checked_model(compose_spec(["arm.xml"]).compile(), caught)
+        model = checked_model(compose_spec(["arm.xml"], arm).compile(), caught)
     data = mujoco.MjData(model)
     data.qpos[:] = q
     mujoco.mj_forward(model, data)

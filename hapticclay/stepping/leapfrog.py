@@ -12,12 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm, clay, controller
-from ..model.arm import I1, I2, TRACE_W
-from ..model.constants import L1, L2
+from ..model import arm, clay, compensator, controller, regions
 from . import energy, loop, path
-from .loop import SXX, SYY
-from .path import INF, OPEN, TOUCH, put6, put12, put28
+from .path import INF, OPEN, TOUCH, put6, put12, put33
 
 FIRST_OF_HIT = 0.02  # first step of a hit that saturates the motors, in decay times of the speed
 HIT_GROWTH = 1.01  # of each step of it over the one before
@@ -33,10 +30,18 @@ put_raw, put_varied = struct.Struct(f"{RAW}d").pack_into, struct.Struct(f"{VARIE
 LEAPFROG_STATE = [  # beside path.STATE
     # (deltax, deltay [m], deltax', deltay' [m/s], yx, yy [m], yx', yy' [m/s], g1, g2 [rad/s^2],
     # owedx, owedy [N.s]): compensator output and rate, reference model y = G delta and its rate,
-    # link accelerations, impulse owed by stiff clay; positions at the sample, rates before it
+    # link accelerations, impulse owed by stiff clay; positions at the sample, rates before it.
+    # delta counts by the static gain of G; where the compensator is `formed`, it holds start and
+    # the command alone.
     ("loop", "f8", 12),
+    ("form_states", "f8", 2 * compensator.ORDER),  # of it, x and y, before the sample
+    ("form_next", "f8", 2 * compensator.ORDER),  # and after the kick last worked out
+    ("form_kept", "f8", 2 * compensator.ORDER),
+    ("form_kick", "f8", 2 * compensator.KICK),  # compensator.form_kick of each axis
+    ("form_work", "f8", compensator.WORK),
+    ("form_of", "f8", 2),  # lengths of the steps that these are for [s]
     # of the kick last worked out, beside its raw row, the first of Engine.raw:
-    ("coefficients", "f8", 28),  # loop.loop_coefficients
+    ("coefficients", "f8", 33),  # loop.loop_coefficients
     ("inputs", "f8", 12),  # loop.step_inputs
     ("next", "f8", 12),  # state for the next sample
     ("command", "f8", 6),  # motors [N.m], implicit clay x, y [N.s/m], further torques [N.m]
@@ -58,13 +63,19 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         Number of steps made.
     """
     (
-        H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, keep, gainx, gainy,
-        ox, noy, limit1, limit2, square1, square2, spring, mass, damp0, damp1, held, shaped,
+        H, step, half, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy, lagx, lagy,
+        gainx, gainy, ox, noy, limit1, limit2, square1, square2, springx, springy, massx, massy,
+        dampx0, dampy0, dampx1, dampy1, held, shaped,
     ) = s["coefficients"]  # fmt: skip
     bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _ = s["inputs"]
     deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy = s["loop"]
     q1, q2 = s["q"]
     w1, w2 = s["w"]
+    L1, L2, I1, I2, trace = s["arm"]
+    ratiox, _, _, SXX, _, _ = s["servox"]
+    ratioy, _, _, SYY, _, _ = s["servoy"]
+    formed, turned, grain = s["formed"], s["turned_clay"], s["grain"]
+    smooth, table = s["smooth"] if n > 0 else 0, e.table
     q, w, ctrl, push, mj_step, model, data = e.q, e.w, e.ctrl, e.push, e.step, e.model, e.data
     low, high = s["low"], s["high"]
     lowx, lowy, highx, highy = low[0], low[1], high[0], high[1]
@@ -75,7 +86,18 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
     if n > 0 and s["dampers"]:
         ctrl[2], ctrl[3] = bx1, by1
     made = 0
-    p1, p2 = 0.0, 0.0
+    p1, p2, dz = 0.0, 0.0, 0.0
+    odd = stiff > 0.0 or turned > 0
+    feedx, feedy, throughx, throughy, startx, starty = 0.0, 0.0, 0.0, 0.0, deltax, deltay
+    form, kick, gainsx, gainsy = s["form_next"], s["form_kick"], s["gain"][0], s["gain"][1]
+    if formed:
+        ex, ey = 0.0, 0.0
+        for j in range(2 * compensator.ORDER):
+            form[j] = s["form_states"][j]
+        # delta that the force of this kick adds, and acceleration by way of it
+        feedx = ratiox * gainsx * kick[compensator.FEED]
+        feedy = ratioy * gainsy * kick[compensator.KICK + compensator.FEED]
+        throughx, throughy = nx * takex * feedx, ny * takey * feedy
     while True:
         # what changes from step to step
         if varies:
@@ -84,6 +106,7 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             )  # fmt: skip
             uhx, uhy, stiff = varied[made, 5], varied[made, 6], varied[made, 7]
             sharex, sharey = varied[made, 8], varied[made, 9]
+            odd = stiff > 0.0 or turned > 0
             if s["dampers"]:
                 ctrl[2], ctrl[3] = bx1, by1
 
@@ -93,6 +116,15 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         u2x, u2y = -L2 * sin(a2), L2 * cos(a2)
         px = u1y + u2y - ox
         py = noy - u1x - u2x
+        if smooth:  # and never stiff, see Scenario
+            x, y = regions.smooth_clay(table, smooth, px, py, 0.0, 0.0)
+            if smooth != 2:
+                bx0 = bx1 = 0.5 * x
+                varied[made, 0], varied[made, 1], varied[made, 12] = bx0, bx1, x
+            if smooth != 1:
+                by0 = by1 = 0.5 * y
+                varied[made, 2], varied[made, 3], varied[made, 13] = by0, by1, y
+            ctrl[2], ctrl[3] = bx1, by1
         r2 = w1 + w2
         vx = u1x * w1 + u2x * r2
         vy = u1y * w1 + u2y * r2
@@ -102,10 +134,6 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         s2 = s2 * s2
         cx = u1y * s1 + u2y * s2
         cy = -u1x * s1 - u2x * s2
-        if stiff:  # after the sample the handle stands still where the clay is stiff
-            cx, cy = arm.centripetal_about_sample(
-                L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
-            )
         if shaped:
             sxx, sxy, syy = SXX, 0.0, SYY
         else:
@@ -113,19 +141,33 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             m2 = u2x / I2
             sxx = u1x * m1 + u2x * m2
             sxy = u1y * m1 + u2y * m2
-            syy = TRACE_W - sxx
+            syy = trace - sxx
 
         # clay and operator: net force f = (fx - dx ux, fy - dy uy)
         fx = uhx - bx0 * vx
         fy = uhy - by0 * vy
         dx, dy = bx1, by1
+        if odd:
+            if turned:  # and never stiff, see Scenario
+                x, y = clay.turned_force(grain[0], grain[1], bx0, by0, vx, vy)
+                fx, fy = uhx - x, uhy - y
+                dx, dy, dz = clay.turned_damping(grain[0], grain[1], bx1, by1)
+            else:  # after the sample the handle stands still where the clay is stiff
+                cx, cy = arm.centripetal_about_sample(
+                    L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
+                )
         if held:
-            fx -= spring * px - mass * cx + damp0 * vx
-            fy -= spring * py - mass * cy + damp0 * vy
-            dx += damp1
-            dy += damp1
+            fx -= springx * px - massx * cx + dampx0 * vx
+            fy -= springy * py - massy * cy + dampy0 * vy
+            dx += dampx1
+            dy += dampy1
 
         # servo: one kick of the reference model, then of the handle
+        if formed:
+            deltax = startx + ratiox * compensator.form_output(kick, form, 0)
+            deltay = starty + ratioy * compensator.form_output(kick, form, 1)
+            sxx += throughx
+            syy += throughy
         vrx = keepx * ydx + takex * (deltax - yx)
         vry = keepy * ydy + takey * (deltay - yy)
         ax = nx * vrx + mx * (vx - ydx) + kpx * (yx - px) + cx
@@ -134,11 +176,13 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         if stiff:
             restx, resty = owedx / H, owedy / H
             fex, fey = (bx0 + bx1) * vx, (by0 + by1) * vy
-            hx, hy = uhx - spring * px, uhy - spring * py
+            hx, hy = uhx - springx * px, uhy - springy * py
             gx = ax - mx * vx + sxx * hx + sxy * hy
             gy = ay - my * vy + sxy * hx + syy * hy
             gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
-            newx, newy, softx, softy = loop.owed_impulse(step, H, spring, sharex, sharey, gx, gy)
+            newx, newy, softx, softy = loop.owed_impulse(
+                step, springx, springy, sharex, sharey, gx, gy
+            )
             fx += newx - restx
             fy += newy - resty
             dx += softx
@@ -156,6 +200,10 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             uy = gy / ny
         ffx = fx - dx * ux
         ffy = fy - dy * uy
+        if dz:
+            ux, uy = controller.solve_turned((nx, ny), (gx, gy), (sxx, sxy, syy), (dx, dy, dz))
+            ffx = fx - dx * ux - dz * uy
+            ffy = fy - dy * uy - dz * ux
         gx = ux - vx
         gy = uy - vy
         det = H * (u1x * u2y - u2x * u1y)
@@ -164,25 +212,33 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         t2 = I2 * h2 - u2x * ffx - u2y * ffy
         t1 = I1 * h1 - u1x * ffx - u1y * ffy + t2
         if t1 * t1 > square1 or t2 * t2 > square2:
-            ux, uy, h1, h2, ffx, ffy, t1, t2 = controller.kick_at_limit(
-                H, (vx, vy), (u1x, u1y, u2x, u2y), (fx, fy), (dx, dy), (t1, t2), (limit1, limit2)
-            )
-        if stiff:
+            if dz:
+                ux, uy, h1, h2, ffx, ffy, t1, t2 = controller.turned_kick_at_limit(
+                    H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy),
+                    (dx, dy, dz), (t1, t2), (limit1, limit2),
+                )  # fmt: skip
+            else:
+                ux, uy, h1, h2, ffx, ffy, t1, t2 = controller.kick_at_limit(
+                    H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy), (dx, dy),
+                    (t1, t2), (limit1, limit2),
+                )  # fmt: skip
+        if odd and not turned:
             # motors at their limits hold less against the clay
             if t1 * t1 >= square1 or t2 * t2 >= square2:
                 gx, gy = arm.handle_acceleration(
-                    (t1 - t2) / I1, t2 / I2, hx, hy, (u1x, u1y, u2x, u2y)
+                    (t1 - t2) / I1, t2 / I2, hx, hy, (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace)
                 )
-                sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y))
+                sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace))
                 gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
                 fx -= newx
                 fy -= newy
-                newx, newy, _, _ = loop.owed_impulse(step, H, spring, sharex, sharey, gx, gy)
+                newx, newy, _, _ = loop.owed_impulse(step, springx, springy, sharex, sharey, gx, gy)
                 fx += newx
                 fy += newy
                 ux, uy = controller.velocity_under_torque(
-                    H, (vx, vy), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (dx, dy)
-                )
+                    H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (t1, t2), (fx, fy),
+                    (dx, dy),
+                )  # fmt: skip
                 ffx = fx - dx * ux
                 ffy = fy - dy * uy
                 h1, h2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
@@ -195,6 +251,9 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             newx *= H
             newy *= H
 
+        elif odd:
+            restx, resty = loop.turned_rest(grain, (bx0, bx1, by0, by1), vx, vy, ux, uy)
+
         n1 = w1 + H * h1
         n2 = w2 + H * (h2 - h1)
         if n:  # a step that would leave the region is left to path.careful
@@ -205,21 +264,29 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             if not (lowx + slack <= x <= highx - slack and lowy + slack <= y <= highy - slack):
                 if not abs(n1) + abs(n2) < INF:
                     break
-                x, y = arm.handle_position(q1 + step * n1, q2 + step * n2)
+                x, y = arm.handle_position(q1 + step * n1, q2 + step * n2, (L1, L2, I1, I2, trace))
                 x, y = x - ox, y + noy
                 if not (lowx - TOUCH <= x <= highx + TOUCH and lowy - TOUCH <= y <= highy + TOUCH):
                     break
 
         # to the engine goes what it does not treat implicitly: the hand, and the clay's first part
         if held:
-            fx -= damp1 * ux
-            fy -= damp1 * uy
+            fx -= dampx1 * ux
+            fy -= dampy1 * uy
         p2 = u2x * fx + u2y * fy
         p1 = u1x * fx + u1y * fy + p2
 
         # compensator, driven by the force that acts in this kick
-        ex = keep * ex + gainx * ffx
-        ey = keep * ey + gainy * ffy
+        if formed:
+            deltax += feedx * ffx
+            deltay += feedy * ffy
+            vrx += takex * feedx * ffx
+            vry += takey * feedy * ffy
+            compensator.form_advance(kick, form, 0, gainsx * ffx)
+            compensator.form_advance(kick, form, 1, gainsy * ffy)
+        else:
+            ex = lagx * ex + gainx * ffx
+            ey = lagy * ey + gainy * ffy
         put_raw(
             e.raw, made * RAW_BYTES, q1, q2, px, py, vx, vy, ux, uy, ffx, ffy, t1, t2,
             deltax, deltay, w1, w2, n1, n2, restx, resty, u1x, u1y, u2x, u2y,
@@ -236,11 +303,15 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         if varies:
             deltax += varied[made, 14]
             deltay += varied[made, 15]
+            startx += varied[made, 14]
+            starty += varied[made, 15]
         mj_step(model, data)
         made += 1
         if made == n:
             break
         q1, q2, w1, w2 = q[0], q[1], w[0], w[1]
+    if formed:
+        deltax, deltay = startx, starty
     put12(s["next"], 0, deltax, deltay, ex, ey, yx, yy, ydx, ydy, g1, g2, owedx, owedy)
     put6(s["command"], 0, t1, t2, bx1, by1, p1, p2)
     return made
@@ -255,8 +326,27 @@ def prepare(s, e, before, after):
         before: length of the step before the sample [s].
         after: length of the step after the sample [s].
     """
-    put28(s["coefficients"], 0, *loop.loop_coefficients(s, before, after))
+    put33(s["coefficients"], 0, *loop.loop_coefficients(s, before, after))
+    if s["formed"]:
+        prepare_form(s, before, after)
     put12(s["inputs"], 0, *inputs(s, e, before, after))
+
+
+def prepare_form(s, before, after):
+    """Readies the compensator for a kick, unless it is ready.
+
+    Args:
+        s: state of the run.
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+    """
+    ready = s["form_of"]
+    if ready[0] != before or ready[1] != after:
+        for i in range(2):
+            compensator.form_kick(
+                s["form"], s["formed"], i, before, after, s["form_work"], s["form_kick"]
+            )
+        ready[0], ready[1] = before, after
 
 
 def propose(s, e, before, after):
@@ -287,7 +377,7 @@ def inputs(s, e, before, after):
     t = s["t"]
     b0, b1 = path.damping_before(s, t - 0.25 * before), path.damping_now(s, t + 0.25 * after)
     uh = path.mean_force(s, e, t + 0.25 * (after - before), 0.25 * (before + after))
-    return loop.step_inputs(b0, b1, uh, before, after, s["hand"])
+    return loop.step_inputs(s, b0, b1, uh, before, after)
 
 
 def vary(s, e, n):
@@ -299,9 +389,9 @@ def vary(s, e, n):
         n: number of steps.
     """
     k, coming, dt = s["inputs"], e.ahead, s["dt"]
-    hand = (s["hand"][0], s["hand"][1], s["hand"][2])
     base, rate = (s["base"][0], s["base"][1]), (s["rate"][0], s["rate"][1])
     bx0, bx1, by0, by1, L, _, _, stiff, sharex, sharey, meltx, melty = k
+    ratiox, ratioy = s["servox"][0], s["servoy"][0]
     for j in range(n):
         i = s["i"] - s["first"] + j
         t, uhx, uhy = coming[i, 4], coming[i, 0], coming[i, 1]
@@ -309,12 +399,12 @@ def vary(s, e, n):
             b0 = clay.damping_at(base, rate, t - 0.25 * dt)
             b1 = clay.damping_at(base, rate, t + 0.25 * dt)
             bx0, bx1, by0, by1, L, _, _, stiff, sharex, sharey, meltx, melty = loop.step_inputs(
-                b0, b1, (uhx, uhy), dt, dt, hand
+                s, b0, b1, (uhx, uhy), dt, dt
             )
         x, y = clay.damping_at(base, rate, t)
         put_varied(
             e.varied, j * VARIED_BYTES, bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey,
-            meltx, melty, x, y, coming[i, 2], coming[i, 3],
+            meltx, melty, x, y, ratiox * coming[i, 2], ratioy * coming[i, 3],
         )  # fmt: skip
 
 
@@ -337,6 +427,8 @@ def leap_block(s, e, n):
             accept(s)
             for j in range(2):
                 s["q"][j], s["w"][j] = e.q[j], e.w[j]
+            if s["smooth"]:
+                path.feel_place(s, e.table)
             tabulate(s, e, made)
             s["filled"] += made
             total += made
@@ -369,12 +461,13 @@ def tabulate(s, e, n):
         if s["held"]:
             out[6 + i] = raw[8 + i] + k[2 * i] * before[i] + k[2 * i + 1] * after[i] + rest[i]
         out[12 + i] = k[12 + i]
-    out[8:12] = raw[10:14]
+    out[8:10] = raw[10:12]
+    out[10], out[11] = raw[12] / s["servox"][0], raw[13] / s["servoy"][0]
     r1, r2 = arm.joint_velocity(out[4], out[5], raw[20:24], 1.0)
     out[14], out[15] = r1, r2 - r1
     done = energy.kick_work(
         s["dt"], k, rest[0], rest[1], before[0], before[1], after[0], after[1], raw[10], raw[11],
-        0.5 * (raw[14] + raw[16]), 0.5 * (raw[15] + raw[17]), s["hand"][1],
+        0.5 * (raw[14] + raw[16]), 0.5 * (raw[15] + raw[17]), s["handx"][1], s["handy"][1],
     )  # fmt: skip
     for j, x in enumerate(done):  # one after the other, as in the loop below
         work[j] = float(np.cumsum(np.append(work[j], x))[-1])
@@ -430,7 +523,9 @@ def write_row(s, e, j, i, x):
     vx, vy, ux, uy = raw[j, 4], raw[j, 5], raw[j, 6], raw[j, 7]
     restx, resty = raw[j, 18], raw[j, 19]
     for n in range(4):
-        rows[i, n], rows[i, 8 + n] = raw[j, n], raw[j, 10 + n]
+        rows[i, n] = raw[j, n]
+    rows[i, 8], rows[i, 9] = raw[j, 10], raw[j, 11]
+    rows[i, 10], rows[i, 11] = raw[j, 12] / s["servox"][0], raw[j, 13] / s["servoy"][0]
     rows[i, 4] = loop.velocity_at_sample(x, 0, vx, ux, restx)
     rows[i, 5] = loop.velocity_at_sample(x, 1, vy, uy, resty)
     if s["held"]:
@@ -469,8 +564,8 @@ def add_work(s, e, j, H, x):
     raw, work = e.raw, s["work"]
     done = energy.kick_work(
         H, x, raw[j, 18], raw[j, 19], raw[j, 4], raw[j, 5], raw[j, 6], raw[j, 7],
-        raw[j, 10], raw[j, 11],
-        0.5 * (raw[j, 14] + raw[j, 16]), 0.5 * (raw[j, 15] + raw[j, 17]), s["hand"][1],
+        raw[j, 10], raw[j, 11], 0.5 * (raw[j, 14] + raw[j, 16]),
+        0.5 * (raw[j, 15] + raw[j, 17]), s["handx"][1], s["handy"][1],
     )  # fmt: skip
     for n in range(5):
         work[n] += done[n]
@@ -495,6 +590,9 @@ def accept(s):
     """
     for j in range(12):
         s["loop"][j] = s["next"][j]
+    if s["formed"]:
+        for j in range(2 * compensator.ORDER):
+            s["form_states"][j] = s["form_next"][j]
 
 
 def step_engine(s, e, command, after):
@@ -516,6 +614,8 @@ def step_engine(s, e, command, after):
     s["steps"] += 1
     for j in range(2):
         s["q"][j], s["w"][j] = e.q[j], e.w[j]
+    if s["smooth"]:
+        path.feel_place(s, e.table)
 
 
 def steps_ahead(run, i, n):
@@ -535,7 +635,7 @@ def steps_ahead(run, i, n):
     out = np.zeros((n, 5))
     out[:, 0:2] = run.uh(t[:n], 0.5 * dt)
     if run.command:
-        out[:, 2:4] = np.diff(run.command(t), axis=0)
+        out[:, 2:4] = np.diff(run.command.around(t, 0.5 * dt), axis=0)
     out[:, 4] = t[:n]
     return out
 
@@ -606,11 +706,13 @@ class Leapfrog(NamedTuple):
         s["fine"] = INF
         x, y = path.damping_now(s, s["t"])
         b = max(x, y)
-        first = FIRST_OF_HIT / (b * TRACE_W) if b > 0.0 else INF
+        first = FIRST_OF_HIT / (b * s["arm"][4]) if b > 0.0 else INF
         if first >= after:
             return after
         before, w1, w2, x = s["before"], s["w"][0], s["w"][1], s["loop"]
         saved = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
+        for j in range(2 * compensator.ORDER):
+            s["form_kept"][j] = s["form_states"][j]
         for trial in range(2):
             if before > 0.0:
                 propose(s, e, before, 0.0)
@@ -621,6 +723,8 @@ class Leapfrog(NamedTuple):
             if trial == 0:
                 propose(s, e, 0.0, first)
                 put12(s["loop"], 0, *saved)
+                for j in range(2 * compensator.ORDER):
+                    s["form_states"][j] = s["form_kept"][j]
                 s["w"][0], s["w"][1] = w1, w2
                 if not limited(s):
                     return after
@@ -636,7 +740,7 @@ class Leapfrog(NamedTuple):
 
     def place(self, s, e, h):
         q, origin = s["q"], s["origin"]
-        x, y = arm.handle_position(q[0] + h * e.raw[0, 16], q[1] + h * e.raw[0, 17])
+        x, y = arm.handle_position(q[0] + h * e.raw[0, 16], q[1] + h * e.raw[0, 17], path.arm_of(s))
         return x - origin[0], y - origin[1]
 
     def keep(self, s, e, after, shows):
@@ -659,13 +763,13 @@ class Leapfrog(NamedTuple):
         command = (c[0], c[1], c[2], c[3], c[4], c[5])
         if not (s["before"] == dt and after == dt):
             n1, n2 = e.raw[0, 16], e.raw[0, 17]
-            command = loop.whole_kick(w[0], w[1], n1, n2, c[0], c[1], after)
+            command = loop.whole_kick(s, w[0], w[1], n1, n2, c[0], c[1], after)
         accept(s)
         step_engine(s, e, command, after)
         if len(e.command):
-            x, y = path.command_change(e, s["t"], s["t"] + after)
-            s["loop"][0] += x
-            s["loop"][1] += y
+            x, y = path.command_change(e, s["t"], s["t"] + after, 0.5 * dt)
+            s["loop"][0] += s["servox"][0] * x
+            s["loop"][1] += s["servoy"][0] * y
         if s["fine"] < INF:
             s["fine"] = s["fine"] * HIT_GROWTH if limited(s) else INF
 

@@ -9,13 +9,13 @@ and error terms: docs/equations.md, section 4.
 
 from __future__ import annotations
 
-from ..model import arm, clay, controller, operator
-from ..model.constants import C_POLE, G, S
-
-SXX, SYY = S[0].gain, S[1].gain  # inverse inertia that shaping imposes [1/kg]
+from ..model import clay, controller, operator
+from ..model.controller import Servo
 
 
-def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float, ...]:
+def initial_state(
+    p: tuple[float, float], v: tuple[float, float], servo: tuple[Servo, Servo]
+) -> tuple[float, ...]:
     """State of a loop whose handle has moved evenly for long, as of `leapfrog.kicks`.
 
     The compensator leads by the lag of G at constant speed.
@@ -23,12 +23,17 @@ def initial_state(p: tuple[float, float], v: tuple[float, float]) -> tuple[float
     Args:
         p: handle position, (x, y) [m].
         v: handle velocity, (x, y) [m/s].
+        servo: of each axis.
 
     Returns:
         12 numbers.
     """
-    ahead = (p[i] + G[i].damping / G[i].stiffness * v[i] for i in (0, 1))
-    return (*ahead, *v, *p, *v, 0.0, 0.0, 0.0, 0.0)
+    G = servo[0].G, servo[1].G
+    ahead = (
+        (p[i] + G[i].damping / G[i].stiffness * v[i]) / (G[i].gain / G[i].stiffness) for i in (0, 1)
+    )
+    rates = (v[i] / (G[i].gain / G[i].stiffness) for i in (0, 1))
+    return (*ahead, *rates, *p, *v, 0.0, 0.0, 0.0, 0.0)
 
 
 def loop_coefficients(s, before, after):
@@ -40,56 +45,61 @@ def loop_coefficients(s, before, after):
         after: length of the step after the sample [s]; 0 at the end.
 
     Returns:
-        28 numbers.
+        36 numbers.
     """
     H = 0.5 * (before + after)
     L, R = before / (before + after), after / (before + after)
-    keepx, takex, nx, mx, kpx = controller.servo_coefficients(G[0], S[0], H, L, R)
-    keepy, takey, ny, my, kpy = controller.servo_coefficients(G[1], S[1], H, L, R)
-    keep, take = controller.compensator_coefficients(C_POLE, H, L, R)
+    keepx, takex, nx, mx, kpx = controller.servo_coefficients(s["servox"], H, L, R)
+    keepy, takey, ny, my, kpy = controller.servo_coefficients(s["servoy"], H, L, R)
+    lagx, gainx = controller.compensator_coefficients(s["lag"][0], H, L, R)
+    lagy, gainy = controller.compensator_coefficients(s["lag"][1], H, L, R)
     # at start and end the kick is half of one
     step = H if before > 0.0 and after > 0.0 else max(before, after)
-    spring, mass, damp0, damp1 = operator.operator_coefficients(s["hand"], H, L, R, step)
+    springx, massx, dampx0, dampx1 = operator.operator_coefficients(s["handx"], H, L, R, step)
+    springy, massy, dampy0, dampy1 = operator.operator_coefficients(s["handy"], H, L, R, step)
     gain, origin, limit = s["gain"], s["origin"], s["torque_limit"]
     return (
         H, after, 0.5 * before, keepx, takex, nx, mx, kpx, keepy, takey, ny, my, kpy,
-        keep, take * gain[0], take * gain[1], origin[0], -origin[1],
+        lagx, lagy, gainx * gain[0] * s["servox"][0], gainy * gain[1] * s["servoy"][0],
+        origin[0], -origin[1],
         limit[0], limit[1], limit[0] * limit[0], limit[1] * limit[1],
-        spring, mass, damp0, damp1, float(s["held"]), float(s["shaping"]),
+        springx, springy, massx, massy, dampx0, dampy0, dampx1, dampy1,
+        float(s["held"]), float(s["shaping"]),
     )  # fmt: skip
 
 
-def step_inputs(b0, b1, uh, before, after, hand):
+def step_inputs(s, b0, b1, uh, before, after):
     """Numbers that a kick takes from clay and operator around its sample.
 
     Args:
+        s: state of the run, for the scenario's numbers.
         b0: clay before the sample, (x, y) [N.s/m].
         b1: clay after the sample, (x, y) [N.s/m].
         uh: muscle force, (x, y) [N].
         before: length of the step before the sample [s].
         after: length of the step after the sample [s].
-        hand: mass [kg], damper [N.s/m] and spring [N/m] of the operator's arm; zeros for none.
 
     Returns:
         12 numbers.
     """
     span = before + after
     L = before / span
-    W = arm.TRACE_W / (1.0 + hand[0] * arm.TRACE_W)
+    handx, handy, trace = s["handx"], s["handy"], s["arm"][4]
+    W = trace / (1.0 + min(handx[0], handy[0]) * trace)
     bx0, bx1, by0, by1, stiff, sharex, sharey, softx, softy = clay.split_damping(
-        b0, b1, 0.5 * span, L, after / span, W, hand[1]
+        b0, b1, 0.5 * span, L, after / span, W, handx[1], handy[1]
     )
     uhx, uhy = uh
     return bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy
 
 
-def owed_impulse(step, H, spring, sharex, sharey, hx, hy):
+def owed_impulse(step, springx, springy, sharex, sharey, hx, hy):
     """Force of stiff clay in this kick that the next kick returns.
 
     Args:
         step: length of the step after the sample [s].
-        H: length of the kick [s].
-        spring: of the operator's arm [N/m].
+        springx: of the operator's arm, x [N/m].
+        springy: the same, y [N/m].
         sharex: from clay.split_damping [s].
         sharey: from clay.split_damping [s].
         hx: clay.slow_force at the sample, x [N].
@@ -98,7 +108,26 @@ def owed_impulse(step, H, spring, sharex, sharey, hx, hy):
     Returns:
         (x, y [N]; reduction per unit of the velocity after the kick, x, y [N.s/m]).
     """
-    return sharex * hx, sharey * hy, 0.5 * step * spring * sharex, 0.5 * step * spring * sharey
+    return sharex * hx, sharey * hy, 0.5 * step * springx * sharex, 0.5 * step * springy * sharey
+
+
+def turned_rest(grain, k, v0x, v0y, v1x, v1y):  # noqa: PLR0913  # plain numbers, for speed
+    """What the force of turned clay in a kick is beside that of dampers along x and y.
+
+    Args:
+        grain: cosine and sine of the angle by which it is turned.
+        k: the first numbers of `step_inputs`, of its own axes.
+        v0x: handle velocity before the kick, x [m/s].
+        v0y: the same, y [m/s].
+        v1x: handle velocity after the kick, x [m/s].
+        v1y: the same, y [m/s].
+
+    Returns:
+        (x, y) [N].
+    """
+    fex, fey = clay.turned_force(grain[0], grain[1], k[0], k[2], v0x, v0y)
+    x, y = clay.turned_force(grain[0], grain[1], k[1], k[3], v1x, v1y)
+    return fex + x - (k[0] * v0x + k[1] * v1x), fey + y - (k[2] * v0y + k[3] * v1y)
 
 
 def velocity_at_sample(k, i, before, after, rest):
@@ -123,10 +152,11 @@ def velocity_at_sample(k, i, before, after, rest):
     return v
 
 
-def whole_kick(w1, w2, n1, n2, t1, t2, step):
+def whole_kick(s, w1, w2, n1, n2, t1, t2, step):
     """Command that gives the engine the rates after a kick in one step of another length.
 
     Args:
+        s: state of the run, for the scenario's numbers.
         w1: rate of joint 1 before [rad/s].
         w2: rate of joint 2 before [rad/s].
         n1: rate of joint 1 after [rad/s].
@@ -138,5 +168,6 @@ def whole_kick(w1, w2, n1, n2, t1, t2, step):
     Returns:
         The command, as `leapfrog.kicks` leaves it, without implicit clay.
     """
+    I1, I2 = s["arm"][2], s["arm"][3]
     a1, a2 = (n1 - w1) / step, (n1 + n2 - w1 - w2) / step
-    return t1, t2, 0.0, 0.0, arm.I1 * a1 + arm.I2 * a2 - t1, arm.I2 * a2 - t2
+    return t1, t2, 0.0, 0.0, I1 * a1 + I2 * a2 - t1, I2 * a2 - t2

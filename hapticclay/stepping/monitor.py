@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import bisect
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.clay import Profile
 from ..model.constants import AXES
 from ..model.scenario import Scenario
+from ..model.signals import Multisine
 from ..theory import gain_limit
 
 LIMITS = "oscillation against the torque limits"
@@ -27,6 +26,9 @@ MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
 WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
 QUIET = 9 + SWINGS + 1  # numbers of an axis that `is_quiet` goes on with
+MOST_CLAYS = (
+    33  # of a grid whose gain limits are worked out; of more, so many between least and most
+)
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -108,7 +110,8 @@ class StabilityMonitor:
         if abs(math.sin(q2[good])) < FOLD:
             stretched = math.cos(q2[good]) > 0.0
             code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
-            reach = "within 0.11 to 0.59 m of the shoulder"
+            low, high = self.scenario.arm.reach
+            reach = f"within {low:.3g} to {high:.3g} m of the shoulder"
             advice = f"choose a force, start or origin that keeps the handle {reach}"
             return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
         axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
@@ -138,7 +141,7 @@ class StabilityMonitor:
             return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
         if outcome.code == "time limit":
             if self.seen - 1 - self.unbound >= recent:
-                least = "rms" if s.muscle else "the force"
+                least = "rms" if isinstance(s.muscle, Multisine) else "the force"
                 advice = f"{self._raise_limit()}, or lower {least}"
                 return replace(
                     outcome, code="saturated", cause="a motor stays in its limit", advice=advice
@@ -159,9 +162,9 @@ class StabilityMonitor:
 
     def _why_still(self) -> str:
         s = self.scenario
-        if s.muscle:
+        if isinstance(s.muscle, Multisine):
             return "raise rms"
-        if s.operator and s.operator.spring:
+        if any(th and th.spring for th in s.operators):
             holds = "the spring of the hand holds the muscle's force"
             return f"{holds}: raise force, or lower operator.spring"
         return "raise force, or lower b" if any(s.force) else "give a force"
@@ -248,7 +251,7 @@ class StabilityMonitor:
         steps = zip(sizes, sizes[1:], strict=False)
         if math.prod(min(b / a, STEP_GROWTH) for a, b in steps) <= SWING_GROWTH:
             return ""
-        driven = self.scenario.muscle or self.scenario.command
+        driven = self.scenario.driven
         if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
             return ""
         return "growing oscillation"
@@ -256,22 +259,30 @@ class StabilityMonitor:
     def _blame(self, axes: list[int]) -> str:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
-    def _limit(self, i: int, values: tuple[float, ...]) -> tuple[float, float]:
+    def _limit(self, i: int, values: list[float]) -> tuple[float, float]:
         """The clay with the least gain limit of the linear loop of axis i, and this limit."""
         return min(
-            ((b, gain_limit.gain_limit(AXES[i], b, self.scenario.operator)) for b in values),
+            ((b, gain_limit.continuous_limit(self.scenario, AXES[i], b)) for b in values),
             key=lambda x: x[1],
         )
 
-    def _profile(self, i: int) -> Profile:
+    def _dampings(self, i: int, visited: bool) -> list[float]:
+        """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited."""
         clay = self.scenario.clay
-        return getattr(clay, AXES[i]) if clay else Profile((), (0.0,))
+        if clay is None:
+            return [0.0]
+        ends = (self.least, self.most) if visited else ([-math.inf] * 2, [math.inf] * 2)
+        low, high = ((e[0], e[1]) for e in ends)
+        laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+        values = [b for law in laws for b in law.within(low, high)]
+        if len(values) > MOST_CLAYS:
+            values = np.unique(values).tolist()
+        if len(values) > MOST_CLAYS:
+            values = np.linspace(values[0], values[-1], MOST_CLAYS).tolist()
+        return values
 
     def _above_limit(self, i: int) -> bool:
-        profile = self._profile(i)
-        k = AXES.index(profile.along)
-        first, last = (bisect.bisect_right(profile.edges, x) for x in (self.least[k], self.most[k]))
-        return self.scenario.gain[i] > self._limit(i, profile.values[first : last + 1])[1]
+        return self.scenario.gain[i] > self._limit(i, self._dampings(i, True))[1]
 
     def _raise_limit(self) -> str:
         shoulder, elbow = self.scenario.torque_limit
@@ -280,7 +291,7 @@ class StabilityMonitor:
     def _advice(self, axis: str) -> str:
         s = self.scenario
         i = AXES.index(axis)
-        b, limit = self._limit(i, self._profile(i).values)
+        b, limit = self._limit(i, self._dampings(i, False))
         if s.gain[i] > limit:
             return (
                 f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "
@@ -288,6 +299,8 @@ class StabilityMonitor:
             )
         if any(x[1] for x in self.swings[i]):
             return f"{self._raise_limit()}: the motors saturate"
+        if s.controller is not None:
+            return "change the controller, or lower dt or Ts"
         if not s.shaping:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"

@@ -16,13 +16,14 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..model import clay, signals
+from ..model import arm, clay, compensator, pieces, regions
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # how a run stands
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 SUMS = 8  # of energy.kick_work, and energy.HARDWARE_WORK
 INF = np.inf
+NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
 LANDINGS = 4  # on borders in one step; a handle that slides along one then completes the step
 
 SCENARIO = [  # in numbers, see model.scenario
@@ -33,10 +34,21 @@ SCENARIO = [  # in numbers, see model.scenario
     ("force", "f8", 2),
     ("origin", "f8", 2),
     ("torque_limit", "f8", 2),
-    ("hand", "f8", 3),  # mass, damper, spring of the operator's arm; zeros for Th = 0
+    ("arm", "f8", 5),  # arm.Arm.links
+    ("servox", "f8", 6),  # controller.Servo.numbers
+    ("servoy", "f8", 6),
+    ("lag", "f8", 2),  # poles of a compensator K/(s (s + pole)) [rad/s]; not used if
+    # order of a compensator of another shape, 0 where both axes have that one, and its numbers
+    ("formed", "i8"),
+    ("form", "f8", 2 * compensator.FORM),
+    ("handx", "f8", 3),  # mass, damper, spring of the operator's arm; zeros for Th = 0
+    ("handy", "f8", 3),
     ("held", "i8"),  # whether there is an operator's arm
     ("shaping", "i8"),
     ("dampers", "i8"),  # whether there is clay
+    ("turned_clay", "i8"),  # whether its axes are not x and y
+    ("smooth", "i8"),  # which axes have smooth clay, see clay.Clay.smooth
+    ("grain", "f8", 2),  # cosine and sine of the angle between them
     ("ramp", "f8", 5),  # muscle force that changes evenly: since [s], x, y [N], rate x, y [N/s]
     ("landings_most", "i8"),  # landings on borders in one step
 ]
@@ -67,8 +79,8 @@ STATE = [
 
 
 # the cheapest way for CPython to write floats into an array: (array, offset [bytes], floats)
-put4, put5, put6, put8, put10, put12, put14, put17, put18, put28 = (
-    struct.Struct(f"{n}d").pack_into for n in (4, 5, 6, 8, 10, 12, 14, 17, 18, 28)
+put4, put5, put6, put8, put10, put12, put14, put17, put22, put33 = (
+    struct.Struct(f"{n}d").pack_into for n in (4, 5, 6, 8, 10, 12, 14, 17, 22, 33)
 )
 
 
@@ -86,9 +98,9 @@ class Engine(NamedTuple):
         ctrl: controls.
         push: applied joint torques [N.m].
         timestep: length of a step [s], shape (1,).
-        table: from clay.region_table.
-        muscle: lines of the muscle's multisine, see Signal.lines.
-        command: lines of the command's multisine.
+        table: from regions.region_table.
+        muscle: table of the muscle's signal, see model.pieces; empty for none.
+        command: table of the command's signal, whose pieces are counted from their start.
         ahead: what changes from step to step, from sample s["first"] on; see `steps_ahead` of the
             method.
         rows: of the record, shape (n, ROW).
@@ -100,6 +112,10 @@ class Engine(NamedTuple):
             past samples, `window` rows; forces of the clay at past samples [N], whole_delay + 2;
             the queue: time [s] and what to hold from then on, whole_delay + 4.
         rendered: force of the clay as rendered [N], a line a row, shape (n, 2) or (0, 2).
+        breaks: times at which steps of an accurate run must end: a signal jumps there [s].
+        law: of a sampled controller of the user's own, called with law_data.
+        law_data: what it is called with.
+        desk: the floats that it reads and writes, see sampled_controller.DESK.
     """
 
     step: Any
@@ -123,6 +139,10 @@ class Engine(NamedTuple):
     chance: Any
     ring: Any
     rendered: Any
+    breaks: Any
+    law: Any
+    law_data: Any
+    desk: Any
 
 
 class Method(Protocol):
@@ -241,6 +261,16 @@ class Method(Protocol):
         ...
 
 
+def arm_of(s):
+    """The arm's numbers, see arm.Arm.links.
+
+    Args:
+        s: state of the run.
+    """
+    a = s["arm"]
+    return a[0], a[1], a[2], a[3], a[4]
+
+
 def next_sample(t, i, last, dt, t_max):
     """The next sample of a run.
 
@@ -328,23 +358,78 @@ def muscle_force(s, muscle, t, h):
         t: centre of the interval [s].
         h: half its length [s].
     """
-    x, y = signals.mean_of_lines(muscle, t, h)
+    x, y = 0.0, 0.0
+    if len(muscle) > 0:
+        x, y = pieces.mean_of_table(muscle, t, h)
+    return steady_force(s, t, x, y)
+
+
+def steady_force(s, t, x, y):
+    """Muscle force with its parts that are constant or change evenly.
+
+    Args:
+        s: state of the run.
+        t: time [s].
+        x: force of the signal along x [N].
+        y: force of the signal along y [N].
+
+    Returns:
+        (x, y) [N].
+    """
     force, ramp = s["force"], s["ramp"]
     x += ramp[1] + (t - ramp[0]) * ramp[3]
     y += ramp[2] + (t - ramp[0]) * ramp[4]
     return force[0] + x, force[1] + y
 
 
-def command_change(e, t0, t1):
+def force_at(s, e, t, near):
+    """Muscle force at a time, from one side of it where it jumps.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        t: the time [s].
+        near: a time beside it [s].
+
+    Returns:
+        (x, y) [N].
+    """
+    x, y = 0.0, 0.0
+    if len(e.muscle) > 0:
+        x, y = pieces.value_of_table(e.muscle, t, near)
+    return steady_force(s, t, x, y)
+
+
+def command_at(e, t, near):
+    """Change of the command since t = 0, (x, y) [m], from one side of a time where it jumps.
+
+    Args:
+        e: arrays of the run.
+        t: the time [s].
+        near: a time beside it [s].
+    """
+    x0, y0 = pieces.mean_of_lines(e.command, 0.0, 0.0)
+    x1, y1 = pieces.value_of_table(e.command, t, near)
+    return x1 - x0, y1 - y0
+
+
+def command_change(e, t0, t1, h):
     """Change of the command between two times, (x, y) [m].
 
     Args:
         e: arrays of the run.
         t0: first time [s].
         t1: second time [s].
+        h: pieces count by their mean over h before and after a time, or over less next to t = 0
+            [s]; 0 for their value.
     """
-    x0, y0 = signals.mean_of_lines(e.command, t0, 0.0)
-    x1, y1 = signals.mean_of_lines(e.command, t1, 0.0)
+    x0, y0 = pieces.mean_of_lines(e.command, t0, 0.0)
+    x1, y1 = pieces.mean_of_lines(e.command, t1, 0.0)
+    if pieces.has_pieces(e.command):
+        ax, ay = pieces.mean_of_pieces(e.command, t0, min(h, t0))
+        bx, by = pieces.mean_of_pieces(e.command, t1, min(h, t1))
+        x1 += bx - ax
+        y1 += by - ay
     return x1 - x0, y1 - y0
 
 
@@ -386,11 +471,75 @@ def settle(s, table):
 
     Args:
         s: state of the run.
-        table: from clay.region_table.
+        table: from regions.region_table.
     """
-    low, high, base, rate = clay.enter_region(table, s["index"][0], s["index"][1], s["t"])
+    low, high, base, rate = regions.enter_region(table, s["index"][0], s["index"][1], s["t"])
     for j in range(2):
         s["low"][j], s["high"][j], s["base"][j], s["rate"][j] = low[j], high[j], base[j], rate[j]
+    if s["smooth"]:
+        feel_place(s, table)
+
+
+def feel_place(s, table):
+    """Takes the clay of the place of the handle, where it is smooth: that before and after it too.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+    """
+    q1, q2 = s["q"]
+    ox, oy = s["origin"]
+    base, old, which = s["base"], s["old"], s["smooth"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
+    x, y = u1y + u2y - ox, -oy - u1x - u2x
+    base[0], base[1] = regions.smooth_clay(table, which, x, y, base[0], base[1])
+    for j in range(2):
+        if which != 2 - j:
+            old[j], old[2 + j] = base[j], 0.0
+
+
+def move_on(s, table, i, up):
+    """Takes the region beyond a border for the present one.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+        i: coordinate, 0 for x, 1 for y.
+        up: 1 for the upper border, -1 for the lower one.
+    """
+    s["index"][i] += up
+    settle(s, table)
+
+
+def sides_of(s, table, x, y):
+    """Borders between here and a place; moves the region on where one lies between cells alike.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+        x: where a step leads, x [m].
+        y: the same, y [m].
+
+    Returns:
+        (x, y), as `side`.
+    """
+    while True:
+        sx, sy = side(x, s["low"][0], s["high"][0]), side(y, s["low"][1], s["high"][1])
+        if (sx == 0) == (sy == 0) or not is_same_beyond(s, table, 1 if sy else 0, sx + sy):
+            return sx, sy
+        move_on(s, table, 1 if sy else 0, sx + sy)
+
+
+def is_same_beyond(s, table, i, up):
+    """Whether the clay beyond a border of the present region is the same.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+        i: coordinate, 0 for x, 1 for y.
+        up: 1 for the upper border, -1 for the lower one.
+    """
+    return regions.is_alike(table, s["index"][0], s["index"][1], i, up)
 
 
 def cross(m, s, e, i, up):
@@ -408,11 +557,10 @@ def cross(m, s, e, i, up):
     crossings[n, 0], crossings[n, 1], crossings[n, 2] = float(i), border, s["t"]
     crossings[n, 3] = m.speed(s, e, i)
     s["crossed"] = n + 1
-    if i == 0 and up > 0 and border == e.table[clay.AXIS_ROWS, 2]:
+    if i == 0 and up > 0 and border == e.table[regions.END]:
         s["closing"] = FINISHED
     else:
-        s["index"][i] += up
-        settle(s, e.table)
+        move_on(s, e.table, i, up)
         s["struck"] = 1
 
 
@@ -487,7 +635,7 @@ def careful(m, s, e):
         if after == 0.0 or axis >= 0 or not good:
             break
         x, y = m.place(s, e, after)
-        sx, sy = side(x, s["low"][0], s["high"][0]), side(y, s["low"][1], s["high"][1])
+        sx, sy = sides_of(s, e.table, x, y)
         # no way back over a border: it must not hold the run
         sx, sy = sx if overx in (0, sx) else 0, sy if overy in (0, sy) else 0
         if sx == 0 and sy == 0:
@@ -500,7 +648,14 @@ def careful(m, s, e):
         elif s["landings"] >= s["landings_most"]:
             break
         else:
-            after, axis, up = locate_event(m, s, e, after, (x, y), (sx, sy))
+            length, i, over = locate_event(m, s, e, after, (x, y), (sx, sy))
+            if is_same_beyond(s, e.table, i, over):
+                move_on(s, e.table, i, over)
+            else:
+                after, axis, up = length, i, over
+            continue
+        if is_same_beyond(s, e.table, i, over):
+            move_on(s, e.table, i, over)
             continue
         cross(m, s, e, i, over)
         act = True

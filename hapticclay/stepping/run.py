@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 import contextlib
 import functools
 import hashlib
@@ -19,15 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
-from ..model import arm, clay
+from ..model import arm, clay, compensator, regions
+from ..model.compensator import Compensator
 from ..model.constants import AXES
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
-from ..model.signals import Multisine
 from . import energy, engine, leapfrog, loop, monitor, path
 from .engine import mujoco
 
 CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
+STORED = 8  # that one store keeps: two of an arm, with clay and without
 CROSSINGS_ROOM = 64  # crossings between two looks
 
 
@@ -110,15 +110,25 @@ class Kernel(NamedTuple):
         handles: (step, forward, model, data) as compiled loops call the engine; None if there are
             none.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
+        law: (law, law_data) of Engine for compiled loops, from a LawCaller or None, and the desk.
     """
 
     advance: Callable[[Run, int], None]
     block: int = CHUNK
     handles: Callable[[Any, Any], tuple[Any, ...]] | None = None
     quiet: Callable[..., bool] | None = None
+    law: Callable[[Any, Any], tuple[Any, Any]] | None = None
+
+
+def _to_next_sample(run: Run, room: int) -> None:
+    s, e, begin = run.s, run.e, run.s["i"]
+    while s["code"] == path.OPEN and s["i"] == begin:
+        if not run.method.glide(s, e, s["filled"] + 1):
+            path.careful(run.method, s, e)
 
 
 PLAIN = Kernel(lambda run, room: path.advance(run.method, run.s, run.e, room))
+STEPWISE = Kernel(_to_next_sample)
 
 
 class NeedsMonitor(Exception):
@@ -134,7 +144,7 @@ class EngineStore:
 
     def __init__(self, kernel: Kernel):
         self.kernel = kernel
-        self.engines: dict[bool, tuple[Any, Any, path.Engine, path.Engine | None]] = {}
+        self.engines: dict[Any, tuple[Any, Any, path.Engine, path.Engine | None]] = {}
         self.states: dict[type[Run], State] = {}
         self.rows = np.empty((CHUNK - 1, path.ROW))
         self.crossings = np.empty((CROSSINGS_ROOM, 4))
@@ -158,31 +168,37 @@ class EngineStore:
         Returns:
             (model, data, arrays of a run for CPython, for compiled loops).
         """
-        dampers = s.clay is not None
-        if dampers not in self.engines:
-            self.engines[dampers] = self._equip(engine.build(s))
-        model, data, *_ = self.engines[dampers]
+        key = s.clay is not None, s.arm
+        if key not in self.engines:
+            if len(self.engines) >= STORED:
+                del self.engines[next(iter(self.engines))]  # the one longest there
+            self.engines[key] = self._equip(engine.build(s))
+        model, data, *_ = self.engines[key]
         model.opt.timestep = s.dt
         for i, limit in enumerate(s.torque_limit):
             model.actuator_ctrlrange[i] = -limit, limit
+        engine.turn_dampers(model, s)
         mujoco.mj_resetData(model, data)
-        return self.engines[dampers]
+        return self.engines[key]
 
     def _equip(self, model: Any) -> tuple[Any, Any, path.Engine, path.Engine | None]:
         data, block = mujoco.MjData(model), self.kernel.block
         none = np.zeros((0, 5))
         arrays: Any = (
             data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied,
-            engine.timestep_view(model), clay.region_table(None, None), none, none, none,
+            engine.timestep_view(model), regions.region_table(None, None), none, none, none,
             self.rows, self.crossings,
             np.zeros((block, leapfrog.RAW)), np.zeros((block, leapfrog.VARIED)),
-            none, none, none,
+            none, none, none, np.zeros(0),
         )  # fmt: skip
-        plain = path.Engine(
-            mujoco.mj_step, mujoco.mj_forward, model, data, *map(memoryview, arrays)
-        )
-        handles: Any = self.kernel.handles
-        native = path.Engine(*handles(model, data), *arrays) if handles else None
+        desk: Any = np.zeros(0)
+        views: Any = map(memoryview, arrays)
+        calls: Any = (mujoco.mj_step, mujoco.mj_forward, model, data)
+        plain = path.Engine._make((*calls, *views, None, None, memoryview(desk)))
+        native, kernel = None, self.kernel
+        if kernel.handles and kernel.law:
+            calls, own = kernel.handles(model, data), kernel.law(None, desk)
+            native = path.Engine._make((*calls, *arrays, *own, desk))
         return model, data, plain, native
 
 
@@ -243,14 +259,13 @@ class Run:
         self.scenario, self.every, self.kernel = scenario, every, kernel
         self.store = store or EngineStore(kernel)
         self.model, self.data, self.e, self.native = self.store.engine(scenario)
-        self.muscle, self.command = _build_signal(scenario.muscle), _build_signal(scenario.command)
+        self.drives = _drives(scenario)
+        self.muscle, self.command = self.drives.get("muscle"), self.drives.get("command")
         self.last = math.floor(scenario.t_max / scenario.dt + 1e-6)
-        self.table = clay.region_table(scenario.clay, scenario.length)
-        grows = scenario.clay and (scenario.clay.x.growth or scenario.clay.y.growth)
+        self.table = regions.region_table(scenario.clay, scenario.length)
+        grows = scenario.clay and scenario.clay.grows
         self.varies = bool(self.muscle or self.command or grows)  # from step to step
-        driven = {"muscle": self.muscle, "command": self.command}
-        lines = {name: signal.lines for name, signal in driven.items() if signal}
-        self._arrays(table=self.table, **lines)
+        self._arrays(table=self.table, **{name: d.table for name, d in self.drives.items()})
         self.s = self.store.state(type(self))
         self.pause = math.inf
         self.watch = monitor.StabilityMonitor(scenario)
@@ -275,30 +290,51 @@ class Run:
         s, data, now = self.scenario, self.data, self.s
         self._tell(s)
         (x, y), (ox, oy) = s.start, s.origin
-        q1, q2 = arm.inverse_kinematics(ox + x, oy + y)
-        r1, r2 = arm.joint_velocity(*s.velocity, arm.jacobian(q1, q2), 1.0)
+        q1, q2 = arm.inverse_kinematics(ox + x, oy + y, s.arm.links)
+        r1, r2 = arm.joint_velocity(*s.velocity, arm.jacobian(q1, q2, s.arm.links), 1.0)
         data.qpos[:], data.qvel[:] = (q1, q2), (r1, r2 - r1)
         self._put(q=data.qpos, w=data.qvel)
         now["fine"], now["struck"], now["first"] = math.inf, 1, -1
-        for i in (0, 1):
-            edges = self.table[clay.EDGE_ROW + i].tolist()
-            now["index"][i] = bisect.bisect_right(edges, s.start[i], 1) - 1
+        self._put(index=regions.region_of(self.table, s.start))
         path.settle(now, self.e.table)
         self._put(old=(*now["base"], *now["rate"]))
         w1, w2 = now["w"]
-        th = s.operator or NO_HAND
-        self.first = energy.stored_energy(th, w1, w1 + w2, s.start, s.velocity)
+        self.first = energy.stored_energy(s, w1, w1 + w2, s.start, s.velocity)
 
     def _tell(self, s: Scenario) -> None:
         """Gives the scenario's numbers to the loops."""
-        th, now = s.operator or NO_HAND, self.s
+        now, (x, y) = self.s, (th or NO_HAND for th in s.operators)
         for name in ("dt", "t_max"):
             now[name] = float(getattr(s, name))
-        names = "gain", "force", "origin", "torque_limit"
-        self._put(hand=(th.mass, th.damper, th.spring), **{x: getattr(s, x) for x in names})
-        now["held"], now["shaping"] = int(s.operator is not None), int(s.shaping)
+        names = "gain", "origin", "torque_limit"
+        self._put(force=_steady_force(s), **{x: getattr(s, x) for x in names})
+        self._put(handx=(x.mass, x.damper, x.spring), handy=(y.mass, y.damper, y.spring))
+        self._put(arm=s.arm.links, servox=s.servo[0].numbers, servoy=s.servo[1].numbers)
+        self._tell_compensator(s.compensators)
+        now["held"], now["shaping"] = int(any(s.operators)), int(s.shaping)
         now["dampers"], now["last"] = int(s.clay is not None), self.last
         now["landings_most"] = path.LANDINGS
+        angle = s.clay.angle if s.clay else 0.0
+        now["turned_clay"] = int(angle != 0.0)
+        now["smooth"] = s.clay.smooth if s.clay else 0
+        self._put(grain=(math.cos(angle), math.sin(angle)))
+
+    def _tell_compensator(self, shapes: tuple[Compensator, Compensator]) -> None:
+        """Gives the compensators to the loops: as printed by two numbers, others by all."""
+        lags = [c.lag for c in shapes]
+        if all(lag and lag[0] == 1.0 for lag in lags):
+            self._put(lag=[lag[1] for lag in lags if lag])
+            return
+        self.s["formed"] = max(1, *(c.order for c in shapes))
+        self._put(form=[x for c in shapes for x in compensator.form_numbers(c)])
+
+    def moving_states(self) -> list[float]:
+        """States of the compensators where the handle has long moved evenly."""
+        s = self.scenario
+        both = zip(s.compensators, s.servo, s.velocity, strict=True)
+        return [
+            x for c, servo, v in both for x in compensator.moving_states(c, v / servo.numbers[0])
+        ]
 
     def _put(self, **arrays: Any) -> None:
         for name, values in arrays.items():
@@ -348,6 +384,20 @@ class Run:
         if code:
             self.finish("finished" if code == path.FINISHED else "time limit")
 
+    def _prepare_drives(self, n: int, further: int = 0) -> tuple[float, float]:
+        """Readies the signals for the next n whole steps, and further ones to look ahead.
+
+        Returns:
+            The part of the run that this covers, (begin, end) [s].
+        """
+        dt = self.scenario.dt
+        begin = max(self.i - 1, 0) * dt
+        end = min((self.i + n + 2 + further) * dt, self.scenario.t_max)
+        for name, drive in self.drives.items():
+            drive.prepare(begin, end)
+            self._arrays(**{name: drive.table})
+        return begin, end
+
     def _make(self, room: int) -> None:
         self.s["crossed"] = 0
         self.kernel.advance(self, room)
@@ -383,6 +433,35 @@ class Run:
                 cause = "the arm is stretched or folded"
                 self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=cause)
 
+    def step(self) -> None:
+        """Goes on to the next sample, with the kernel STEPWISE."""
+        self.pause = self.i + 1
+        self.go(None)
+
+    def interrupt(self) -> None:
+        """Ends the run at its last sample."""
+        self.outcome = monitor.Outcome("interrupted", self.t, self.i)
+        self.flush()
+
+    def ahead(self) -> dict[str, np.ndarray]:
+        """The sample that `step` would write now, as `arrays`; the run stays where it is."""
+        saved, entered, n = self._save(), self.table.copy(), self.filled
+        try:
+            self._make(n + 1)
+            return self.columns(self.store.rows[n : n + 1], n)
+        finally:
+            self._restore(saved)
+            self.table[:] = entered
+
+    def change_force(self, force: tuple[float, float]) -> None:
+        """Goes on under another constant muscle force.
+
+        Args:
+            force: (x, y) [N].
+        """
+        self.scenario = replace(self.scenario, force=force)
+        self._put(force=_steady_force(self.scenario))
+
     def uh(self, t: np.ndarray, h: float) -> np.ndarray:
         """Mean muscle force over intervals.
 
@@ -393,7 +472,7 @@ class Run:
         Returns:
             Force [N], shape (n, 2).
         """
-        force = np.broadcast_to(self.scenario.force, (len(t), 2))
+        force = np.broadcast_to(_steady_force(self.scenario), (len(t), 2))
         return force + self.muscle.mean(t, h) if self.muscle else force
 
     def shift(self, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -420,7 +499,7 @@ class Run:
             (x, y) [m].
         """
         (q1, q2), (w1, w2) = self.data.qpos.tolist(), self.data.qvel.tolist()
-        x, y = arm.handle_position(q1 + h * w1, q2 + h * w2)
+        x, y = arm.handle_position(q1 + h * w1, q2 + h * w2, self.scenario.arm.links)
         return x - self.scenario.origin[0], y - self.scenario.origin[1]
 
     def finish(self, code: str) -> None:
@@ -512,19 +591,35 @@ class Run:
         t = np.concatenate([index for index, _ in self.kept]) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
-        columns = (
-            np.concatenate([rows[:, j : j + 2] for _, rows in self.kept])
-            for j in range(0, path.ROW, 2)
-        )
+        return {"t": t} | self._columns([rows for _, rows in self.kept])
+
+    def columns(self, rows: np.ndarray, first: int) -> dict[str, np.ndarray]:
+        """Rows by the names of Record's arrays, without their times.
+
+        Args:
+            rows: shape (n, path.ROW).
+            first: index of the first one among those not yet judged.
+        """
+        return self._columns([rows])
+
+    def _columns(self, rows: list[np.ndarray]) -> dict[str, np.ndarray]:
+        columns = (np.concatenate([x[:, j : j + 2] for x in rows]) for j in range(0, path.ROW, 2))
         q, p, v, fh, tau, delta, b, qd = columns
-        fe = np.column_stack(clay.viscous_force(*b.T, *v.T))
-        return dict(t=t, p=p, v=v, fh=fh, fe=fe, b=b, q=q, qd=qd, tau=tau, delta=delta)
+        fe = np.column_stack(self._force(*b.T, *v.T))
+        return dict(p=p, v=v, fh=fh, fe=fe, b=b, q=q, qd=qd, tau=tau, delta=delta)
+
+    def _force(self, bx: Any, by: Any, vx: Any, vy: Any) -> tuple[Any, Any]:
+        """Force of the clay, (x, y) [N]."""
+        if self.s["turned_clay"]:
+            c, s = self.s["grain"]
+            return clay.turned_force(c, s, bx, by, vx, vy)
+        return clay.viscous_force(bx, by, vx, vy)
 
     def brief(self) -> tuple[Any, ...]:
         """The end of the run: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
         if self.without_samples:
             px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.last_row[2:14]
-            force = clay.viscous_force(bx, by, vx, vy)
+            force = self._force(bx, by, vx, vy)
             last: Any = [(px, py), (vx, vy), (fx, fy), force, (bx, by)]
             return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
         arrays = self.arrays()
@@ -535,8 +630,7 @@ class Run:
     def balance(self) -> dict[str, float]:
         """The energy balance, as Record.energy."""
         px, py, vx, vy, w1, w2 = (float(x) for x in self.s["final"])
-        th = self.scenario.operator or NO_HAND
-        last = energy.stored_energy(th, w1, w1 + w2, (px, py), (vx, vy))
+        last = energy.stored_energy(self.scenario, w1, w1 + w2, (px, py), (vx, vy))
         work = [float(x) for x in self.s["work"]][:5]
         return energy.energy_balance(work, self.first if self.looked else last, last)
 
@@ -546,12 +640,27 @@ def _columns(rows: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(rows[:, :12].T)
 
 
-def _build_signal(multisine: Multisine | None) -> Any:
-    if multisine is None:
-        return None
-    from ..model.signals import Signal  # only a run that has one pays for it
+def _drives(scenario: Scenario) -> dict[str, Any]:
+    """The Drive of the muscle and of the command, where they vary."""
+    if not scenario.driven:
+        return {}
+    from .drive import Drive  # only a run that has one pays for it
 
-    return Signal(multisine)
+    both = {"muscle": scenario.muscle, "command": scenario.command}
+    return {
+        name: Drive(signal, scenario.dt, name == "command")
+        for name, signal in both.items()
+        if signal is not None and signal.varies
+    }
+
+
+def _steady_force(scenario: Scenario) -> tuple[float, float]:
+    """The constant part of the muscle force, (x, y) [N]."""
+    (x, y), muscle = scenario.force, scenario.muscle
+    if muscle is not None and not muscle.varies:
+        more = muscle(0.0)
+        x, y = x + float(more[0]), y + float(more[1])
+    return x, y
 
 
 class LeapfrogRun(Run):
@@ -561,12 +670,18 @@ class LeapfrogRun(Run):
 
     def _start(self) -> None:
         super()._start()
-        self._put(loop=loop.initial_state(self.scenario.start, self.scenario.velocity))
+        s = self.scenario
+        x = loop.initial_state(s.start, s.velocity, s.servo)
+        ratio = [servo.numbers[0] for servo in s.servo] * 2
+        self._put(loop=[a * b for a, b in zip(x[:4], ratio, strict=True)] + list(x[4:]))
+        if self.s["formed"]:
+            self._put(form_of=(-1.0, -1.0), form_states=self.moving_states())
 
     def _make(self, room: int) -> None:
-        if self.varies:
+        if self.varies or self.s["smooth"]:  # b varies too
             n = min(room - self.filled + 1, max(self.last - self.i, 0) + 1)
             self.s["first"] = self.i
+            self._prepare_drives(n)
             self._arrays(ahead=leapfrog.steps_ahead(self, self.i, n))
         super()._make(room)
 

@@ -14,14 +14,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm, clay, controller, hardware, operator
-from ..model.constants import AXES, G, S
+from ..model import arm, clay, compensator, controller, hardware, operator
+from ..model.compensator import Compensator
+from ..model.controller import Servo
+from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
 from . import energy, loop, path
-from .path import INF, OPEN, TOUCH, put4, put6, put8, put10, put14, put18
+from .path import INF, OPEN, TOUCH, put4, put6, put8, put10, put14, put22
 from .run import CHUNK, Run
 
 SLACK = 1e-9  # of dt: events so close are one
 HOLD = 10  # numbers that the motors hold, see SAMPLED_STATE
+FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
 AHEAD = 10  # muscle force of a kick before, after and around a sample, at it; change of the command
 
 SAMPLED_STATE = [  # beside path.STATE
@@ -30,6 +33,13 @@ SAMPLED_STATE = [  # beside path.STATE
     ("Ts", "f8"),
     ("physical", "i8"),  # whether the clay is there all the time; else the motors render it
     ("memory", "f8", 40),  # rows (A, B) of controller.held_compensator, x and y
+    (
+        "form_memory",
+        "f8",
+        2 * FORM_MEMORY,
+    ),  # where the compensator is `formed`, see `formed_memory`
+    ("own", "i8"),  # whether the controller is the user's own
+    ("asked", "i8"),  # index of the sample for which it was last asked
     ("wired", "i8"),  # whether there is hardware
     ("uneven", "i8"),  # whether events may lie between the steps
     ("random", "i8"),  # whether Engine.chance matters
@@ -53,6 +63,8 @@ SAMPLED_STATE = [  # beside path.STATE
     ("coupling", "f8", 2),
     # now
     ("loop", "f8", 8),  # delta, delta', y, y' of x, then of y
+    ("form_states", "f8", 2 * compensator.ORDER),  # of such a compensator, x and y
+    ("form_start", "f8", 2),  # delta of start and command, to which it adds [m]
     # what the motors hold: their torques [N.m], force of the clay as rendered, of it that of the
     # passivity controller, that of the coupling [N], velocity of its tool [m/s]; two each
     ("hold", "f8", HOLD),
@@ -82,6 +94,7 @@ SAMPLED_STATE = [  # beside path.STATE
     ("uh", "f8", 2),  # muscle force now [N]
     ("shift", "f8", 2),  # change of the command over a sample [m]
     ("loop_next", "f8", 8),
+    ("form_next", "f8", 2 * compensator.ORDER),
     ("hold_next", "f8", HOLD),
     ("wires_next", "f8", 14),
     ("entry", "f8", 1 + HOLD),  # of the queue: time [s], what to hold
@@ -92,9 +105,9 @@ SAMPLED_STATE = [  # beside path.STATE
     ("early_force", "f8", 2),  # hand force of that kick [N]
     ("early_work", "f8", path.SUMS),  # and its works [J]
     # kicks: `ready_kick` writes numbers of the one before a sample, after it, and around it
-    ("early", "f8", 18),
-    ("late", "f8", 18),
-    ("whole", "f8", 18),
+    ("early", "f8", 22),
+    ("late", "f8", 22),
+    ("whole", "f8", 22),
     # the kick last worked out
     ("sample", "f8", 10),  # p [m], v before [m/s], net force [N], delta [m], clay's rest [N]
     ("end", "f8", 4),  # velocity [m/s] and joint rates [rad/s] after it
@@ -108,27 +121,27 @@ def ready_kick(s, x, before, after, uh):
 
     Args:
         s: state of the run.
-        x: gets them, shape (18,).
+        x: gets them, shape (22,).
         before: length of the step before the sample [s].
         after: length of the step after the sample [s].
         uh: muscle force, (x, y) [N].
     """
     span = before + after
     H = 0.5 * span
-    spring, mass, damp0, damp1 = operator.operator_coefficients(
-        s["hand"], H, before / span, after / span, max(before, after)
-    )
+    L, R, step = before / span, after / span, max(before, after)
+    springx, massx, dampx0, dampx1 = operator.operator_coefficients(s["handx"], H, L, R, step)
+    springy, massy, dampy0, dampy1 = operator.operator_coefficients(s["handy"], H, L, R, step)
     bx0, bx1, by0, by1, L, uhx, uhy = 0.0, 0.0, 0.0, 0.0, before / span, uh[0], uh[1]
     stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
     if s["physical"]:
         t = s["t"]
         bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy = loop.step_inputs(
-            path.damping_before(s, t - 0.25 * before), path.damping_now(s, t + 0.25 * after),
-            (uhx, uhy), before, after, s["hand"],
+            s, path.damping_before(s, t - 0.25 * before), path.damping_now(s, t + 0.25 * after),
+            (uhx, uhy), before, after,
         )  # fmt: skip
-    put18(
+    put22(
         x, 0, bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy,
-        H, after, spring, mass, damp0, damp1,
+        H, after, springx, springy, massx, massy, dampx0, dampy0, dampx1, dampy1,
     )  # fmt: skip
 
 
@@ -138,7 +151,7 @@ def ready_kick_now(s, muscle, x, before, after):
     Args:
         s: state of the run.
         muscle: see Engine.
-        x: gets the numbers, shape (18,).
+        x: gets the numbers, shape (22,).
         before: length of the step before the sample [s].
         after: length of the step after the sample [s].
     """
@@ -154,8 +167,9 @@ def measure_pose(s):
     """
     q1, q2 = s["q"]
     ox, oy = s["origin"]
-    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2)
-    wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y))
+    links = s["arm"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, links)
+    wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y), links)
     put10(
         s["pose"], 0, u1x, u1y, u2x, u2y, u1y + u2y - ox, -oy - u1x - u2x, wxx, wxy, wyy,
         u1x * u2y - u2x * u1y,
@@ -177,15 +191,23 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
     """
     (
         bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _,
-        H, step, spring, mass, damp0, damp1,
+        H, step, springx, springy, massx, massy, dampx0, dampy0, dampx1, dampy1,
     ) = x  # fmt: skip
+    _, _, I1, I2, _ = s["arm"]
     u1x, u1y, u2x, u2y, px, py, sxx, sxy, syy, det = s["pose"]
     r2 = w1 + w2
     vx = u1x * w1 + u2x * r2
     vy = u1y * w1 + u2y * r2
-    fx = uhx - bx0 * vx
-    fy = uhy - by0 * vy
-    dx, dy = bx1 + damp1, by1 + damp1
+    turned, dx, dy, dz = s["turned_clay"], bx1 + dampx1, by1 + dampy1, 0.0
+    if turned:  # and never stiff, see Scenario
+        cos, sin = s["grain"]
+        x, y = clay.turned_force(cos, sin, bx0, by0, vx, vy)
+        fx, fy = uhx - x, uhy - y
+        dx, dy, dz = clay.turned_damping(cos, sin, bx1, by1)
+        dx, dy = dx + dampx1, dy + dampy1
+    else:
+        fx = uhx - bx0 * vx
+        fy = uhy - by0 * vy
     if s["held"]:
         s1 = w1 * w1
         s2 = r2 * r2
@@ -195,18 +217,20 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
             cx, cy = arm.centripetal_about_sample(
                 L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
             )
-        fx -= spring * px - mass * cx + damp0 * vx
-        fy -= spring * py - mass * cy + damp0 * vy
-    a1, a2 = (t1 - t2) / arm.I1, t2 / arm.I2
+        fx -= springx * px - massx * cx + dampx0 * vx
+        fy -= springy * py - massy * cy + dampy0 * vy
+    a1, a2 = (t1 - t2) / I1, t2 / I2
     restx, resty, softx, softy = 0.0, 0.0, 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        hx, hy = uhx - spring * px, uhy - spring * py
-        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y))
+        hx, hy = uhx - springx * px, uhy - springy * py
+        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y), s["arm"])
         hx, hy = clay.slow_force(
             hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )
-        owedx, owedy, softx, softy = loop.owed_impulse(step, H, spring, sharex, sharey, hx, hy)
+        owedx, owedy, softx, softy = loop.owed_impulse(
+            step, springx, springy, sharex, sharey, hx, hy
+        )
         fx += owedx - restx
         fy += owedy - resty
         dx += softx
@@ -215,7 +239,9 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
     n = 1.0 / H
     gx = n * vx + (u1x * a1 + u2x * a2) + sxx * fx + sxy * fy
     gy = n * vy + (u1y * a1 + u2y * a2) + sxy * fx + syy * fy
-    if dx or dy:
+    if dz:
+        ux, uy = controller.solve_turned((n, n), (gx, gy), (sxx, sxy, syy), (dx, dy, dz))
+    elif dx or dy:
         m1 = n + sxx * dx
         m2 = sxy * dy
         r = sxy * dx / m1
@@ -234,9 +260,13 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
     g1 = (gx * u2y - gy * u2x) / det
     g2 = (gy * u1x - gx * u1y) / det
     shown, left = s["loop"], s["left"]
-    put10(
-        s["sample"], 0, px, py, vx, vy, fx - dx * ux, fy - dy * uy, shown[0], shown[4], restx, resty
-    )
+    fx -= dx * ux
+    fy -= dy * uy
+    if turned:
+        fx -= dz * uy
+        fy -= dz * ux
+        restx, resty = loop.turned_rest(s["grain"], (bx0, bx1, by0, by1), vx, vy, ux, uy)
+    put10(s["sample"], 0, px, py, vx, vy, fx, fy, shown[0], shown[4], restx, resty)
     put4(s["end"], 0, ux, uy, w1 + H * g1, w2 + H * (g2 - g1))
     left[0], left[1] = H * owedx, H * owedy
 
@@ -292,8 +322,9 @@ def add_works(s, x, hold, w1, w2, work):
     H = x[12]
     w1, w2 = 0.5 * (w1 + n1), 0.5 * (w2 + n2)
     muscle, motors, taken, hand, through = energy.kick_work(
-        H, x, restx, resty, vx, vy, ux, uy, hold[0], hold[1], w1, w2, s["hand"][1]
-    )
+        H, x, restx, resty, vx, vy, ux, uy, hold[0], hold[1], w1, w2,
+        s["handx"][1], s["handy"][1],
+    )  # fmt: skip
     work[0] += muscle
     work[1] += motors
     work[2] += taken
@@ -318,12 +349,12 @@ def look_for_event(s):
     s["event"] = 1 if s["acts"] or s["due"] <= now else 0
 
 
-def respond(s, ring):
+def respond(s, e):
     """The controller acts at an event: works out what `commit` will take.
 
     Args:
         s: state of the run; early, whole, uh and shift hold what belongs to now.
-        ring: see Engine.
+        e: its arrays.
     """
     w1, w2 = s["w"]
     owedx, owedy = s["owed"]
@@ -349,9 +380,9 @@ def respond(s, ring):
         fx, fy = first_force(s)
     s["shown"] = 0
     if s["acts"]:
-        sample(s, ring, w1, w2, fx, fy)
+        sample(s, e, w1, w2, fx, fy)
     if s["delay"] > 0.0:
-        take_due(s, ring)
+        take_due(s, e.ring)
 
 
 def soft_rates(s, x, half):
@@ -409,9 +440,9 @@ def first_force(s):
     uhx, uhy = s["uh"]
     if not s["held"]:
         return uhx, uhy
-    pose, hand = s["pose"], s["hand"]
+    pose, x, y = s["pose"], s["handx"], s["handy"]
     vx, vy, _, _ = handle_motion(pose, s["w"][0], s["w"][1])
-    return uhx - hand[2] * pose[4] - hand[1] * vx, uhy - hand[2] * pose[5] - hand[1] * vy
+    return uhx - x[2] * pose[4] - x[1] * vx, uhy - y[2] * pose[5] - y[1] * vy
 
 
 def felt_force(s, w1, w2, t1, t2):
@@ -431,27 +462,32 @@ def felt_force(s, w1, w2, t1, t2):
     if not s["held"]:
         return uhx, uhy
     u1x, u1y, u2x, u2y, px, py, _, _, _, _ = s["pose"]
-    mass, damper, spring = s["hand"]
+    massx, damperx, springx = s["handx"]
+    massy, dampery, springy = s["handy"]
     vx, vy, cx, cy = handle_motion(s["pose"], w1, w2)
-    restx = uhx - operator.operator_force(spring, mass, damper, px, cx, vx)
-    resty = uhy - operator.operator_force(spring, mass, damper, py, cy, vy)
+    restx = uhx - operator.operator_force(springx, massx, damperx, px, cx, vx)
+    resty = uhy - operator.operator_force(springy, massy, dampery, py, cy, vy)
     fx, fy = restx, resty
     if s["physical"]:
         bx, by = path.damping_before(s, s["t"])
-        fx, fy = restx - bx * vx, resty - by * vy
+        if s["turned_clay"]:
+            fex, fey = clay.turned_force(s["grain"][0], s["grain"][1], bx, by, vx, vy)
+        else:
+            fex, fey = bx * vx, by * vy
+        fx, fy = restx - fex, resty - fey
     # a kick of one second from rest, in which the velocity after it is the acceleration
     ax, ay = controller.velocity_under_torque(
-        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (t1, t2), (fx, fy), (mass, mass)
+        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), s["arm"], (t1, t2), (fx, fy), (massx, massy)
     )
-    return restx - mass * ax, resty - mass * ay
+    return restx - massx * ax, resty - massy * ay
 
 
-def sample(s, ring, w1, w2, fx, fy):
+def sample(s, e, w1, w2, fx, fy):
     """One sample: what is measured, what the motors are to hold, the compensator at the next.
 
     Args:
         s: state of the run.
-        ring: see Engine.
+        e: its arrays.
         w1: rate of joint 1 [rad/s].
         w2: rate of joint 2 [rad/s].
         fx: the operator's force on the sensor, x [N].
@@ -465,43 +501,45 @@ def sample(s, ring, w1, w2, fx, fy):
         fx, fy = sensed_force(s, fx, fy)
         shown = s["lost"] == 0
         if shown:
-            w1, w2 = measured_rates(s, ring, w1, w2)
-    if shown:
+            w1, w2 = measured_rates(s, e.ring, w1, w2)
+    if shown and s["own"]:
+        ask_law(s, e, w1, w2, fx, fy)
+    elif shown:
         u1x, u1y, u2x, u2y, px, py, wxx, wxy, wyy, _ = pose
         if s["encoder"]:
             ox, oy = s["origin"]
-            u1x, u1y, u2x, u2y = arm.jacobian(s["turned"][0], s["turned"][1])
+            links = s["arm"]
+            u1x, u1y, u2x, u2y = arm.jacobian(s["turned"][0], s["turned"][1], links)
             px, py = u1y + u2y - ox, -oy - u1x - u2x
-            wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y))
+            wxx, wxy, wyy = arm.mobility((u1x, u1y, u2x, u2y), links)
         det = u1x * u2y - u2x * u1y
         vx, vy, cx, cy = handle_motion((u1x, u1y, u2x, u2y), w1, w2)
         bx, by = path.damping_now(s, s["t"])
-        fex, fey = bx * vx, by * vy
+        if s["turned_clay"]:
+            fex, fey = clay.turned_force(s["grain"][0], s["grain"][1], bx, by, vx, vy)
+        else:
+            fex, fey = bx * vx, by * vy
         put10(hold, 0, 0.0, 0.0, fex, fey, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if s["coupled"] or s["guarded"]:
-            render(s, ring, (px, py), (vx, vy), (bx, by), (wxx, wyy))
+            render(s, e.ring, (px, py), (vx, vy), (bx, by), (wxx, wyy))
             fex, fey = hold[2], hold[3]
         fx, fy = fx - fex, fy - fey
         # the servo's law, see controller.feedback_law and controller.solve_velocity
+        if s["formed"]:
+            show_form(s, fx, fy)
         deltax, _, yx, ydx, deltay, _, yy, ydy = s["loop"]
-        ax, _ = controller.feedback_law(G[0], S[0], deltax, yx, ydx, px, vx, cx)
-        ay, _ = controller.feedback_law(G[1], S[1], deltay, yy, ydy, py, vy, cy)
+        ax, _ = controller.feedback_law(s["servox"], deltax, yx, ydx, px, vx, cx)
+        ay, _ = controller.feedback_law(s["servoy"], deltay, yy, ydy, py, vy, cy)
         if s["shaping"]:
-            wxx, wxy, wyy = loop.SXX, 0.0, loop.SYY
+            wxx, wxy, wyy = s["servox"][3], 0.0, s["servoy"][3]
         ux = ax + wxx * fx + wxy * fy
         uy = ay + wxy * fx + wyy * fy
-        t2 = arm.I2 * ((uy * u1x - ux * u1y) / det) - u2x * fx - u2y * fy
-        t1 = arm.I1 * ((ux * u2y - uy * u2x) / det) - u1x * fx - u1y * fy + t2
+        t2 = s["arm"][3] * ((uy * u1x - ux * u1y) / det) - u2x * fx - u2y * fy
+        t1 = s["arm"][2] * ((ux * u2y - uy * u2x) / det) - u1x * fx - u1y * fy + t2
         if not s["physical"]:
             p1, p2 = arm.joint_torques(fex, fey, (u1x, u1y, u2x, u2y))
             t1, t2 = t1 - p1, t2 - p2
-        limit1, limit2 = s["torque_limit"]
-        t1 = min(max(t1, -limit1), limit1)
-        t2 = min(max(t2, -limit2), limit2)
-        if s["dac_bits"]:
-            t1 = hardware.quantize(t1, s["dac_bits"], s["dac_range"][0])
-            t2 = hardware.quantize(t2, s["dac_bits"], s["dac_range"][1])
-        hold[0], hold[1] = t1, t2
+        hold[0], hold[1] = driven_torques(s, t1, t2)
         if s["wired"]:
             s["wires_next"][6], s["wires_next"][7] = fx, fy
         s["shown"] = 1
@@ -509,7 +547,105 @@ def sample(s, ring, w1, w2, fx, fy):
         fx, fy = s["wires"][6], s["wires"][7]
         for j in range(HOLD):
             hold[j] = s["hold"][j]
-    next_memory(s, fx, fy)
+    if s["own"]:
+        pass
+    elif s["formed"]:
+        next_form(s, 0, fx)
+        next_form(s, 1, fy)
+    else:
+        next_memory(s, fx, fy)
+
+
+def driven_torques(s, t1, t2):
+    """Torques of the motors, within their limits and behind the converter.
+
+    Args:
+        s: state of the run.
+        t1: torque asked of the shoulder [N.m].
+        t2: torque asked of the elbow [N.m].
+
+    Returns:
+        (shoulder, elbow) [N.m].
+    """
+    limit1, limit2 = s["torque_limit"]
+    t1 = min(max(t1, -limit1), limit1)
+    t2 = min(max(t2, -limit2), limit2)
+    if s["dac_bits"]:
+        t1 = hardware.quantize(t1, s["dac_bits"], s["dac_range"][0])
+        t2 = hardware.quantize(t2, s["dac_bits"], s["dac_range"][1])
+    return t1, t2
+
+
+def ask_law(s, e, w1, w2, fx, fy):
+    """Lets a controller of the user's own say what the motors are to hold.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        w1: rate of joint 1 as measured [rad/s].
+        w2: rate of joint 2 as measured [rad/s].
+        fx: hand force as measured, x [N].
+        fy: the same, y [N].
+    """
+    desk, hold, q = e.desk, s["hold_next"], s["q"]
+    if s["encoder"]:
+        q = s["turned"]
+    if s["asked"] != s["k"]:  # once more for the same sample the state is what it was
+        n = s["own"] - 1
+        for j in range(n):
+            desk[DESK + j] = desk[DESK + n + j]
+        s["asked"] = s["k"]
+    desk[0], desk[1], desk[2], desk[3], desk[4] = s["t"], q[0], q[1], w1, w2
+    desk[5], desk[6] = fx, fy
+    e.law(e.law_data)
+    t1, t2 = desk[TORQUE], desk[TORQUE + 1]
+    put10(hold, 0, t1, t2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if abs(t1) + abs(t2) < INF:  # limits would hide what is not finite
+        hold[0], hold[1] = driven_torques(s, t1, t2)
+    s["shown"] = 1
+
+
+def show_form(s, fx, fy):
+    """Puts delta at the sample into the loop, where the compensator is formed.
+
+    Args:
+        s: state of the run.
+        fx: net force, x [N].
+        fy: net force, y [N].
+    """
+    form, z, start = s["form"], s["form_states"], s["form_start"]
+    for i in range(2):
+        o, j = compensator.FORM * i + 20, compensator.ORDER * i
+        shown = start[i] + s["gain"][i] * form[o + 4] * (fy if i else fx)
+        for r in range(compensator.ORDER):
+            shown += form[o + r] * z[j + r]
+        s["loop"][4 * i] = shown
+
+
+def next_form(s, i, f):
+    """States of a formed compensator and of the reference model at the next sample, one axis.
+
+    Args:
+        s: state of the run.
+        i: axis, 0 for x, 1 for y.
+        f: net force [N].
+    """
+    m, z, order = s["form_memory"], s["form_states"], compensator.ORDER
+    x, out, j, o = s["loop"], s["loop_next"], order * i, FORM_MEMORY * i
+    form, place = s["form"], compensator.FORM * i + 20
+    shown = s["form_start"][i] + s["shift"][i] + s["gain"][i] * form[place + 4] * f
+    for r in range(order + 2):
+        new = m[o + 4] * x[4 * i + 2] + m[o + 5] * x[4 * i + 3]
+        new += m[o + 6] * s["form_start"][i] + m[o + 7] * f
+        for c in range(order):
+            new += m[o + c] * z[j + c]
+        if r < order:
+            s["form_next"][j + r] = new
+            shown += form[place + r] * new
+        else:
+            out[4 * i + 2 + r - order] = new
+        o += 8
+    out[4 * i] = shown
 
 
 def next_memory(s, fx, fy):
@@ -676,6 +812,11 @@ def take_event(s, chance, ring):
     if s["acts"]:
         a, b, c, d, f, g, h, i = s["loop_next"]
         put8(s["loop"], 0, a, b, c, d, f, g, h, i)
+        if s["formed"]:
+            for n in range(2 * compensator.ORDER):
+                s["form_states"][n] = s["form_next"][n]
+            s["form_start"][0] += s["shift"][0]
+            s["form_start"][1] += s["shift"][1]
         if s["wired"]:
             take_wires(s, ring)
         s["k"] += 1
@@ -768,7 +909,7 @@ def place_after(s, h):
         (x, y) [m].
     """
     q, end, origin = s["q"], s["end"], s["origin"]
-    x, y = arm.handle_position(q[0] + h * end[2], q[1] + h * end[3])
+    x, y = arm.handle_position(q[0] + h * end[2], q[1] + h * end[3], s["arm"])
     return x - origin[0], y - origin[1]
 
 
@@ -844,25 +985,28 @@ def command(s, ctrl, push, after):
     """
     hold, w, end, left = s["hold"], s["w"], s["end"], s["left"]
     s["owed"][0], s["owed"][1] = left[0], left[1]
-    t1, t2, bx, by, p1, p2 = loop.whole_kick(w[0], w[1], end[2], end[3], hold[0], hold[1], after)
+    t1, t2, bx, by, p1, p2 = loop.whole_kick(s, w[0], w[1], end[2], end[3], hold[0], hold[1], after)
     ctrl[0], ctrl[1] = t1, t2
     if s["dampers"]:
         ctrl[2], ctrl[3] = bx, by
     push[0], push[1] = p1, p2
 
 
-def observe(s, q, w):
+def observe(s, q, w, table):
     """Reads the engine after a step.
 
     Args:
         s: state of the run.
         q: see Engine.
         w: see Engine.
+        table: see Engine.
     """
     s["steps"] += 1
     for j in range(2):
         s["q"][j], s["w"][j] = q[j], w[j]
     measure_pose(s)
+    if s["smooth"]:
+        path.feel_place(s, table)
 
 
 def ready_kicks(s, ahead, row, grows):
@@ -872,7 +1016,7 @@ def ready_kicks(s, ahead, row, grows):
         s: state of the run.
         ahead: see Engine.
         row: of it; -1 where nothing is driven.
-        grows: whether the clay does, so that all numbers change.
+        grows: whether the clay changes, so that all numbers do.
     """
     dt, now, shift, force = s["dt"], s["uh"], s["shift"], s["force"]
     early, late, whole = (force[0], force[1]), (force[0], force[1]), (force[0], force[1])
@@ -889,6 +1033,30 @@ def ready_kicks(s, ahead, row, grows):
         s["early"][5], s["early"][6] = early
         s["late"][5], s["late"][6] = late
         s["whole"][5], s["whole"][6] = whole
+
+
+def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndarray:
+    """Rows of `next_form` of one axis: exact, by a matrix exponential, under a held force.
+
+    Args:
+        servo: of the axis.
+        shape: of C.
+        K: gain of the compensator.
+        T: length of the sample [s].
+
+    Returns:
+        Shape (6, 8): z filled up to the highest order, y and y', over (z, y, y', start, f).
+    """
+    n, most = shape.order, compensator.ORDER
+    A, B = controller.controller_matrices(servo, shape, K)
+    m = np.zeros((n + 4, n + 4))
+    m[: n + 2, : n + 2], m[: n + 2, n + 3] = A, B
+    m[n + 1, n + 2] = servo.G.gain  # the start adds to delta
+    e = controller.matrix_exponential(T * m)
+    used = [*range(n), *range(most, most + 2)]
+    out = np.zeros((most + 2, most + 4))
+    out[np.ix_(used, [*used, most + 2, most + 3])] = e[: n + 2]
+    return out
 
 
 class Sampled(NamedTuple):
@@ -912,8 +1080,8 @@ class Sampled(NamedTuple):
             row = i - s["first"]
             n = min(n, len(e.ahead) - row)
         ready_kicks(s, e.ahead, -1, True)
-        varies = row >= 0 or (s["physical"] and (rate[0] > 0.0 or rate[1] > 0.0))
-        grows = s["physical"] and (rate[0] > 0.0 or rate[1] > 0.0)
+        grows = s["physical"] > 0 and (s["smooth"] > 0 or rate[0] > 0.0 or rate[1] > 0.0)
+        varies = row >= 0 or grows
         lowx, lowy, highx, highy = s["low"][0], s["low"][1], s["high"][0], s["high"][1]
         for made in range(n):
             if s["uneven"] and self.stop(s)[1] < dt:
@@ -922,7 +1090,7 @@ class Sampled(NamedTuple):
                 ready_kicks(s, e.ahead, row + made if row >= 0 else -1, grows)
             look_for_event(s)
             if s["event"]:
-                respond(s, e.ring)
+                respond(s, e)
             x = s["late"] if s["event"] else s["whole"]
             work_out(s, x, s["event"] > 0)
             px, py = place_after(s, dt)
@@ -934,7 +1102,7 @@ class Sampled(NamedTuple):
                 take_event(s, e.chance, e.ring)
             command(s, e.ctrl, e.push, dt)
             e.step(e.model, e.data)
-            observe(s, e.q, e.w)
+            observe(s, e.q, e.w, e.table)
             s["i"] = i + made + 1
             s["t"] = s["i"] * dt
             s["landings"] = 0
@@ -965,11 +1133,11 @@ class Sampled(NamedTuple):
             t, before = s["t"], s["before"]
             s["uh"][0], s["uh"][1] = path.muscle_force(s, e.muscle, t, 0.0)
             if len(e.command):
-                s["shift"][0], s["shift"][1] = path.command_change(e, t, t + s["Ts"])
+                s["shift"][0], s["shift"][1] = path.command_change(e, t, t + s["Ts"], 0.0)
             if before > 0.0:
                 ready_kick_now(s, e.muscle, s["early"], before, 0.0)
                 ready_kick_now(s, e.muscle, s["whole"], before, before)
-            respond(s, e.ring)
+            respond(s, e)
 
     def strike(self, s, e, after):
         return after  # torques that are held do not follow a hit
@@ -1000,7 +1168,7 @@ class Sampled(NamedTuple):
         e.timestep[0] = after
         e.step(e.model, e.data)
         e.timestep[0] = s["dt"]
-        observe(s, e.q, e.w)
+        observe(s, e.q, e.w, e.table)
 
     def speed(self, s, e, i):
         # half a kick has led to the border; in stiff clay that half holds too little of the clay,
@@ -1028,12 +1196,21 @@ class SampledRun(Run):
         now["ratio"] = round((s.Ts or s.dt) / s.dt)
         now["Ts"] = now["ratio"] * float(s.dt)
         now["physical"] = int(s.render == "implicit")
-        blocks = [
-            np.column_stack(controller.held_compensator(axis, K, now["Ts"]))
-            for axis, K in zip(AXES, s.gain, strict=True)
-        ]
-        x = loop.initial_state(s.start, s.velocity)
-        self._put(memory=np.ravel(blocks), loop=(*x[0:8:2], *x[1:8:2]))
+        self.law: LawCaller | None = None
+        parts = list(zip(s.servo, s.compensators, s.gain, strict=True))
+        x = loop.initial_state(s.start, s.velocity, s.servo)
+        self._put(loop=(*x[0:8:2], *x[1:8:2]))
+        if now["formed"]:
+            rows = [formed_memory(*axis, now["Ts"]) for axis in parts]
+            self._put(form_memory=np.ravel(rows), form_start=x[0:2])
+            self._put(form_states=self.moving_states())
+        else:
+            rows = [
+                np.column_stack(controller.held_compensator(*axis, now["Ts"])) for axis in parts
+            ]
+            self._put(memory=np.ravel(rows))
+        if s.controller is not None:
+            self.take_over(s.controller)
         measure_pose(now)
         now["due"] = now["due_next"] = math.inf
         self.ring = np.zeros((0, 1 + HOLD))
@@ -1043,6 +1220,22 @@ class SampledRun(Run):
         if s.interface:
             self._wire(s.interface)
         look_ahead(now, self.e.chance)
+
+    def take_over(self, controller: Controller) -> None:
+        """Lets a controller of the user's own act, from the start of the run on.
+
+        Args:
+            controller: that one.
+        """
+        state, now = controller.state, self.s
+        self.desk: Any = np.array([0.0] * DESK + [*state, *state, *controller.params])
+        self.law = LawCaller(controller, self.desk)
+        now["own"], now["asked"] = 1 + len(state), -1
+        self._put(loop=[0.0] * 8)
+        self.e = self.e._replace(law=self.law, desk=memoryview(self.desk))
+        if self.native and self.kernel.law:
+            law, data = self.kernel.law(self.law, self.desk)
+            self.native = self.native._replace(law=law, law_data=data, desk=self.desk)
 
     def _wire(self, parts: hardware.Interface) -> None:
         """Sets up the hardware."""
@@ -1095,8 +1288,12 @@ class SampledRun(Run):
             self._arrays(chance=self.noise.table(now["k"], rows // now["ratio"] + 8))
         if self.muscle or self.command:
             now["first"] = self.i
-            self._arrays(ahead=self._ahead(min(rows, max(self.last - self.i, 0) + 1)))
+            n = min(rows, max(self.last - self.i, 0) + 1)
+            self._prepare_drives(n, now["ratio"])
+            self._arrays(ahead=self._ahead(n))
         super()._make(room)
+        if self.law:
+            self.law.check()
 
     def _ahead(self, n: int) -> np.ndarray:
         """What drives the next n whole steps, see AHEAD; shape (n, AHEAD)."""
@@ -1113,11 +1310,13 @@ class SampledRun(Run):
     def _save(self) -> Any:
         if self.s["random"]:
             self.noise.forget(self.s["k"])
-        return super()._save(), self.ring.copy()
+        return super()._save(), self.ring.copy(), self.desk.copy() if self.law else None
 
     def _restore(self, saved: Any) -> None:
         super()._restore(saved[0])
         self.ring[:] = saved[1]
+        if self.law:
+            self.desk[:] = saved[2]
 
     def flush(self) -> None:
         n = self.filled
@@ -1143,6 +1342,18 @@ class SampledRun(Run):
         if self.rendered_kept:
             arrays["fe"] = np.concatenate(self.rendered_kept)
         return arrays
+
+    def columns(self, rows: np.ndarray, first: int) -> dict[str, np.ndarray]:
+        """As Run.columns; fe as in `arrays`.
+
+        Args:
+            rows: as in Run.columns.
+            first: as in Run.columns.
+        """
+        out = super().columns(rows, first)
+        if len(self.rendered):
+            out["fe"] = self.rendered[first : first + len(rows)].copy()
+        return out
 
     def brief(self) -> tuple[Any, ...]:
         """As Run.brief."""

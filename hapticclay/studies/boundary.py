@@ -6,23 +6,27 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import choice, flag, number, pair
+from ..errors import Bound, choice, number
 from ..model import arm
+from ..model.arm import Arm
 from ..model.clay import Clay, Profile
-from ..model.constants import AXES, B_MAX, NOMINAL, TORQUE_LIMIT, TS
+from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
+from ..model.controller import SERVO
 from ..model.hardware import Interface
-from ..model.operator import Operator
-from ..model.scenario import Scenario
+from ..model.scenario import Position, Scenario, TorqueLimit
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limit, linear_loop
+from ..theory.linear_loop import TIMING, Loop
 from ..theory.roots import first_failure
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
 LARGE_PUSH = 0.05  # [m/s] initial velocity that a hand gives
+PUSH_TIME = 0.01  # [s] in which a force takes the place of such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
 CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer while the motors are in their limits
 FITTED_SHARE = 0.7  # of a run, its end, from which growth is read
@@ -34,40 +38,32 @@ BRACKET = 2e-3  # boundaries are found to this share
 
 
 @dataclass(frozen=True)
-class Loop:
-    """One loop: the handle pushed along one axis, in clay all around it.
+class PushedLoop(Loop):
+    """A loop to be run: the handle pushed along its axis, in clay all around it.
+
+    The other axis has the printed servo and no compensator.
 
     Attributes:
-        axis: "x" or "y"; the other axis has no compensator.
-        K: compensator gain.
         b: clay on both axes [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: of the motors, in a sampled loop [s].
-        shaping: as in Scenario.
+        K: compensator gain, > 0, at most 1e6.
+        shaping: as in Scenario; without it the arm's mobility takes the place of the gain of Sh.
         pose: place of the handle, from its nominal position [m].
-        push: velocity of the handle at the start [m/s].
+        push: velocity of the handle at the start [m/s]. Where C does not integrate no state of it
+            goes with a velocity; a constant force then would give it to a free handle in PUSH_TIME.
         torque_limit: of the motors [N.m].
+        arm: the two-link arm.
     """
 
-    axis: str = "x"
-    K: float = 1.0
-    b: float = 90.0
-    operator: Operator | None = None
-    Ts: float | None = None
-    delay: float = 0.0
+    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
+    K: Annotated[float, Bound(0.0, 1e6, above=True)] = 1.0
     shaping: bool = True
-    pose: tuple[float, float] = (0.0, 0.0)
-    push: float = SMALL_PUSH
-    torque_limit: tuple[float, float] = TORQUE_LIMIT
+    pose: Position = (0.0, 0.0)
+    push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
+    torque_limit: TorqueLimit = TORQUE_LIMIT
+    arm: Arm = Arm()
 
     def __post_init__(self):
-        choice("axis", self.axis, AXES)
-        flag("shaping", self.shaping)
-        object.__setattr__(self, "K", number("K", self.K, 0.0, 1e6, above=True))
-        object.__setattr__(self, "b", number("b", self.b, 0.0, B_MAX, unit="N.s/m"))
-        object.__setattr__(self, "push", number("push", self.push, -10.0, 10.0, unit="m/s"))
-        object.__setattr__(self, "pose", pair("pose", self.pose, unit="m"))
+        super().__post_init__()
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
     def scenario(self, t_max: float = GROWTH_SPAN, stop: bool = True) -> Scenario:
@@ -78,24 +74,40 @@ class Loop:
             stop: as in Scenario.
         """
         i, everywhere = AXES.index(self.axis), Profile((), (self.b,))
+        x, y = self._nominal
+        moves = linear_loop.reduced(self.compensator).den[-1] == 0.0
         along = (lambda x: (x, 0.0)) if i == 0 else (lambda x: (0.0, x))
         return Scenario(
             name="boundary",
             clay=Clay(everywhere, everywhere),
             gain=along(self.K),
-            force=(0.0, 0.0),
-            velocity=along(self.push),
+            force=(0.0, 0.0) if moves else along(self.push / (self.servo.S.gain * PUSH_TIME)),
+            velocity=along(self.push) if moves else (0.0, 0.0),
             operator=self.operator,
             shaping=self.shaping,
             dt=self.Ts or TS,
             control="sampled" if self.Ts else "continuous",
+            render=self.render if self.Ts else "held",
             interface=Interface(delay=self.delay) if self.delay else None,
-            origin=(NOMINAL[0] + self.pose[0], NOMINAL[1] + self.pose[1]),
+            origin=(x + self.pose[0], y + self.pose[1]),
             torque_limit=self.torque_limit,
             length=None,
             t_max=t_max,
             stop=stop,
+            arm=self.arm,
+            servo=(self.servo, SERVO[1]) if i == 0 else (SERVO[0], self.servo),
+            compensator=self.compensator,
         )
+
+    @property
+    def linear(self) -> Loop:
+        """The linear loop of it at the nominal pose."""
+        return Loop.of(self.scenario(), self.axis, self.b)
+
+    @property
+    def _nominal(self) -> tuple[float, float]:
+        """Handle at the nominal pose [m]: link 1 along y, link 2 along x."""
+        return self.arm.l2, self.arm.l1
 
 
 def growth_rate(record: Record, axis: str) -> float:
@@ -139,7 +151,7 @@ def _least_damped(v: np.ndarray, dt: float) -> float:
     return float(rate[counts].max()) if counts.any() else -math.inf
 
 
-def classify_run(loop: Loop) -> str:
+def classify_run(loop: PushedLoop) -> str:
     """Class of a run of the loop: "stable", "limit cycle" (bounded by the motors) or "diverges".
 
     Growth is that of a linear motion, so a run whose motors are in their limits at its end is
@@ -207,7 +219,7 @@ def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> 
     return math.sqrt(low * high)
 
 
-def simulated_gain(loop: Loop, guess: float | None = None, most: float = 200.0) -> float:
+def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 200.0) -> float:
     """Gain K above which the oscillation of a run grows; the loop's own K does not matter.
 
     Args:
@@ -220,7 +232,7 @@ def simulated_gain(loop: Loop, guess: float | None = None, most: float = 200.0) 
     return _simulated(loop, "K", guess, most)
 
 
-def simulated_damping(loop: Loop, guess: float, most: float = 1e5) -> float:
+def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> float:
     """Clay b [N.s/m] above which the oscillation of a run grows; the loop's own b does not matter.
 
     Args:
@@ -231,23 +243,23 @@ def simulated_damping(loop: Loop, guess: float, most: float = 1e5) -> float:
     return _simulated(loop, "b", guess, most)
 
 
-def _simulated(loop: Loop, field: str, guess: float, most: float) -> float:
+def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
     def rate(value: float) -> float:
         return growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
 
     return find_crossing(rate, guess, most)
 
 
-def nominal_limit(loop: Loop) -> float:
+def nominal_limit(loop: PushedLoop) -> float:
     """Largest stable K of the linear loop at the nominal pose; the loop's own K does not matter.
 
     Args:
         loop: all but K.
     """
-    return gain_limit.gain_limit(loop.axis, loop.b, loop.operator, Ts=loop.Ts, delay=loop.delay)
+    return gain_limit.gain_limit(loop.linear)
 
 
-def pose_matrix(loop: Loop) -> np.ndarray:
+def pose_matrix(loop: PushedLoop) -> np.ndarray:
     """The linear loop of both axes at the handle's pose.
 
     Without shaping W = Lambda^-1 of that pose takes the place of the gains of Sh, and couples the
@@ -260,22 +272,28 @@ def pose_matrix(loop: Loop) -> np.ndarray:
         A, shape (m, m): z' = A z in continuous time (see `linear_loop.state_space`), else
         x(k+1) = A x(k) (see `linear_loop.sampled_differences`).
     """
-    i, gains = AXES.index(loop.axis), np.zeros(2)
-    gains[i] = loop.K
-    q1, q2 = arm.inverse_kinematics(NOMINAL[0] + loop.pose[0], NOMINAL[1] + loop.pose[1])
-    u = arm.jacobian(q1, q2)
-    xx, xy, yy = arm.mobility(u)
+    i, links = AXES.index(loop.axis), loop.arm.links
+    other = Loop(
+        axis=AXES[1 - i],
+        b=loop.b,
+        operator=loop.operator,
+        K=0.0,
+        Ts=loop.Ts,
+        delay=loop.delay,
+        render=loop.render,
+    )
+    loops = (loop, other) if i == 0 else (other, loop)
+    x, y = loop._nominal
+    q1, q2 = arm.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
+    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
     W = np.array([[xx, xy], [xy, yy]])
     if loop.Ts is None:
-        nominal = None if loop.shaping else W
-        return linear_loop.state_space("xy", gains, loop.b, loop.operator, nominal)[0]
-    less, beta, gamma = linear_loop.sampled_differences(
-        "xy", loop.b, loop.operator, loop.Ts, loop.delay, pose=(W, loop.shaping)
-    )
-    return np.eye(len(less)) + less + beta @ np.diag(gains) @ gamma
+        return linear_loop.state_space(*loops, mobility=None if loop.shaping else W)[0]
+    less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.shaping))
+    return np.eye(len(less)) + less + beta @ np.diag([x.gain for x in loops]) @ gamma
 
 
-def pose_limit(loop: Loop, most: float = 200.0) -> float:
+def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
     """Smallest K at which the linear loop at the handle's pose is unstable.
 
     Args:
@@ -285,10 +303,15 @@ def pose_limit(loop: Loop, most: float = 200.0) -> float:
     Returns:
         K; inf if there is none up to most, 0 if it is below 1e-3.
     """
-    first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))  # it is linear in K
+    first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))
+    # It is linear in K, unless a force that goes straight through C meets the hand's mass.
+    straight = len(loop.compensator.num) == len(loop.compensator.den) and loop.hand.mass > 0.0
 
     def stable(K: float) -> bool:
-        z = np.linalg.eigvals(first + (K - 1.0) * (second - first))
+        if straight and not loop.Ts:
+            z = np.linalg.eigvals(pose_matrix(replace(loop, K=K)))
+        else:
+            z = np.linalg.eigvals(first + (K - 1.0) * (second - first))
         if loop.Ts:
             return bool(np.all(np.abs(z[np.abs(z - 1.0) > 1e-4 * loop.Ts]) <= 1.0))
         return bool(np.all(z.real[np.abs(z) > 1e-4] <= 0.0))
@@ -297,16 +320,16 @@ def pose_limit(loop: Loop, most: float = 200.0) -> float:
     return high if low else 0.0
 
 
-def continuous_stable(loop: Loop) -> bool:
+def continuous_stable(loop: PushedLoop) -> bool:
     """Whether the linear loop at the nominal pose is stable in continuous time.
 
     Args:
         loop: the loop.
     """
-    return gain_limit.is_stable(loop.axis, loop.K, loop.b, loop.operator)
+    return gain_limit.is_stable(replace(loop.linear, **TIMING))
 
 
-def explain_disagreement(loop: Loop, stable: bool) -> str:
+def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
     """Cause of a difference between a run and the continuous linear loop at the nominal pose.
 
     One property of the run is changed at a time, and two if no single one will do, until the run

@@ -18,10 +18,11 @@ import numpy as np
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 from ..files import versions
 from ..model import arm
+from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.scenario import Control, Scenario
-from ..model.signals import Multisine, Signal
+from ..model.signals import Multisine
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
@@ -119,17 +120,18 @@ class Identified:
     Attributes:
         what: "G" [m/m], "S" (Sh) [m/N] or "Th" [N/m].
         axis: "x" or "y".
-        frequency: lines of the multisine [Hz], (n,).
+        frequency: lines of the multisine, or middles of bands of a measured spectrum [Hz], (n,).
         response: complex, (n,), in the unit of what.
         deviation: standard deviation of response, by its scatter over the runs, (n,).
         coherence: of measured input and output over all periods, (n,).
         coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring,
             with 95 % intervals from the scatter of the runs.
-        scenario: of the first run.
+        scenario: of the first run; None for measured columns.
         noise: added to the records; None for none.
         seed: of phases and noise.
-        periods: kept of each run.
+        periods: kept of each run; 0 for a measured record without a period.
         realisations: number of runs.
+        source: name of the measured columns; empty for the simulated arm.
     """
 
     what: str
@@ -139,11 +141,19 @@ class Identified:
     deviation: np.ndarray
     coherence: np.ndarray
     coefficients: tuple[Coefficient, ...]
-    scenario: Scenario
+    scenario: Scenario | None
     noise: Noise | None
     seed: int
     periods: int
     realisations: int
+    source: str = ""
+
+    @property
+    def estimate(self) -> str:
+        """How the response was estimated, in words."""
+        if self.periods:
+            return f"lines of {self.periods} whole periods"
+        return "whole record, with its start and end"
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -152,6 +162,9 @@ class Identified:
 
     def summary(self) -> dict[str, Any]:
         """Return everything, ready for JSON."""
+        given: dict[str, Any] = {"source": self.source, "estimate": self.estimate}
+        if self.scenario:
+            given = {"scenario": asdict(self.scenario)}
         return {
             "schema": IDENTIFICATION_SCHEMA,
             "what": self.what,
@@ -162,7 +175,7 @@ class Identified:
             "imaginary": self.response.imag.tolist(),
             "deviation": self.deviation.tolist(),
             "coherence": self.coherence.tolist(),
-            "scenario": asdict(self.scenario),
+            **given,
             "noise": asdict(self.noise) if self.noise else None,
             "seed": self.seed,
             "periods": self.periods,
@@ -182,9 +195,9 @@ def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
         x: world position of the handle [m].
         y: world position of the handle [m].
     """
-    q1, q2 = arm.inverse_kinematics(x, y)
-    u = arm.jacobians(q1, q2)
-    wxx, _, wyy = arm.mobility(u)
+    links = Arm().links
+    q1, q2 = arm.inverse_kinematics(x, y, links)
+    wxx, _, wyy = arm.mobility(arm.jacobians(q1, q2, links), links)
     return float(wxx), float(wyy)
 
 
@@ -205,7 +218,7 @@ def measured(
         return record.p, record.fh
     count = 2.0 * np.pi / noise.encoder_counts
     q = count * np.round(record.q / count)
-    u1x, u1y, u2x, u2y = arm.jacobians(q[:, 0], q[:, 1])
+    u1x, u1y, u2x, u2y = arm.jacobians(q[:, 0], q[:, 1], record.scenario.arm.links)
     p = np.column_stack((u1y + u2y, -u1x - u2x)) - record.scenario.origin
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
@@ -299,7 +312,7 @@ def identify(  # noqa: PLR0913  # the settings of one experiment, each by its na
         signals.append(_signals(what, i, record, *shown, slice(n, (1 + periods) * n)))
         if progress:
             progress(made, realisations)
-    bins = np.round(Signal(wave).omega / (2.0 * np.pi) * wave.period).astype(int)
+    bins = np.round(wave.omega / (2.0 * np.pi) * wave.period).astype(int)
     frequency = bins / wave.period
     found = estimate_response(np.array(signals), n, bins)
     # The difference equation of the continuous loop; none of second order describes a hold.
@@ -331,7 +344,7 @@ def _signals(
     wave = record.scenario.muscle or record.scenario.command
     assert wave is not None
     given, out = {"G": (record.delta, p), "S": (fh, p), "Th": (p, -fh)}[what]
-    return np.array((Signal(wave)(record.t[part])[:, i], given[part, i], out[part, i]))
+    return np.array((wave(record.t[part])[:, i], given[part, i], out[part, i]))
 
 
 def format_coefficient(c: Coefficient) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, number
-from ..model.clay import extent
+from ..model.clay import Clay, extent
 from ..model.scenario import Scenario
 from ..simulation.record import Record
 
@@ -61,7 +61,7 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     start, length = np.array(scenario.start), scenario.length
     low, high = start - HALF_BREADTH, start + HALF_BREADTH
     if length is not None:
-        across = scenario.clay is not None and scenario.clay.y.along == "y"
+        across = scenario.clay is not None and "y" in scenario.clay.y.along
         low, high[0] = low.copy(), length + MAP_MARGIN
         low[0] = start[0] - MAP_MARGIN
         if across:
@@ -129,8 +129,7 @@ class Removal:
         lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
         self.wide, self.high = (np.diff(at) for at in lines)
-        left = [1.0 - _share(spans[i], lines[i]) for i in (0, 1)]
-        self.clay = 1.0 - left[1][:, None] * left[0][None, :]
+        self.clay = _clay_share(scenario.clay, spans, lines)
         self.cut = np.zeros(self.clay.shape)
         self.volume = 0.0
 
@@ -259,6 +258,26 @@ def _share(spans: list[tuple[float, float]], lines: np.ndarray) -> np.ndarray:
         for low, high in spans
     )
     return np.diff(inside) / np.diff(lines) if spans else np.zeros(len(lines) - 1)
+
+
+def _clay_share(clay: Clay | None, spans: list[Any], lines: list[np.ndarray]) -> np.ndarray:
+    """Share of clay in each cell between the lines along x and along y, shape (ny, nx)."""
+    if clay is None or all(len(law.along) == 1 for law in clay.laws):
+        left = [1.0 - _share(spans[i], lines[i]) for i in (0, 1)]
+        return 1.0 - left[1][:, None] * left[0][None, :]
+    edges = [np.unique([e for law in clay.laws for e in law.lines[i]]) for i in (0, 1)]
+    x, y = (np.concatenate((e[:1] - 1.0, 0.5 * (e[1:] + e[:-1]), e[-1:] + 1.0)) for e in edges)
+    some = np.zeros((len(x), len(y)), dtype=bool)
+    for law in clay.laws:
+        some |= law.some[law.index(x[:, None], y)]
+    parts = [_cell_parts(e, at) for e, at in zip(edges, lines, strict=True)]
+    return parts[1] @ some.T @ parts[0].T
+
+
+def _cell_parts(edges: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Share of each cell between the lines that lies between two edges, shape (n, m)."""
+    low, high = np.append(-math.inf, edges), np.append(edges, math.inf)
+    return np.diff(np.clip(lines[:, None], low, high), axis=0) / np.diff(lines)[:, None]
 
 
 def _window(centres: np.ndarray, low: float, high: float) -> slice:

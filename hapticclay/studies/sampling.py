@@ -8,18 +8,19 @@ import hashlib
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError, choice, field_types, integer
+from ..errors import ParameterError, choice, integer
 from ..files import versions
-from ..model.constants import AXES
-from ..model.experiments import EXPERIMENTS, from_words, parameters
-from ..model.operator import Operator
+from ..model.experiments import EXPERIMENTS
+from ..model.fields import join_names, named_values
 from ..model.scenario import Scenario
+from ..model.scenario_file import read_settings, scenario_of
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
@@ -112,21 +113,22 @@ class Range:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Runs of one experiment over a space of its parameters.
+    """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
-    A parameter is one of the experiment's, as on the command line. "gain.x" is one axis of a pair;
-    a pair without axis gets the value on both. "operator.mass" (damper, spring) puts an arm at the
-    handle.
+    A number is a parameter of the experiment, as on the command line, or any field of the scenario
+    by dotted name (`model/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    without axis gets the value on both. "operator.mass" puts an arm at the handle.
 
     Attributes:
-        experiment: a name in EXPERIMENTS.
-        vary: ranges by parameter.
-        fixed: values by parameter, the same in all runs.
+        experiment: a name in EXPERIMENTS; not used with a scenario.
+        vary: ranges by name.
+        fixed: values by name, the same in all runs.
         design: "grid" (all combinations, the last parameter fastest), "lhs" (Latin hypercube) or
             "sobol".
         runs: number of runs of "lhs" and "sobol"; None for "grid".
         seed: seed of both.
         chunk: runs in one file.
+        scenario: plain data of a scenario file, from `read_settings`; empty for the experiment.
     """
 
     experiment: str
@@ -136,6 +138,7 @@ class Sweep:
     runs: int | None = None
     seed: int = 0
     chunk: int = 64
+    scenario: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         choice("experiment", self.experiment, tuple(EXPERIMENTS))
@@ -161,16 +164,7 @@ class Sweep:
                     f"{told} ({self.design})",
                 )
         integer("runs", len(self), 1, MOST_RUNS)
-        known = tuple(parameters(EXPERIMENTS[self.experiment]))
-        for name in (*self.vary, *self.fixed):
-            head, _, part = name.partition(".")
-            if head == "operator":
-                choice("parameter", part, tuple(field_types(Operator)))
-            else:
-                choice("parameter", head, known)
-                if part:
-                    choice(f"axis of {head}", part, AXES)
-        self.scenario(self.points(0, 1)[0])  # refuses what the first run refuses
+        self.run_scenario(self.points(0, 1)[0])  # refuses what the first run refuses
 
     def __len__(self) -> int:
         if self.runs is not None:
@@ -204,38 +198,23 @@ class Sweep:
         unit = _unit_samples(self.design, len(axes), len(self), self.seed)[first:last]
         return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
 
-    def scenario(self, point: np.ndarray) -> Scenario:
+    @property
+    def title(self) -> str:
+        """Name of the experiment or the scenario."""
+        return str(self.scenario.get("name", "scenario")) if self.scenario else self.experiment
+
+    def run_scenario(self, point: np.ndarray) -> Scenario:
         """The scenario of one run.
 
         Args:
             point: its parameters, a row of `points`.
 
         Raises:
-            ParameterError: a value is out of its bounds.
+            ParameterError: there is no such parameter, or a value is out of its bounds.
         """
-        kind = EXPERIMENTS[self.experiment]
-        known = parameters(kind)
-        words: dict[str, Any] = {}
-        hand: dict[str, float] = {}
+        settings = self.scenario or {"experiment": self.experiment}
         varied = dict(zip(self.vary, point.tolist(), strict=True))
-        for name, value in {**self.fixed, **varied}.items():
-            head, _, part = name.partition(".")
-            if head == "operator":
-                hand[part] = value
-                continue
-            usual = words.get(head, known[head].default)
-            if part:
-                pair = list(usual)
-                pair[AXES.index(part)] = value
-                words[head] = tuple(pair)
-            elif isinstance(usual, tuple) and not isinstance(value, list | tuple):
-                words[head] = (value,) * len(usual)
-            elif known[head].kind in (bool, int):
-                words[head] = known[head].kind(value)
-            else:
-                words[head] = tuple(value) if isinstance(value, list) else value
-        scenario = from_words(kind, words)
-        return dataclasses.replace(scenario, operator=Operator(**hand)) if hand else scenario
+        return scenario_of(settings, self.fixed, varied)
 
     def described(self) -> dict[str, Any]:
         """The sweep as data."""
@@ -281,7 +260,7 @@ def parse_grid(text: str) -> dict[str, Range]:
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
-    """Reads "t_max=2 shaping=true force=1,0 growth=30/s".
+    """Reads "t_max=2 shaping=true force=1,0 growth=30/s arm.l1=30cm".
 
     Args:
         text: the values.
@@ -289,10 +268,7 @@ def parse_fixed(text: str) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    return {
-        name: _value(value)
-        for name, value in _split_words("fixed", text, "must be name=value, each name once").items()
-    }
+    return named_values("fixed", text.split())
 
 
 def _split_words(field: str, text: str, how: str) -> dict[str, str]:
@@ -306,21 +282,11 @@ def _split_words(field: str, text: str, how: str) -> dict[str, str]:
     return out
 
 
-def _value(text: str) -> Any:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    try:
-        parts = [float(x) for x in text.split(",")]
-    except ValueError:
-        return text
-    return parts if len(parts) > 1 else parts[0]
-
-
 def load_sweep(path: Path) -> dict[str, Any]:
-    """Reads a sweep from TOML: experiment, design, runs, seed, chunk; tables [vary] and [fixed].
+    """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk; [vary], [fixed].
 
     Args:
-        path: the file.
+        path: the file; `scenario` in it is a scenario file, by its path from there.
 
     Returns:
         Arguments of `Sweep`.
@@ -331,7 +297,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
     import tomllib
 
     try:
-        data = tomllib.loads(path.read_text())
+        data = tomllib.loads(path.read_bytes().decode())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         fault = getattr(error, "strerror", None) or error
         raise ParameterError("spec", str(path), f"must be a TOML file ({fault})") from None
@@ -341,21 +307,20 @@ def load_sweep(path: Path) -> dict[str, Any]:
     for name in ("vary", "fixed"):
         if not isinstance(data.get(name, {}), dict):
             raise ParameterError(name, data[name], "must be a table")
-    data["vary"] = {k: Range.parse(k, v) for k, v in data.get("vary", {}).items()}
+        data[name] = _flat(data.get(name, {}))
+    if "scenario" in data:
+        if "experiment" in data or not isinstance(data["scenario"], str):
+            bound = "must be the path of a scenario file, without an experiment beside it"
+            raise ParameterError("scenario", data["scenario"], bound)
+        data["scenario"] = read_settings(path.parent / data["scenario"])
+    data["vary"] = {k: Range.parse(k, v) for k, v in data["vary"].items()}
     return {"experiment": "constant", **data}
 
 
-def parameter_unit(name: str) -> str:
-    """Unit of a parameter of any experiment, as in "gain.x" or "operator.mass"; "" for none.
-
-    Args:
-        name: the parameter, as sweeps name it.
-    """
-    head, _, part = name.partition(".")
-    if head == "operator" and part in field_types(Operator):
-        bound = field_types(Operator)[part][1]
-        return bound.unit if bound else ""
-    units = [
-        parameters(kind)[head].unit for kind in EXPERIMENTS.values() if head in parameters(kind)
-    ]
-    return next(filter(None, units), "")
+def _flat(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Values by dotted name of a deep table: a.b = 1 and "a.b" = 1 are one."""
+    out: dict[str, Any] = {}
+    for name, value in table.items():
+        inner = join_names(path, name)
+        out |= _flat(value, inner) if isinstance(value, dict) else {inner: value}
+    return out

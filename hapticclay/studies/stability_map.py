@@ -11,9 +11,10 @@ import numpy as np
 from ..errors import choice
 from ..model.constants import TS
 from ..theory import gain_limit, margins, passivity
+from ..theory.linear_loop import TIMING
 from ..theory.roots import bisect, first_failure
 from . import boundary
-from .boundary import Loop, nominal_limit
+from .boundary import PushedLoop, nominal_limit
 
 MAP_KINDS = ("gain-damping", "delay-damping", "gain-pose")
 MAP_POSES = 0.10  # [m] the handle's path, either way from the nominal pose
@@ -62,7 +63,7 @@ class StabilityMap:
     """
 
     kind: str
-    loop: Loop
+    loop: PushedLoop
     x_name: str
     y_name: str
     lines: dict[str, Line]
@@ -85,7 +86,7 @@ class StabilityMap:
 
 
 def stability_map(
-    kind: str, loop: Loop, quick: bool = False, progress: Progress = iter
+    kind: str, loop: PushedLoop, quick: bool = False, progress: Progress = iter
 ) -> StabilityMap:
     """Make a map.
 
@@ -101,19 +102,20 @@ def stability_map(
     return make[choice("map", kind, MAP_KINDS)](loop, columns, rows, progress)
 
 
-def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
     fine = np.geomspace(*DAMPINGS, LINE_POINTS).tolist()
     x = np.geomspace(*DAMPINGS, columns).tolist()
-    continuous = replace(loop, Ts=None, delay=0.0)
+    continuous = replace(loop, **TIMING)
+    linear = continuous.linear
 
     def line(law: Callable[[float], float]) -> Line:
         return fine, [law(b) for b in fine]
 
     def small_gain(b: float, K: float) -> bool:
-        return bool(margins.small_gain(loop.axis, K, b, loop.operator))
+        return bool(margins.small_gain(replace(linear, b=b), K=K))
 
     def passive(b: float, K: float) -> bool:
-        return bool(passivity.passivity(loop.axis, K, b))
+        return bool(passivity.passivity(replace(linear, b=b), K=K))
 
     lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
@@ -131,7 +133,7 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> St
             notes.append(f"{name}: holds for no K in this range")
     middle = nominal_limit(continuous)
     ys = np.geomspace(0.25 * middle, 4.0 * middle, rows).tolist()
-    damper = loop.operator.damper if loop.operator else 0.0
+    damper = loop.hand.damper
     if loop.Ts and damper:
         name = "held clay passive left of it (Colgate, Schenkel)"
         lines[name] = ([damper, damper], [ys[0], ys[-1]])
@@ -145,7 +147,7 @@ def _gain_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> St
     return StabilityMap("gain-damping", loop, *names, lines, found, exact, cells, tuple(notes))
 
 
-def _delay_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
     Ts = loop.Ts or TS
     loop = replace(loop, Ts=Ts)
     low, high = 0.5 * Ts, 16.0 * Ts
@@ -159,7 +161,7 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> S
         ),
     }
     notes = []
-    damper = loop.operator.damper if loop.operator else 0.0
+    damper = loop.hand.damper
     if damper:
         name = "held clay passive (Colgate, Schenkel)"
         lines[name] = (fine, [_passive_damping(Ts, d, damper) for d in fine])
@@ -187,7 +189,7 @@ def _delay_damping(loop: Loop, columns: int, rows: int, progress: Progress) -> S
     )
 
 
-def _gain_pose(loop: Loop, columns: int, rows: int, progress: Progress) -> StabilityMap:
+def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
     fine = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
     x = np.linspace(-MAP_POSES, MAP_POSES, columns).tolist()
     loop_at = replace(loop, shaping=False)
@@ -221,7 +223,7 @@ def _gain_pose(loop: Loop, columns: int, rows: int, progress: Progress) -> Stabi
 
 
 def _map_cells(
-    loops: list[Loop], x: list[float], field: str, ys: list[float], progress: Progress
+    loops: list[PushedLoop], x: list[float], field: str, ys: list[float], progress: Progress
 ) -> tuple[MapCell, ...]:
     """Theory beside a run for each loop, with each of ys as its field."""
     out = []
@@ -236,7 +238,7 @@ def _map_cells(
     return tuple(out)
 
 
-def _late(loop: Loop) -> str:
+def _late(loop: PushedLoop) -> str:
     return f", {1e3 * loop.delay:g} ms late" if loop.delay else ""
 
 
@@ -247,11 +249,12 @@ def _largest_gain(holds: Callable[[float], bool], low: float = 1e-2, high: float
     return math.inf if holds(high) else bisect(holds, low, high)[0]
 
 
-def _unstable_damping(loop: Loop, Ts: float | None, delay: float) -> float:
+def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float:
     """Smallest b at which the late linear loop is unstable [N.s/m]; inf for none, 0 if below 1."""
+    linear = replace(loop.linear, Ts=Ts, delay=delay)
 
     def stable(b: float) -> bool:
-        return gain_limit.is_stable(loop.axis, loop.K, b, loop.operator, Ts, delay)
+        return gain_limit.is_stable(replace(linear, b=b))
 
     low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
     return high if low else 0.0

@@ -71,9 +71,8 @@ def result_row(
         }
         margin = nan
         if r and r.scenario.gain[i] > 0.0:
-            b = entry.get("b", 0.0)
-            th = r.scenario.operator
-            margin = gain_limit.gain_limit(axis, b, th) / r.scenario.gain[i]
+            limit = gain_limit.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
+            margin = limit / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0
     out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
@@ -91,7 +90,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
     """
     names = list(sweep.vary)
     try:
-        scenario = sweep.scenario(point)
+        scenario = sweep.run_scenario(point)
         compiled = len(sweep) * scenario.t_max / scenario.dt >= COMPILE_FROM and has_numba()
         return result_row(
             index, names, point, simulate(scenario, engine="native" if compiled else "python")

@@ -14,17 +14,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import ParameterError, choice, number
-from ..model.constants import AXES, B_MAX, S
-from ..model.controller import PRINTED, Compensator
-from ..model.operator import Operator
-from ..model.scenario import RENDERS
+from ..errors import number
+from ..model.compensator import Compensator
+from ..model.scenario import Scenario
 from . import linear_loop, roots
+from .linear_loop import Loop, of_loop
 
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
@@ -32,16 +31,8 @@ LEAST_GAIN = 1e-60  # nothing crosses at a lower gain, and products of such numb
 SMALL_ANGLE = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
 
 
-def gain_limit(
-    axis: str,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    Ts: float | None = None,
-    delay: float = 0.0,
-    render: str = "held",
-    compensator: Compensator = PRINTED,
-) -> float:
+@of_loop("b", "operator", timing=True)
+def gain_limit(loop: Loop) -> float:
     """Largest compensator gain K up to which the loop of one axis is stable at the nominal pose.
 
     Every gain between 0 and the limit is stable. In continuous time without delay the limit is the
@@ -49,115 +40,67 @@ def gain_limit(
     `delayed_loop` (continuous, the motors late).
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: from a measurement to the torque computed from it [s]. Everything the motors do is
-            late by it: the servo's feedback, what the compensator commands, and clay that is held.
-        render: the clay is "held" (a force of the motors) or "implicit" (physical, never late).
-        compensator: shape of C; the printed one with sampling.
+        loop: the loop, whose own K does not matter; or axis, b, operator, and other parts by name.
 
     Returns:
-        K; inf if there is no limit, 0 if the loop is unstable at any gain.
+        K; inf if there is no limit, 0 if the loop is unstable at any small gain.
 
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    return critical_gain(axis, b, operator, Ts, delay, render, compensator)[0]
+    return critical_gain(loop)[0]
 
 
-def critical_gain(
-    axis: str,
-    b: float,
-    operator: Operator | None = None,
-    Ts: float | None = None,
-    delay: float = 0.0,
-    render: str = "held",
-    compensator: Compensator = PRINTED,
-) -> tuple[float, float]:
+def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
+    """Gain limit of the loop of a scenario as if its control were continuous and without delay.
+
+    Args:
+        scenario: the run.
+        axis: "x" or "y".
+        b: clay [N.s/m].
+
+    Returns:
+        K; inf if there is no limit, or where the controller is the user's own.
+    """
+    if scenario.controller is not None:
+        return math.inf
+    return gain_limit(replace(Loop.of(scenario, axis, b), **linear_loop.TIMING))
+
+
+def critical_gain(loop: Loop) -> tuple[float, float]:
     """The gain limit and the frequency at which the loop then rings.
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: as in `gain_limit` [s].
-        render: as in `gain_limit`.
-        compensator: as in `gain_limit`.
+        loop: the loop, whose own K does not matter.
 
     Returns:
         (K, omega [rad/s]).
     """
-    loop = loop_family(axis, b, operator, Ts, delay, render, compensator)
-    if loop:
-        return first_instability(loop)
-    denominator, passive, driven = linear_loop.loop_polynomials(axis, b, operator, compensator)
+    if loop.Ts is not None or loop.delay:
+        return first_instability(loop_family(loop))
+    denominator, passive, driven = linear_loop.loop_polynomials(loop)
     return roots.first_crossing(denominator + passive, driven)
 
 
-def is_stable(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    Ts: float | None = None,
-    delay: float = 0.0,
-    render: str = "held",
-    compensator: Compensator = PRINTED,
-) -> bool:
+def is_stable(loop: Loop) -> bool:
     """Whether the loop is stable at this very K, whatever it is below.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: as in `gain_limit` [s].
-        render: as in `gain_limit`.
-        compensator: as in `gain_limit`.
+        loop: the loop with its K > 0.
     """
-    K = number("K", K, 0.0, above=True)
-    loop = loop_family(axis, b, operator, Ts, delay, render, compensator)
-    return loop.stable(K) if loop else linear_loop.stable(axis, K, b, operator, compensator)
+    K = number("K", loop.gain, 0.0, above=True)
+    if loop.Ts is not None or loop.delay:
+        return loop_family(loop).stable(K)
+    return linear_loop.stable(loop)
 
 
-def loop_family(
-    axis: str,
-    b: float,
-    operator: Operator | None,
-    Ts: float | None,
-    delay: float,
-    render: str,
-    compensator: Compensator = PRINTED,
-) -> LoopFamily | None:
-    """The sampled or late loop for every gain; None for the loop that is a polynomial.
+def loop_family(loop: Loop) -> LoopFamily:
+    """The sampled or late loop for every gain.
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: as in `gain_limit` [s].
-        render: as in `gain_limit`.
-        compensator: as in `gain_limit`.
-
-    Raises:
-        ParameterError: a value is out of its bounds.
+        loop: the loop, sampled or late, whose own K does not matter.
     """
-    choice("axis", axis, AXES)
-    b = number("b", b, 0.0, B_MAX, unit="N.s/m")
-    delay = number("delay", delay, 0.0, 1.0, unit="s")
-    choice("render", render, RENDERS)
-    if Ts is None:
-        return delayed_loop(axis, b, operator, delay, render, compensator) if delay else None
-    Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
-    number("delay", delay, 0.0, 100.0 * Ts, unit="s")
-    if compensator != PRINTED:
-        raise ParameterError("compensator", compensator, "must be the printed one with sampling")
-    return sampled_loop(axis, b, operator, Ts, delay, render)
+    return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
 
 
 @dataclass(frozen=True)
@@ -169,13 +112,19 @@ class LoopFamily:
             where 1 = K h(omega).
         grid: frequencies dense enough to follow h [rad/s], ascending.
         stable: whether the loop is stable at K.
-        last: highest frequency, where h is real by symmetry [rad/s]; None if there is none.
+        ends: further frequencies at which a pole may cross, where h is real by symmetry [rad/s].
+        most: gain from which on poles lie right of the axis at any frequency; inf for none.
+        order: multiplicity of the pole of h at 0, or at z = 1.
+        right: number of poles of h right of the axis, or outside the unit circle.
     """
 
     h: Callable[[np.ndarray], np.ndarray]
     grid: np.ndarray
     stable: Callable[[float], bool]
-    last: float | None = None
+    ends: tuple[float, ...] = ()
+    most: float = math.inf
+    order: int = 0
+    right: Callable[[], int] = lambda: 0
 
 
 def first_instability(loop: LoopFamily) -> tuple[float, float]:
@@ -187,7 +136,8 @@ def first_instability(loop: LoopFamily) -> tuple[float, float]:
     Returns:
         (K, omega [rad/s]); (inf, nan) if it never does.
     """
-    found = sorted(gain_crossings(loop))
+    found = gain_crossings(loop)
+    found = sorted(found + [(loop.most, math.inf)] if loop.most < math.inf else found)
     if not loop.stable(0.5 * found[0][0] if found else 1.0):
         return 0.0, math.nan
     for i, (K, omega) in enumerate(found):
@@ -206,33 +156,57 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     Args:
         loop: the loop for every gain.
     """
-    from scipy.optimize import brentq, minimize_scalar
 
     def phase_sine(x: float) -> float:
         z = loop.h(np.array([math.exp(x)]))[0]
         return z.imag / abs(z)
 
-    x, z = np.log(loop.grid), loop.h(loop.grid)
+    z = loop.h(loop.grid)
     if not np.any(z):  # nothing drives the compensator
         return []
-    y, ahead = z.imag / np.abs(z), z.real > 0.0
-    y[y == 0.0] = 1e-300  # a grid point on a crossing: found from one side
-    spans = [
-        (x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (ahead[:-1] | ahead[1:]))
-    ]
-    dip = (np.abs(y[1:-1]) <= np.minimum(np.abs(y[:-2]), np.abs(y[2:]))) & (y[:-2] * y[1:-1] > 0.0)
-    for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & ahead[1:-1]) + 1:
-        sign = math.copysign(1.0, y[i])
-        bottom = minimize_scalar(
-            lambda x, s=sign: s * phase_sine(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
-        )
-        if bottom.fun < 0.0:  # type: ignore[union-attr]
-            spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
-    omega = [math.exp(brentq(phase_sine, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
-    omega += [] if loop.last is None else [loop.last]
+    omega = _zeros(phase_sine, np.log(loop.grid), z.imag / np.abs(z), z.real > 0.0)
+    omega += loop.ends
     with np.errstate(divide="ignore"):
         K = 1.0 / loop.h(np.array(omega)).real if omega else np.empty(0)
     return [(float(k), float(w)) for k, w in zip(K, omega, strict=True) if 0.0 < k < math.inf]
+
+
+def unit_crossings(loop: LoopFamily, K: float) -> list[float]:
+    """Every frequency of the grid's range at which |K h| = 1 [rad/s], found as `gain_crossings`.
+
+    Args:
+        loop: the loop for every gain.
+        K: compensator gain, > 0.
+    """
+
+    def level(x: float) -> float:
+        return math.log(K * abs(loop.h(np.array([math.exp(x)]))[0]))
+
+    size = np.abs(loop.h(loop.grid))
+    if not np.all(size):
+        return []
+    return _zeros(level, np.log(loop.grid), np.log(K * size), np.full(len(size), True))
+
+
+def _zeros(
+    f: Callable[[float], float], x: np.ndarray, y: np.ndarray, where: np.ndarray
+) -> list[float]:
+    """exp of the zeros of f between points x, where it is y, next to one at which where holds."""
+    from scipy.optimize import brentq, minimize_scalar
+
+    y[y == 0.0] = 1e-300  # a grid point on a crossing: found from one side
+    spans = [
+        (x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (where[:-1] | where[1:]))
+    ]
+    dip = (np.abs(y[1:-1]) <= np.minimum(np.abs(y[:-2]), np.abs(y[2:]))) & (y[:-2] * y[1:-1] > 0.0)
+    for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & where[1:-1]) + 1:
+        sign = math.copysign(1.0, y[i])
+        bottom = minimize_scalar(
+            lambda x, s=sign: s * f(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
+        )
+        if bottom.fun < 0.0:  # type: ignore[union-attr]
+            spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
+    return [math.exp(brentq(f, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
@@ -250,28 +224,29 @@ def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarra
     return np.unique(np.concatenate((base, near[(near > low) & (near < high)])))
 
 
-def delayed_loop(
-    axis: str,
-    b: float,
-    operator: Operator | None,
-    delay: float,
-    render: str = "held",
-    compensator: Compensator = PRINTED,
-) -> LoopFamily:
+def delayed_loop(loop: Loop) -> LoopFamily:
     """The continuous loop in which everything the motors do is late.
 
+    Where Th has a mass, and a force passes straight through C (numerator and denominator of one
+    order) or is used to shape the inertia, an acceleration comes back late with the same gain at
+    any high frequency. That gain must stay below one (a neutral delay system: Hale, Verduyn Lunel,
+    Introduction to Functional Differential Equations, 1993, ch. 9).
+
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        delay: of the motors [s].
-        render: the clay is "held" by the motors or "implicit".
-        compensator: shape of C.
+        loop: the loop, in continuous time, whose own K does not matter.
     """
-    parts = linear_loop.delayed_polynomials(axis, b, operator, render, compensator)
-    if not linear_loop.hand_or_none(operator).spring:  # the integrator that moves the handle
+    parts, delay = linear_loop.delayed_polynomials(loop), loop.delay
+    while all(p.coef[0] == 0.0 for p in parts):  # the integrator that moves the handle
         parts = tuple(p // roots.VARIABLE for p in parts)
     physical, motors, driven = parts
+    own, straight, more = (p.coef[physical.degree() :] for p in parts)
+    straight, more = (float(np.sum(x) / own[0]) for x in (straight, more))
+    order = roots.multiplicity_of_zero(physical + motors)
+    neutral, most = bool(straight or more), math.inf
+    if abs(straight) >= 1.0:
+        most = 0.0
+    elif more:
+        most = (1.0 - math.copysign(straight, straight * more)) / abs(more)
     resonances = np.concatenate([roots.roots(p) for p in (physical, physical + motors, driven)])
     resonances = resonances[np.abs(resonances) > 0.0]
     size = np.abs(resonances)
@@ -281,11 +256,12 @@ def delayed_loop(
         late = np.exp(-s * delay)
         return -driven(s) * late / (physical(s) + motors(s) * late)
 
-    def stable(K: float) -> bool:
-        acting = motors + K * driven
-        a, high = float(np.exp(np.mean(np.log(size)))), float(size.max())
+    def right(K: float) -> float:
+        """Number of poles right of the axis, for K = 0 those of h, none of which lies at 0."""
+        acting, share = motors + K * driven, 0.5 * (1.0 + abs(straight + K * more))
+        a, high = float(np.exp(np.mean(np.log(size)))), (100.0 if neutral else 1.0) * size.max()
         bound = Polynomial(np.abs(acting.coef))
-        while bound(high) > 0.5 * abs(physical(1j * high)):
+        while bound(high) > share * abs(physical(1j * high)):
             high *= 2.0
         turns = np.linspace(0.0, high, min(100 + int(4.0 * delay * high), 100_000))
 
@@ -294,13 +270,25 @@ def delayed_loop(
             return (physical(s) + acting(s) * np.exp(-s * delay)) / (s + a) ** physical.degree()
 
         # Each zero right of the axis turns F by -pi between 0 and infinity; beyond 1e3 high hardly
-        # anything is left.
-        near = frequency_grid(1e-3 * size.min(), 1e3 * high, resonances)
-        return abs(phase_change(F, np.union1d(turns, near))) < 0.5 * np.pi
+        # anything is left, and what is, turns it by less than a quarter.
+        end = high if neutral else 1e3 * high
+        omega = np.union1d(turns, frequency_grid(1e-3 * size.min(), end, resonances))
+        at_zero = order if K == 0.0 else 0
+        if at_zero:  # s^order/(s + a)^order turns F by a quarter each
+            omega[0] = 1e-6 * omega[1]
+        left = np.angle(F(omega[-1:])[0])
+        return -(phase_change(F, omega) - left) / np.pi - 0.5 * at_zero
+
+    def stable(K: float) -> bool:
+        return K < most and bool(abs(right(K)) < 0.5)
 
     low, top = 1e-3 * size.min(), max(40.0 / delay, 2.0 * np.abs(resonances.imag).max())
+    top = max(top, 10.0 * size.max()) if neutral else top  # where |h| has nearly come to rest
     turns = np.linspace(low, top, min(int(4.0 * delay * top), 100_000))
-    return LoopFamily(h, np.union1d(turns, frequency_grid(low, top, resonances)), stable)
+    grid = np.union1d(turns, frequency_grid(low, top, resonances))
+    rest = physical.coef[0] + motors.coef[0]
+    ends = (0.0,) if rest and driven.coef[0] / rest < 0.0 else ()
+    return LoopFamily(h, grid, stable, ends, most, order, lambda: round(right(0.0)))
 
 
 def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
@@ -324,41 +312,30 @@ def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
     return math.nan
 
 
-def sampled_loop(
-    axis: str,
-    b: float,
-    operator: Operator | None,
-    Ts: float,
-    delay: float = 0.0,
-    render: str = "held",
-) -> LoopFamily:
+def sampled_loop(loop: Loop) -> LoopFamily:
     """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma) x(k), exact at samples.
 
     See `linear_loop.sampled_differences`. A loop is stable if every eigenvalue lies within the unit
-    circle, except the one at z = 1 that moves the handle where Th has no spring. Clay of 1e9 N.s/m,
-    or K = 1e-12, puts others within rounding of z = 1, so the map is of differences, M - 1, with
-    place and forces counted from where handle and motors would rest under this delta: the column of
-    delta is then exactly zero, and its entry in gamma is that of the hand's spring.
+    circle, except one at z = 1 that moves the handle where C integrates and Th has no spring. Clay
+    of 1e9 N.s/m, or K = 1e-12, puts others within rounding of z = 1, so the map is of differences,
+    M - 1, with everything counted from where it would rest, or move evenly, under the present
+    states of C's integrators: their columns are then zero but for their own chain.
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        Ts: control sample [s].
-        delay: from the sample to the torque computed from it [s].
-        render: the clay is "held" by the motors or "implicit".
+        loop: the loop, sampled, whose own K does not matter.
     """
-    less, beta, gamma = linear_loop.sampled_differences(axis, b, operator, Ts, delay, render)
-    beta, gamma = beta[:, 0], gamma[0]
-    s, spring = S[AXES.index(axis)], linear_loop.hand_or_none(operator).spring
-    rest = np.zeros(len(less))
-    rest[0] = s.stiffness / (s.stiffness + s.gain * spring)
-    rest[4], rest[6:] = 1.0, spring * rest[0]
-    less, beta = less - np.outer(rest, less[2]), beta - rest * beta[2]
-    less[:, 2], gamma[2] = 0.0, -spring * rest[0]
-    free = np.delete(np.delete(less, 2, 0), 2, 1)  # without the integrator
-    if not spring:
-        less, beta, gamma = free, np.delete(beta, 2), np.delete(gamma, 2)
+    loop = replace(loop, compensator=linear_loop.reduced(loop.compensator))
+    less, beta, gamma = linear_loop.sampled_differences(loop)
+    less, beta, gamma = _from_rest(loop, less, beta[:, 0], gamma[0])
+    t, Ts = loop.environment, loop.Ts
+    assert Ts is not None
+    integrators = _integrators(loop.compensator)
+    # Nothing of the force tells of a state that only moves the place, or the speed, of the handle.
+    unseen = min(integrators, roots.multiplicity_of_zero(t)) if np.any(t.coef) else integrators
+    kept = np.delete(np.arange(len(less)), np.arange(2, 2 + unseen))
+    free = np.delete(np.arange(len(less)), np.arange(2, 2 + integrators))
+    free = less[np.ix_(free, free)]
+    less, beta, gamma = less[np.ix_(kept, kept)], beta[kept], gamma[kept]
     n = len(less)
 
     def h(omega: np.ndarray) -> np.ndarray:
@@ -374,14 +351,52 @@ def sampled_loop(
         z1 = eigenvalues(less + max(K, LEAST_GAIN) * np.outer(beta, gamma))
         return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
 
-    z1 = eigenvalues(free)
+    z1 = eigenvalues(free).astype(complex)
     poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    zeros = roots.nonzero_roots(linear_loop.environment_polynomial(b, operator))
-    resonances = np.concatenate((poles, zeros))
+    resonances = np.concatenate((poles, roots.nonzero_roots(t)))
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     near = frequency_grid(low, top * (1.0 - 1e-9), resonances.imag)
-    return LoopFamily(h, np.union1d(np.linspace(low, top, 20 * n)[:-1], near), stable, top)
+    grid = np.union1d(np.linspace(low, top, 20 * n)[:-1], near)
+    still = not integrators and h(np.zeros(1))[0].real > 0.0
+    outside = int(np.sum(2.0 * z1.real + np.abs(z1) ** 2 > 0.0))
+    ends = (0.0, top) if still else (top,)
+    return LoopFamily(h, grid, stable, ends, math.inf, integrators - unseen, lambda: outside)
+
+
+def _integrators(compensator: Compensator) -> int:
+    return roots.multiplicity_of_zero(compensator.fraction[1])
+
+
+def _from_rest(
+    loop: Loop, less: np.ndarray, beta: np.ndarray, gamma: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The map with the other states counted from where they rest under C's integrators.
+
+    The first m states of a compensator with m integrators are a chain of them, which nothing of
+    the others' own motion reads. Under the first alone the loop rests; under the second it moves
+    evenly, and so on.
+    """
+    m, n = _integrators(loop.compensator), loop.compensator.order
+    if not m:
+        return less, beta, gamma
+    s, spring, g = loop.servo.S, loop.hand.spring, loop.servo.G
+    chain = np.arange(2, 2 + m)
+    others = np.delete(np.arange(len(less)), chain)
+    rest = np.zeros((len(less), m))
+    rest[2 + n, 0] = loop.compensator.state_space()[2][0] * (g.gain / g.stiffness)
+    rest[0, 0] = s.stiffness / (s.stiffness + s.gain * spring) * rest[2 + n, 0]
+    rest[4 + n :, 0] = spring * rest[0, 0]
+    own, theirs = np.triu(less[np.ix_(chain, chain)], 1), less[np.ix_(others, others)]
+    for j in range(1, m):
+        needed = rest[others, :j] @ own[:j, j] - less[others, chain[j]]
+        rest[others, j] = np.linalg.solve(theirs, needed)
+    read = gamma @ rest
+    read[0] = -spring * rest[0, 0]
+    less, beta = less - rest @ less[chain], beta - rest @ beta[chain]
+    less[:, chain], gamma[chain] = 0.0, read
+    less[np.ix_(chain, chain)] = own
+    return less, beta, gamma
 
 
 def eigenvalues(a: np.ndarray) -> np.ndarray:

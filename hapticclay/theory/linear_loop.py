@@ -1,301 +1,480 @@
-"""The linear loop (Fig. 2): its closed-loop polynomials, its state space and its sampled map.
+"""The linear loop (Fig. 2): its parts, closed-loop polynomials, state space and sampled map.
 
-Everything that `theory` and `studies` say of a loop starts from one of these. Polynomials treat one
-axis at the nominal pose; state spaces one axis, or both where a pose couples them.
+Everything that `theory` and `studies` say of a loop starts from a `Loop`: one axis at the nominal
+pose. Polynomials treat one such axis; state spaces one, or both where a pose couples them.
 """
 
 from __future__ import annotations
 
 import cmath
+import functools
+import inspect
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import ParameterError, choice, number
+from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model import controller
-from ..model.constants import AXES, G, S
-from ..model.controller import PRINTED, Compensator
+from ..model.compensator import PRINTED, Compensator
+from ..model.constants import AXES, B_MAX
+from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
-from ..model.scenario import RENDERS
+from ..model.scenario import Render, Scenario
 from . import roots
 
+Answer = TypeVar("Answer")
+NO_TIMING = "must be {} here: the analysis is one of continuous time without delay"
+MOST_DAMPINGS = 64  # of the clay of a scenario, of which the worst is sought
+TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
 
-def steady_speed(K: float, f: float, b: Any) -> Any:
-    """Speed under a constant hand force, K f/(10 + K b) with the printed compensator [m/s].
 
-    The compensator's damper and the clay share the force: f = (10/K + b) v (Eqs. 20, 21).
+@dataclass(frozen=True)
+class Loop:
+    """The linear loop of one axis at the nominal pose: the parts of a run, for the analysis.
+
+    What is said of it holds for the machine at the nominal pose, where the axes are decoupled, in
+    small motions and with the motors within their torque limits. Elsewhere it holds with inertia
+    shaping in continuous time.
+
+    Attributes:
+        axis: "x" or "y".
+        b: clay [N.s/m], 0 to 1e9.
+        operator: Th, the arm at the handle; None for no hand (Th = 0).
+        servo: G and Sh; None for the printed ones of the axis. The gain of Sh is the mobility of
+            the handle that the loop has, the arm's own or a shaped one.
+        compensator: shape of C. Systems of python-control and scipy.signal are taken as well.
+        K: gain of the compensator, >= 0; None where the analysis asks for none.
+        Ts: control sample [s], 1e-6 to 1; None for continuous time.
+        delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts.
+            Everything the motors do is late by it: the servo's feedback, what the compensator
+            commands, and clay that is held.
+        render: the clay is "held" (a force of the motors) or "implicit" (physical, never late).
+        mobility: of the bare handle where the servo shapes its inertia [1/kg], which tells with
+            sampling or delay; None for the gain of Sh.
+    """
+
+    axis: Literal["x", "y"] = "x"
+    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    operator: Operator | None = None
+    servo: Servo = None  # type: ignore[assignment]  # __post_init__ puts the axis's own there
+    compensator: Compensator = PRINTED
+    K: Annotated[float | None, Bound(0.0)] = None
+    Ts: Annotated[float | None, Bound(1e-6, 1.0, "s")] = None
+    delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
+    render: Render = "held"
+    mobility: Annotated[float | None, Bound(0.0, 1e12, "1/kg", above=True)] = None
+
+    def __post_init__(self):
+        axis = AXES.index(choice("axis", self.axis, AXES))
+        if self.servo is None:
+            object.__setattr__(self, "servo", SERVO[axis])
+        if not isinstance(self.compensator, Compensator):
+            object.__setattr__(self, "compensator", Compensator.of(self.compensator))
+        check_fields(self)
+        if self.Ts is not None:
+            number("delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
+
+    @classmethod
+    def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
+        """The loop of one axis of a scenario, at the nominal pose of its arm.
+
+        Muscle force, pose, friction and what else the interface has besides its delay are not part
+        of it.
+
+        Args:
+            scenario: the run.
+            axis: "x" or "y".
+            b: clay [N.s/m]; None for that of the scenario's clay, before it grows, with the least
+                gain limit, 0 without clay. Of more than MOST_DAMPINGS values so many are tried;
+                turned clay resists by those of both of its own axes.
+
+        Raises:
+            ParameterError: no scenario, one with a controller of the user's own, unknown axis, or b
+                out of its bounds.
+        """
+        if not isinstance(scenario, Scenario):
+            raise ParameterError("scenario", scenario, "must be a Scenario")
+        if scenario.controller is not None:
+            bound = "must be None: the analysis is of compensator and servo, not of a law"
+            raise ParameterError("controller", scenario.controller, bound)
+        i, clay = AXES.index(choice("axis", axis, AXES)), scenario.clay
+        servo, bare = scenario.servo[i], scenario.arm.nominal_mobility[i]
+        shaped = scenario.shaping and bare != servo.S.gain
+        sampled = scenario.control == "sampled"
+        loop = Loop(
+            axis=AXES[i],
+            operator=scenario.operators[i],
+            servo=servo if scenario.shaping else replace(servo, S=replace(servo.S, gain=bare)),
+            compensator=scenario.compensators[i],
+            K=scenario.gain[i],
+            Ts=(scenario.Ts or scenario.dt) if sampled else None,
+            delay=scenario.interface.delay if scenario.interface else 0.0,
+            render=scenario.render if sampled else "held",
+            mobility=bare if shaped else None,
+        )
+        if b is not None:
+            return replace(loop, b=b)
+        from .gain_limit import gain_limit
+
+        laws = () if clay is None else clay.laws if clay.angle else clay.laws[i : i + 1]
+        dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
+        if len(dampings) > MOST_DAMPINGS:
+            dampings = dampings[np.linspace(0, len(dampings) - 1, MOST_DAMPINGS).astype(int)]
+        return min((replace(loop, b=x) for x in dampings.tolist()), key=gain_limit, default=loop)
+
+    @property
+    def gain(self) -> float:
+        """K.
+
+        Raises:
+            ParameterError: it is None.
+        """
+        if self.K is None:
+            raise ParameterError("K", None, "must be given: the analysis is of a loop with a gain")
+        return self.K
+
+    @property
+    def hand(self) -> Operator:
+        """The operator's arm, or one of zeros for None."""
+        return self.operator or NO_HAND
+
+    @property
+    def environment(self) -> Polynomial:
+        """Te + Th, clay and the operator's arm (Eqs. 4, 19), as a polynomial in s."""
+        th = self.hand
+        return Polynomial([th.spring, th.damper + self.b, th.mass])
+
+
+PARTS = tuple(f.name for f in fields(Loop))
+
+
+def of_loop(
+    *order: str, timing: bool = False
+) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
+    """Lets an analysis of a `Loop` be asked of the parts of one, too.
+
+    `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
+    asks of `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
+    names by position or by name, and every other part of a Loop by name.
+
+    Args:
+        order: parts of the loop and arguments of the analysis that may follow the axis by position;
+            all but the operator must be given. Only the latter may follow a Loop by position.
+        timing: whether the analysis is one of sampled and late loops too.
+
+    Returns:
+        A decorator.
+    """
+
+    def decorate(analysis: Callable[..., Answer]) -> Callable[..., Answer]:
+        name = analysis.__name__
+        own = [p for n, p in inspect.signature(analysis).parameters.items() if n != "loop"]
+        free = tuple(n for n in order if n not in PARTS)
+
+        @functools.wraps(analysis)
+        def ask(*args: Any, **given: Any) -> Answer:
+            if args and isinstance(args[0], Scenario):
+                scenario, *rest = args
+                if not rest and "axis" not in given:
+                    raise TypeError(f"{name}() of a Scenario needs an axis")
+                axis = rest.pop(0) if rest else given.pop("axis")
+                args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
+            for word in ("loop", "axis"):
+                if word in given:
+                    args = (given.pop(word), *args)
+            if not args:
+                raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
+            whole, *rest = args
+            names = free if isinstance(whole, Loop) else order
+            if len(rest) > len(names):
+                raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
+            for word, value in zip(names, rest, strict=False):
+                if word in given:
+                    raise TypeError(f"{name}() got multiple values for argument {word!r}")
+                given[word] = value
+            parts = {word: given.pop(word) for word in PARTS if word in given}
+            if isinstance(whole, Loop):
+                loop = _with_gain(whole, parts)
+            else:
+                missing = [n for n in order if n in PARTS and n not in ("operator", *parts)]
+                if missing:
+                    raise TypeError(f"{name}() lacks {', '.join(missing)}")
+                loop = Loop(whole, **parts)
+            if not timing:
+                for word, value in TIMING.items():
+                    if getattr(loop, word) != value:
+                        raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
+            return analysis(loop, **given)
+
+        ask.__signature__ = _signature(order, own)  # type: ignore[attr-defined]
+        return ask
+
+    return decorate
+
+
+def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
+    """The loop, with K where it is given."""
+    for word, value in parts.items():
+        if word != "K":
+            raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
+    return replace(loop, **parts) if parts else loop
+
+
+def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
+    """What an analysis takes: an axis or a Loop, what may follow by position, and the rest."""
+    P, more = inspect.Parameter, {p.name: p for p in own}
+    blank = {"operator": None}
+    out = [P("axis", P.POSITIONAL_OR_KEYWORD, annotation="str | Loop | Scenario")]
+    out += [P(n, P.POSITIONAL_OR_KEYWORD, default=blank.get(n, P.empty)) for n in order]
+    out += [
+        P(f.name, P.KEYWORD_ONLY, default=f.default)
+        for f in fields(Loop)
+        if f.name != "axis" and f.name not in order
+    ]
+    rest = [p for n, p in more.items() if n not in order]
+    out += [p.replace(kind=P.KEYWORD_ONLY) for p in rest if p.kind is not P.VAR_KEYWORD]
+    return inspect.Signature(out + [p for p in rest if p.kind is P.VAR_KEYWORD])
+
+
+def steady_speed(
+    K: float, f: float, b: Any, compensator: Compensator = PRINTED, servo: Servo = SERVO[0]
+) -> Any:
+    """Speed under a constant hand force, K f/(10 + K b) with the printed parts [m/s].
+
+    The compensator's damper and the clay share the force: f = (1/(K c) + b) v, c the limit of
+    s C G/K as s goes to 0 (Eqs. 20, 21). Without an integrator in C the handle comes to rest; with
+    two it gives way until the clay takes all of the force, and without clay its speed grows.
 
     Args:
         K: compensator gain.
         f: hand force [N].
         b: clay [N.s/m], a float or an array.
+        compensator: shape of C.
+        servo: of the axis; the printed ones follow C without loss.
+
+    Returns:
+        The speed, inf with the sign of f where it grows without end.
     """
-    return K * f / (PRINTED.pole + K * b)
+    num, den = (p.coef for p in reduced(compensator).fraction)
+    n = np.count_nonzero(np.cumsum(den != 0.0) == 0)  # integrators
+    if n == 0 or K == 0.0 or f == 0.0:
+        return 0.0 * b
+    if n > 1:
+        with np.errstate(divide="ignore"):
+            speed = np.divide(f, b)
+        return speed if isinstance(b, np.ndarray) else float(speed)
+    c = num[0] * (servo.G.gain / servo.G.stiffness)
+    return K * c * f / (den[1] + K * c * b)
 
 
-def hand_or_none(operator: Operator | None) -> Operator:
-    """The operator's arm, or one of zeros for None.
+def reduced(compensator: Compensator) -> Compensator:
+    """A compensator without the factors s that numerator and denominator share.
 
     Args:
-        operator: Th; None for Th = 0.
-
-    Raises:
-        ParameterError: operator is of another type.
+        compensator: shape of C.
     """
-    if operator is None:
-        return NO_HAND
-    if not isinstance(operator, Operator):
-        raise ParameterError("operator", operator, "must be an Operator or None")
-    return operator
+    num, den = compensator.num, compensator.den
+    while num[-1] == den[-1] == 0.0:
+        num, den = num[:-1], den[:-1]
+    return compensator if den == compensator.den else Compensator(num, den)
 
 
 # ---- polynomials ---------------------------------------------------------------------------------
 
 
-def loop_polynomials(
-    axis: str, b: float, operator: Operator | None = None, compensator: Compensator = PRINTED
-) -> tuple[Polynomial, Polynomial, Polynomial]:
+def loop_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial: denominator + passive + K driven.
 
     The first is the common denominator of G, C and Sh, so the loop's transfer function
     (G C + Sh)(Te + Th) is (passive + K driven)/denominator.
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        compensator: shape of C.
+        loop: the loop, in continuous time without delay; its K does not matter.
 
     Returns:
         (denominator, passive, driven).
-
-    Raises:
-        ParameterError: unknown axis, or b not finite and >= 0.
     """
-    s, cg = S[AXES.index(choice("axis", axis, AXES))], _forward_denominator(axis, compensator)
-    servo, t = Polynomial([s.stiffness, s.damping, 1.0]), environment_polynomial(b, operator)
-    forward = G[AXES.index(axis)].gain * (compensator.fraction[0] * servo * t)
+    s, cg, t = loop.servo.S, _forward_denominator(loop), loop.environment
+    servo = Polynomial([s.stiffness, s.damping, 1.0])
+    forward = loop.servo.G.gain * (loop.compensator.fraction[0] * servo * t)
     return cg * servo, s.gain * (cg * t), forward
 
 
-def delayed_polynomials(
-    axis: str, b: float, operator: Operator | None, render: str, compensator: Compensator = PRINTED
-) -> tuple[Polynomial, Polynomial, Polynomial]:
+def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial with late motors: physical + late (motors + K driven).
 
-    With late = exp(-s delay), W = 1/mass of the handle (the gain of Sh) and T = Te + Th,
+    With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
+    without shaping) and T = Te + Th,
 
-        0 = s^2 + W (Th + [implicit] b s) + late (kd s + kp + [held] W b s + (s^2 + kd s + kp) G C
-        T)
+        0 = s^2 + W (Th + [implicit] b s) + late (kd s + kp + [held] W b s + (Wn - W) T
+            + (s^2 + kd s + kp) G C T)
 
     times the denominator of G C.
 
     Args:
-        axis: "x" or "y".
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        render: the clay is "held" (a force of the motors) or "implicit" (physical).
-        compensator: shape of C.
+        loop: the loop, in continuous time; its K does not matter.
 
     Returns:
         (physical, motors, driven).
     """
-    implicit = choice("render", render, RENDERS) == "implicit"
-    s, th, cg = S[AXES.index(axis)], hand_or_none(operator), _forward_denominator(axis, compensator)
-    damper, held = (th.damper + b, 0.0) if implicit else (th.damper, b)
-    physical = cg * Polynomial([s.gain * th.spring, s.gain * damper, 1.0 + s.gain * th.mass])
-    motors = cg * Polynomial([s.stiffness, s.damping + s.gain * held])
-    return physical, motors, loop_polynomials(axis, b, operator, compensator)[2]
+    s, th, cg = loop.servo.S, loop.hand, _forward_denominator(loop)
+    damper, held = (th.damper + loop.b, 0.0) if loop.render == "implicit" else (th.damper, loop.b)
+    W = s.gain if loop.mobility is None else loop.mobility
+    physical = cg * Polynomial([W * th.spring, W * damper, 1.0 + W * th.mass])
+    motors = cg * Polynomial([s.stiffness, s.damping + W * held])
+    if loop.mobility is not None:
+        motors = motors + (s.gain - W) * (cg * loop.environment)
+    return physical, motors, loop_polynomials(loop)[2]
 
 
-def _forward_denominator(axis: str, compensator: Compensator) -> Polynomial:
+def _forward_denominator(loop: Loop) -> Polynomial:
     """Denominator of G C."""
-    g = G[AXES.index(choice("axis", axis, AXES))]
-    return compensator.fraction[1] * Polynomial([g.stiffness, g.damping, 1.0])
+    g = loop.servo.G
+    return loop.compensator.fraction[1] * Polynomial([g.stiffness, g.damping, 1.0])
 
 
-def environment_polynomial(b: float, operator: Operator | None = None) -> Polynomial:
-    """Te + Th, clay and the operator's arm (Eqs. 4, 19), as a polynomial in s.
-
-    Args:
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-    """
-    b, th = number("b", b, 0.0, unit="N.s/m"), hand_or_none(operator)
-    return Polynomial([th.spring, th.damper + b, th.mass])
-
-
-def characteristic(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    compensator: Compensator = PRINTED,
-) -> Polynomial:
+def characteristic(loop: Loop) -> Polynomial:
     """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        compensator: shape of C.
+        loop: the loop, in continuous time without delay.
 
     Returns:
         Polynomial in s, of degree 6 with the printed compensator.
-
-    Raises:
-        ParameterError: unknown axis, or K or b not finite and >= 0.
     """
-    denominator, passive, driven = loop_polynomials(axis, b, operator, compensator)
-    return denominator + passive + number("K", K, 0.0) * driven
+    denominator, passive, driven = loop_polynomials(loop)
+    return denominator + passive + loop.gain * driven
 
 
-def device_admittance(
-    axis: str, K: float, compensator: Compensator = PRINTED
-) -> tuple[Polynomial, Polynomial]:
+def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     """G C + Sh, handle position over net force, as (numerator, denominator).
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        compensator: shape of C.
+        loop: the loop; hand and clay do not matter.
     """
-    unit_spring = Operator(0.0, 0.0, 1.0)
-    denominator, passive, driven = loop_polynomials(axis, 0.0, unit_spring, compensator)
-    return passive + number("K", K, 0.0) * driven, denominator
+    unit_spring = replace(loop, b=0.0, operator=Operator(0.0, 0.0, 1.0))
+    denominator, passive, driven = loop_polynomials(unit_spring)
+    return passive + loop.gain * driven, denominator
 
 
-def closed_loop_poles(
-    axis: str, K: float, b: float, operator: Operator | None = None
-) -> np.ndarray:
-    """Poles of the loop at the nominal pose [rad/s], shape (6,).
-
-    Without a spring in Th one of them is the integrator that moves the handle (s = 0).
+def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
+    """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
+        loop: the loop; hand and clay do not matter.
     """
-    return roots.roots(characteristic(axis, K, b, operator))
+    e, d = device_admittance(loop)
+    return (d, roots.VARIABLE * e) if d.coef[0] else (d // roots.VARIABLE, e)
 
 
-def stable(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    compensator: Compensator = PRINTED,
-) -> bool:
+@of_loop("K", "b", "operator")
+def closed_loop_poles(loop: Loop) -> np.ndarray:
+    """Poles of the loop at the nominal pose [rad/s], shape (4 + order of C,).
+
+    With an integrator in C and no spring in Th one of them is that which moves the handle (s = 0).
+
+    Args:
+        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
+    """
+    return roots.roots(characteristic(loop))
+
+
+def stable(loop: Loop) -> bool:
     """Return True if no closed-loop pole lies right of the imaginary axis.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        compensator: shape of C.
+        loop: the loop, in continuous time without delay.
     """
-    return roots.hurwitz(characteristic(axis, K, b, operator, compensator))
+    return roots.hurwitz(characteristic(loop))
 
 
 # ---- state spaces --------------------------------------------------------------------------------
 
 
-def state_space(
-    axes: str,
-    K: float | Sequence[float] | np.ndarray,
-    b: float,
-    operator: Operator | None = None,
-    mobility: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
+def state_space(*loops: Loop, mobility: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The loop in continuous time: z' = A z + B uh, with y = G delta.
 
     The servo's law is that of docs/equations.md, section 3.
 
     Args:
-        axes: "x", "y", or "xy" for both, n of them.
-        K: compensator gain of each axis.
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
+        *loops: of one axis, or of x and y, with their K.
         mobility: W = Lambda^-1 of the arm [1/kg], shape (n, n); None for the gains of Sh.
 
     Returns:
-        A, shape (6 n, 6 n), and B, shape (6 n, n); z holds (p, p', delta, delta', y, y') of each
-        axis.
+        A, shape (m, m), and B, shape (m, n); z holds (p, p', states of the compensator, y, y') of
+        each of the n axes. As printed, m = 6 n and those states are delta and delta'.
     """
-    th, n, gains = hand_or_none(operator), len(axes), np.broadcast_to(K, len(axes))
-    W = _nominal_mobility(axes) if mobility is None else mobility
+    n, at = len(loops), _places(loops)
+    W = _shaped_mobility(loops) if mobility is None else mobility
+    parts = [controller.controller_matrices(x.servo, x.compensator, x.gain) for x in loops]
     # Hand and clay without the hand's mass; p'' appears in the hand's force too.
-    force = np.hstack((_over_states(axes, [-th.spring, -th.damper - b]), np.eye(n)))
-    law = np.hstack((_feedback(axes), np.zeros((n, n)))) + W @ force
-    acceleration = np.linalg.solve(np.eye(n) + th.mass * W, law)
-    net = force - th.mass * acceleration
-    AB = np.zeros((6 * n, 7 * n))
-    for j, axis in enumerate(axes):
-        k = 6 * j
-        own, drive = controller.controller_matrices(axis, gains[j])
+    force = np.hstack((_over_states(loops, *_resistance(loops)), np.eye(n)))
+    through = np.diag([drive[-1] for _, drive in parts])  # of C, in y'' at once
+    mass = np.diag([x.hand.mass for x in loops])
+    law = np.hstack((_feedback(loops), np.zeros((n, n)))) + (W + through) @ force
+    acceleration = np.linalg.solve(np.eye(n) + (W + through) @ mass, law)
+    net = force - mass @ acceleration
+    AB = np.zeros((at[-1], at[-1] + n))
+    for j, (own, drive) in enumerate(parts):
+        k, inner = at[j], slice(at[j] + 2, at[j + 1])
         AB[k, k + 1] = 1.0
         AB[k + 1] = acceleration[j]
-        AB[k + 2 : k + 6] = np.outer(drive, net[j])
-        AB[k + 2 : k + 6, k + 2 : k + 6] += own
-    return AB[:, : 6 * n], AB[:, 6 * n :]
+        AB[inner] = np.outer(drive, net[j])
+        AB[inner, inner] += own
+    return AB[:, : at[-1]], AB[:, at[-1] :]
 
 
 def sampled_differences(
-    axes: str,
-    b: float,
-    operator: Operator | None,
-    Ts: float,
-    delay: float = 0.0,
-    render: str = "held",
-    pose: tuple[np.ndarray, bool] | None = None,
+    *loops: Loop, pose: tuple[np.ndarray, bool] | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The sampled loop x(k+1) = (M + beta K gamma) x(k), x at the sample before it acts.
 
-    x holds (p, v, delta, delta', y, y') of each of the n axes, then the motors' force on the handle
-    u(k-1), ..., u(k-1-N) [N] on each axis, with N the whole samples in the delay. Between samples
-    handle and hand move under held u (matrix exponential); a fraction of a sample in the delay
-    splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed., 3.2). As in
-    `Sampled`, the net force f = gamma x that drives the compensator is measured before u changes,
-    so it holds the share of the hand's mass under the u that acted until then.
+    x holds (p, v, states of the compensator, y, y') of each of the n axes, then the motors' force
+    on the handle u(k-1), ..., u(k-1-N) [N] on each axis, with N the whole samples in the delay.
+    Between samples handle and hand move under held u (matrix exponential); a fraction of a sample
+    in the delay splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.,
+    3.2). As in `Sampled`, the net force f = gamma x that drives the compensator is measured before
+    u changes, so it holds the share of the hand's mass under the u that acted until then.
 
     Args:
-        axes: "x", "y", or "xy" for both.
-        b: clay [N.s/m].
-        operator: Th; None for Th = 0.
-        Ts: control sample [s].
-        delay: from the sample to the change of u that it causes [s].
-        render: the clay is "held" by the motors or "implicit".
+        *loops: of one axis, or of x and y; Ts, delay and render are those of the first, the gains
+            do not matter.
         pose: mobility of the arm [1/kg], shape (n, n), and whether the servo shapes the inertia;
-            None for the gains of Sh.
+            None for the nominal pose.
 
     Returns:
         M - 1, shape (m, m), without the loss of digits of the difference; beta, shape (m, n);
-        gamma, shape (n, m). m = n (7 + N). K is the diagonal matrix of the gains.
+        gamma, shape (n, m). m = n (7 + N) with compensators of order 2. K is the diagonal matrix
+        of the gains.
     """
-    implicit = choice("render", render, RENDERS) == "implicit"
-    th, n, nominal = hand_or_none(operator), len(axes), _nominal_mobility(axes)
-    W, shaping = (nominal, False) if pose is None else pose
-    whole = math.floor(delay / Ts + 1e-9)
-    part = max(delay / Ts - whole, 0.0) if delay / Ts - whole > 1e-9 else 0.0
-    m, newest = n * (7 + whole), 6 * n
-    inertia = np.linalg.inv(W)
-    # Hand and handle in the directions in which they have one mass: there the axes are decoupled.
-    masses, directions = np.linalg.eigh(inertia + th.mass * np.eye(n))
+    n, at, first = len(loops), _places(loops), loops[0]
+    Ts, implicit = first.Ts, first.render == "implicit"
+    assert Ts is not None
+    nominal = _shaped_mobility(loops)
+    W, shaping = _nominal_pose(loops) if pose is None else pose
+    whole = math.floor(first.delay / Ts + 1e-9)
+    part = first.delay / Ts - whole
+    part = max(part, 0.0) if part > 1e-9 else 0.0
+    newest = at[-1]
+    m = newest + n * (1 + whole)
+    inertia, mass = np.linalg.inv(W), np.diag([x.hand.mass for x in loops])
+    springs, resistance = _resistance(loops)
+    dampers = resistance if implicit else np.array([-x.hand.damper for x in loops])
+    masses, directions = np.linalg.eigh(inertia + mass)
     w = (directions / masses) @ directions.T
-    damper = th.damper + b if implicit else th.damper
 
     def moved(t: float) -> tuple[np.ndarray, np.ndarray]:
         """Change of (p of each axis, v of each axis) over t [s], and that for a held u."""
+        if np.ptp(springs) or np.ptp(dampers):  # another hand on each axis
+            return _moved_together(np.hstack((np.diag(springs), np.diag(dampers))), w, t)
         change, drive = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, n))
-        for mass, direction in zip(masses.tolist(), directions.T, strict=True):
-            own, held = _moved(np.array([-th.spring, -damper]) / mass, 1.0 / mass, t)
+        # In the directions in which hand and handle have one mass the axes are decoupled.
+        for size, direction in zip(masses.tolist(), directions.T, strict=True):
+            own, held = _moved(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
             share = np.outer(direction, direction)
             change += np.kron(own, share)
             drive += np.kron(held[:, None], share)
@@ -303,18 +482,18 @@ def sampled_differences(
 
     (rest, new), (head, old) = (moved(x * Ts) for x in (1.0 - part, part))
     queue = np.zeros((n, n * (1 + whole)))
-    force = np.hstack((_over_states(axes, [-th.spring, -th.damper - b]), queue))
-    before = np.hstack((w @ _over_states(axes, [-th.spring, -damper]), queue))
+    force = np.hstack((_over_states(loops, springs, resistance), queue))
+    before = np.hstack((w @ _over_states(loops, springs, dampers), queue))
     before[:, -n:] += w
-    gamma = force - th.mass * before
-    u = np.hstack((inertia @ _feedback(axes), queue))
+    gamma = force - mass @ before
+    u = np.hstack((inertia @ _feedback(loops), queue))
     if not implicit:
-        u += np.hstack((_over_states(axes, [0.0, -b]), queue))
+        u += np.hstack((_over_states(loops, np.zeros(n), [-x.b for x in loops]), queue))
     if shaping:
         u += (inertia @ nominal - np.eye(n)) @ gamma
 
     less, beta = np.zeros((m, m)), np.zeros((m, n))
-    place = [6 * j + k for k in (0, 1) for j in range(n)]
+    place = [k + j for j in (0, 1) for k in at[:-1]]
     less[np.ix_(place, place)] = rest + head + rest @ head
     less[place, m - n :] = old + rest @ old
     if whole:
@@ -322,31 +501,75 @@ def sampled_differences(
         less[place, late : late + n] += new
     else:
         less[place] += new @ u
-    for j, axis in enumerate(axes):
-        own = slice(6 * j + 2, 6 * j + 6)
-        A, B = controller.held_compensator(axis, 1.0, Ts)
-        less[own, own], beta[own, j] = A - np.eye(4), B
+    for j, loop in enumerate(loops):
+        own = slice(at[j] + 2, at[j + 1])
+        A, B = controller.held_compensator(loop.servo, loop.compensator, 1.0, Ts)
+        less[own, own], beta[own, j] = A - np.eye(len(B)), B
+        through = controller.controller_matrices(loop.servo, loop.compensator, 1.0)[1][-1]
+        if through:  # of C, in y'' and so in u at once
+            beta[newest : newest + n, j] = through * inertia[:, j]
+            if not whole:
+                beta[place, j] += new @ (through * inertia[:, j])
     less[newest : newest + n] = u
     less[np.arange(newest + n, m), np.arange(newest, m - n)] = 1.0
     less[np.arange(newest, m), np.arange(newest, m)] -= 1.0
     return less, beta, gamma
 
 
-def _nominal_mobility(axes: str) -> np.ndarray:
-    return np.diag([S[AXES.index(choice("axis", axis, AXES))].gain for axis in axes])
+def _places(loops: Sequence[Loop]) -> list[int]:
+    """Where the states of each axis begin, and where those of the last end."""
+    at = [0]
+    for loop in loops:
+        at.append(at[-1] + 4 + loop.compensator.order)
+    return at
 
 
-def _feedback(axes: str) -> np.ndarray:
-    """The servo's law over the states of all axes, shape (n, 6 n)."""
-    out = np.zeros((len(axes), 6 * len(axes)))
-    for j, axis in enumerate(axes):
-        out[j, 6 * j : 6 * j + 6] = controller.feedback_vector(axis)
+def _shaped_mobility(loops: Sequence[Loop]) -> np.ndarray:
+    return np.diag([x.servo.S.gain for x in loops])
+
+
+def _nominal_pose(loops: Sequence[Loop]) -> tuple[np.ndarray, bool]:
+    """Mobility of the bare handle at the nominal pose, and whether the servo shapes it."""
+    bare = [x.servo.S.gain if x.mobility is None else x.mobility for x in loops]
+    return np.diag(bare), any(x.mobility is not None for x in loops)
+
+
+def _resistance(loops: Sequence[Loop]) -> tuple[np.ndarray, np.ndarray]:
+    """Hand and clay without the hand's mass: force per place and per velocity of each axis."""
+    hands = [x.hand for x in loops]
+    dampers = np.array([-h.damper - x.b for h, x in zip(hands, loops, strict=True)])
+    return np.array([-h.spring for h in hands]), dampers
+
+
+def _feedback(loops: Sequence[Loop]) -> np.ndarray:
+    """The servo's law over the states of all axes, without what passes straight through C."""
+    at = _places(loops)
+    out = np.zeros((len(loops), at[-1]))
+    for j, loop in enumerate(loops):
+        law, delta = controller.feedback_vector(loop.servo), loop.compensator.state_space()[2]
+        out[j, at[j] : at[j + 1]] = [*law[:2], *(law[2] * delta), *law[4:]]
     return out
 
 
-def _over_states(axes: str, row: list[float]) -> np.ndarray:
-    """The same row over (p, p') of each axis, shape (n, 6 n)."""
-    return np.kron(np.eye(len(axes)), np.array([*row, 0.0, 0.0, 0.0, 0.0]))
+def _over_states(
+    loops: Sequence[Loop], place: Sequence[float] | np.ndarray, rate: Sequence[float] | np.ndarray
+) -> np.ndarray:
+    """Rows over the states of all axes that hold a factor on p and one on p' of each."""
+    at = _places(loops)
+    out = np.zeros((len(loops), at[-1]))
+    for j, k in enumerate(at[:-1]):
+        out[j, k : k + 2] = place[j], rate[j]
+    return out
+
+
+def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """As `_moved`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
+    n = len(w)
+    a = np.zeros((3 * n, 3 * n))
+    a[:n, n : 2 * n] = np.eye(n)
+    a[n : 2 * n] = np.hstack((w @ force, w))
+    change = controller.matrix_exponential(t * a) - np.eye(3 * n)
+    return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
 
 
 def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -376,16 +599,15 @@ def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def crossing_times(
-    axis: str, K: float, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
+    loop: Loop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
 ) -> list[float]:
     """Times at which a handle that starts at rest under a constant force passes each border.
 
-    Without a hand, exact: between borders the loop is linear, so a matrix exponential moves it, and
-    the times are found by bisection to rounding (Brent 1973).
+    Exact: between borders the loop is linear, so a matrix exponential moves it, and the times are
+    found by bisection to rounding (Brent 1973).
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
+        loop: the loop with its K, in continuous time; its own clay does not matter.
         uh: muscle force [N].
         edges: borders, ascending [m].
         b: clay before each border [N.s/m].
@@ -396,11 +618,12 @@ def crossing_times(
     """
     from scipy.optimize import brentq
 
-    z, t, out = np.zeros(7), 0.0, []
-    z[6] = uh
+    n = 4 + loop.compensator.order
+    z, t, out = np.zeros(n + 1), 0.0, []
+    z[n] = uh
     for edge, here in zip(edges, b, strict=True):
-        A = np.zeros((7, 7))
-        A[:6] = np.hstack(state_space(axis, K, here))
+        A = np.zeros((n + 1, n + 1))
+        A[:n] = np.hstack(state_space(replace(loop, b=here)))
         step = 1e-3
         E = controller.matrix_exponential(A * step)
         while (ahead := E @ z)[0] < edge and t < t_max:

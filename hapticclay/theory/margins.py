@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of
-from ..model.controller import PRINTED, Compensator
 from ..model.operator import Operator
 from . import gain_limit, linear_loop, roots
+from .linear_loop import Loop, of_loop
 from .roots import first_failure
 
 BREAKS = ("force", "compensator")
+ON_AXIS = 1e-9  # poles this near the axis, as a share of their size, count as on it
+ARC = 1e-6  # radius of the arc around one, as a share of its frequency
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
 
@@ -80,6 +82,11 @@ class Margins:
     disk_omega: float
 
 
+NO_MARGINS = Margins(
+    False, (1.0, 1.0), 0.0, 0.0, 0.0, (math.nan, math.nan), math.nan, math.nan, math.nan
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Nyquist:
     """L along the positive frequencies, and the encirclements of its whole contour.
@@ -102,60 +109,47 @@ class Nyquist:
         return self.N + self.P
 
 
-def open_loop(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    at: str = "force",
-    compensator: Compensator = PRINTED,
-) -> tuple[Polynomial, Polynomial]:
-    """The loop's transfer function as (numerator, denominator), a common factor s removed.
+@of_loop("K", "b", "operator")
+def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]:
+    """The loop's transfer function as (numerator, denominator), common factors s removed.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
+        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
         at: where the loop is broken: at the net "force", L = (G C + Sh)(Te + Th) (Eq. 8), or at the
             "compensator", G C (Te + Th)/(1 + Sh (Te + Th)) (Eq. 12), whose gain margin is that of
             K.
-        compensator: shape of C.
 
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    blank, passive, driven = linear_loop.loop_polynomials(axis, b, operator, compensator)
-    driven = number("K", K, 0.0) * driven
+    blank, passive, driven = linear_loop.loop_polynomials(loop)
+    driven = loop.gain * driven
     if choice("at", at, BREAKS) == "force":
         n, d = passive + driven, blank
     else:
         n, d = driven, blank + passive
-    s = roots.VARIABLE
-    return (n // s, d // s) if n.coef[0] == 0.0 == d.coef[0] else (n, d)
+    while n.coef[0] == 0.0 == d.coef[0]:
+        n, d = n // roots.VARIABLE, d // roots.VARIABLE
+    return n, d
 
 
-def nyquist(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    at: str = "force",
-    compensator: Compensator = PRINTED,
-) -> Nyquist:
+@of_loop("K", "b", "operator", timing=True)
+def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
     """The Nyquist curve and its encirclements.
 
+    With sampling the contour is the unit circle, z = exp(j omega Ts), and P and Z count what lies
+    outside it.
+
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        at: where the loop is broken, as in `open_loop`.
-        compensator: shape of C.
+        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
+        at: where the loop is broken, as in `open_loop`; "compensator" with sampling or delay.
+
+    Raises:
+        ParameterError: a value is out of its bounds.
     """
-    n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
+    if _is_timed(loop, at):
+        return _response_nyquist(gain_limit.loop_family(loop), loop.gain)
+    n, d = open_loop(loop, at=at)
     size = np.abs(np.concatenate((roots.nonzero_roots(n), roots.nonzero_roots(d))))
     omega = gain_limit.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
     return Nyquist(omega, n(1j * omega) / d(1j * omega), *encirclements(n, d))
@@ -164,19 +158,20 @@ def nyquist(
 def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
     """N and P of the loop n/d, counted along its curve and never from the closed-loop poles.
 
-    The contour passes a pole at s = 0 on its right, in an arc so small that |L| is large all over
-    it; the arc turns L by -pi for each such pole. Beyond the largest frequency L is constant.
+    The contour passes poles on the axis on their right, in arcs so small that |L| is large all over
+    them; such an arc turns L by -pi for each such pole. Beyond the largest frequency L is constant.
 
     Args:
         n: numerator, of no higher degree than d.
-        d: denominator, without a root on the imaginary axis other than s = 0.
+        d: denominator.
 
     Returns:
         (N, clockwise encirclements of -1; P, roots of d right of the axis).
     """
     n, d = n.trim(), d.trim()
     poles, zeros = roots.nonzero_roots(d), roots.nonzero_roots(n)
-    P = int(np.sum(poles.real > 0.0))
+    on = np.abs(poles.real) <= ON_AXIS * np.abs(poles)
+    P = int(np.sum((poles.real > 0.0) & ~on))
     if not np.any(n.coef):
         return 0, P
     order = roots.multiplicity_of_zero(d) - roots.multiplicity_of_zero(n)
@@ -195,38 +190,43 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
     omega = gain_limit.frequency_grid(low, high, np.concatenate((poles, zeros)))
     if order <= 0:
         omega = np.concatenate(([1e-9 * low], omega))
-    turned = 2.0 * gain_limit.phase_change(lambda w: 1.0 + n(1j * w) / d(1j * w), omega)
-    return round((max(order, 0) * math.pi - turned) / (2.0 * math.pi)), P
+    arcs = np.sort(np.abs(poles[on & (poles.imag > 0.0)]))
+    turned = -math.pi * len(arcs)
+    for start, end in itertools.pairwise((0.0, *arcs.tolist(), math.inf)):
+        gap = ARC if start < math.inf else 0.0
+        piece = omega[(omega > start * (1.0 + gap)) & (omega < end * (1.0 - gap))]
+        turned += gain_limit.phase_change(lambda w: 1.0 + n(1j * w) / d(1j * w), piece)
+    return round((max(order, 0) * math.pi - 2.0 * turned) / (2.0 * math.pi)), P
 
 
-def margins(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    at: str = "compensator",
-    compensator: Compensator = PRINTED,
-) -> Margins:
-    """Gain, phase, delay and disk margins of the continuous loop, from roots of polynomials.
+@of_loop("K", "b", "operator", timing=True)
+def margins(loop: Loop, *, at: str = "compensator") -> Margins:
+    """Gain, phase, delay and disk margins, in continuous time from roots of polynomials.
+
+    With sampling or delay they are read from the frequency response at the compensator, up to half
+    the sampling frequency: crossings as in `gain_limit`, the disk from a grid, refined.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
+        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
         at: "compensator": a factor on K, a delay of the compensator alone; "force": a factor on, or
-            a delay of, everything that the net force does.
-        compensator: shape of C.
+            a delay of, everything that the net force does, in continuous time without delay.
+
+    Raises:
+        ParameterError: a value is out of its bounds.
     """
-    n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
+    if _is_timed(loop, at):
+        return _response_margins(gain_limit.loop_family(loop), loop.gain)
+    n, d = (p.trim() for p in open_loop(loop, at=at))
     if not roots.hurwitz(n + d):
-        nan = math.nan
-        return Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, (nan, nan), nan, nan, nan)
+        return NO_MARGINS
     nd = roots.cross_spectrum(n, d)
     omega = roots.positive_roots(Polynomial(nd.coef.imag))
     with np.errstate(divide="ignore"):
         factor = -(np.abs(roots.on_axis(d)(omega)) ** 2) / nd(omega).real
+        ends = [-d.coef[0] / n.coef[0]]  # L is real at 0 and, if it does not fall off, at infinity
+        ends += [-d.coef[-1] / n.coef[-1]] if n.degree() == d.degree() else []
+    factor = np.concatenate((factor, ends))
+    omega = np.concatenate((omega, [0.0, math.inf][: len(ends)]))
     more, more_at = _extreme(factor, omega, factor > 1.0, np.argmin, math.inf)
     less, less_at = _extreme(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
@@ -236,7 +236,6 @@ def margins(
     turn = np.minimum(lag, 2.0 * np.pi - lag)
     phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
-    n, d = n.trim(), d.trim()
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
         delay, delay_at = 0.0, math.inf  # L does not fall off: any delay turns it round -1
     far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
@@ -245,6 +244,77 @@ def margins(
     return Margins(
         True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
     )
+
+
+def _is_timed(loop: Loop, at: str) -> bool:
+    """Whether the loop is sampled or late; it can then be broken at the compensator alone."""
+    timed = loop.Ts is not None or loop.delay > 0.0
+    if choice("at", at, BREAKS) != "compensator" and timed:
+        raise ParameterError("at", at, "must be 'compensator' with sampling or delay")
+    return timed
+
+
+def _response_nyquist(family: gain_limit.LoopFamily, K: float) -> Nyquist:
+    """The curve of L = -K h, counted as in `encirclements`."""
+    if K >= family.most:
+        bound = f"must be < {family.most:g}: above, poles without number lie on the right"
+        raise ParameterError("K", K, bound)
+
+    def back(omega: np.ndarray) -> np.ndarray:
+        return 1.0 - K * family.h(omega)
+
+    omega, low = family.grid, float(family.grid[0])
+    while family.order and K and abs(back(np.array([low]))[0]) < 1e3:
+        low *= 0.1
+    last = [w for w in family.ends if w > omega[-1]]  # the Nyquist frequency
+    if not last:  # L falls off, or its absolute value stays below 1
+        top = float(omega[-1])
+        while abs(back(np.array([top]))[0] - 1.0) > max(0.5, 0.5 * (1.0 + K / family.most)):
+            top *= 2.0
+        omega = np.append(omega, top) if top > omega[-1] else omega
+    path = np.concatenate(([low] if low < omega[0] else [], omega, last))
+    turned = gain_limit.phase_change(back, path)
+    if not last:
+        turned -= np.angle(back(path[-1:])[0])
+    N = round((family.order * (K > 0.0) * math.pi - 2.0 * turned) / (2.0 * math.pi))
+    return Nyquist(family.grid, -K * family.h(family.grid), N, family.right())
+
+
+def _response_margins(family: gain_limit.LoopFamily, K: float) -> Margins:
+    """Margins of L = -K h."""
+    from scipy.optimize import minimize_scalar
+
+    if not family.stable(K):
+        return NO_MARGINS
+    found = [*gain_limit.gain_crossings(family), (family.most, math.inf)]
+    factor, omega = np.array(found).T / [[K or 1e-300], [1.0]]
+    more, more_at = _extreme(factor, omega, (factor > 1.0) & (factor < np.inf), np.argmin, math.inf)
+    less, less_at = _extreme(factor, omega, factor < 1.0, np.argmax, 0.0)
+    omega = np.array(gain_limit.unit_crossings(family, K) if K else [])
+    lag = np.angle(-family.h(omega)) + np.pi if len(omega) else omega
+    every = lag > -1.0
+    turn = np.minimum(lag, 2.0 * np.pi - lag)
+    phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
+    delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
+
+    def far(omega: np.ndarray) -> np.ndarray:
+        L = -K * family.h(omega)
+        return np.abs((1.0 - L) / (1.0 + L))
+
+    grid = np.append(family.grid, family.ends)
+    size = far(grid)
+    i = int(np.argmax(size[: len(family.grid)]))
+    worst, disk_at = float(size.max()), float(grid[np.argmax(size)])
+    around = family.grid[max(i - 1, 0)], family.grid[min(i + 1, len(family.grid) - 1)]
+    best = minimize_scalar(
+        lambda x: -far(np.array([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
+    )
+    if -best.fun > worst:  # type: ignore[union-attr]
+        worst, disk_at = -float(best.fun), float(best.x)  # type: ignore[union-attr]
+    return Margins(
+        True, (less, more), phase, delay, 2.0 / worst, (less_at, more_at), phase_at, delay_at,
+        disk_at,
+    )  # fmt: skip
 
 
 def _extreme(
@@ -257,54 +327,36 @@ def _extreme(
     return float(value[i]), float(omega[i])
 
 
-def coupled_stability(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    Ts: float | None = None,
-    delay: float = 0.0,
-    render: str = "held",
-) -> Verdict:
+@of_loop("K", "b", "operator", timing=True)
+def coupled_stability(loop: Loop) -> Verdict:
     """Whether the loop with this hand is stable.
 
     The margin is the gain limit over K. A loop that is stable again above its first limit has a
     verdict of True beside a margin below 1.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
-        Ts: control sample [s]; None for continuous time.
-        delay: as in `gain_limit` [s].
-        render: as in `gain_limit`.
+        loop: the loop with its K > 0; or axis, K, b, operator, and other parts by name.
     """
-    limit, omega = gain_limit.critical_gain(axis, b, operator, Ts, delay, render)
-    good = gain_limit.is_stable(axis, K, b, operator, Ts, delay, render)
-    if Ts:
+    good = gain_limit.is_stable(loop)
+    limit, omega = gain_limit.critical_gain(loop)
+    if loop.Ts:
         how = "eigenvalues of the exact sampled model"
-    elif delay:
+    elif loop.delay:
         how = "argument principle on the loop with its delay"
     else:
         how = "roots of the closed-loop polynomial"
     hand = "no hand at the handle"
-    if operator:
-        th = f"{operator.mass:g} s^2 + {operator.damper:g} s + {operator.spring:g}"
+    if loop.operator:
+        th = loop.operator
+        th = f"{th.mass:g} s^2 + {th.damper:g} s + {th.spring:g}"
         hand = f"the hand is {th} N/m"
-    return Verdict(good, limit / K, omega, (LINEAR, hand), f"{how}: exact", "gain limit over K")
+    return Verdict(
+        good, limit / loop.gain, omega, (LINEAR, hand), f"{how}: exact", "gain limit over K"
+    )
 
 
-def small_gain(
-    axis: str,
-    K: float,
-    b: float,
-    operator: Operator | None = None,
-    *,
-    equation: int = 13,
-    compensator: Compensator = PRINTED,
-) -> Verdict:
+@of_loop("K", "b", "operator")
+def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail.
 
     (11), the same as (10), requires |L| < 1 and (13), the same as (12), |G C| < |1/(Te + Th) + Sh|:
@@ -312,12 +364,8 @@ def small_gain(
     which holds for unstable loops too.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        operator: arm at the handle; None for no hand (Th = 0).
+        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
         equation: 9, 10, 11, 12 or 13.
-        compensator: shape of C.
 
     Returns:
         Verdict whose margin is the least ratio of right to left side; for (9), the least |1 + L|.
@@ -325,7 +373,7 @@ def small_gain(
     if equation not in (9, 10, 11, 12, 13):
         raise ParameterError("equation", equation, "must be 9, 10, 11, 12 or 13")
     at = "force" if equation < 12 else "compensator"
-    n, d = open_loop(axis, K, b, operator, at=at, compensator=compensator)
+    n, d = open_loop(loop, at=at)
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
     how = "extreme of a ratio of polynomials: exact. "
     if equation == 9:
@@ -341,25 +389,21 @@ def small_gain(
     return Verdict(margin > 1.0, margin, omega, (LINEAR,), how, measures, fails)
 
 
-def transparency(
-    axis: str, K: float, b: float, omega: np.ndarray, *, compensator: Compensator = PRINTED
-) -> np.ndarray:
+@of_loop("K", "b", "omega")
+def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
     """fe/fh, the clay's share of the hand's force (Eq. 7), which no hand changes.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
+        loop: the loop with its K; or axis, K, b, omega, and other parts by name.
         omega: [rad/s], shape (n,).
-        compensator: shape of C.
 
     Returns:
         Complex, shape (n,). At omega = 0 it is K b/(10 + K b) with the printed compensator.
     """
-    e, d = linear_loop.device_admittance(axis, K, compensator)
+    z, e = linear_loop.device_impedance(loop)
     s = 1j * np.asarray(omega, dtype=float)
-    felt = number("b", b, 0.0, unit="N.s/m") * e(s)
-    return felt / (felt + (d // roots.VARIABLE)(s))
+    felt = loop.b * e(s)
+    return felt / (felt + z(s))
 
 
 # ---- the worst case over hands -------------------------------------------------------------------
@@ -422,9 +466,7 @@ class WorstCase:
     hand: Operator | None
 
 
-def critical_hand(
-    axis: str, K: float, b: float, box: Box, compensator: Compensator = PRINTED
-) -> tuple[Operator, float] | None:
+def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
     """A hand of the box that puts a pole on the imaginary axis.
 
     Exact (zero exclusion; Barmish, New Tools for Robustness of Linear Systems, 1994). The
@@ -433,17 +475,16 @@ def critical_hand(
     it where four polynomials in omega^2 have the right sign.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
+        loop: the loop with its K, in continuous time; its own hand does not matter.
         box: the hands.
-        compensator: shape of C.
 
     Returns:
         (hand, frequency [rad/s]), or None if no hand of the box does.
     """
-    A = linear_loop.characteristic(axis, K, b, None, compensator)
-    E = linear_loop.device_admittance(axis, K, compensator)[0]
+    A = linear_loop.characteristic(replace(loop, operator=None))
+    E = linear_loop.device_admittance(loop)[0]
+    for edge in _critical_ends(A, E, box):
+        return edge
     AE = roots.cross_spectrum(-A, E).coef
     R, X = Polynomial(AE.real[::2]), Polynomial(AE.imag[1::2])
     Q = roots.squared_magnitude(E)  # -A/E = R/Q + j omega X/Q
@@ -458,6 +499,17 @@ def critical_hand(
     return None
 
 
+def _critical_ends(A: Polynomial, E: Polynomial, box: Box) -> Iterator[tuple[Operator, float]]:
+    """Hands that put a pole at 0, by their spring, or at infinity, by their mass."""
+    lows = {f: getattr(box, f)[0] for f in ("mass", "damper", "spring")}
+    for field, end, at, power in (("spring", 0, 0.0, 0), ("mass", -1, math.inf, 2)):
+        low, high = getattr(box, field)
+        if A.coef[end] and E.coef[end] and (not power or A.degree() == E.degree() + power):
+            needed = -A.coef[end] / E.coef[end]
+            if low <= needed <= high:
+                yield Operator(**lows | {field: float(needed)}), at
+
+
 def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, float]:
     """The hand of the box whose value at omega^2 = x is real + j omega damper."""
     lowest = max(box.mass[0], (box.spring[0] - real) / x)
@@ -467,7 +519,7 @@ def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, f
     return Operator(mass, min(max(damper, box.damper[0]), box.damper[1]), spring), math.sqrt(x)
 
 
-def rigid_limit(axis: str, compensator: Compensator = PRINTED) -> tuple[float, float]:
+def rigid_limit(loop: Loop) -> tuple[float, float]:
     """Largest K that is stable with an arm that cannot move, Th to infinity.
 
     The closed-loop poles tend to the zeros of G C + Sh, so the limit is that of its numerator,
@@ -475,29 +527,18 @@ def rigid_limit(axis: str, compensator: Compensator = PRINTED) -> tuple[float, f
     property of its sufficient condition, not of the loop.
 
     Args:
-        axis: "x" or "y".
-        compensator: shape of C.
+        loop: the loop, in continuous time; clay, hand and K do not matter.
 
     Returns:
         (K, omega [rad/s]).
     """
-    driven = linear_loop.device_admittance(axis, 1.0, compensator)[0]
-    passive = linear_loop.device_admittance(axis, 0.0, compensator)[0]
+    driven = linear_loop.device_admittance(replace(loop, K=1.0))[0]
+    passive = linear_loop.device_admittance(replace(loop, K=0.0))[0]
     return roots.first_crossing(passive, driven - passive)
 
 
-def worst_case(  # noqa: PLR0913  # one loop, one box, and how finely to look
-    axis: str,
-    K: float,
-    b: float,
-    box: Box,
-    *,
-    Ts: float | None = None,
-    delay: float = 0.0,
-    render: str = "held",
-    compensator: Compensator = PRINTED,
-    samples: int = 56,
-) -> WorstCase:
+@of_loop("K", "b", "box", timing=True)
+def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
     """The lowest gain limit over a box of hands.
 
     In continuous time without delay it is exact: K rises from zero until `critical_hand` finds one.
@@ -505,60 +546,50 @@ def worst_case(  # noqa: PLR0913  # one loop, one box, and how finely to look
     method says so.
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
+        loop: the loop with its K > 0, whose own hand does not matter; or axis, K, b, box, and other
+            parts by name.
         box: the hands.
-        Ts: control sample [s]; None for continuous time.
-        delay: as in `gain_limit` [s].
-        render: as in `gain_limit`.
-        compensator: shape of C; the printed one with sampling.
         samples: random members tried with sampling or delay, 0 to 10000.
     """
-    K = number("K", K, 0.0, above=True)
+    K = number("K", loop.gain, 0.0, above=True)
     if not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
-    if Ts is None and not delay:
-        limit, omega, hand = _exact_worst_case(axis, b, box, compensator)
-        how = "zero exclusion, its value set a rectangle at every frequency: exact"
-    else:
+    timed = loop.Ts is not None or loop.delay > 0.0
+    if timed:
         members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))
-        loop = (Ts, delay, render, compensator)
-        found = [(*gain_limit.critical_gain(axis, b, th, *loop), th) for th in members]
+        found = [(*gain_limit.critical_gain(replace(loop, operator=th)), th) for th in members]
         limit, omega, hand = min(found, key=lambda x: x[0])
         how = f"sampled: the corners and {samples} random members, no proof for those between"
+    else:
+        limit, omega, hand = _exact_worst_case(loop, box)
+        how = "zero exclusion, its value set a rectangle at every frequency: exact"
     if box.rigid:
-        rigid, rigid_omega = rigid_limit(axis, compensator)
+        rigid, rigid_omega = rigid_limit(loop)
         if rigid < limit:
             limit, omega, hand = rigid, rigid_omega, None
         how += "; the rigid arm by the zeros of G C + Sh"
-        how += ", in continuous time" if Ts or delay else ", exact"
+        how += ", in continuous time" if timed else ", exact"
     assumptions = (LINEAR, f"hand in {box}")
     verdict = Verdict(K < limit, limit / K, omega, assumptions, how, "worst gain limit over K")
     return WorstCase(verdict, limit, hand)
 
 
-def _exact_worst_case(
-    axis: str, b: float, box: Box, compensator: Compensator
-) -> tuple[float, float, Operator | None]:
+def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | None]:
     corners = box.corners()
 
     def stable(K: float) -> bool:
-        return linear_loop.stable(axis, K, b, corners[0], compensator) and not critical_hand(
-            axis, K, b, box, compensator
-        )
+        tried = replace(loop, operator=corners[0], K=K)
+        return linear_loop.stable(tried) and not critical_hand(tried, box)
 
-    found = [
-        (*gain_limit.critical_gain(axis, b, th, compensator=compensator), th) for th in corners
-    ]
+    found = [(*gain_limit.critical_gain(replace(loop, operator=th)), th) for th in corners]
     limit, omega, worst = min(found, key=lambda x: x[0])
     top = min(limit, 1e6)
-    if limit == math.inf and stable(top):
+    if limit == 0.0 or (limit == math.inf and stable(top)):
         return limit, math.nan, worst
     # A window narrower than 20 % in K may be missed, but no limit of a corner.
     grid = [*np.geomspace(1e-4 * top, top, 49)[:-1].tolist(), (1.0 + 1e-6) * top]
     high = first_failure(stable, grid, below=0.0)[1]
     if high < (1.0 - 1e-7) * limit:  # `critical_hand` is that sharp
-        critical = critical_hand(axis, high, b, box, compensator)
+        critical = critical_hand(replace(loop, K=high), box)
         return high, critical[1] if critical else math.nan, critical[0] if critical else worst
     return limit, omega, worst

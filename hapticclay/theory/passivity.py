@@ -6,40 +6,45 @@ A sampled loop that is stable with one hand may still be active; `margins` judge
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ..errors import number
-from ..model.controller import PRINTED, Compensator
 from . import linear_loop, roots
+from .linear_loop import Loop, of_loop
 from .margins import LINEAR, Verdict
 
 
-def passivity(axis: str, K: float, b: float, *, compensator: Compensator = PRINTED) -> Verdict:
+@of_loop("K", "b")
+def passivity(loop: Loop) -> Verdict:
     """Whether the impedance shown to the hand is passive, in continuous time.
 
-    Z = fh/v = b + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable and
-    Re Z(j omega) >= 0 (Colgate, Hogan, Int. J. Control 48, 1988).
+    Z = fh/v = b + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable,
+    Re Z(j omega) >= 0, and Z is a spring at rest and a mass at high frequency, not their negatives
+    (Colgate, Hogan, Int. J. Control 48, 1988).
 
     Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        compensator: shape of C.
+        loop: the loop with its K, whose hand does not matter; or axis, K, b, and other parts by
+            name.
 
     Returns:
         Verdict with the least Re Z [N.s/m]: the damping that the clay has to spare, or lacks.
     """
-    e, d = linear_loop.device_admittance(axis, K, compensator)
-    b = number("b", b, 0.0, unit="N.s/m")
-    Q = roots.squared_magnitude(e)
-    R = roots.real_part(d // roots.VARIABLE, e) + b * Q
+    z, e = (p.trim() for p in linear_loop.device_impedance(loop))
+    R, Q = roots.real_part(z, e), roots.squared_magnitude(e)
+    spring = roots.multiplicity_of_zero(e)
+    R, Q = Polynomial(R.coef[spring:]), Polynomial(Q.coef[spring:])
+    R = R + loop.b * Q
     worst, omega = roots.least_ratio(R, Q)
-    alone = linear_loop.stable(axis, K, b, None, compensator)
+    alone = linear_loop.stable(replace(loop, operator=None))
     how = "stable without a hand and Re Z >= 0 at the least of a ratio of polynomials: exact"
     measures = "least Re Z [N.s/m]" + ("" if alone else "; not stable without a hand")
     fails = roots.positive_bands(-R)
-    good = alone and worst >= 0.0
+    negative = z.coef[-1] * e.coef[-1] < 0.0 or (spring and z.coef[0] * e.coef[spring] < 0.0)
+    measures += "; a negative mass or spring" if negative else ""
+    good = alone and worst >= 0.0 and not negative
     return Verdict(good, worst, omega, (LINEAR, "continuous time"), how, measures, fails)
 
 

@@ -105,21 +105,30 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
     """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
 
     Exact: on the imaginary axis A + K B vanishes, so Im(A B*) = 0, a polynomial in omega, whose
-    positive roots give the K at which a pair of roots can cross.
+    positive roots give the K at which a pair of roots can cross; one root can do so at 0 and at
+    infinity. Roots that stay at zero do not count.
 
     Args:
-        A: polynomial without a root right of the imaginary axis.
-        B: polynomial.
+        A: polynomial.
+        B: polynomial, of no higher degree.
 
     Returns:
-        (K, omega [rad/s]); (inf, nan) if no root crosses.
+        (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
+        small K.
     """
     AB = cross_spectrum(A, B)
     omega = positive_roots(Polynomial(AB.coef.imag))
     with np.errstate(divide="ignore", invalid="ignore"):  # B(j omega) = 0: no K puts a pole there
         K = -AB(omega).real / np.abs(on_axis(B)(omega)) ** 2
-    for i in np.argsort(K):
-        if 0.0 < K[i] < math.inf and not hurwitz(A + (1.0 + 1e-6) * K[i] * B):
+        n = multiplicity_of_zero(A)
+        ends = [-A.coef[n] / B.coef[n] if n == multiplicity_of_zero(B) else math.nan]
+        ends += [-A.coef[-1] / B.coef[-1] if A.degree() == B.degree() else math.nan]
+    K, omega = np.concatenate((K, ends)), np.concatenate((omega, [0.0, math.inf]))
+    found = [i for i in np.argsort(K) if 0.0 < K[i] < math.inf]
+    if not hurwitz(A + (0.5 * K[found[0]] if found else 1.0) * B):
+        return 0.0, math.nan
+    for i in found:
+        if not hurwitz(A + (1.0 + 1e-6) * K[i] * B):
             return float(K[i]), float(omega[i])
     return math.inf, math.nan
 

@@ -20,9 +20,9 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 
 from ..errors import ParameterError, integer
-from ..model.constants import AXES, L1, L2
+from ..model.constants import AXES
 from .session import Player, Session
-from .stage import GROUND, THICKNESS, Stage, hardest, plotted_axes
+from .stage import GROUND, THICKNESS, Stage, hardest, plotted_axes, room_scale
 from .style import CLAY_DEEP, FORCE_COLORS, GRID, MATERIALS, SKY, TABLE, rgb_bytes, verdict_color
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
@@ -114,12 +114,14 @@ class Page:
         self._console.quiet = self._quiet
 
     def _scene(self) -> None:
-        add, tool = self.server.scene, self.session.tool
+        add, tool, arm = self.server.scene, self.session.tool, self.session.scenario.arm
+        size = room_scale(arm)
         dark, steel, blue, orange = (
             rgb_bytes(MATERIALS[name]) for name in ("dark", "steel", "blue", "orange")
         )
         camera = self.server.initial_camera
-        camera.position, camera.look_at, camera.fov = (0.21, -0.66, 0.64), (0.18, 0.15, -0.04), 0.60
+        camera.position = (0.21 * size, -0.66 * size, 0.64 * size)
+        camera.look_at, camera.fov = (0.18 * size, 0.15 * size, -0.04), 0.60
         sky = np.linspace(rgb_bytes(SKY[0]), rgb_bytes(SKY[1]), 64).astype(np.uint8)
         add.set_background_image(sky[:, None].repeat(64, axis=1), "png")
         add.set_up_direction("+z")
@@ -128,27 +130,28 @@ class Page:
         lamp: Any = dict(color=(255, 250, 240), intensity=1.2, cast_shadow=True)
         add.add_light_directional("/lamp", position=(-0.4, 0.6, 1.1), **lamp)
         add.world_axes.visible = False
-        table = (0.92, 0.88)
-        place = (*CENTRE, GROUND - 0.012)
+        table, centre = (0.92 * size, 0.88 * size), (CENTRE[0] * size, CENTRE[1] * size)
+        place = (*centre, GROUND - 0.012)
         add.add_box("/table", rgb_bytes(TABLE), (*table, 0.02), position=place)
         lines: Any = dict(cell_size=0.1, section_size=0.1)
         lines.update(cell_color=rgb_bytes(GRID), section_color=rgb_bytes(GRID))
-        add.add_grid("/grid", *table, plane="xy", position=(*CENTRE, GROUND - 0.001), **lines)
+        add.add_grid("/grid", *table, plane="xy", position=(*centre, GROUND - 0.001), **lines)
         add.add_cylinder("/foot", 0.06, 0.03, dark, position=(0.0, 0.0, GROUND + 0.015))
         add.add_cylinder("/shoulder", 0.042, 0.052, steel, position=(0.0, 0.0, -0.004))
         along_x = math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0  # of a cylinder
         self._link1 = add.add_frame("/link1", show_axes=False)
-        half = (0.5 * L1, 0.0, 0.0)
-        add.add_cylinder("/link1/bar", 0.017, L1, dark, wxyz=along_x, position=half)
+        l1, l2 = arm.l1, arm.l2
+        half = (0.5 * l1, 0.0, 0.0)
+        add.add_cylinder("/link1/bar", 0.017, l1, dark, wxyz=along_x, position=half)
         self._link2 = add.add_frame("/link2", show_axes=False)
-        half = (0.5 * L2, 0.0, 0.0)
-        add.add_cylinder("/link2/bar", 0.012, L2, blue, wxyz=along_x, position=half)
+        half = (0.5 * l2, 0.0, 0.0)
+        add.add_cylinder("/link2/bar", 0.012, l2, blue, wxyz=along_x, position=half)
         add.add_cylinder("/link2/elbow", 0.026, 0.048, steel)
         tip = GROUND + THICKNESS - tool.depth
-        place = (L2, 0.0, 0.5 * tip)
+        place = (l2, 0.0, 0.5 * tip)
         add.add_cylinder("/link2/tool", 0.5 * tool.width, -tip, steel, position=place)
-        add.add_cylinder("/link2/handle", 0.008, 0.045, dark, position=(L2, 0.0, 0.022))
-        add.add_icosphere("/link2/knob", 0.016, orange, position=(L2, 0.0, 0.052))
+        add.add_cylinder("/link2/handle", 0.008, 0.045, dark, position=(l2, 0.0, 0.022))
+        add.add_icosphere("/link2/knob", 0.016, orange, position=(l2, 0.0, 0.052))
         self._clay: Any = None
         if self.stage.field >= 0:
             grid, origin = self.stage.removal, self.session.scenario.origin
@@ -276,7 +279,8 @@ class Page:
             self.stage.carve([f.p for f in new])
         with self.server.atomic():
             self._link1.wxyz, self._link2.wxyz = _about_z(q[0]), _about_z(q[0] + q[1])
-            self._link2.position = (L1 * math.cos(q[0]), L1 * math.sin(q[0]), 0.0)
+            l1 = session.scenario.arm.l1
+            self._link2.position = (l1 * math.cos(q[0]), l1 * math.sin(q[0]), 0.0)
             if point is None:
                 x, y = np.add(frame.p, session.scenario.origin).tolist()
                 self.target.position = (x, y, 0.052)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -12,10 +13,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ..model.clay import Clay, Profile
-from ..model.constants import AXES, C_POLE
+from ..model.clay import Clay, Profile, Smooth
+from ..model.compensator import PRINTED
+from ..model.constants import AXES
 from ..model.scenario import Scenario
-from ..model.signals import Signal
+from ..model.signals import Multisine
 from ..simulation.record import Record
 from ..theory import linear_loop
 from .style import (
@@ -33,6 +35,10 @@ from .style import (
 )
 
 BEYOND = 1e4  # [cm], past every path
+MOST_BORDERS = 20  # of clay that is drawn region by region
+PICTURE_SIZE = 400  # pixels of a picture of other clay, along x and along y
+SHADES = 100  # of smooth clay along a path
+MOST_TITLED = 8  # that a title lists
 FILM_DPI = 100
 LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
 ROOMY_PANEL = (180, 110)  # ... and the names of its axes
@@ -52,11 +58,15 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
             i = AXES.index(name)
             v = record.v[:, i]
             ax.plot(100.0 * record.p[:, i], v, color=BLUE, label="measured")
-            if s.operator is None and s.muscle is None:
-                law = functools.partial(linear_loop.steady_speed, s.gain[i], s.force[i])
-                _steps(
-                    ax, record, i, law, color=VERMILION, ls="--", label="expected, K f/(10 + K b)"
+            built_in = s.controller is None
+            if built_in and s.operators[i] is None and s.muscle is None and not s.turned:
+                c, servo = s.compensators[i], s.servo[i]
+                law = functools.partial(
+                    linear_loop.steady_speed, s.gain[i], s.force[i], compensator=c, servo=servo
                 )
+                printed = c == PRINTED and servo.numbers[0] == 1.0
+                told = "expected, K f/(10 + K b)" if printed else "expected"
+                _steps(ax, record, i, law, color=VERMILION, ls="--", label=told)
             ax.set_ylabel(f"velocity v$_{name}$ [m/s]")
             low, high = min(0.0, float(v.min())), max(0.0, float(v.max()))
             span = (high - low) or 1.0
@@ -67,6 +77,9 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
 
 def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
     """Plots fe/v and fh/v over position, with b and 10/K + b (Fig. 8, bottom).
+
+    In steady motion the printed compensator resists as a damper of 10/K, another one as a damper
+    of 1/(K c), c the limit of s C G/K as s goes to 0; without an integrator there is no such line.
 
     Args:
         record: the run.
@@ -79,15 +92,27 @@ def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
         x = 100.0 * record.p[:, i]
         ax.plot(x, record.ratio(record.fh)[:, i], color=GREEN, label="operator, f$_h$/v")
         ax.plot(x, record.ratio(record.fe)[:, i], color=BLUE, label="clay, f$_e$/v")
-        own = C_POLE / s.gain[i] if s.gain[i] else 0.0
-        if s.operator is None and s.muscle is None:
-            _steps(ax, record, i, lambda b: own + b, color=BLACK, ls=":", label="10/K + b")
+        shown = _compensator_damper(s, i)
+        own = shown / s.gain[i] if shown else 0.0
+        if shown and s.operators[i] is None and s.muscle is None:
+            told = f"{shown:.3g}/K + b"
+            _steps(ax, record, i, lambda b: own + b, color=BLACK, ls=":", label=told)
         _steps(ax, record, i, lambda b: b, color=VERMILION, ls="--", label="b")
         ax.set_ylabel("force / velocity [N$\\cdot$s/m]")
-        top = own + float(np.max(record.b[:, i], initial=0.0))
+        top = own + float(np.max(record.b[:, i], initial=0.0)) or 1.0
         ax.set_ylim(-0.04 * top, 1.35 * top)
         _finish(figure, panels, record)
     return figure
+
+
+def _compensator_damper(scenario: Scenario, i: int) -> float:
+    """K times the damper that hand and compensator end up with; 0 if there is none."""
+    if not scenario.gain[i] or scenario.controller is not None:
+        return 0.0
+    num, den = (p.coef for p in linear_loop.reduced(scenario.compensators[i]).fraction)
+    if den[0] != 0.0 or len(den) < 2:  # no integrator: the handle comes to rest
+        return 0.0
+    return float(den[1] / (num[0] * scenario.servo[i].numbers[0]))
 
 
 def path_plot(record: Record) -> Figure:
@@ -122,19 +147,16 @@ def path_plot(record: Record) -> Figure:
 
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
     """Shades each region of the clay and names its damping along x and y on entry [N.s/m]."""
-    laws = (clay.x, clay.y)
-    edges = [
-        sorted({-BEYOND, BEYOND, *(100.0 * e for f in laws if f.along == a for e in f.edges)})
-        for a in AXES
-    ]
-    top = max(max(f.values) for f in laws)
+    edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
+    if clay.smooth or max(map(len, edges)) > MOST_BORDERS:
+        _clay_image(ax, clay, low, high)
+        return
     for x0, x1 in zip(edges[0], edges[0][1:], strict=False):
         for y0, y1 in zip(edges[1], edges[1][1:], strict=False):
-            at = {"x": 0.005 * (x0 + x1), "y": 0.005 * (y0 + y1)}
-            b = [f.values[int(np.searchsorted(f.edges, at[f.along]))] for f in laws]
+            b = clay.at(0.005 * (x0 + x1), 0.005 * (y0 + y1)).tolist()
             if not max(b):
                 continue
-            shade: Any = dict(color=clay_color(max(b) / top), alpha=CLAY_ALPHA, lw=0)
+            shade: Any = dict(color=clay_color(max(b) / clay.largest), alpha=CLAY_ALPHA, lw=0)
             ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **shade))
             right, bottom = min(x1, high[0]), max(y0, low[1])
             shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
@@ -142,6 +164,15 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
                 place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
                 text: Any = dict(ha="right", va="bottom", fontsize=8, color=GREY)
                 ax.text(place[0], place[1], f"b = ({b[0]:g}, {b[1]:g})", **text)
+
+
+def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
+    """Shades clay of many cells by a picture of it [cm]."""
+    x, y = (np.linspace(low[i], high[i], PICTURE_SIZE + 1) for i in (0, 1))
+    middle = 0.005 * (x[1:] + x[:-1]), 0.005 * (y[1:] + y[:-1])
+    share = clay.at(middle[0], middle[1][:, None]).max(axis=0) / (clay.largest or 1.0)
+    colors = np.concatenate((clay_color(share), CLAY_ALPHA * (share > 0.0)[..., None]), axis=2)
+    ax.imshow(colors, extent=(x[0], x[-1], y[0], y[-1]), origin="lower", zorder=0)
 
 
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
@@ -160,7 +191,7 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
             where = r.t if over == "time" else 100.0 * r.p[:, i]
             ax.plot(where, r.fh[:, i], color=BLUE, lw=0.9, label="operator, f$_h$")
             if r.scenario.muscle is not None:
-                muscle = Signal(r.scenario.muscle)
+                muscle = r.scenario.muscle
                 pieces = np.array_split(r.t, len(r.t) // 4096 + 1)  # it takes (n, lines) of memory
                 uh = r.scenario.force[i] + np.concatenate([muscle(t)[:, i] for t in pieces])
                 ax.plot(where, uh, color=VERMILION, lw=1.1, ls="--", label="muscle, u$_h$")
@@ -192,11 +223,16 @@ def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:
 
 
 def _clay_along_both_axes(s: Scenario) -> bool:
-    return s.clay is not None and s.clay.x.along != s.clay.y.along
+    return s.clay is not None and s.clay.along == AXES[0] + AXES[1]
 
 
 def _main_axis(s: Scenario) -> str:
-    size = s.force if s.muscle is None else s.muscle.rms
+    size = s.force
+    if isinstance(s.muscle, Multisine):
+        size = s.muscle.rms
+    elif s.muscle is not None:
+        x, y = np.abs(s.muscle(np.linspace(0.0, s.t_max, 501)) + s.force).max(axis=0)
+        size = float(x), float(y)
     return "y" if abs(size[1]) > abs(size[0]) else "x"
 
 
@@ -255,13 +291,26 @@ def _position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
         x = 100.0 * record.p[:, AXES.index(name)]
         low, high = float(x.min()), float(x.max())
         margin = 0.02 * ((high - low) or 1.0)
-        shade_clay(ax, _profile(record.scenario, name), name)
+        shade_clay(ax, _profile(record, name), name)
         ax.set(xlabel=f"position {name} [cm]", xlim=(low - margin, high + margin))
     return figure, panels
 
 
-def _profile(s: Scenario, axis: str) -> Profile | None:
-    return (s.clay.x, s.clay.y)[AXES.index(axis)] if s.clay else None
+def _profile(record: Record, axis: str) -> Profile | None:
+    """The clay of an axis; of a grid or smooth clay, what the path met along that axis."""
+    clay, i = record.scenario.clay, AXES.index(axis)
+    law = getattr(clay, axis) if clay else None
+    if law is None or isinstance(law, Profile):
+        return law
+    x, first = np.unique(record.p[:, i], return_index=True)
+    if isinstance(law, Smooth) and len(x) > SHADES:
+        near = np.searchsorted(x, np.linspace(x[0], x[-1], SHADES))
+        x, first = x[near], first[near]
+    b = record.b[first, i]
+    change = np.flatnonzero(np.diff(b))
+    edges = 0.5 * (x[change] + x[change + 1])
+    along = "x" if i == 0 else "y"
+    return Profile(tuple(edges.tolist()), (*b[change].tolist(), float(b[-1])), along)
 
 
 def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
@@ -271,7 +320,7 @@ def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
         pieces = pieces[:3]
     for piece in pieces:
         x, b = 100.0 * record.p[piece, i], record.b[piece, i]
-        constant = b[0] == b[-1]
+        constant = np.ptp(b) == 0.0
         x, y = ([x.min(), x.max()], [law(float(b[0]))] * 2) if constant else (x, law(b))
         ax.plot(x, y, lw=1.4, zorder=3, **look)
         look["label"] = "_"
@@ -283,14 +332,21 @@ def _scenario_parts(s: Scenario) -> list[str]:
     def pair(x: tuple[float, float]) -> str:
         return f"({x[0]:.3g}, {x[1]:.3g})"
 
-    out = [f"{s.name}: K = {pair(s.gain)}"]
+    how = f"K = {pair(s.gain)}" if s.controller is None else "a controller of one's own"
+    out = [f"{s.name}: {how}"]
     if s.muscle is None:
         out.append(f"u$_h$ = {pair(s.force)} N")
     if s.clay:
-        values = list(dict.fromkeys(v for f in (s.clay.x, s.clay.y) for v in f.values if v))
-        out.append(f"b = {', '.join(f'{v:g}' for v in values) or '0'} N$\\cdot$s/m")
-        out += [f"growing {g:g} a second" for f in (s.clay.x, s.clay.y) for g in f.growth if g][:1]
-    return out + ["T$_h$ in the loop"] * bool(s.operator) + ["inertia shaped"] * s.shaping
+        values = [v for f in s.clay.laws for v in dict.fromkeys(f.damping.ravel().tolist()) if v]
+        values = list(dict.fromkeys(values))
+        told = ", ".join(f"{v:g}" for v in values) or "0"
+        if len(values) > MOST_TITLED:
+            told = f"{min(values):g} to {max(values):g}"
+        out.append(f"b = {told} N$\\cdot$s/m")
+        rates = [g for f in s.clay.laws for g in f.rates.ravel().tolist() if g]
+        out += [f"growing {g:g} a second" for g in rates][:1]
+        out += [f"turned by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
+    return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.shaping
 
 
 def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:
@@ -395,7 +451,7 @@ def running_figure(
             title = plan.title if roomy else plan.short
             ax.set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
         for ax in panels[:2]:
-            shade_clay(ax, _profile(record.scenario, AXES[i]), AXES[i])
+            shade_clay(ax, _profile(record, AXES[i]), AXES[i])
         b = np.unique(record.b[:, i])
         for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 else ():
             panels[1].axhline(value, color=VERMILION, ls="--", lw=0.9)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import math
 import signal
 import threading
@@ -22,10 +23,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, integer, number
-from ..model import clay as laws
-from ..model.clay import Clay, Profile
-from ..model.constants import AXES, B_MAX, L1, L2
-from ..model.operator import Operator
+from ..model import regions
+from ..model.clay import Clay
+from ..model.constants import AXES, B_MAX
+from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
@@ -38,7 +39,7 @@ from ..theory import gain_limit
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
 LONGEST_SESSION = 3600.0  # [s]
-PULL_REACH = (abs(L2 - L1) + 0.05, L1 + L2 - 0.02)  # of the point pulled to, from the shoulder [m]
+PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
 RECENT_FRAMES = 60  # over which the real-time factor is averaged
 CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
@@ -51,19 +52,19 @@ class Pull:
     holds against p itself, this makes fh = -Th applied to p - point.
 
     Attributes:
-        spring: k [N/m].
+        spring: k of x and y [N/m], (2,).
         force: steady force beside it [N], (2,).
         knots: (t [s], x, y [m]) of the point's path so far.
     """
 
-    def __init__(self, spring: float, p: tuple[float, float]):
+    def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
         """Puts the point at the handle.
 
         Args:
-            spring: k [N/m].
+            spring: k of x and y [N/m].
             p: position of the handle [m].
         """
-        self.spring, self.force = spring, (0.0, 0.0)
+        self.spring, self.force = np.array(spring), (0.0, 0.0)
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
@@ -126,8 +127,8 @@ class LiveRun(LeapfrogRun):
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every)
-        assert scenario.operator is not None
-        self.muscle = Pull(scenario.operator.spring, scenario.start)
+        x, y = (th or NO_HAND for th in scenario.operators)
+        self.muscle = Pull((x.spring, y.spring), scenario.start)
         self.varies = True
         # motion is the person's: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
@@ -158,8 +159,8 @@ class LiveRun(LeapfrogRun):
         self._tell(scenario)
         self.watch.scenario = replace(scenario, muscle=Multisine())
         if scenario.clay is not None:
-            table, first = laws.region_table(scenario.clay, scenario.length), laws.ENTERED_ROW
-            table[first : first + 2] = self.table[first : first + 2]
+            table = regions.region_table(scenario.clay, scenario.length)
+            regions.keep_entries(table, self.table)
             self.table = table
             self._arrays(table=table)
             path.settle(self.s, self.e.table)
@@ -348,7 +349,7 @@ class Session:
         """Says whether the loop is stable, by the monitor of the run and its gain limit."""
         s, onset = self.scenario, self.run.watch.onset
         return live_verdict(
-            self.gain, live_gain_limits(self.b, s.operator), onset, self.t - self._swung < CALM_TIME
+            self.gain, live_gain_limits(s, self.b), onset, self.t - self._swung < CALM_TIME
         )
 
     def pull(self, point: tuple[float, float] | None) -> None:
@@ -477,10 +478,9 @@ class Session:
             self._swung = self.t
         p, v = self._state()
         b = self.b
-        spring = self.run.muscle
-        th = self.scenario.operator
-        assert th is not None
-        hand = spring.mean(self.t, 0.0) - th.spring * np.array(p) - th.damper * np.array(v)
+        hands = [th or NO_HAND for th in self.scenario.operators]
+        spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
+        hand = self.run.muscle.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
         self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist())))
 
@@ -488,7 +488,10 @@ class Session:
         x, y = (a + o for a, o in zip(point, self.scenario.origin, strict=True))
         x = x or 1e-9  # the shoulder has no direction
         r = math.hypot(x, y)
-        scale = min(max(r, PULL_REACH[0]), PULL_REACH[1]) / r
+        folded, stretched = self.scenario.arm.reach
+        least = min(PULL_MARGIN[0], 0.25 * (stretched - folded))  # of a short arm
+        most = min(PULL_MARGIN[1], 0.25 * (stretched - folded))
+        scale = min(max(r, folded + least), stretched - most) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
 
 
@@ -500,11 +503,13 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
         stiffness: factor on the spring of Th; its damper takes the square root.
     """
     stiffness = number("stiffness", stiffness, 1e-3, 1e4)
-    th = scenario.operator or Operator()
-    hand = Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)
+    x, y = (
+        Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)
+        for th in (given or Operator() for given in scenario.operators)
+    )
     return replace(
         scenario,
-        operator=hand,
+        operator=x if x == y else (x, y),
         force=(0.0, 0.0),
         muscle=None,
         command=None,
@@ -522,13 +527,16 @@ def scaled(clay: Clay | None, factor: float) -> Clay | None:
         factor: on the damping.
     """
 
-    def times(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(min(b * factor, B_MAX) for b in values)
+    def times(values: Any) -> Any:  # numbers, or rows of them
+        if isinstance(values, tuple):
+            return tuple(map(times, values))
+        return min(values * factor, B_MAX)
 
-    def law(f: Profile) -> Profile:
-        return replace(f, values=times(f.values), growth=times(f.growth))
+    def law(f: Any) -> Any:
+        growing = {"growth": times(f.growth)} if f.growth else {}
+        return replace(f, values=times(f.values), **growing)
 
-    return None if clay is None else Clay(x=law(clay.x), y=law(clay.y))
+    return None if clay is None else replace(clay, x=law(clay.x), y=law(clay.y))
 
 
 class Replay:
@@ -605,7 +613,7 @@ class Replay:
         """As of a session; the monitor's finding is the outcome of the record."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
-        limit = live_gain_limits(self.b, s.operator) if s.control == "continuous" else None
+        limit = live_gain_limits(s, self.b) if s.control == "continuous" else None
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
     def _frame(self, n: int) -> Frame:
@@ -722,15 +730,14 @@ def live_verdict(
     return LiveVerdict(text, bool(onset and swings))
 
 
-def live_gain_limits(b: tuple[float, float], operator: Operator | None) -> tuple[float, float]:
+def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float, float]:
     """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
 
+    It is that of continuous time at the nominal pose.
+
     Args:
+        scenario: the run.
         b: damping of the clay at the handle [N.s/m].
-        operator: the hand; None for no hand.
     """
-    x, y = (
-        gain_limit.gain_limit(axis, damping, operator)
-        for axis, damping in zip(AXES, b, strict=True)
-    )
+    x, y = map(functools.partial(gain_limit.continuous_limit, scenario), AXES, b)
     return x, y

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..model.constants import AXES, L1, L2
+from ..model.arm import PAPER, Arm
+from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
@@ -24,15 +25,6 @@ THICKNESS = 0.03  # of a block of clay [m]
 GRAIN = 0.03  # rms of the brightness of clay, as a share
 KNOB = (0.0, 0.0, 0.052)  # of the handle, from the tip of link 2 [m]
 TARGET_ALPHA = 0.45
-SKIN: Any = (  # body ("" for the world), shape, from, to [m], radius [m], material
-    ("", "cylinder", (0.0, 0.0, GROUND), (0.0, 0.0, -0.03), 0.060, "dark"),
-    ("", "cylinder", (0.0, 0.0, -0.03), (0.0, 0.0, 0.022), 0.042, "steel"),
-    ("link1", "cylinder", (0.0, 0.0, 0.022), (0.0, 0.0, 0.034), 0.034, "dark"),
-    ("link1", "capsule", (0.0, 0.0, 0.0), (L1, 0.0, 0.0), 0.017, "dark"),
-    ("link1", "cylinder", (L1, 0.0, -0.024), (L1, 0.0, 0.024), 0.026, "steel"),
-    ("link2", "cylinder", (0.0, 0.0, 0.024), (0.0, 0.0, 0.034), 0.021, "blue"),
-    ("link2", "capsule", (0.0, 0.0, 0.0), (L2, 0.0, 0.0), 0.012, "blue"),
-)
 
 
 def plotted_axes(scenario: Scenario) -> tuple[int, ...]:
@@ -41,10 +33,7 @@ def plotted_axes(scenario: Scenario) -> tuple[int, ...]:
     Args:
         scenario: that runs.
     """
-    clay = scenario.clay
-    if clay is None:
-        return (0,)
-    return tuple(sorted({AXES.index(f.along) for f in (clay.x, clay.y)}))
+    return tuple(map(AXES.index, scenario.clay.along)) if scenario.clay else (0,)
 
 
 def hardest(scenario: Scenario) -> float:
@@ -53,8 +42,7 @@ def hardest(scenario: Scenario) -> float:
     Args:
         scenario: that holds the clay.
     """
-    clay = scenario.clay
-    return max(*clay.x.values, *clay.y.values) if clay is not None else 0.0
+    return scenario.clay.largest if scenario.clay else 0.0
 
 
 class Stage:
@@ -87,7 +75,7 @@ class Stage:
             high = origin + (grid.x[-1], grid.y[-1])
             rows, columns = len(grid.y), len(grid.x)
             block = Block(low, high, rows, columns, THICKNESS, self._colors())
-        self.model = picture(block, (tool.width, tool.depth))
+        self.model = picture(scenario.arm, block, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if block else -1
         self.place: tuple[float, float] | None = None
@@ -143,10 +131,7 @@ class Stage:
         """The clay from above, darker where it damps more, shape (ny, nx, 3) of bytes."""
         clay, grid = self.scenario.clay, self.removal
         assert clay is not None
-        b = np.zeros(grid.cut.shape)
-        for f in (clay.x, clay.y):
-            at, across = (grid.x, np.s_[None, :]) if f.along == "x" else (grid.y, np.s_[:, None])
-            b = np.maximum(b, np.array(f.values)[np.searchsorted(f.edges, at)][across])
+        b = np.broadcast_to(clay.at(grid.x, grid.y[:, None]).max(axis=0), grid.cut.shape)
         rng = np.random.default_rng(0)
         grain = 1.0 + GRAIN * rng.standard_normal(b.shape)[..., None]
         colors = 255.0 * clay_color(b / (hardest(self.scenario) or 1.0)) * grain
@@ -174,24 +159,27 @@ class Block:
     colors: np.ndarray
 
 
-def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
+def picture(arm: Arm, clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
     """Compiles a model to draw, not to step: the arm with its skin, the room, the block of clay.
 
     Its joints are those of `build`. The target of the hand is the mocap body "target", the tip of
     the tool the body "tool".
 
     Args:
+        arm: that is drawn.
         clay: the block, as a heightfield; None for none.
         tool: width of the tool, and depth of its tip under the surface [m].
     """
     with warnings_caught() as caught:
-        spec = compose_spec(["arm.xml", "room.xml"])
+        spec = compose_spec(["arm.xml", "room.xml"], arm)
+        _enlarge_room(spec, room_scale(arm))
         for name, color in MATERIALS.items():
             spec.material(name).rgba = (*rgb(color), 1.0)
-        for body, *skin in SKIN:
+        for body, *skin in arm_skin(arm):
             _skin(spec.body(body) if body else spec.worldbody, *skin)
         tip = (0.0, 0.0, GROUND + (clay.thickness if clay else THICKNESS) - tool[1])
-        body, centre = spec.body("link2").add_body(name="tool", pos=(L2, 0.0, 0.0)), (0.0, 0.0, 0.0)
+        centre = (0.0, 0.0, 0.0)
+        body = spec.body("link2").add_body(name="tool", pos=(arm.l2, 0.0, 0.0))
         _skin(body, "cylinder", tip, centre, 0.5 * tool[0], "steel")
         _skin(body, "cylinder", centre, (0.0, 0.0, 0.045), 0.008, "dark")
         _skin(body, "sphere", KNOB, KNOB, 0.016, "orange")
@@ -202,6 +190,47 @@ def picture(clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
             _block(spec, clay)
         model = spec.compile()
     return checked_model(model, caught)
+
+
+def room_scale(arm: Arm) -> float:
+    """How much larger the room is than that of the paper's arm, which smaller arms have as well.
+
+    Args:
+        arm: in the room.
+    """
+    return max(1.0, arm.reach[1] / PAPER.reach[1])
+
+
+def _enlarge_room(spec: mujoco.MjSpec, scale: float) -> None:
+    """Moves cameras and light away from the shoulder, and widens the table."""
+    for part in (*spec.cameras, *spec.lights):
+        part.pos *= scale
+    table = spec.geom("table")
+    table.pos[:2] *= scale
+    table.size[:2] *= scale
+    spec.stat.center *= scale
+    spec.stat.extent *= scale
+
+
+def arm_skin(arm: Arm) -> Any:
+    """What is seen of an arm, in its links.
+
+    Args:
+        arm: the arm.
+
+    Returns:
+        Rows of body ("" for the world), shape, from, to [m], radius [m], material.
+    """
+    joint, elbow, handle = (0.0, 0.0, 0.0), (arm.l1, 0.0, 0.0), (arm.l2, 0.0, 0.0)
+    return (
+        ("", "cylinder", (0.0, 0.0, GROUND), (0.0, 0.0, -0.03), 0.060, "dark"),
+        ("", "cylinder", (0.0, 0.0, -0.03), (0.0, 0.0, 0.022), 0.042, "steel"),
+        ("link1", "cylinder", (0.0, 0.0, 0.022), (0.0, 0.0, 0.034), 0.034, "dark"),
+        ("link1", "capsule", joint, elbow, 0.017, "dark"),
+        ("link1", "cylinder", (arm.l1, 0.0, -0.024), (arm.l1, 0.0, 0.024), 0.026, "steel"),
+        ("link2", "cylinder", (0.0, 0.0, 0.024), (0.0, 0.0, 0.034), 0.021, "blue"),
+        ("link2", "capsule", joint, handle, 0.012, "blue"),
+    )
 
 
 def _skin(body: Any, shape: str, begin: Any, end: Any, radius: float, material: str) -> None:

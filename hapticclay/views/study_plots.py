@@ -17,6 +17,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, N
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES, L1, L2, ORIGIN, PATH_LENGTH
+from ..model.experiments import parameter_unit
 from ..studies.accuracy import CLEAR, SAMPLED, Ladder
 from ..studies.identification import (
     NOMINAL_POSE,
@@ -26,7 +27,6 @@ from ..studies.identification import (
     printed_form,
     response,
 )
-from ..studies.sampling import parameter_unit
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
 from .style import (
@@ -202,6 +202,8 @@ def identification_plot(results: Sequence[Identified]) -> Figure:
         labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
         for ax, label in zip(axes[:, 0], labels, strict=True):
             ax.set_ylabel(label)
+        low = min(0.9, *(float(r.coherence.min()) for r in results))
+        axes[2, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
         figure.align_ylabels(axes[:, 0])
         add_legend(figure, axes[0, 0], 3)
     return figure
@@ -217,13 +219,12 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     share = result.deviation / np.abs(result.response)
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
     marks: Any = dict(fmt="o", ms=4.0, mfc=WHITE, mew=1.2, color=BLUE, elinewidth=1.0, zorder=3)
+    label = f"{'simulated arm' if result.scenario else 'measured'}, with 95 % bars"
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
         ax.plot(fine, part(known), color=VERMILION, lw=2.2, label="printed")
         ax.plot(fine, part(fitted), color=BLACK, ls=":", lw=1.2, label="fitted to the points")
-        ax.errorbar(f, part(result.response), e, label="simulated arm, with 95 % bars", **marks)
+        ax.errorbar(f, part(result.response), e, label=label, **marks)
     coherence.plot(f, result.coherence, "o", ms=3.0, color=BLUE)
-    low = min(0.9, float(result.coherence.min()))
-    coherence.set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
     coherence.set_xscale("log")
     coherence.set_xlabel("frequency [Hz]")
     coherence.xaxis.set_major_formatter("{x:g}")

@@ -150,13 +150,13 @@ def add_legend(figure: Figure, ax: Axes, ncols: int = 5, **more: Any) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=ncols, **more)
 
 
-def hand_name(operator: Operator | None) -> str:
+def hand_name(operator: Operator | None | tuple[Operator | None, Operator | None]) -> str:
     """Names the hand in a title.
 
     Args:
-        operator: the hand; None for no hand.
+        operator: the hand, or one for each axis; None for no hand.
     """
-    if operator is None:
+    if operator is None or operator == (None, None):
         return "no hand"
     return "nominal hand" if operator == Operator() else "given hand"
 

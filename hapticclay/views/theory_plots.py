@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.polynomial import Polynomial
 
-from ..errors import choice
-from ..model.constants import AXES
-from ..model.controller import PRINTED, Compensator
-from ..model.operator import Operator
+from ..model.compensator import Compensator
 from ..theory import linear_loop, margins
 from ..theory.design import DESIGN_BAND
+from ..theory.linear_loop import Loop, of_loop
 from .style import (
     BLACK,
     BLUE,
@@ -34,31 +33,20 @@ BREAK_NAMES = {"force": "at the net force", "compensator": "at the compensator"}
 OMEGA_LABEL = "angular frequency [rad/s]"
 
 
+@of_loop("K", "b")
 def bode_plot(
-    axis: str,
-    K: float,
-    b: float,
-    *,
-    operator: Operator | None = None,
-    at: str = "compensator",
-    compensator: Compensator = PRINTED,
-    omega: tuple[float, float] = (0.1, 1000.0),
+    loop: Loop, *, at: str = "compensator", omega: tuple[float, float] = (0.1, 1000.0)
 ) -> Figure:
     """Plots magnitude and phase of the loop and marks its gain and phase margins.
 
     Args:
-        axis: "x" or "y".
-        K: gain of the compensator [1/kg].
-        b: damping of the clay [N.s/m].
-        operator: the hand; None for no hand.
+        loop: the loop with its K; or axis, K, b, and operator and other parts by name.
         at: where the loop is broken, "compensator" or "force".
-        compensator: its shape.
         omega: range shown [rad/s].
     """
-    kw: Any = dict(operator=operator, at=at, compensator=compensator)
-    m = margins.margins(axis, K, b, **kw)
+    m = margins.margins(loop, at=at)
     w = np.geomspace(*omega, 2000)
-    L = _response(*margins.open_loop(axis, K, b, **kw), w)
+    L = _response(*margins.open_loop(loop, at=at), w)
     phase = np.degrees(np.unwrap(np.angle(L)))
     phase -= 360.0 * round((phase[0] + 90.0) / 360.0)
     bar: Any = dict(lw=3.0, solid_capstyle="butt")
@@ -85,38 +73,30 @@ def bode_plot(
         low.set(xlabel=OMEGA_LABEL, ylabel="phase of L [degrees]", xlim=omega)
         low.set_yticks(np.arange(45.0 * math.floor(phase.min() / 45.0), phase.max() + 45.0, 45.0))
         state = "" if m.stable else " (unstable)"
-        set_title(
-            top, f"{_loop_name(axis, b, operator)}, K = {K:g}{state}; broken {BREAK_NAMES[at]}"
-        )
+        set_title(top, f"{_loop_name(loop)}, K = {loop.gain:g}{state}; broken {BREAK_NAMES[at]}")
     return figure
 
 
+@of_loop("b", "gains")
 def nyquist_plot(
-    axis: str,
-    b: float,
-    gains: tuple[float, ...] = (1.0,),
-    *,
-    operator: Operator | None = None,
-    at: str = "compensator",
+    loop: Loop, gains: tuple[float, ...] = (1.0,), *, at: str = "compensator"
 ) -> Figure:
     """Plots Nyquist curves with the unit circle, the point -1 and the margins of each.
 
     Args:
-        axis: "x" or "y".
-        b: damping of the clay [N.s/m].
+        loop: the loop, whose own K does not matter; or axis, b, gains, and operator and other parts
+            by name.
         gains: K of each curve [1/kg], five at most.
-        operator: the hand; None for no hand.
         at: where the loop is broken, "compensator" or "force".
     """
-    kw: Any = dict(operator=operator, at=at)
     with figure_style():
         figure = Figure(figsize=(5.6, 5.7 + 0.2 * len(gains)))  # for the legend
         ax = figure.add_subplot()
         columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
         ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=0.9, ls=(0, (4, 3)))
         for K, (color, style) in zip(gains, CURVE_STYLES, strict=False):
-            found = margins.nyquist(axis, K, b, **kw)
-            m = margins.margins(axis, K, b, **kw)
+            found = margins.nyquist(loop, K=K, at=at)
+            m = margins.margins(loop, K=K, at=at)
             if m.stable:
                 gain = f"\u00d7{m.gain[1]:.3g}" if math.isfinite(m.gain[1]) else "any gain"
                 label = f"K = {K:g}: {gain}, {math.degrees(m.phase):.3g}\u00b0"
@@ -128,7 +108,8 @@ def nyquist_plot(
             if m.stable and math.isfinite(m.gain[1]):
                 ax.plot(-1.0 / m.gain[1], 0.0, "o", color=color, ms=4.5, zorder=4)
             if m.stable and math.isfinite(m.phase):
-                z = _response(*margins.open_loop(axis, K, b, **kw), np.array([m.phase_omega]))[0]
+                L = margins.open_loop(loop, K=K, at=at)
+                z = _response(*L, np.array([m.phase_omega]))[0]
                 ax.plot(z.real, z.imag, "s", color=color, ms=4.5, zorder=4)
         ax.plot(-1.0, 0.0, "+", color=BLACK, ms=12, mew=2.0, zorder=5)
         ax.annotate("-1", (-1.0, 0.0), (5.0, -13.0), textcoords="offset points", fontsize=9)
@@ -136,36 +117,25 @@ def nyquist_plot(
         ax.set(xlim=(-2.6, 1.6), ylim=(-2.3, 1.5))
         title = "margins of gain (circle) and phase (square); arrows: rising frequency"
         add_legend(figure, ax, columns, title=title, title_fontsize=9)
-        set_title(ax, f"{_loop_name(axis, b, operator)}; broken {BREAK_NAMES[at]}")
+        set_title(ax, f"{_loop_name(loop)}; broken {BREAK_NAMES[at]}")
     return figure
 
 
-def small_gain_plot(
-    axis: str,
-    K: float,
-    b: float,
-    *,
-    operator: Operator | None = None,
-    omega: tuple[float, float] = (0.1, 1000.0),
-) -> Figure:
+@of_loop("K", "b")
+def small_gain_plot(loop: Loop, *, omega: tuple[float, float] = (0.1, 1000.0)) -> Figure:
     """Plots both sides of inequality (13) and shades the frequencies at which it fails.
 
     Args:
-        axis: "x" or "y".
-        K: gain of the compensator [1/kg].
-        b: damping of the clay [N.s/m].
-        operator: the hand; None for no hand.
+        loop: the loop with its K; or axis, K, b, and operator and other parts by name.
         omega: range shown [rad/s].
     """
-    kw: Any = dict(operator=operator)
-    verdict = margins.small_gain(axis, K, b, **kw)
-    stable = margins.coupled_stability(axis, K, b, **kw)
+    verdict = margins.small_gain(loop)
+    stable = margins.coupled_stability(loop)
     w = np.geomspace(*omega, 2000)
-    passive, d = linear_loop.device_admittance(axis, 0.0)
-    active = linear_loop.device_admittance(axis, K)[0] - passive
+    passive, d = linear_loop.device_admittance(replace(loop, K=0.0))
+    active = linear_loop.device_admittance(loop)[0] - passive
     left = np.abs(_response(active, d, w))
-    loop = margins.open_loop(axis, K, b, at="compensator", **kw)
-    right = left / np.abs(_response(*loop, w))
+    right = left / np.abs(_response(*margins.open_loop(loop, at="compensator"), w))
     with figure_style():
         figure = Figure(figsize=(6.4, 3.8))
         ax = figure.add_subplot()
@@ -177,14 +147,14 @@ def small_gain_plot(
         ax.set(xlabel=OMEGA_LABEL, ylabel="handle over force [m/N]", xlim=omega)
         add_legend(figure, ax, 3)
         outcome = "holds" if verdict else "fails"
-        name = f"{_loop_name(axis, b, operator)}, K = {K:g}"
+        name = f"{_loop_name(loop)}, K = {loop.gain:g}"
         set_title(ax, f"{name}: (13) {outcome}", f"the loop is {'' if stable else 'un'}stable")
     return figure
 
 
+@of_loop("b", "designs")
 def transparency_plot(
-    axis: str,
-    b: float,
+    loop: Loop,
     designs: list[tuple[str, float, Compensator]],
     *,
     omega: tuple[float, float] = (0.1, 300.0),
@@ -193,13 +163,12 @@ def transparency_plot(
     """Plots the clay's share of the hand's force, |fe/fh| (Eq. 7), for some compensators.
 
     Args:
-        axis: "x" or "y".
-        b: damping of the clay [N.s/m].
+        loop: the loop, whose own compensator, K and hand do not matter; or axis, b, designs, and
+            other parts by name.
         designs: (label, K, shape) of each compensator, five at most.
         omega: range shown [rad/s].
         band: frequencies that `transparency_error` averages over [rad/s].
     """
-    choice("axis", axis, AXES)
     w = np.geomspace(*omega, 1000)
     with figure_style():
         figure = Figure(figsize=(6.4, 3.8))
@@ -207,13 +176,13 @@ def transparency_plot(
         ax.axvspan(*band, color=PALE_GREY, lw=0, zorder=0)
         ax.axhline(1.0, color=BLACK, lw=0.8)
         for (label, K, shape), (color, style) in zip(designs, CURVE_STYLES, strict=False):
-            share = np.abs(margins.transparency(axis, K, b, w, compensator=shape))
+            share = np.abs(margins.transparency(replace(loop, compensator=shape, K=K), w))
             ax.semilogx(w, share, color=color, ls=style, label=label)
         _note(ax, omega[1], 1.0, "ideal", BLACK, "right", 8.0)
         ax.set(xlabel=f"{OMEGA_LABEL}; grey: band of the error", ylabel="|f$_e$/f$_h$|")
         ax.set(xlim=omega, ylim=(0.0, None))
         add_legend(figure, ax, 2)
-        set_title(ax, f"{axis} axis, b = {b:g} N$\\cdot$s/m")
+        set_title(ax, f"{loop.axis} axis, b = {loop.b:g} N$\\cdot$s/m")
     return figure
 
 
@@ -221,8 +190,8 @@ def _response(n: Polynomial, d: Polynomial, omega: np.ndarray) -> np.ndarray:
     return n(1j * omega) / d(1j * omega)
 
 
-def _loop_name(axis: str, b: float, operator: Operator | None) -> str:
-    return f"{axis} axis, b = {b:g} N$\\cdot$s/m, {hand_name(operator)}"
+def _loop_name(loop: Loop) -> str:
+    return f"{loop.axis} axis, b = {loop.b:g} N$\\cdot$s/m, {hand_name(loop.operator)}"
 
 
 def _note(

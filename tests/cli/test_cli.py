@@ -32,6 +32,7 @@ def test_run_constant_writes_record_summary_and_plots(capsys, tmp_path):
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]
@@ -46,7 +47,7 @@ def test_run_free_and_no_plots(capsys, tmp_path):
         capsys, "run", "free", "--shaping", "--no-plots", "--every", "10", "--out", str(tmp_path)
     )
     assert code == 0 and "border x = 20 cm" in out
-    assert sorted(os.listdir(tmp_path)) == ["record.npz", "summary.json"]
+    assert sorted(os.listdir(tmp_path)) == ["record.npz", "scenario.toml", "summary.json"]
 
 
 def test_a_run_to_an_asked_error_says_what_was_reached(capsys, tmp_path):
@@ -136,12 +137,12 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
         (
             ["video", "--speed", "2", "constnat"],
-            ["did you mean 'constant'? (or give the folder of a record)"],
+            ["did you mean 'constant'? (or give a scenario file, .toml or .json, or the folder"],
         ),
         (["run", "constnat"], ["constnat", "did you mean 'constant'"]),
         (["rnu", "constant"], ["rnu", "did you mean 'run'"]),
         (["stabilty"], ["stabilty", "did you mean 'stability'"]),
-        (["run"], ["give an experiment: constant, variable, stability, free\n"]),
+        (["run"], ["give an experiment or a scenario file: constant, variable, stability, free\n"]),
         (["help", "nope"], ["command = 'nope'"]),
         ([], ["give a command: run, stability"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
@@ -152,7 +153,10 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["run", "constant", "--error"], ["--error = '': must be a word"]),
         (["run", "stability", "--error", "1e-6"], ["error = '1e-6': must be in m"]),
         (["run", "constant", "--eror", "1"], ["--eror: no", "did you mean --error?"]),
-        (["accuracy"], ["give an experiment: constant, variable, stability, free\n"]),
+        (
+            ["accuracy"],
+            ["give an experiment or a scenario file: constant, variable, stability, free\n"],
+        ),
         (["accuracy", "constnat"], ["constnat", "did you mean 'constant'"]),
         (["accuracy", "free", "--qiuck"], ["did you mean --quick?"]),
         (["accuracy", "constant", "--b", "nan"], ["b = nan", "finite"]),
@@ -265,6 +269,7 @@ def test_ctrl_c_keeps_what_was_run(tmp_path):
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]
@@ -300,6 +305,7 @@ def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]
@@ -335,7 +341,7 @@ def test_a_closed_output_is_no_traceback(tmp_path):
         ["bash", "-c", words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, timeout=120
     )
     assert (out.returncode, out.stderr) == (0, "")
-    assert sorted(os.listdir(tmp_path / "o")) == ["record.npz", "summary.json"]
+    assert sorted(os.listdir(tmp_path / "o")) == ["record.npz", "scenario.toml", "summary.json"]
 
 
 def test_a_file_that_is_no_record_is_called_so(capsys, tmp_path):
@@ -399,11 +405,12 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
         "notes.png",
         "path.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]
     run(capsys, "run", "stability", "--t-max", "0.1", "--no-plots", "--out", "o")
-    assert sorted(os.listdir("o")) == ["notes.png", "record.npz", "summary.json"]
+    assert sorted(os.listdir("o")) == ["notes.png", "record.npz", "scenario.toml", "summary.json"]
 
 
 @pytest.mark.parametrize(
@@ -527,3 +534,118 @@ def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
     code, out, err = run(capsys, "run", "constant", "--out", str(tmp_path / "o"))
     assert (code, out, err) == (1, "", "hapticclay: out of memory: Unable to allocate 8 GiB\n")
     assert os.listdir(tmp_path) == []
+
+
+PARTS = ("arm.l1=30cm", "servo.x.G.damping=50", "compensator.den=1,40,0", "operator.mass=0.5")
+
+
+def test_any_number_of_any_part_is_set_by_name(capsys, tmp_path):
+    first, rest = PARTS[:2], PARTS[2:]  # one --set or several
+    words = ["--set", *first, "--t-max", "0.1", "--set", *rest, "--no-plots"]
+    code, _, err = run(capsys, "run", "constant", *words, "--out", str(tmp_path / "a"))
+    assert (code, err) == (0, "")
+    s = hc.Record.load(tmp_path / "a").scenario
+    assert (s.arm, s.operator) == (hc.Arm(0.3), hc.Operator(0.5))
+    assert s.servo[0].G.damping == 50.0 and s.compensator == hc.Compensator(den=(1.0, 40.0, 0.0))
+    assert s.t_max == 0.1
+    words = ["--set", *PARTS, "t_max=0.1"]  # before the experiment
+    code, _, err = run(
+        capsys, "run", *words, "constant", "--no-plots", "--out", str(tmp_path / "b")
+    )
+    assert (code, err) == (0, "") and hc.Record.load(tmp_path / "b").scenario == s
+
+
+def test_a_small_arm_goes_its_own_way(capsys, tmp_path):
+    """No part of the way is within reach of the paper's arm."""
+    way = ("--origin", "0.05", "0.03", "--length", "0.02", "--clay", "0.01", "0.015")
+    small = ("--set", "arm.l1=0.05", "arm.l2=0.05", "--no-plots", "--out", str(tmp_path))
+    code, out, err = run(capsys, "run", "constant", *way, *small)
+    assert (code, err) == (0, "") and "status: " in out
+
+
+@pytest.mark.parametrize("name", ["constant", "stability"])
+def test_the_scenario_beside_a_record_repeats_the_run(capsys, tmp_path, name):
+    words = ["--t-max", "0.3", "--no-plots", "--set", *PARTS, "muscle.rms.x=0.5"]
+    assert run(capsys, "run", name, *words, "--out", str(tmp_path / "a"))[0] == 0
+    file = str(tmp_path / "a" / "scenario.toml")
+    again = ["--no-plots", "--out", str(tmp_path / "b")]
+    for words in ((file, *again), ("file", file, *again), (*again, file)):
+        code, _, err = run(capsys, "run", *words)
+        assert (code, err) == (0, "")
+        a, b = (hc.Record.load(tmp_path / x) for x in "ab")
+        assert a.scenario == b.scenario
+        assert all(getattr(a, x).tobytes() == getattr(b, x).tobytes() for x in record.ARRAYS)
+
+
+def test_a_file_names_its_folder_and_takes_changes(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.json").write_text('{"experiment": "constant", "b": 70, "t_max": 0.1}')
+    code, out, err = run(capsys, "run", "mine.json", "--no-plots", "--set", "gain.x=2", "b=60")
+    assert (code, err) == (0, "") and "written to out/run/mine" in out
+    s = hc.Record.load("out/run/mine").scenario
+    assert s.name == "mine" and s.gain == (2.0, 0.5) and s.clay.x.values == (0.0, 60.0, 0.0)
+    (tmp_path / "odd.toml").write_text('name = "../../a b/.."\nt_max = 0.01')
+    code, out, _ = run(capsys, "run", "odd.toml", "--no-plots")
+    assert code == 0 and "written to out/run/a-b\n" in out
+
+
+@pytest.mark.parametrize(
+    "args,words",
+    [
+        (["run", "constant", "--set", "arm.l3=1"], ["arm.l3 = 1.0: no such field", "did you mean"]),
+        (["run", "constant", "--set", "l1=1"], ["did you mean 'arm.l1'?"]),
+        (["run", "constant", "--set", "bb=1"], ["did you mean 'b'?"]),
+        (["run", "constant", "--set", "arm.l1"], ["must be name=value"]),
+        (["run", "constant", "--set", "arm.l1=1", "--set", "arm.l1=2"], ["each name once"]),
+        (["run", "constant", "--set", "arm.l1=3kg"], ["must be a number in m, not in kg"]),
+        (["run", "constant", "--set", "arm.l1=-1"], ["arm.l1 = -1.0: must be a finite number"]),
+        (["run", "constant", "--set", "arm.l1=five"], ["arm.l1 = 'five': must be a finite"]),
+        (["run", "constant", "--st", "arm.l1=1"], ["--st: no option", "did you mean --set?"]),
+        (["run", "--set", "arm.l1=1"], ["give an experiment"]),
+        (["run", "none.toml"], ["none.toml", "No such file"]),
+        (["run", "good.toml", "--b", "3"], ["--b: no option of run"]),
+        (["run", "folder.toml"], ["folder.toml", "Is a directory"]),
+        (["run", "bad.toml"], ["must be TOML: Invalid value (at line 1, column 5)"]),
+        (["run", "typo.toml"], ["arm.l3 = 0.3: no such field", "(in typo.toml)"]),
+        (["run", "good.toml", "other.toml"], ["'other.toml': one word too many"]),
+        (["run", "file"], ["Missing", "PATH"]),
+        (["accuracy", "none.toml"], ["none.toml", "No such file"]),
+        (["video", "none.toml"], ["none.toml", "No such file"]),
+        (["view", "typo.toml"], ["arm.l3 = 0.3: no such field"]),
+        (["run", "constnat"], ["(or give a scenario file, .toml or .json)"]),
+        (["sweep", "--grid", "arm.l4=1:2:3"], ["arm.l4 = 1.0: no such field"]),
+        (["sweep", "--grid", "b=1:2:3", "--experiment", "none.toml"], ["No such file"]),
+        (["fields", "amr"], ["field = 'amr'", "did you mean 'arm'?"]),
+    ],
+)
+def test_bad_parts_and_files_are_one_line_and_exit_2(capsys, tmp_path, monkeypatch, args, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "bad.toml").write_text("a = = 3")
+    (tmp_path / "typo.toml").write_text("[arm]\nl3 = 0.3")
+    (tmp_path / "good.toml").write_text("t_max = 0.01")
+    here = sorted(os.listdir(tmp_path))
+    code, out, err = run(capsys, *args)
+    assert code == 2 and out == ""
+    assert err.count("\n") == 1 and err.startswith("hapticclay: ")
+    for word in words:
+        assert word in err
+    assert sorted(os.listdir(tmp_path)) == here
+
+
+def test_the_names_of_all_fields_are_listed(capsys):
+    code, out, err = run(capsys, "fields")
+    assert (code, err) == (0, "") and max(map(len, out.splitlines())) <= 100
+    assert "arm.l1 = 0.24  [m]  0.001 to 100\n    length of link 1" in out
+    assert "servo.y.S.damping = 32.4  [1/s]" in out and "integrator = fast  fast | accurate" in out
+    lines = out.splitlines()
+    heads = [i for i, line in enumerate(lines) if line[0] != " "]
+    told = [(lines[i].partition(" = ")[0], lines[i + 1].partition(":")[0]) for i in heads]
+    names = {name for name, _ in told}
+    # once, or once for each class that a part may have
+    assert len(told) == len(set(told)) and len(names) > 60
+    out = run(capsys, "fields", "arm", "constant")[1]
+    assert "b = 90  [N.s/m]  0 to 1000000000" in out and "arm.I2" in out
+    assert "servo.x" not in out
+    for words in (["run", "--help"], ["run", "constant", "--help"]):
+        assert "--set" in run(capsys, *words)[1]

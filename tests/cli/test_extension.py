@@ -11,8 +11,14 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import Bound, ParameterError
-from hapticclay.model.experiments import EXPERIMENTS, Damping, Gains, PathExperiment
-from hapticclay.studies.sampling import Sweep, parameter_unit, parse_grid
+from hapticclay.model.experiments import (
+    EXPERIMENTS,
+    Damping,
+    Gains,
+    PathExperiment,
+    parameter_unit,
+)
+from hapticclay.studies.sampling import Sweep, parse_grid
 from hapticclay.studies.sweep import read_sweep
 from hapticclay.views import study_plots
 
@@ -88,6 +94,7 @@ def test_a_new_experiment_runs_and_is_drawn(capsys, tmp_path, staircase):
     assert sorted(os.listdir(tmp_path)) == [
         "force.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors
 from hapticclay.errors import Bound, ParameterError, check_fields, field_types
-from hapticclay.model import experiments
+from hapticclay.model import fields
 from hapticclay.model.experiments import EXPERIMENTS, Experiment, parameters
 
 CLAY = hc.Clay(hc.Profile((0.0,), (0.0, 9.0)), hc.Profile((0.0,), (0.0, 9.0)))
@@ -21,8 +21,18 @@ PARTS = {  # a valid one of each, and what its errors put before the field
     "operator.": (hc.Operator(),),
     "clay.": (hc.Profile((0.05, 0.15), (0.0, 90.0, 0.0), growth=(0.0, 1.0, 0.0)),),
     "multisine.": (hc.Multisine(lines=3),),
+    "constant.": (hc.Constant((1.0, 0.0)),),
+    "step.": (hc.Step((1.0, 0.0), 1.0),),
+    "ramp.": (hc.Ramp((1.0, 0.0), 1.0, 2.0),),
+    "pulse.": (hc.Pulse((1.0, 0.0), 1.0, 5e-4, 1.0),),
+    "chirp.": (hc.Chirp((1.0, 0.0), 1.0, 2.0, 3.0),),
     "coupling.": (hc.Coupling(100.0, 1.0),),
     "interface.": (hc.Interface(),),
+    "arm.": (hc.Arm(),),
+    "servo.": (
+        hc.SecondOrder(910.19, 41.8, 910.19),
+        hc.Servo(*[hc.SecondOrder(9.0, 3.0, 4.0)] * 2),
+    ),
     "compensator.": (hc.Compensator(),),
 }
 BOUNDED = [
@@ -151,7 +161,7 @@ def test_a_type_without_a_check_is_no_field():
     "kind", [type(p) for k in PARTS for p in PARTS[k]], ids=lambda k: k.__name__
 )
 def test_docstrings_name_the_unit_of_every_bound(kind):
-    told = experiments._descriptions(kind)
+    told = fields.field_descriptions(kind)
     for name, (_, bound) in field_types(kind).items():
         assert told[name], name
         assert not bound or not bound.unit or f"[{bound.unit}]" in told[name], name

@@ -22,10 +22,10 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
 ):
     """The sampled loop: measured and held every Ts, the arm exact (DOP853 at 1e-12) in between.
 
-    b_of_x(x) is the damping on both axes. render "held": the clay's force is the motors', held too;
-    "implicit": it is physical. It starts at p0 and moves with v0 as it had before t = 0, without
-    acceleration. Returns positions at the samples (n, 2), the velocities there (n, 2), and the
-    torques held (n, 2).
+    b_of_x(x) is the damping on both axes; without edges it may change smoothly. render "held": the
+    clay's force is the motors', held too; "implicit": it is physical. It starts at p0 and moves
+    with v0 as it had before t = 0, without acceleration. Returns positions at the samples (n, 2),
+    the velocities there (n, 2), and the torques held (n, 2).
     """
     K, uh, p0, v0 = np.array(K), np.array(uh), np.array(p0, float), np.array(v0, float)
     m, d, k = th or (0.0, 0.0, 0.0)
@@ -74,6 +74,8 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
             b = b_of_x(Arm.forward(x[:2])[0] - ORIGIN[0] + 1e-15) if render == "implicit" else 0.0
 
             def rhs(t, x, tau=tau, b=b):
+                if render == "implicit" and not edges:
+                    b = b_of_x(Arm.forward(x[:2])[0] - ORIGIN[0])
                 return np.concatenate((x[2:], hand_and_rates(x[:2], x[2:], tau, b)[1]))
 
             events = []

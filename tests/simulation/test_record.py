@@ -20,7 +20,11 @@ def run():
 
 def test_save_and_load_give_back_the_same_record(run, tmp_path):
     folder = run.save(tmp_path / "a" / "b")
-    assert sorted(p.name for p in folder.iterdir()) == ["record.npz", "summary.json"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "record.npz",
+        "scenario.toml",
+        "summary.json",
+    ]
     for path in (folder, folder / "record.npz"):
         again = hc.Record.load(path)
         for f in dataclasses.fields(run):
@@ -175,3 +179,91 @@ def test_save_refuses_an_unwritable_place(run):
 def test_ratio_is_nan_only_where_nothing_moves(run):
     assert np.isnan(run.ratio(run.fe)[0, 0])
     assert np.all(np.isfinite(run.ratio(run.fe)[1:, 0]))
+
+
+BEFORE_PARTS = {  # a scenario as release 0.1 wrote it in its records
+    "name": "stability",
+    "clay": {
+        axis: {"edges": [0.01], "values": [0.0, 100.0], "along": "x", "growth": [0.0, 3.0]}
+        for axis in ("x", "y")
+    },
+    "gain": [2.0, 0.5],
+    "force": [0.0, 0.0],
+    "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0},
+    "shaping": False,
+    "dt": 0.00036,
+    "t_max": 0.1,
+    "length": None,
+    "start": [0.0, 0.0],
+    "velocity": [0.0, 0.0],
+    "origin": [0.35, 0.24],
+    "torque_limit": [40.0, 40.0],
+    "integrator": "fast",
+    "control": "sampled",
+    "Ts": None,
+    "render": "held",
+    "muscle": {
+        "rms": [1.0, 0.0],
+        "low": 0.1,
+        "high": 2.0,
+        "period": 20.0,
+        "lines": None,
+        "seed": 7,
+    },
+    "command": None,
+    "stop": False,
+    "interface": {"delay": 0.0001, "coupling": {"spring": 1e4, "damper": 10.0}, "seed": 3},
+}
+
+
+def test_a_record_of_the_release_before_is_read(run, tmp_path):
+    file = run.save(tmp_path) / "record.npz"
+    with np.load(file) as z:
+        arrays = dict(z)
+    head = json.loads(str(arrays.pop("summary")))
+    head["scenario"] = BEFORE_PARTS
+    np.savez(file, summary=np.array(json.dumps(head)), **arrays)
+    profile = hc.Profile((0.01,), (0.0, 100.0), growth=(0.0, 3.0))
+    assert hc.Record.load(tmp_path).scenario == hc.Scenario(
+        "stability",
+        hc.Clay(profile, profile),
+        (2.0, 0.5),
+        (0.0, 0.0),
+        hc.Operator(),
+        t_max=0.1,
+        length=None,
+        origin=(0.35, 0.24),
+        control="sampled",
+        muscle=hc.Multisine(seed=7),
+        stop=False,
+        interface=hc.Interface(delay=1e-4, coupling=hc.Coupling(1e4, 10.0), seed=3),
+    )
+
+
+def test_the_scenario_lies_beside_the_record(run, tmp_path):
+    folder = run.save(tmp_path)
+    assert hc.Scenario.load(folder / "scenario.toml") == run.scenario
+    assert "[operator]" in (folder / "scenario.toml").read_text()
+
+
+def law(t, q, qd, fh, state, params):
+    return (0.0, 0.0), state
+
+
+def test_a_function_that_others_cannot_find_is_left_out(run, tmp_path):
+    sampled = dataclasses.replace(run.scenario, control="sampled")
+    for function, kept in ((lambda *a: law(*a), False), (json.dumps, True)):
+        (tmp_path / "scenario.toml").write_text("of an earlier run")
+        scenario = dataclasses.replace(sampled, controller=hc.Controller(function, (1.0,)))
+        dataclasses.replace(run, scenario=scenario).save(tmp_path)
+        again = hc.Record.load(tmp_path)
+        assert again.scenario == (scenario if kept else sampled)
+        assert again.notes == ({} if kept else {"left_out": ["controller"]})
+        assert (tmp_path / "scenario.toml").exists() == kept
+    assert hc.Scenario.load(tmp_path / "scenario.toml") == scenario
+    with np.load(tmp_path / "record.npz") as z:
+        arrays = dict(z)
+    text = str(arrays.pop("summary")).replace("json:dumps", "nowhere:law")
+    np.savez(tmp_path / "record.npz", summary=np.array(text), **arrays)
+    again = hc.Record.load(tmp_path)
+    assert again.scenario == sampled and again.notes == {"left_out": ["controller"]}

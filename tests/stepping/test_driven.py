@@ -13,14 +13,14 @@ from scipy.integrate import solve_ivp
 import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
-from hapticclay.model.signals import Multisine, Signal
+from hapticclay.model.signals import Multisine
 from tests.oracles import G0, G1, Linear, piecewise_linear
 
 TH = (0.25, 2.0, 6.0)
 
 
 def muscle_of(m, t, i):
-    s = Signal(m)
+    s = m
     return np.sum(s.amplitude[i] * np.cos(s.omega * t + s.phase[:, i]))
 
 
@@ -206,7 +206,7 @@ def test_command_is_counted_from_the_start(engine, kw):
     command = Multisine(rms=(1e-3, 0.0), low=1.0, high=2.0, period=1.0, seed=2)
     s = hc.free(force=(0.0, 0.0), shaping=True, t_max=8000 * 3.6e-4)
     s = dataclasses.replace(s, gain=(0.0, 0.0), length=None, command=command, **kw)
-    r, sig = hc.simulate(s, engine=engine), Signal(command)
+    r, sig = hc.simulate(s, engine=engine), command
     assert abs(sig(0.0)[0]) > 1e-4  # a jump, if it were not counted from there
     every = round((s.Ts or s.dt) / s.dt)
     np.testing.assert_allclose(r.delta[::every], (sig(r.t) - sig(0.0))[::every], atol=1e-12)

@@ -5,11 +5,15 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import hapticclay as hc
+from hapticclay.model import arm
 from hapticclay.model.signals import Multisine
 from hapticclay.stepping import engine
 from hapticclay.views import stage
+from tests.oracles.links import Links
 
 
 def test_operational_inertia_at_home_is_read_from_the_engine():
@@ -99,7 +103,7 @@ def test_looking_at_a_run_leaves_its_model_as_it_is():
     """Pictures have a model of their own."""
     s = hc.constant_cut()
     before = binary(hc.build(s))
-    stage.picture(None, (0.01, 0.005))
+    stage.picture(s.arm, None, (0.01, 0.005))
     assert binary(hc.build(s)) == before
 
 
@@ -142,13 +146,42 @@ def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
     assert model.ngeom > 0 and model.opt.timestep == 0.00036
 
 
-def test_the_arm_of_the_model_is_that_of_the_constants(monkeypatch):
-    """Other lengths and inertias in model.constants and model.arm reach the engine."""
-    monkeypatch.setattr(engine, "L1", 0.3)
-    monkeypatch.setattr(engine, "L2", 0.25)
-    monkeypatch.setattr(engine.arm, "I1", 0.2)
-    monkeypatch.setattr(engine.arm, "I2", 0.5)
-    model = hc.build(hc.free())
+length, inertia = st.floats(0.05, 2.0), st.floats(1e-3, 10.0)
+angle = st.floats(-3.1, 3.1)
+
+
+def test_the_file_of_the_arm_is_the_papers():
+    """arm.xml as it stands, opened by hand, has the numbers that a run gives it."""
+    text = '<mujoco><include file="arm.xml"/></mujoco>'
+    files = {"arm.xml": (engine.mjcf_folder() / "arm.xml").read_bytes()}
+    by_hand = mujoco.MjSpec.from_string(text, include=files).compile()
+    ours = engine.compose_spec(["arm.xml"], hc.Arm()).compile()
+    for name in ("body_pos", "site_pos", "body_mass", "body_inertia"):
+        np.testing.assert_array_equal(getattr(by_hand, name), getattr(ours, name), name)
+    assert by_hand.body("link2").pos[0] == 0.24 and by_hand.site("handle").pos[0] == 0.35
+
+
+@given(st.builds(hc.Arm, length, length, inertia, inertia), angle, angle)
+@settings(max_examples=30)  # each compiles a model
+def test_the_model_is_that_of_any_arm(a, q1, q2):
+    """Kinematics and inertia by the engine, by first principles, and by the formulas."""
+    own, links, bound = Links(a.l1, a.l2, a.I1, a.I2), a.links, 1e-14 * max(1.0, a.l1 + a.l2)
+    p, J, M = engine.arm_at((q1, q2), a)
+    np.testing.assert_allclose(p, own.forward((q1, q2)), atol=bound)
+    np.testing.assert_allclose(p, arm.handle_position(q1, q2, links), atol=bound)
+    np.testing.assert_allclose(J, own.jacobian((q1, q2)), atol=bound)
+    np.testing.assert_allclose(M, own.M, rtol=1e-13)
+    u = arm.jacobian(q1, q2, links)
+    wxx, wxy, wyy = arm.mobility(u, links)
+    W = J @ np.linalg.solve(M, J.T)
+    rounding = 4e-16 * np.linalg.cond(M) * links[4]
+    np.testing.assert_allclose([[wxx, wxy], [wxy, wyy]], W, atol=rounding)
+
+
+@pytest.mark.parametrize("clay", [None, hc.constant_cut().clay])
+def test_a_run_steps_the_arm_of_its_scenario(clay):
+    a = hc.Arm(0.3, 0.25, 0.2, 0.5)
+    model = hc.build(dataclasses.replace(hc.free(), clay=clay, arm=a))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     M = np.zeros((2, 2))
@@ -156,3 +189,8 @@ def test_the_arm_of_the_model_is_that_of_the_constants(monkeypatch):
     # in absolute angles the inertia is diag(I1, I2): M = T' diag T with T = [[1, 0], [1, 1]]
     assert M == pytest.approx(np.array([[0.7, 0.5], [0.5, 0.5]]), rel=1e-14)
     assert data.site("handle").xpos[:2] == pytest.approx([0.55, 0.0], abs=1e-15)
+    plain = hc.build(dataclasses.replace(hc.free(), clay=clay))
+    assert binary(plain) != binary(model)
+    assert binary(plain) == binary(
+        hc.build(dataclasses.replace(hc.free(), clay=clay, arm=hc.Arm()))
+    )

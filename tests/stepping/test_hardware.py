@@ -328,7 +328,9 @@ def test_torques_come_late_by_the_delay_to_the_step(delay):
 def test_delayed_run_follows_the_lifted_map(axis, b, Ts, delay):
     """At the nominal pose the small motion of the arm is x(k+1) = M x(k), exact between samples."""
     K, i = 0.5, "xy".index(axis)
-    less, beta, gamma = linear_loop.sampled_differences(axis, b, Operator(), Ts, delay)
+    less, beta, gamma = linear_loop.sampled_differences(
+        hc.Loop(axis, b, Operator(), Ts=Ts, delay=delay)
+    )
     A = np.eye(len(less)) + less + K * np.outer(beta, gamma)
     r = hc.simulate(ring(axis, K, b, hc.Interface(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
     x = np.zeros(len(A))
@@ -395,8 +397,8 @@ def test_a_push_below_the_friction_does_not_move_the_arm_and_one_above_does():
     the hand's torques J'f against the limit.
     """
     s = replace(hc.free(control="sampled", t_max=0.3), gain=(0.0, 0.0), force=(0.1, 0.0))
-    q = arm.inverse_kinematics(*s.origin)
-    u = arm.jacobian(*q)
+    q = arm.inverse_kinematics(*s.origin, s.arm.links)
+    u = arm.jacobian(*q, s.arm.links)
     tau = arm.joint_torques(0.1, 0.0, u)
     for factor, moves in ((1.01, False), (0.99, True)):
         parts = hc.Interface(friction=(factor * abs(tau[0]), factor * abs(tau[1])))

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay.model import arm
 from hapticclay.model.operator import Operator
 from hapticclay.simulation.record import Record
 from hapticclay.stepping import monitor
 from hapticclay.stepping.run import LeapfrogRun
+from tests.oracles import I1, I2
 
 CODES = {
     "finished",
@@ -87,8 +87,26 @@ def test_out_of_reach(force, word):
     r = hc.simulate(hc.free(force=force, gain=(0.5, 0.5), t_max=120.0))
     assert r.outcome.code == ("out of reach" if word == "stretched" else "singular"), r.status
     assert word in r.status
+    assert "0.11 to 0.59 m" in r.outcome.advice
     check_finite(r)
     assert np.min(np.abs(np.sin(r.q[:, 1]))) >= monitor.FOLD
+
+
+def test_the_advice_names_the_reach_of_the_arm():
+    s = dataclasses.replace(hc.free(force=(-1.0, 0.0), gain=(0.5, 0.5)), arm=hc.Arm(0.3, 0.4))
+    assert "0.1 to 0.7 m" in hc.simulate(s).outcome.advice
+
+
+@pytest.mark.parametrize("inner", [0.0, 1.0])
+def test_a_start_within_a_degree_of_folded_or_stretched_is_refused(inner):
+    long = hc.Arm(10.0, 10.0 + inner, 1e4, 1e4)
+    assert hc.simulate(hc.Scenario(arm=long, origin=(5.0, 5.0), t_max=0.01)).p.shape[0] > 1
+    edges = [
+        np.abs(long.l1 + long.l2 * np.exp(1j * np.radians(180.0 - bend))) for bend in (0.9, 179.1)
+    ]
+    for r in edges:
+        with pytest.raises(hc.ParameterError, match="unreachable"):
+            hc.Scenario(arm=long, origin=(0.0, float(r)), length=None)
 
 
 def test_clay_that_was_never_touched_makes_no_loop_unstable():
@@ -102,7 +120,7 @@ def test_a_spring_far_too_stiff_for_the_step_gets_no_more_energy_than_it_is_give
     """A step of force F on a spring k stores F^2/(2 k) at most; omega dt is 1, and 28."""
     s = hc.constant_cut(gain=(1e-3, 1e-3), t_max=0.5, dt=dt)
     r = hc.simulate(dataclasses.replace(s, operator=Operator(0.0, 0.0, 1e7)))
-    kinetic = 0.5 * (arm.I1 * r.qd[:, 0] ** 2 + arm.I2 * r.qd.sum(axis=1) ** 2)
+    kinetic = 0.5 * (I1 * r.qd[:, 0] ** 2 + I2 * r.qd.sum(axis=1) ** 2)
     assert r.outcome.code in ("time limit", "stalled") and np.max(kinetic) < 1.01 * 0.5 / 1e7
 
 

@@ -13,8 +13,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import arm, clay, controller, operator
 from hapticclay.model.clay import Clay, Profile
-from hapticclay.model.constants import G, S
-from hapticclay.model.operator import Operator
+from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping import runge_kutta
 from hapticclay.stepping.run import PLAIN
 from hapticclay.stepping.runge_kutta import RungeKuttaRun
@@ -129,51 +128,90 @@ def test_both_integrators_step_one_model():
 
 
 unit = st.floats(-1.0, 1.0)
+OTHER = dict(  # parts that have nothing in common with the paper's
+    arm=hc.Arm(0.3, 0.25, 0.05, 0.4),
+    servo=(
+        hc.Servo(hc.SecondOrder(500.0, 30.0, 800.0), hc.SecondOrder(1.3, 25.0, 300.0)),
+        hc.Servo(hc.SecondOrder(900.0, 55.0, 600.0), hc.SecondOrder(0.2, 40.0, 700.0)),
+    ),
+)
+HANDS = Operator(0.4, 3.0, 5.0), Operator(0.1, 7.0, 20.0)
+ZEROS = (
+    hc.Compensator((0.3, 2.0), (1.0, 12.0, 0.0)),
+    hc.Compensator((0.02, 1.0, 40.0, 30.0), (1.0, 14.0, 140.0, 400.0)),
+)
+STAGES = CASES | {
+    "weak": dict(torque_limit=(0.2, 0.1)),
+    "other": OTHER,
+    "two hands": dict(operator=HANDS, **OTHER),
+    "hand on y": dict(operator=(None, HANDS[1]), shaping=True, **OTHER),
+    "formed": dict(compensator=ZEROS),
+    "all": dict(compensator=ZEROS, operator=HANDS, **OTHER),
+}
 
 
 @given(
-    st.sampled_from([*CASES, "weak"]),
-    st.tuples(*[unit] * 10),
+    st.sampled_from([*STAGES]),
+    st.tuples(*[unit] * 18),
     st.floats(0.0, 100.0),
     st.integers(0, 1),
 )
 def test_a_stage_is_what_its_laws_say(name, x, b, held):
     """`march` spells its laws out; put together from the laws, a stage is the same to rounding."""
-    s = hc.constant_cut(integrator="accurate", **CASES.get(name, dict(torque_limit=(0.2, 0.1))))
-    s = dataclasses.replace(s, operator=hc.Operator() if held else s.operator)
+    s = dataclasses.replace(hc.constant_cut(integrator="accurate"), **STAGES[name])
+    s = dataclasses.replace(s, operator=s.operator or (hc.Operator() if held else None))
     run = RungeKuttaRun(s, 1)
-    now = run.s
+    now, links = run.s, s.arm.links
     for i in (0, 1):
         now["w"][i], now["base"][i] = x[i], b
     for j in range(8):
         now["control"][j] = 0.1 * x[2 + j]
+        now["form_states"][j] = 0.1 * x[10 + j]
+    for j in range(s.compensators[0].order, 4):
+        now["form_states"][j] = 0.0
+    now["form_states"][7] = 0.0
     runge_kutta.march(now, run.e, 0.0, 0)
-    th = s.operator or Operator(0.0, 0.0, 0.0)
+    hands = [th or NO_HAND for th in s.operators]
     (q1, q2), (w1, w2) = now["q"], now["w"]
     dx, dy, _, _, yx, yy, ydx, ydy = now["control"]
-    u = arm.jacobian(q1, q2)
-    p = np.subtract(arm.handle_position(q1, q2), s.origin).tolist()
+    u = arm.jacobian(q1, q2, links)
+    p = np.subtract(arm.handle_position(q1, q2, links), s.origin).tolist()
     v, c = arm.handle_velocity(w1, w1 + w2, u), arm.centripetal(w1, w1 + w2, u)
-    W = (S[0].gain, 0.0, S[1].gain) if s.shaping else arm.mobility(u)
+    W = [s.servo[0].S.gain, 0.0, s.servo[1].S.gain] if s.shaping else [*arm.mobility(u, links)]
     fe = clay.viscous_force(b, b, *v)
-    a, hand = [], []
-    for i, (delta, y, yd) in enumerate(((dx, yx, ydx), (dy, yy, ydy))):
-        ydd = G[i].stiffness * (delta - y) - G[i].damping * yd
-        k, d = S[i].stiffness, S[i].damping
+    a, hand, shown, feed = [], [], [dx, dy], [0.0, 0.0]
+    for i, (y, yd) in enumerate(((yx, ydx), (yy, ydy))):
+        th, servo = hands[i], s.servo[i]
+        if now["formed"]:
+            _, _, C, D = s.compensators[i].state_space()
+            shown[i] += C @ now["form_states"][4 * i : 4 * i + len(C)]
+            feed[i] = s.gain[i] * D
+            W[2 * i] += servo.G.gain * feed[i]  # a force moves delta, and delta the reference
+        ydd = servo.G.gain * shown[i] - servo.G.stiffness * y - servo.G.damping * yd
+        k, d = servo.S.stiffness, servo.S.damping
         a.append(controller.servo_acceleration(1.0, -d, k, ydd, yd, v[i], y, p[i], c[i]))
+        law = controller.feedback_law(servo.numbers, shown[i], y, yd, p[i], v[i], c[i])
+        np.testing.assert_allclose(law, (a[i], ydd), rtol=1e-12, atol=1e-11)
         resists = operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
         hand.append(s.force[i] - resists)
     net = hand[0] - fe[0], hand[1] - fe[1]
-    mass = th.mass, th.mass
-    out = servo_kick(1.0, (0.0, 0.0), u, (1.0, 1.0), a, W, net, mass, s.torque_limit)
+    mass = hands[0].mass, hands[1].mass
+    out = servo_kick(1.0, (0.0, 0.0), u, links, (1.0, 1.0), a, W, net, mass, s.torque_limit)
     fh = out[4] + fe[0], out[5] + fe[1]
-    expected = (*p, *v, *fh, *out[6:8], dx, dy)
+    delta = shown[0] + feed[0] * out[4], shown[1] + feed[1] * out[5]
+    expected = (*p, *v, *fh, *out[6:8], *delta)
     np.testing.assert_allclose(now["sample"], expected, rtol=1e-11, atol=1e-11)
 
 
 LAYERS = Clay(
     Profile((0.01, 0.03), (0.0, 90.0, 30.0), "x"), Profile((0.01,), (40.0, 120.0), "y", (0.0, 9.0))
 )
+
+
+def cut(**parts):
+    return dataclasses.replace(hc.constant_cut(), **parts)
+
+
 SHAKEN = dict(operator=hc.Operator(), muscle=hc.Multisine(rms=(2.0, 0.5), high=3.0))
 ONE_SOURCE = {
     "hand": hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.3)),
@@ -186,6 +224,9 @@ ONE_SOURCE = {
     ),
     "weak": dataclasses.replace(hc.constant_cut(torque_limit=(0.1, 0.15)), **SHAKEN),
     "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+    "other": cut(operator=HANDS, force=(2.0, 0.3), **OTHER),
+    "formed": cut(compensator=ZEROS, force=(2.0, 0.3)),
+    "all": cut(compensator=ZEROS, operator=HANDS, force=(2.0, 0.3), **OTHER),
 }
 
 

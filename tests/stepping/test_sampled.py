@@ -8,8 +8,9 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import controller
+from hapticclay.model.compensator import PRINTED
 from hapticclay.model.operator import Operator
-from hapticclay.model.signals import Multisine, Signal
+from hapticclay.model.signals import Multisine
 from tests.oracles import hybrid
 
 CASES = {
@@ -86,7 +87,7 @@ def test_the_recorded_force_belongs_to_its_sample(operator, late):
         parts = hc.Interface(delay=late * Ts) if late else None
         s = hc.constant_cut(control="sampled", dt=Ts, t_max=0.5, force=(0.0, 0.0))
         r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, interface=parts))
-        want = Signal(drive)(r.t)[1:-1]
+        want = drive(r.t)[1:-1]
         if operator:
             want -= 6.0 * r.p[1:-1] + 2.0 * r.v[1:-1] + 0.25 * np.diff(r.p, 2, axis=0) / Ts**2
         rate = np.gradient(want, Ts, axis=0)
@@ -153,7 +154,8 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     s = control.tf("s")
     G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
     C = K / (s**2 + 10 * s)
-    A, B = controller.held_compensator(axis, K, 0.01)
+    servo = controller.SERVO["xy".index(axis)]
+    A, B = controller.held_compensator(servo, PRINTED, K, 0.01)
     z = np.zeros(4)
     found = []
     for _ in range(50):
@@ -166,6 +168,40 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     np.testing.assert_allclose(
         [x[1] for x in found], control.step_response(G * C, t).outputs, atol=1e-9
     )
+
+
+SHAPES = {  # order 0 to 4: without and with an output at once, complex poles
+    "gain": hc.Compensator((0.002,), (1.0,)),
+    "lag": hc.Compensator((1.0, 3.0), (1.0, 12.0)),
+    "lead": hc.Compensator((0.3, 2.0), (1.0, 12.0, 0.0)),
+    "complex": hc.Compensator((0.02, 1.0, 40.0, 30.0), (1.0, 14.0, 140.0, 400.0)),
+    "fourth": hc.Compensator.zpk((-4.0,), (0.0, -10.0, -60.0 + 90.0j, -60.0 - 90.0j), 1e3),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_held_block_is_the_step_response_of_any_C_and_G(name):
+    """G's gain is not its stiffness; delta by the output of the compensator's states."""
+    import control
+
+    c, servo, K = (
+        SHAPES[name],
+        hc.Servo(hc.SecondOrder(900.0, 55.0, 600.0), controller.SERVO[1].S),
+        0.5,
+    )
+    s = control.tf("s")
+    C = K * control.tf(c.num, c.den)
+    G = 900.0 / (s**2 + 55.0 * s + 600.0)
+    A, B = controller.held_compensator(servo, c, K, 0.01)
+    *_, out, through = c.state_space()
+    z = np.zeros(c.order + 2)
+    found = []
+    for _ in range(50):
+        found.append((out @ z[: c.order] + K * through, z[c.order]))
+        z = A @ z + B
+    t = np.arange(50) * 0.01
+    for system, y in zip((C, G * C), np.transpose(found), strict=True):
+        np.testing.assert_allclose(y, control.step_response(system, t).outputs, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ The growth that it is read from against known modes.
 """
 
 import functools
+import json
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
+from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
 from hapticclay.theory import gain_limit
@@ -23,7 +25,7 @@ from hapticclay.views import study_plots
 from tests.oracles import Linear
 
 TH = Operator()
-Loop = functools.partial(boundary.Loop, operator=TH)
+Loop = functools.partial(boundary.PushedLoop, operator=TH)
 
 
 @settings(max_examples=10)
@@ -157,7 +159,7 @@ def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
 
     A large push stays.
     """
-    loop = Loop("y", 0.84, push=0.05, torque_limit=(0.5, 0.5))
+    loop = Loop("y", K=0.84, push=0.05, torque_limit=(0.5, 0.5))
     assert saturating(0.84, 1.0) < 0.0 < max(saturating(0.84, n) for n in SHARES)
     assert boundary.continuous_stable(loop) and boundary.classify_run(loop) == "limit cycle"
     assert boundary.explain_disagreement(loop, False) == "saturation"
@@ -168,7 +170,7 @@ def test_motors_in_their_limits_make_a_limit_cycle_of_a_loop_that_is_stable():
 def test_motors_that_leave_their_limits_late_are_no_divergence():
     """K = 0.8 is stable whatever share of it the motors give."""
     assert max(saturating(0.8, n) for n in SHARES) < 0.0
-    assert boundary.classify_run(Loop("y", 0.8, push=0.05, torque_limit=(1.0, 1.0))) == "stable"
+    assert boundary.classify_run(Loop("y", K=0.8, push=0.05, torque_limit=(1.0, 1.0))) == "stable"
 
 
 def test_causes():
@@ -236,8 +238,9 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
     b = stability_map._unstable_damping(Loop(), Ts, delay)
-    assert gain_limit.is_stable("x", 1.0, 0.999 * b, TH, Ts, delay)
-    assert not gain_limit.is_stable("x", 1.0, 1.001 * b, TH, Ts, delay)
+    loop = hc.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
+    assert gain_limit.is_stable(replace(loop, b=0.999 * b))
+    assert not gain_limit.is_stable(replace(loop, b=1.001 * b))
     assert (
         stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it
@@ -253,8 +256,6 @@ def test_colgate_schenkel_with_a_whole_delay_is_its_formula():
 
 
 def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
-    import json
-
     def small(kind, loop, quick, progress):
         return stability_map._gain_pose(replace(loop, Ts=None, delay=0.0), 2, 3, progress)
 
@@ -283,6 +284,11 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
         "b": 90.0,
         "K": 0.5,
         "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0},
+        "compensator": {"num": [1.0], "den": [1.0, 10.0, 0.0]},
+        "servo": {
+            "G": {"gain": 910.19, "damping": 41.8, "stiffness": 910.19},
+            "S": {"gain": 0.7919, "damping": 41.1, "stiffness": 432.0},
+        },
         "Ts": 0.36e-3,
         "delay": 1e-3,
         "shaping": False,
@@ -297,14 +303,55 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
 
+def test_command_takes_a_compensator_and_a_servo_as_numbers(capsys, tmp_path):
+    words = "stability --b 50 --gain 0.5 --num 1 20 --den 1 40 0 --shaping --Ts 1e-3"
+    words += " --G 800 40 900 --S 0.5 40 400 --out"
+    assert app.main([*words.split(), str(tmp_path)]) == 0
+    capsys.readouterr()
+    rows = json.loads((tmp_path / "stability.json").read_text())["verdicts"]
+    servo = hc.Servo(SecondOrder(800.0, 40.0, 900.0), SecondOrder(0.5, 40.0, 400.0))
+    c = hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))
+    loop = hc.Loop("x", 50.0, TH, servo, c, 0.5)
+    bare = hc.Arm().nominal_mobility[0]
+    limits = [r["value"] for r in rows if r["what"] == "largest stable K"]
+    sampled = hc.gain_limit(replace(loop, Ts=1e-3, mobility=bare))
+    assert limits[1] == pytest.approx(sampled, rel=1e-12)
+    found = {r["question"]: r["value"] for r in rows}
+    assert found["phase margin"] == pytest.approx(math.degrees(hc.margins(loop).phase), rel=1e-12)
+    assert app.main(["stability", "--num", "1", "2", "3", "4", "--out", str(tmp_path)]) == 2
+    assert "compensator.num" in capsys.readouterr().err
+
+
+SERVO = hc.Servo(SecondOrder(900.0, 45.0, 900.0), SecondOrder(0.6, 38.0, 500.0))
+ARM = hc.Arm(0.3, 0.32, 0.09, 0.7)
+
+
+@pytest.mark.parametrize(
+    "kw",
+    [
+        dict(compensator=hc.Compensator((3.0, 60.0), (1.0, 60.0, 500.0, 0.0)), b=50.0),
+        dict(
+            compensator=hc.Compensator((0.2, 1.0), (1.0, 8.0)), servo=SERVO, operator=None, b=20.0
+        ),
+        dict(servo=SERVO, arm=ARM, shaping=False, pose=(0.05, 0.0)),
+        dict(servo=SERVO, arm=ARM, Ts=2e-3, delay=1e-3),
+        dict(compensator=hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)), Ts=2e-3),
+    ],
+)
+def test_boundary_of_runs_of_other_parts_is_the_exact_one(kw):
+    loop = Loop(**kw)
+    exact = boundary.pose_limit(loop, 1e4)
+    if "pose" not in kw:
+        assert exact == pytest.approx(boundary.nominal_limit(loop), rel=1e-6)
+    assert boundary.simulated_gain(loop, exact, 1e4) == pytest.approx(exact, rel=5e-3)
+
+
 @pytest.mark.parametrize(
     "gain,stable", [("0.8604", True), ("0.8606", False)]
 )  # its limit is 0.8605
 def test_command_gives_margins_and_transparency_of_stable_loops_only(
     gain, stable, tmp_path, capsys
 ):
-    import json
-
     args = ["stability", "--axis", "y", "--gain", gain, "--out", str(tmp_path)]
     assert app.main(args) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -114,7 +114,7 @@ def test_parameters_reach_the_scenario():
     s = Sweep(
         "constant", vary, parse_fixed("shaping=true operator.damper=3 t_max=5 clay=0.01,0.02")
     )
-    scenario = s.scenario(s.points(0, 1)[0])
+    scenario = s.run_scenario(s.points(0, 1)[0])
     assert (
         scenario.gain == (1.0, 0.3)
         and scenario.force == (2.0, 2.0)
@@ -128,7 +128,50 @@ def test_parameters_reach_the_scenario():
     )
     assert scenario.operator == hc.Operator(1.5, 3.0, 6.0)
     seeded = Sweep("stability", parse_grid("seed=1,2 gain=2"), {})
-    assert seeded.scenario(seeded.points(1, 2)[0]).muscle.seed == 2
+    assert seeded.run_scenario(seeded.points(1, 2)[0]).muscle.seed == 2
+
+
+def test_any_field_of_any_part_is_varied_by_name(tmp_path):
+    names = {
+        "arm.l1": lambda s: s.arm.l1,
+        "servo.x.G.damping": lambda s: s.servo[0].G.damping,
+        "compensator.den.1": lambda s: s.compensator.den[1],
+        "clay.x.values.1": lambda s: s.clay.x.values[1],
+        "torque_limit.elbow": lambda s: s.torque_limit[1],
+        "interface.friction.x": lambda s: s.interface.friction[0],
+        "muscle.rms.x": lambda s: s.muscle.rms[0],
+        "operator.y.mass": lambda s: s.operator[1].mass,
+    }
+    grid = " ".join(f"{name}=0.3:0.4:2" for name in names)
+    sampled = {"control": "sampled", "interface.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0]}
+    s = Sweep("constant", parse_grid(grid), sampled)
+    assert len(s) == 2 ** len(names)
+    for point in s.points(100, 104):
+        scenario = s.run_scenario(point)
+        assert [get(scenario) for get in names.values()] == list(point)
+        assert scenario.clay.y.values == (0.0, 90.0, 0.0)
+
+
+def test_a_sweep_starts_from_a_scenario_file(tmp_path):
+    (tmp_path / "mine.toml").write_text('experiment = "free"\ngain = [1, 0.4]\n[arm]\nl1 = 0.3\n')
+    spec = tmp_path / "spec.toml"
+    spec.write_text('scenario = "mine.toml"\n[vary]\narm.l2 = "0.3:0.4:2"\n"gain.x" = [1, 2]\n'
+                    "[fixed]\nt_max = 0.01\noperator.mass = 0.5\n")  # fmt: skip
+    s = Sweep(**sampling.load_sweep(spec))
+    assert s.title == "mine" and list(s.vary) == ["arm.l2", "gain.x"]
+    got = s.run_scenario(s.points(1, 2)[0])
+    assert (got.arm, got.gain, got.operator) == (hc.Arm(0.3, 0.3), (2.0, 0.4), hc.Operator(0.5))
+    assert json.loads(json.dumps(s.described()))["scenario"]["arm"] == {"l1": 0.3}
+    other = dict(s.scenario, gain=[1, 0.3])
+    assert Sweep(**{**vars(s), "scenario": other}).digest() != s.digest()
+    for text, said in (
+        ('scenario = "none.toml"', "No such file"),
+        ("scenario = 3", "path of a scenario file"),
+        ('scenario = "mine.toml"\nexperiment = "free"', "without an experiment"),
+    ):
+        spec.write_text(f"{text}\n[vary]\narm.l2 = [1, 2]\n")
+        with pytest.raises(ParameterError, match=said):
+            sampling.load_sweep(spec)
 
 
 @pytest.mark.parametrize(
@@ -140,8 +183,8 @@ def test_parameters_reach_the_scenario():
         (dict(runs=5), "runs"),
         (dict(design="lhs"), "runs"),
         (dict(vary={"bb": Range(1, 2, 2)}), "did you mean 'b'"),
-        (dict(vary={"gain.z": Range(1, 2, 2)}), "axis of gain"),
-        (dict(vary={"operator.weight": Range(1, 2, 2)}), "parameter"),
+        (dict(vary={"gain.z": Range(1, 2, 2)}), "did you mean 'gain.y'"),
+        (dict(vary={"operator.weight": Range(1, 2, 2)}), "there are mass, damper, spring"),
         (dict(vary={"b": Range(-5, 2, 2)}), "b = -5"),
         (dict(chunk=0), "chunk"),
         (dict(fixed={"tmax": 3.0}), "t_max"),

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -35,6 +36,36 @@ def test_stability_page_says_what_its_snippets_print():
     said = " ".join(re.findall(r"print\(.*\)  # ([^:\n]*)", code)).split()
     for a, b in zip(out.stdout.split(), said, strict=True):
         assert a == b or float(a) == pytest.approx(float(b), rel=1e-3)
+
+
+def test_signals_page_runs(tmp_path):
+    """Its example of ten lines at most, with a file of its columns."""
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "signals.md").read_text(), re.S)
+    assert len(code.splitlines()) <= 10
+    (tmp_path / "force.csv").write_text("t,fx,fy\n0,0,0\n0.5,1,0.2\n1,0,0\n")
+    out = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "at " in out.stdout
+
+
+PARTS = (ROOT / "docs" / "parts.md").read_text()
+BLOCKS = re.findall(r"## ([^\n]*)\n\n```python\n(.*?)```", PARTS, re.S)
+
+
+@pytest.mark.parametrize("block", [b for _, b in BLOCKS], ids=[name for name, _ in BLOCKS])
+def test_each_part_is_brought_in_ten_lines_that_print_what_they_say(block, tmp_path):
+    assert len(list(filter(str.strip, block.splitlines()))) <= 10
+    out = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
+
+
+@pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", PARTS, re.M))
+def test_commands_with_parts_run(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert app.main(shlex.split(line)) == 0
 
 
 def test_every_limit_in_the_stability_page_is_recomputed():

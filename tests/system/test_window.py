@@ -229,6 +229,7 @@ def test_mouse_cuts_through_the_clay(screen, tmp_path):
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
         "record.npz",
+        "scenario.toml",
         "summary.json",
         "velocity.png",
     ]

@@ -64,25 +64,27 @@ def test_transparency_error_is_its_integral():
 def test_shapes_are_compared_at_equal_margin_the_best_first():
     shapes = [
         hc.Compensator(),
-        hc.Compensator(40.0),
-        hc.Compensator(2.0),
-        hc.Compensator(40.0, 20.0),
+        hc.Compensator((1.0,), (1.0, 40.0, 0.0)),
+        hc.Compensator((1.0,), (1.0, 2.0, 0.0)),
+        hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)),
     ]
     for axis in "xy":
         found = hc.compare(axis, 90.0, shapes, hc.Operator(), disk_margin=0.5, delay_margin=0.005)
         assert {d.compensator for d in found} == set(shapes)
         assert np.all(np.diff([d.error for d in found]) > 0)
-        assert found[0].compensator == hc.Compensator(40.0, 20.0)  # a lead pays
+        assert found[0].compensator == hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))  # a lead pays
         for d in found:
             assert min(d.margins.disk - 0.5, d.margins.delay - 0.005) == pytest.approx(
                 0.0, abs=1e-9
             )
-            assert linear_loop.stable(axis, d.K, 90.0, None, d.compensator) and d.margins.stable
+            assert d.margins.stable
+            assert linear_loop.stable(hc.Loop(axis, 90.0, compensator=d.compensator, K=d.K))
 
 
 def test_a_shape_without_a_largest_gain_is_refused():
     with pytest.raises(ParameterError, match="largest K"):
-        hc.compare("x", 90.0, [hc.Compensator(40.0, 5.0)], hc.Operator(), disk_margin=0.5)
+        lead = hc.Compensator((1.0, 5.0), (1.0, 40.0, 0.0))
+        hc.compare("x", 90.0, [lead], hc.Operator(), disk_margin=0.5)
 
 
 @pytest.mark.parametrize(

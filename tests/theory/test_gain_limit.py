@@ -76,7 +76,7 @@ def test_continuous_limits(axis, on, j):
         lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13
     )
     assert found == pytest.approx(root, rel=1e-9)  # eps times the condition of the roots, 1e4
-    K, omega = gain_limit.critical_gain(axis, b, operator(hand))
+    K, omega = gain_limit.critical_gain(hc.Loop(axis, b, operator(hand)))
     assert abs(np.polyval(polynomial(axis, K, b, hand), 1j * omega)) < 1e-8 * np.polyval(
         np.abs(polynomial(axis, K, b, hand)), omega
     )
@@ -271,7 +271,15 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
         assert stable == (share < 1.0)
         assert (
             gain_limit.is_stable(
-                axis, share * found, b, operator(HANDS[hand]), Ts, delay, "implicit"
+                hc.Loop(
+                    axis,
+                    b,
+                    operator(HANDS[hand]),
+                    K=share * found,
+                    Ts=Ts,
+                    delay=delay,
+                    render="implicit",
+                )
             )
             == stable
         )
@@ -287,7 +295,9 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
     """
     for K in (1e-6, 1e-12, 1e-30, 5e-324):
         assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
-        assert gain_limit.is_stable(axis, K, 90.0, operator(HANDS[hand]), Ts, delay, render)
+        assert gain_limit.is_stable(
+            hc.Loop(axis, 90.0, operator(HANDS[hand]), K=K, Ts=Ts, delay=delay, render=render)
+        )
 
 
 @pytest.mark.parametrize("axis,n", list(itertools.product("xy", [0, 1, 3])))
@@ -297,7 +307,7 @@ def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n)
     The loop broken at the sampled net force, from python-control's own discretisations.
     """
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
-    K, omega = gain_limit.critical_gain(axis, b, None, Ts, n * Ts)
+    K, omega = gain_limit.critical_gain(hc.Loop(axis, b, Ts=Ts, delay=n * Ts))
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
     G = G0[i] / (s**2 + G1[i] * s + G0[i])
     C = K / (s**2 + 10 * s)
@@ -415,7 +425,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
             t_max=4.0,
         )
     )
-    less, beta, gamma = linear_loop.sampled_differences(axis, b, th, Ts)
+    less, beta, gamma = linear_loop.sampled_differences(hc.Loop(axis, b, th, Ts=Ts))
     z = 1.0 + np.linalg.eigvals(less + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
@@ -454,7 +464,16 @@ def test_no_operator_is_no_hand():
         (lambda: hc.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
         (lambda: hc.gain_limit("x", 90.0, operator=True, Ts=1e-3), "operator"),
         (lambda: hc.gain_limit("x", 90.0, operator=True, delay=1e-3), "operator"),
-        (lambda: hc.gain_limit("x", 90.0, Ts=1e-3, compensator=hc.Compensator(5.0)), "compensator"),
+        (lambda: hc.gain_limit("x", 90.0, Ts=1e-3, compensator=5.0), "compensator"),
+        (lambda: hc.gain_limit("x", 90.0, servo=(1.0, 2.0)), "servo"),
+        (lambda: hc.gain_limit("x", 90.0, mobility=0.0), "mobility"),
+        (lambda: hc.gain_limit(hc.Loop(), b=90.0), "b"),
+        (lambda: hc.gain_limit(hc.Loop(), servo=hc.Loop().servo), "servo"),
+        (lambda: hc.margins(hc.Loop(b=90.0)), "K"),
+        (lambda: hc.small_gain(hc.Loop(b=90.0, K=1.0, Ts=1e-3)), "Ts"),
+        (lambda: hc.margins("x", 1.0, 90.0, Ts=1e-3, at="force"), "at"),
+        (lambda: hc.passivity("x", 1.0, 90.0, delay=1e-3), "delay"),
+        (lambda: hc.Loop.of("x", "x"), "scenario"),
     ],
 )
 def test_bad_input_is_refused(call, field):

@@ -1,5 +1,7 @@
 """The linear loop against python-control and the paper's own limits."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import controller
-from hapticclay.model.constants import G, S
+from hapticclay.model.controller import SERVO
 from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop
 from tests.oracles import Linear, piecewise_linear
@@ -34,7 +36,7 @@ def test_characteristic_polynomial_is_one_plus_the_loop(axis, operator, K, b, om
     s = 1j * omega
     den = np.prod([np.polyval(np.atleast_1d(x.den[0][0]), s) for x in (C, G, S)])
     expected = (1 + (G(s) * C(s) + S(s)) * T(s)) * den
-    found = linear_loop.characteristic(axis, K, b, operator)(s)
+    found = linear_loop.characteristic(hc.Loop(axis, b, operator, K=K))(s)
     assert found == pytest.approx(
         expected, rel=1e-11
     )  # cancellation between the terms costs up to 4 digits
@@ -85,8 +87,12 @@ def test_y_axis_is_unstable_at_unit_gain():
     assert linear_loop.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(
         1.56, abs=0.005
     )
-    assert linear_loop.stable("y", 1.0, 61.0) and not linear_loop.stable("y", 1.0, 63.0)
-    assert not linear_loop.stable("y", 1.0, 3800.0) and linear_loop.stable("y", 1.0, 4000.0)
+
+    def stable(b):
+        return linear_loop.stable(hc.Loop("y", b, K=1.0))
+
+    assert stable(61.0) and not stable(63.0)
+    assert not stable(3800.0) and stable(4000.0)
 
 
 def test_gain_limit_without_clay_and_hand_is_infinite():
@@ -101,7 +107,9 @@ def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
         limit = hc.gain_limit("y", 0.0, th)
         assert limit > 0.0
-        assert limit == float("inf") or not linear_loop.stable("y", 1.001 * limit, 0.0, th)
+        assert limit == float("inf") or not linear_loop.stable(
+            hc.Loop("y", 0.0, th, K=1.001 * limit)
+        )
 
 
 @given(K=st.floats(0.01, 100), f=st.floats(-10, 10), b=st.floats(0, 1e6))
@@ -116,9 +124,9 @@ def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
 @pytest.mark.parametrize(
     "call,field",
     [
-        (lambda: linear_loop.stable("z", 1, 1), "axis"),
-        (lambda: linear_loop.stable("x", -1, 1), "K"),
-        (lambda: linear_loop.stable("x", 1, float("nan")), "b"),
+        (lambda: hc.closed_loop_poles("z", 1, 1), "axis"),
+        (lambda: hc.closed_loop_poles("x", -1, 1), "K"),
+        (lambda: hc.closed_loop_poles("x", 1, float("nan")), "b"),
     ],
 )
 def test_bad_input_is_refused(call, field):
@@ -130,7 +138,7 @@ def test_bad_input_is_refused(call, field):
 @pytest.mark.parametrize("axis", "xy")
 @pytest.mark.parametrize("th", [None, Operator(), Operator(5.0, 0.0, 100.0)])
 def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
-    A, B = linear_loop.state_space(axis, 0.7, 90.0, th)
+    A, B = linear_loop.state_space(hc.Loop(axis, 90.0, th, K=0.7))
     poles = np.sort_complex(linear_loop.closed_loop_poles(axis, 0.7, 90.0, th))
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5
@@ -143,9 +151,9 @@ def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
 def test_crossing_times_beside_the_oracle():
     exact, _ = piecewise_linear((0.05, 0.15, 0.2), (0.0, 90.0, 0.0), 1.0, 1.0)
     assert linear_loop.crossing_times(
-        "x", 1.0, 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
+        hc.Loop(K=1.0), 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
     ) == pytest.approx(exact, abs=1e-10)  # eleven thousand products
-    assert linear_loop.crossing_times("x", 1.0, -1.0, (0.05,), (0.0,), t_max=0.5) == []
+    assert linear_loop.crossing_times(hc.Loop(K=1.0), -1.0, (0.05,), (0.0,), t_max=0.5) == []
 
 
 @pytest.mark.parametrize("axis", "xy")
@@ -156,27 +164,30 @@ def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
     The explicit form of the law.
     """
     i = "xy".index(axis)
-    g, s = G[i], S[i]
+    servo = SERVO[i]
     p, v, delta, _, y, yd = state
-    keep, take, after, before, spring = controller.servo_coefficients(g, s, H, 1.0, 0.0)
+    keep, take, after, before, spring = controller.servo_coefficients(servo.numbers, H, 1.0, 0.0)
     ahead = keep * yd + take * (delta - y)
     law = controller.servo_acceleration(after, before, spring, ahead, yd, v, y, p, 0.0) - v / H
-    size = np.abs(state) @ np.abs(controller.feedback_vector(axis))
+    size = np.abs(state) @ np.abs(controller.feedback_vector(servo))
     assert law == pytest.approx(
-        controller.feedback_vector(axis) @ state, abs=1e-14 * (size + 4.0 / H)
+        controller.feedback_vector(servo) @ state, abs=1e-14 * (size + 4.0 / H)
     )
-    A = linear_loop.state_space(axis, 1.0, 0.0)[0]  # without clay and hand the law is all there is
-    assert np.array_equal(A[1], controller.feedback_vector(axis))
+    A = linear_loop.state_space(hc.Loop(axis, K=1.0))[
+        0
+    ]  # without clay and hand the law is all there is
+    assert np.array_equal(A[1], controller.feedback_vector(servo))
 
 
 @pytest.mark.parametrize("delay", [0.0, 4e-4, 1e-3, 2.3e-3])
 @pytest.mark.parametrize("render", ["held", "implicit"])
 def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(delay, render):
-    less, beta, gamma = linear_loop.sampled_differences("xy", 90.0, TH, 1e-3, delay, render)
+    loops = [hc.Loop(axis, 90.0, TH, Ts=1e-3, delay=delay, render=render) for axis in "xy"]
+    less, beta, gamma = linear_loop.sampled_differences(*loops)
     n = len(less) // 2
-    for j, axis in enumerate("xy"):
+    for j in range(2):
         mine = [*range(6 * j, 6 * j + 6), *range(12 + j, 2 * n, 2)]
-        one = linear_loop.sampled_differences(axis, 90.0, TH, 1e-3, delay, render)
+        one = linear_loop.sampled_differences(loops[j])
         both = less[np.ix_(mine, mine)], beta[mine, j : j + 1], gamma[j : j + 1, mine]
         for a, b in zip(both, one, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14 * np.abs(b).max())
@@ -187,11 +198,14 @@ def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(de
 def test_sampled_loop_tends_to_the_continuous_one_at_any_mobility():
     """Both axes coupled: (M - 1)/Ts of slow states is A, to first order in Ts."""
     W = np.array([[0.6, 0.2], [0.2, 0.3]])
-    A = linear_loop.state_space("xy", (0.7, 0.3), 20.0, TH, W)[0]
+    loops = [hc.Loop(axis, 20.0, TH, K=K) for axis, K in (("x", 0.7), ("y", 0.3))]
+    A = linear_loop.state_space(*loops, mobility=W)[0]
     poles = np.linalg.eigvals(A)
     gaps = []
     for Ts in (4e-5, 2e-5):
-        less, beta, gamma = linear_loop.sampled_differences("xy", 20.0, TH, Ts, pose=(W, False))
+        less, beta, gamma = linear_loop.sampled_differences(
+            *(replace(x, Ts=Ts) for x in loops), pose=(W, False)
+        )
         z = np.linalg.eigvals(less + beta @ np.diag([0.7, 0.3]) @ gamma)
         found = np.log1p(z[np.abs(1.0 + z) > 0.5]) / Ts
         gaps.append(max(np.min(np.abs(found - x)) / abs(x) for x in poles if abs(x) > 1e-3))

@@ -33,7 +33,7 @@ def test_passivity_against_dense_frequencies(axis, K, b):
     dense = shown(axis, K, b, OMEGA).real
     assert v.margin <= dense.min() + 1e-9 * np.abs(dense).max()
     assert v.margin == pytest.approx(dense.min(), rel=1e-3, abs=1e-2)  # the grid about a minimum
-    assert v.verdict == (v.margin >= 0.0 and linear_loop.stable(axis, K, b))
+    assert v.verdict == (v.margin >= 0.0 and linear_loop.stable(hc.Loop(axis, b, K=K)))
     for low, high in v.fails:
         inside = (OMEGA > low * 1.001) & (OMEGA < high * 0.999)
         assert np.all(dense[inside] < 0.0)

@@ -99,14 +99,14 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
 
     Th may be as large as it likes.
     """
-    limit, _ = margins.rigid_limit(axis)
+    limit, _ = margins.rigid_limit(hc.Loop(axis))
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
-        zeros = np.sort_complex(linear_loop.device_admittance(axis, K)[0].roots())
+        zeros = np.sort_complex(linear_loop.device_admittance(hc.Loop(axis, K=K))[0].roots())
         poles = linear_loop.closed_loop_poles(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
         near = [np.min(np.abs(poles - z)) / abs(z) for z in zeros]
         assert max(near) < 1e-3 and zeros.real.max() < 0.0
-        assert linear_loop.stable(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
+        assert linear_loop.stable(hc.Loop(axis, 90.0, Operator(1e3, 1e8, 1e9), K=K))
     box = hc.Box((0.1, 0.5), rigid=True)
     assert (
         hc.worst_case(axis, 0.5, 90.0, box).limit
@@ -119,8 +119,8 @@ def test_a_rigid_arm_limits_a_slower_compensator():
 
     The zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it.
     """
-    c, arm = hc.Compensator(1.0), Operator(1e3, 1e8, 1e9)
-    limit, omega = margins.rigid_limit("y", c)
+    c, arm = hc.Compensator((1.0,), (1.0, 1.0, 0.0)), Operator(1e3, 1e8, 1e9)
+    limit, omega = margins.rigid_limit(hc.Loop("y", compensator=c))
     assert 50.0 < omega < 200.0
     assert hc.gain_limit("y", 90.0, arm, compensator=c) == pytest.approx(
         limit, rel=1e-3

@@ -1,5 +1,7 @@
 """What the plots of a run show is what the record holds."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -99,7 +101,7 @@ def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
     args = ["run", "constant", "--t-max", "0.1", "--out", str(tmp_path)]
     assert app.main(args) == 0
     plots = {"velocity.png", "force.png", "power.png"}
-    files = {"record.npz", "summary.json"}
+    files = {"record.npz", "scenario.toml", "summary.json"}
     assert {path.name for path in tmp_path.iterdir()} == plots | files
     assert app.main([*args, "--no-plots"]) == 0
     assert {path.name for path in tmp_path.iterdir()} == files
@@ -109,3 +111,50 @@ def test_a_figure_that_does_not_apply_is_not_drawn(run, monkeypatch):
     assert set(run_plots.figures(run)) == {"velocity", "force"}
     monkeypatch.setitem(run_plots.FIGURES, "velocity", lambda record: None)
     assert set(run_plots.figures(run)) == {"force"}
+
+
+OTHER = {  # compensator, static gain of G, and what C adds to the clay, f = (c/K + b) v
+    "as printed": (hc.Compensator(), 1.0, 10.0),
+    "lead": (hc.Compensator((0.5, 2.0), (1.0, 12.0, 0.0)), 1.0, 6.0),
+    "gain of G": (hc.Compensator(), 1.25, 8.0),
+    "cancelled s": (hc.Compensator((2.0, 0.0), (1.0, 12.0, 0.0, 0.0)), 1.0, 6.0),
+    "no integrator": (hc.Compensator((1.0,), (1.0, 12.0)), 1.0, None),
+    "two integrators": (hc.Compensator((1.0, 9.0), (1.0, 0.0, 0.0)), 1.0, None),
+}
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_force_plot_shows_the_damper_of_any_compensator(name):
+    c, ratio, damper = OTHER[name]
+    G = hc.SecondOrder(ratio * 800.0, 45.0, 800.0)
+    servo = tuple(hc.Servo(G, axis.S) for axis in hc.Scenario().servo)
+    scenario = dataclasses.replace(
+        hc.constant_cut(t_max=5.0), gain=(1.0, 0.0), compensator=c, servo=servo
+    )
+    record = hc.simulate(scenario)
+    figure = run_plots.force_ratio_plot(record)
+    sums = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+    (label,) = (x for x in lines(run_plots.velocity_plot(record)) if x.startswith("expected"))
+    assert (label == "expected, K f/(10 + K b)") == (name == "as printed")
+    if damper is None:
+        assert sums == []
+        return
+    assert f"{damper:g}/K + b" in lines(figure)
+    expected = [damper, damper + 90.0]
+    assert [line.get_ydata()[0] for line in sums][:2] == pytest.approx(expected, rel=1e-12)
+    # and so the run goes, once it is in steady motion in the clay
+    assert record.b[-1, 0] == 90.0
+    assert record.ratio(record.fh)[-1, 0] == pytest.approx(expected[1], rel=0.02)
+    still = run_plots.force_ratio_plot(record, "y")  # K = 0: no compensator
+    assert not [line for line in still.axes[0].lines if line.get_linestyle() == ":"]
+
+
+def test_plots_of_a_controller_of_ones_own_expect_nothing_of_the_papers():
+    law = hc.Controller(lambda t, q, qd, fh, state, params: ((0.2, 0.0), state))
+    scenario = hc.constant_cut(control="sampled", t_max=0.5)
+    record = hc.simulate(dataclasses.replace(scenario, controller=law))
+    for plot in (run_plots.velocity_plot, run_plots.force_ratio_plot):
+        figure = plot(record)
+        assert not [name for name in lines(figure) if "expected" in name or "/K" in name]
+        told = " ".join(text.get_text() for text in figure.findobj(Text))
+        assert "K =" not in told and "controller of one's own" in told

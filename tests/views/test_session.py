@@ -184,12 +184,22 @@ def test_out_of_reach_ends_it_with_a_reason():
     assert "stretched" in session.ended and session.record().outcome.code == "out of reach"
 
 
-def test_point_stays_within_reach():
-    session = Session(hc.constant_cut())
-    for far in ((5.0, 0.0), (-0.25, -0.24)):
+@pytest.mark.parametrize(
+    "arm,low,high",
+    [
+        (hc.Arm(), 0.16, 0.57),
+        (hc.Arm(0.3, 0.45, 0.1, 0.9), 0.2, 0.73),
+        (hc.Arm(0.3, 0.06, 0.1, 0.01), 0.27, 0.34),  # a quarter of the reach where 5 cm is more
+    ],
+    ids=["paper", "longer", "short link"],
+)
+def test_point_stays_within_reach(arm, low, high):
+    cut = hc.constant_cut(length=0.03, clay=(0.01, 0.02))
+    session = Session(dataclasses.replace(cut, arm=arm, origin=(0.22, 0.2)))
+    for far, r in (((5.0, 0.0), high), ((-0.22, -0.2), low)):
         session.pull(far)
         x, y = np.add(session.point, session.scenario.origin)
-        assert 0.15 < np.hypot(x, y) < 0.58
+        assert np.hypot(x, y) == pytest.approx(r, rel=1e-12)
 
 
 @pytest.mark.parametrize("field,value", [("control", "sampled"), ("integrator", "accurate")])

@@ -10,6 +10,7 @@ import hapticclay as hc
 from hapticclay.views import theory_plots as plots
 
 HAND = hc.Operator()
+LEAD = hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))
 
 
 def texts(figure):
@@ -72,7 +73,7 @@ def test_transparency_is_drawn_for_each_design():
     figure = plots.transparency_plot(
         "x",
         90.0,
-        [("as printed", 1.0, hc.Compensator()), ("lead", 0.5, hc.Compensator(40.0, 20.0))],
+        [("as printed", 1.0, hc.Compensator()), ("lead", 0.5, LEAD)],
     )
     curve = next(line for line in figure.axes[0].lines if line.get_label() == "as printed")
     assert curve.get_ydata()[0] == pytest.approx(0.9, rel=1e-3)  # K b/(10 + K b)

@@ -1,0 +1,101 @@
+"""`hapticclay fields`: the names of all that --set, sweeps and scenario files can change."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
+
+import tyro
+
+from ..errors import ParameterError
+
+if TYPE_CHECKING:
+    from ..model.fields import Field
+
+WIDTH = 96  # of the text
+
+
+@dataclass(frozen=True)
+class FieldsCommand:
+    """List the fields of a scenario: dotted name, default, unit, bounds, and what it is.
+
+    The names serve --set, sweeps and scenario files alike. gain.x is one entry of a pair,
+    clay.x.values.1 one of a longer list; operator and compensator may differ by axis, as in
+    operator.x.mass.
+
+    Attributes:
+        names: Words that the names must contain, any of them, as in arm or servo.x; constant and
+            the like stand for the parameters of an experiment.
+    """
+
+    names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+
+    def __call__(self) -> int:
+        from ..model.experiments import EXPERIMENTS, parameter_fields
+        from ..model.fields import dotted_names, fields_of, no_field
+        from ..model.scenario import Scenario
+
+        known, shown = fields_of(Scenario, part=Scenario()), []
+        for name in self.names:
+            own = parameter_fields(EXPERIMENTS[name]) if name in EXPERIMENTS else ()
+            found = own or [f for f in known if name in f.name]
+            if not found:
+                told = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
+                raise ParameterError("field", name, told.bound)
+            shown += [f for f in found if f not in shown]
+        print(field_list(shown if self.names else known))
+        return 0
+
+
+def field_list(fields: Iterable[Field]) -> str:
+    """Fields with their defaults, units, bounds and descriptions, for a terminal.
+
+    Args:
+        fields: from `fields_of`.
+    """
+    lines = []
+    for f in fields:
+        unit = f"  [{f.bound.unit}]" if f.bound.unit else ""
+        lines.append(f"{f.name} = {_value_in_words(f.default)}{unit}  {_takes(f)}".rstrip())
+        lines += textwrap.wrap(f.about, WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return "\n".join(lines)
+
+
+def _value_in_words(value: Any) -> str:
+    from ..model.fields import UNSET
+
+    if value is UNSET:
+        return "(to be given)"
+    if isinstance(value, tuple):
+        return ",".join(map(_value_in_words, value))
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+def _takes(field: Field) -> str:
+    """Bounds of a number, or the words that a field takes."""
+    from ..model.fields import union_members
+
+    words, numbers = [], False
+    for kind in union_members(field.hint):
+        if get_origin(kind) is Literal:
+            words += get_args(kind)
+        elif kind is bool:
+            words += ["true", "false"]
+        elif kind is type(None):
+            words += ["none"]
+        else:
+            numbers = kind is not str
+    low, high = field.bound.low, field.bound.high
+    if numbers and isinstance(low, str):  # the name of a field
+        words.insert(0, f"{low} to {high:.10g}")
+    elif numbers and not isinstance(low, str) and math.isfinite(low):
+        above = "above " if field.bound.above else ""
+        words.insert(
+            0, f"{above}{low:g}{f' to {high:.10g}' if math.isfinite(high) else ' or more'}"
+        )
+    elif numbers and words:
+        words.insert(0, "a number")
+    return " | ".join(words)

@@ -1,0 +1,381 @@
+"""The compensator: a proper transfer function from net force to commanded displacement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..errors import Bound, ParameterError, check_fields
+from .constants import C_DEN, C_NUM
+
+ORDER = 4  # highest of a compensator
+# floats of an axis: A, B, C, D of a realisation, each as for the highest order; and of a kick, see
+# `form_kick`: C Phi, what the force of the kick adds, Phi, Gamma
+FORM, KICK = 25, 25
+FEED = 4  # place of the second of the latter
+# working space of `exponential`: two results, then a term of a series, its sum, and a matrix
+WORK, TERM, SUM, NEXT = 64, 40, 44, 48
+CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
+TERMS = 16  # of a series for exp(x) at |x| <= 1/2: the next is below 1e-19
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """Shape of the compensator: C = K num(s)/den(s), proper, of order 4 at most.
+
+    Coefficients stand in descending powers of s, as in SciPy and python-control; they are divided
+    by the first one of den.
+
+    Attributes:
+        num: numerator, at most as long as den; (1,) as printed.
+        den: denominator, 1 to 5 numbers; (1, 10, 0) as printed, s^2 + 10 s (Eqs. 20, 22, 27).
+    """
+
+    num: Annotated[tuple[float, ...], Bound()] = C_NUM
+    den: Annotated[tuple[float, ...], Bound()] = C_DEN
+
+    def __post_init__(self):
+        check_fields(self, "compensator.")
+        num, den = _without_leading_zeros(self.num), _without_leading_zeros(self.den)
+        if not den or len(den) > ORDER + 1:
+            bound = f"must be 1 to {ORDER + 1} numbers, not all of them 0: order {ORDER} at most"
+            raise ParameterError("compensator.den", self.den, bound)
+        if not num or len(num) > len(den):
+            bound = f"must be 1 to {len(den)} numbers, not all of them 0: C must be proper"
+            raise ParameterError("compensator.num", self.num, bound)
+        for name, values in (("num", num), ("den", den)):
+            scaled = tuple(x / den[0] for x in values)
+            if not all(map(math.isfinite, scaled)):
+                raise ParameterError(f"compensator.{name}", values, "must be finite over den[0]")
+            object.__setattr__(self, name, scaled)
+
+    @classmethod
+    def zpk(
+        cls, zeros: Iterable[complex], poles: Iterable[complex], gain: float = 1.0
+    ) -> Compensator:
+        """The compensator K gain (s - z1) .../((s - p1) ...).
+
+        Args:
+            zeros: its zeros [rad/s], complex ones with their conjugates.
+            poles: its poles [rad/s], as many or more.
+            gain: factor, in addition to K.
+
+        Raises:
+            ParameterError: a complex root lacks its conjugate, or C is not proper.
+        """
+        num, den = _from_roots("zeros", zeros), _from_roots("poles", poles)
+        return cls(tuple(gain * x for x in num), den)
+
+    @classmethod
+    def of(cls, system: Any) -> Compensator:
+        """The compensator of another package, or of (num, den).
+
+        Args:
+            system: a Compensator; a transfer function, state space or zeros-poles-gain system of
+                python-control or scipy.signal, in continuous time, of one input and one output;
+                or a pair of coefficients (num, den).
+
+        Raises:
+            ParameterError: it is none of these, or has no proper transfer function.
+        """
+        if isinstance(system, Compensator):
+            return system
+        bound = "must be a Compensator, or a system of python-control or scipy.signal"
+        if getattr(system, "dt", None):
+            raise ParameterError("compensator", system, f"{bound}, in continuous time")
+        try:
+            own = hasattr(system, "ninputs")  # python-control
+            if not own and not hasattr(system, "to_tf"):  # nor scipy.signal
+                num, den = system
+            elif [getattr(system, f"n{x}" if own else x) for x in ("inputs", "outputs")] != [1, 1]:
+                raise ParameterError("compensator", system, "must have one input, one output")
+            elif hasattr(system, "A"):
+                num, den = _from_state_space(system.A, system.B, system.C, system.D)
+            elif own:
+                num, den = system.num[0][0], system.den[0][0]
+            else:
+                rational = system.to_tf()
+                num, den = rational.num, rational.den
+            num, den = tuple(map(float, num)), tuple(map(float, den))
+        except (TypeError, ValueError, AttributeError, IndexError) as error:
+            if isinstance(error, ParameterError):
+                raise
+            raise ParameterError("compensator", system, bound) from None
+        return cls(num, den)
+
+    @property
+    def order(self) -> int:
+        """Number of its states."""
+        return len(self.den) - 1
+
+    @property
+    def fraction(self) -> tuple[Polynomial, Polynomial]:
+        """Numerator and denominator of C/K in s."""
+        return Polynomial(self.num[::-1]), Polynomial(self.den[::-1])
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Its poles [rad/s], shape (order,)."""
+        return np.roots(self.den)
+
+    @property
+    def zeros(self) -> np.ndarray:
+        """Its zeros [rad/s], shape (at most order,)."""
+        return np.roots(self.num)
+
+    @property
+    def lag(self) -> tuple[float, float] | None:
+        """(c, p) if C = K c/(s (s + p)), an integrator behind one lag as printed; else None."""
+        if len(self.num) == 1 and len(self.den) == 3 and self.den[2] == 0.0 <= self.den[1]:
+            return self.num[0], self.den[1]
+        return None
+
+    def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """A realisation of C/K: z' = A z + B f, delta = C z + D f.
+
+        Controllable form, in units of time in which the fastest pole is 1 rad/s: which keeps the
+        digits of fast poles, and of slow ones beside them. As printed, see `lag`, in seconds.
+
+        Returns:
+            A, shape (order, order), B and C, shape (order,), and D.
+        """
+        n = self.order
+        den = np.array(self.den)
+        num = np.zeros(n + 1)
+        num[n + 1 - len(self.num) :] = self.num
+        D = float(num[0])
+        fastest = float(np.abs(self.poles).max(initial=0.0))
+        w = fastest if fastest > 0.0 and self.lag is None else 1.0
+        A, B = np.zeros((n, n)), np.zeros(n)
+        if n:
+            A[np.arange(n - 1), np.arange(1, n)] = w
+            A[n - 1] = 0.0 - (den[1:] / w ** np.arange(n))[::-1]
+            B[n - 1] = 1.0
+        C = ((num[1:] - D * den[1:]) / w ** np.arange(n))[::-1] if n else np.zeros(0)
+        return A, B, C, D
+
+
+def _without_leading_zeros(x: tuple[float, ...]) -> tuple[float, ...]:
+    first = next((i for i, value in enumerate(x) if value), len(x))
+    return x[first:]
+
+
+def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
+    """Coefficients of the polynomial of these roots."""
+    try:
+        x = np.poly(np.array([complex(r) for r in given]))
+    except (TypeError, ValueError):
+        raise ParameterError(f"compensator.{name}", given, "must be numbers") from None
+    if np.iscomplexobj(x):
+        bound = "must hold the conjugate of each complex number"
+        raise ParameterError(f"compensator.{name}", given, bound)
+    return tuple(float(c) for c in np.atleast_1d(x))
+
+
+def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
+    """Coefficients by way of the impulse response: D, C B, C A B, ...
+
+    What is zero there but for rounding is zero, so that no zero far away is left in num.
+    """
+    A, v, row = np.atleast_2d(A), np.ravel(B), np.ravel(C)
+    den, response, size = np.poly(A), [float(np.ravel(D)[0])], np.abs(v)
+    for _ in range(len(A)):
+        x = float(row @ v)
+        response.append(x if abs(x) > CANCELLED * float(np.abs(row) @ size) else 0.0)
+        v, size = A @ v, np.abs(A) @ size
+    return np.convolve(response, den)[: len(den)], den
+
+
+PRINTED = Compensator()
+
+
+def form_numbers(compensator: Compensator) -> list[float]:
+    """A realisation of C/K as plain numbers, filled up with zeros to the highest order.
+
+    Args:
+        compensator: the shape.
+
+    Returns:
+        FORM numbers: A row by row, B, C, D.
+    """
+    n = compensator.order
+    A, B, C, D = compensator.state_space()
+    a, b, c = np.zeros((ORDER, ORDER)), np.zeros(ORDER), np.zeros(ORDER)
+    a[:n, :n], b[:n], c[:n] = A, B, C
+    return [*a.ravel().tolist(), *b.tolist(), *c.tolist(), D]
+
+
+def moving_states(compensator: Compensator, v: float) -> list[float]:
+    """States of a compensator whose output has long moved evenly, and is 0 now.
+
+    Args:
+        compensator: the shape.
+        v: rate of its output [m/s].
+
+    Returns:
+        ORDER numbers.
+
+    Raises:
+        ParameterError: v is not 0, and without an integrator C cannot hold that rate.
+    """
+    n = compensator.order
+    out = [0.0] * ORDER
+    if v == 0.0:
+        return out
+    A, B, C, D = compensator.state_space()
+    # z = z0 + z1 t under a constant force f: A z1 = 0, A z0 + B f = z1, C z1 = v, C z0 + D f = 0
+    m, right = np.zeros((2 * n + 2, 2 * n + 1)), np.zeros(2 * n + 2)
+    m[:n, n : 2 * n], m[n : 2 * n, :n], m[n : 2 * n, n : 2 * n] = A, A, -np.eye(n)
+    m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C
+    m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C, D
+    right[2 * n] = v
+    z = np.linalg.lstsq(m, right, rcond=None)[0]
+    if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9 * abs(v)):
+        bound = "must be 0 with a compensator without an integrator"
+        raise ParameterError("velocity", v, bound)
+    out[:n] = z[:n].tolist()
+    return out
+
+
+def exponential(form, n, i, h, e, at):
+    """State of one axis after a time in which the force is held, z+ = Phi z + Gamma f.
+
+    The series of exp(A h), scaled and squared (Moler, Van Loan, SIAM Review 45, 2003, method 3).
+
+    Args:
+        form: `form_numbers` of both axes.
+        n: highest order of the two.
+        i: axis, 0 for x, 1 for y.
+        h: time [s], >= 0.
+        e: shape (WORK,): gets Phi, row by row, and Gamma; its end is working space.
+        at: where they begin.
+    """
+    a, b, gamma = FORM * i, FORM * i + 16, at + 16
+    size, halvings = 0.0, 0
+    for r in range(n):
+        row = 0.0
+        for c in range(n):
+            row += abs(form[a + 4 * r + c])
+        size = max(size, row * h)
+    while size > 0.5:
+        size, h, halvings = 0.5 * size, 0.5 * h, halvings + 1
+    for c in range(n + 1):  # columns of Phi, then Gamma
+        for r in range(n):
+            first = h * form[b + r] if c == n else 1.0 if r == c else 0.0
+            e[TERM + r] = first
+            e[SUM + r] = first
+        for k in range(1, TERMS):
+            share = h / (k + 1) if c == n else h / k
+            for r in range(n):
+                x = 0.0
+                for j in range(n):
+                    x += form[a + 4 * r + j] * e[TERM + j]
+                e[NEXT + r] = x * share
+            for r in range(n):
+                e[TERM + r] = e[NEXT + r]
+                e[SUM + r] += e[NEXT + r]
+        for r in range(n):
+            e[gamma + r if c == n else at + 4 * r + c] = e[SUM + r]
+    for _ in range(halvings):  # Gamma += Phi Gamma, then Phi = Phi Phi
+        for c in range(n + 1):
+            for r in range(n):
+                x = e[gamma + r] if c == n else 0.0
+                for j in range(n):
+                    x += e[at + 4 * r + j] * e[gamma + j if c == n else at + 4 * j + c]
+                e[NEXT + 4 * r + c if c < n else TERM + r] = x
+        for r in range(n):
+            e[gamma + r] = e[TERM + r]
+            for c in range(n):
+                e[at + 4 * r + c] = e[NEXT + 4 * r + c]
+
+
+def form_kick(form, n, i, before, after, e, out):
+    """Numbers of one axis for a kick, of which delta is wanted at the sample.
+
+    Exact, however fast the poles: delta = row z + feed f at the sample, and z+ = Phi z + Gamma f
+    over the kick. Between equal steps the force is held. Between others, at a border, a start or an
+    end, it is one impulse at the sample, as it is for the handle: a step gives half of its force to
+    either end, so that held over an uneven kick it would come late or early by first order. delta
+    then counts it by the share of the kick behind the sample.
+
+    Args:
+        form: `form_numbers` of both axes.
+        n: highest order of the two.
+        i: axis, 0 for x, 1 for y.
+        before: length of the step before the sample [s].
+        after: length of the step after the sample [s].
+        e: working space, shape (WORK,).
+        out: gets row (4), feed, Phi (16) and Gamma (4) of each axis, shape (2 KICK,).
+    """
+    exponential(form, n, i, 0.5 * before, e, 0)
+    exponential(form, n, i, 0.5 * after, e, 20)
+    b, c, o = FORM * i + 16, FORM * i + 20, KICK * i
+    uneven, H = before != after, 0.5 * (before + after)
+    feed = form[c + 4]
+    for r in range(n):
+        feed += form[c + r] * (0.5 * after * form[b + r] if uneven else e[16 + r])
+        row, gamma = 0.0, 0.0 if uneven else e[36 + r]
+        for j in range(n):
+            row += form[c + j] * e[4 * j + r]
+            gamma += e[20 + 4 * r + j] * (H * form[b + j] if uneven else e[16 + j])
+            x = 0.0
+            for k in range(n):
+                x += e[20 + 4 * r + k] * e[4 * k + j]
+            out[o + 5 + 4 * r + j] = x
+        out[o + r], out[o + 21 + r] = row, gamma
+    out[o + FEED] = feed
+
+
+def form_output(kick, z, i):
+    """Output of the compensator at the sample but for the force of the kick, with K = 1 [m].
+
+    Args:
+        kick: from `form_kick`.
+        z: states of both axes before the kick.
+        i: axis, 0 for x, 1 for y.
+    """
+    o, j = KICK * i, ORDER * i
+    return kick[o] * z[j] + kick[o + 1] * z[j + 1] + kick[o + 2] * z[j + 2] + kick[o + 3] * z[j + 3]
+
+
+def form_advance(kick, z, i, f):
+    """Carries the states of one axis over the kick.
+
+    Args:
+        kick: from `form_kick`.
+        z: states of both axes before the kick; gets those after it.
+        i: axis, 0 for x, 1 for y.
+        f: net force times K [N].
+    """
+    o, j = KICK * i + 5, ORDER * i
+    a, b, c, d = z[j], z[j + 1], z[j + 2], z[j + 3]
+    for r in range(ORDER):
+        x = kick[o] * a + kick[o + 1] * b + kick[o + 2] * c + kick[o + 3] * d
+        z[j + r] = x + kick[KICK * i + 21 + r] * f
+        o += 4
+
+
+def form_stage(s, i, f, weight, h):
+    """One stage of a Runge-Kutta step of one axis: adds its rates, and goes to the next point.
+
+    Args:
+        s: state of the run: form, formed, and form_states, form_point, form_sums.
+        i: axis, 0 for x, 1 for y.
+        f: net force at the stage times K [N].
+        weight: of the stage in the sums.
+        h: time from the start of the step to the next point [s].
+    """
+    form, start, point, sums = s["form"], s["form_states"], s["form_point"], s["form_sums"]
+    a, b, j = FORM * i, FORM * i + 16, ORDER * i
+    z = point[j], point[j + 1], point[j + 2], point[j + 3]
+    for r in range(ORDER):
+        x = form[a] * z[0] + form[a + 1] * z[1] + form[a + 2] * z[2] + form[a + 3] * z[3]
+        x += form[b + r] * f
+        sums[j + r] += weight * x
+        point[j + r] = start[j + r] + h * x
+        a += 4

@@ -1,0 +1,364 @@
+"""Signals as numbers that a loop reads: rows of cosines, and rows of cubics in time.
+
+A piece is a row of PIECE numbers: its start [s], and for x, then y, the coefficients of 1, u, u^2
+and u^3, with u the time since that start [s]. It holds up to the start of the next; the first holds
+before its start as well, the last for ever. A table is what the loops get: a row (number of lines,
+slack [s]), the lines of multisines (omega [rad/s], phases x, y [rad], amplitudes x, y), the pieces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+PIECE = 9
+NO_PIECES = np.zeros((0, PIECE))
+NO_LINES = np.zeros((0, 5))
+# nodes of a cell for `interpolate`, those of Lobatto: the mean of the cubic over a cell is exact to
+# sixth order in its length; and the coefficients of the cubic for values of 1 at one node each
+NODES = np.array([0.0, 0.5 - 0.5 / math.sqrt(5.0), 0.5 + 0.5 / math.sqrt(5.0), 1.0])
+TO_CUBIC = np.linalg.inv(np.vander(NODES, increasing=True))
+TO_CUBIC[0] = 1.0, 0.0, 0.0, 0.0  # to the last bit
+GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(10)  # nodes and weights on [-1, 1]
+PANELS = 2**17  # panels of a quadrature that are worked out at once
+
+
+def mean_of_lines(table, t, h):
+    """Mean of the multisines of a table over [t - h, t + h], line by line.
+
+    Args:
+        table: see above.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y).
+    """
+    x, y = 0.0, 0.0
+    for j in range(1, 1 + int(table[0, 0])):
+        a = table[j, 0] * h
+        share = math.sin(a) / a if a else 1.0
+        x += table[j, 3] * (share * math.cos(table[j, 0] * t + table[j, 1]))
+        y += table[j, 4] * (share * math.cos(table[j, 0] * t + table[j, 2]))
+    return x, y
+
+
+def has_pieces(table):
+    """Whether a table has pieces.
+
+    Args:
+        table: see above.
+    """
+    return len(table) > 1 + int(table[0, 0])
+
+
+def piece_at(table, t):
+    """Row of the piece that holds at a time.
+
+    Args:
+        table: see above, with pieces.
+        t: time [s].
+    """
+    low, high = 1 + int(table[0, 0]), len(table)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle, 0] <= t:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def mean_of_piece(table, j, t, h):
+    """Mean of one cubic over [t - h, t + h].
+
+    Args:
+        table: see above.
+        j: row of the piece.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y).
+    """
+    u, k = t - table[j, 0], h * h
+    x = table[j, 1] + u * (table[j, 2] + u * (table[j, 3] + u * table[j, 4]))
+    y = table[j, 5] + u * (table[j, 6] + u * (table[j, 7] + u * table[j, 8]))
+    x += k * (table[j, 3] / 3.0 + table[j, 4] * u)
+    y += k * (table[j, 7] / 3.0 + table[j, 8] * u)
+    return x, y
+
+
+def value_of_pieces(table, t, near):
+    """Value of the pieces of a table at a time, from one side of it where they jump.
+
+    Args:
+        table: see above, with pieces.
+        t: the time [s].
+        near: a time beside it; the piece that holds there counts [s].
+
+    Returns:
+        (x, y).
+    """
+    return mean_of_piece(table, piece_at(table, near), t, 0.0)
+
+
+def mean_of_pieces(table, t, h):
+    """Mean of the pieces of a table over [t - h, t + h]; for h = 0 the value from t on.
+
+    Args:
+        table: see above, with pieces.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y).
+    """
+    if h == 0.0:
+        return value_of_pieces(table, t, t + table[0, 1])
+    begin, end, n = t - h, t + h, len(table)
+    j = piece_at(table, begin)
+    if j + 1 == n or table[j + 1, 0] >= end:
+        return mean_of_piece(table, j, t, h)
+    x, y = 0.0, 0.0
+    while begin < end:
+        stop = end if j + 1 == n else min(end, table[j + 1, 0])
+        ax, ay = mean_of_piece(table, j, 0.5 * (begin + stop), 0.5 * (stop - begin))
+        share = 0.5 * (stop - begin) / h
+        x += share * ax
+        y += share * ay
+        begin = stop
+        j += 1
+    return x, y
+
+
+def mean_of_table(table, t, h):
+    """Mean of a signal over [t - h, t + h]; for h = 0 the value from t on.
+
+    Args:
+        table: see above.
+        t: centre of the interval [s].
+        h: half its length [s].
+
+    Returns:
+        (x, y).
+    """
+    x, y = mean_of_lines(table, t, h)
+    if has_pieces(table):
+        ax, ay = mean_of_pieces(table, t, h)
+        x += ax
+        y += ay
+    return x, y
+
+
+def value_of_table(table, t, near):
+    """Value of a signal at a time, from one side of it where it jumps.
+
+    Args:
+        table: see above.
+        t: the time [s].
+        near: a time beside it [s].
+
+    Returns:
+        (x, y).
+    """
+    x, y = mean_of_lines(table, t, 0.0)
+    if has_pieces(table):
+        ax, ay = value_of_pieces(table, t, near)
+        x += ax
+        y += ay
+    return x, y
+
+
+def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarray:
+    """The table of a signal.
+
+    Args:
+        lines: of its multisines, shape (m, 5).
+        pieces: shape (n, PIECE).
+        slack: a jump so soon after a time counts as being at it [s].
+    """
+    table = np.zeros((1 + len(lines) + len(pieces), PIECE))
+    table[0, :2] = len(lines), slack
+    table[1 : 1 + len(lines), :5] = lines
+    table[1 + len(lines) :] = pieces
+    return table
+
+
+def value_rows(rows: np.ndarray, t: np.ndarray, h: Any = 0.0) -> np.ndarray:
+    """As `mean_of_piece`, row by row.
+
+    Args:
+        rows: a piece for each time, shape (n, PIECE).
+        t: centres of the intervals [s], shape (n,).
+        h: half their lengths [s], a number or shape (n,).
+
+    Returns:
+        Shape (n, 2).
+    """
+    u, k = t - rows[:, 0], np.square(h)
+    c = rows[:, 1:].reshape(-1, 2, 4).T
+    mean = c[0] + u * (c[1] + u * (c[2] + u * c[3])) + k * (c[2] / 3.0 + c[3] * u)
+    return mean.T
+
+
+def pieces_value(pieces: np.ndarray, t: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """As `value_of_pieces`, at many times.
+
+    Args:
+        pieces: shape (m, PIECE), m > 0.
+        t: times [s], shape (n,).
+        near: times beside them [s], shape (n,).
+
+    Returns:
+        Shape (n, 2).
+    """
+    at = np.searchsorted(pieces[:, 0], near, "right") - 1
+    return value_rows(pieces[np.maximum(at, 0)], t)
+
+
+def pieces_mean(pieces: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """As `mean_of_pieces`, over many intervals; for h = 0 the value from t on, without slack.
+
+    Args:
+        pieces: shape (m, PIECE), m > 0.
+        t: centres of the intervals [s], shape (n,).
+        h: half their lengths [s], shape (n,).
+
+    Returns:
+        Shape (n, 2).
+    """
+    start, begin, end = pieces[:, 0], t - h, t + h
+    first = np.maximum(np.searchsorted(start, begin, "right") - 1, 0)
+    last = np.maximum(np.searchsorted(start, end, "left") - 1, first)
+    out = value_rows(pieces[first], t, h)
+    (across,) = np.nonzero(last > first)
+    if len(across):
+        count = last[across] - first[across] + 1
+        which = np.repeat(np.arange(len(across)), count)
+        j = np.arange(count.sum()) + np.repeat(first[across] - np.cumsum(count) + count, count)
+        low = np.where(j == first[across][which], begin[across][which], start[j])
+        high = np.append(start[1:], math.inf)[j]
+        high = np.minimum(high, end[across][which])
+        mean = value_rows(pieces[j], 0.5 * (low + high), 0.5 * (high - low))
+        share = 0.5 * (high - low) / h[across][which]
+        for i in (0, 1):
+            out[across, i] = np.bincount(which, share * mean[:, i], len(across))
+    return out
+
+
+def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.ndarray:
+    """Pieces of a sum.
+
+    Args:
+        parts: pieces of each of its parts, shape (m, PIECE) each.
+        factors: on each of them.
+
+    Returns:
+        Shape (n, PIECE).
+    """
+    terms = [(x, k) for x, k in zip(parts, factors, strict=True) if len(x)]
+    if not terms:
+        return NO_PIECES
+    start = np.unique(np.concatenate([x[:, 0] for x, _ in terms]))
+    out = np.zeros((len(start), PIECE))
+    out[:, 0] = start
+    for x, factor in terms:
+        rows = x[np.maximum(np.searchsorted(x[:, 0], start, "right") - 1, 0)]
+        u = start - rows[:, 0]
+        for i in (1, 5):  # the cubic, counted from the new start
+            a, b, c, d = factor * rows[:, i : i + 4].T
+            out[:, i] += a + u * (b + u * (c + u * d))
+            out[:, i + 1] += b + u * (2.0 * c + u * (3.0 * d))
+            out[:, i + 2] += c + u * (3.0 * d)
+            out[:, i + 3] += d
+    return out
+
+
+def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
+    """Pieces that are constant or straight.
+
+    Args:
+        start: of each [s], shape (n,).
+        values: at its start, shape (n, 2).
+        slopes: per second, shape (n, 2); None for constant pieces.
+
+    Returns:
+        Shape (n, PIECE).
+    """
+    out = np.zeros((len(start), PIECE))
+    out[:, 0] = start
+    out[:, [1, 5]] = values
+    if slopes is not None:
+        out[:, [2, 6]] = slopes
+    return out
+
+
+def cell_edges(begin: float, end: float, cell: float) -> np.ndarray:
+    """Edges of cells that cover an interval: whole multiples of their length, cut at the end.
+
+    Args:
+        begin: of the interval [s].
+        end: of the interval [s].
+        cell: length of a cell [s].
+
+    Returns:
+        Shape (n,), n > 1.
+    """
+    first = math.floor(begin / cell + 1e-6)
+    last = max(math.ceil(end / cell - 1e-6), first + 1)
+    edges = np.arange(first, last + 1) * cell
+    if end < edges[-1] - 1e-6 * cell and end > edges[-2]:
+        edges[-1] = end
+    return edges
+
+
+def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.ndarray:
+    """Pieces that are cubics through values at the Lobatto nodes of each cell.
+
+    Args:
+        f: value at times [s] of shape (n,), as shape (n, 2).
+        edges: of the cells [s], shape (m + 1,).
+
+    Returns:
+        Shape (m, PIECE).
+    """
+    m, span = len(edges) - 1, np.diff(edges)
+    inner = edges[:-1, None] + span[:, None] * NODES[:3]
+    values = f(np.append(inner.ravel(), edges[-1]))
+    nodes = np.empty((m, 4, 2))
+    nodes[:, :3], nodes[:, 3] = values[:-1].reshape(m, 3, 2), values[3::3]
+    cubic = np.einsum("kj,mji->mik", TO_CUBIC, nodes) / span[:, None, None] ** np.arange(4)
+    return np.column_stack((edges[:-1], cubic.reshape(m, 8)))
+
+
+def integrals(
+    f: Callable[[np.ndarray], np.ndarray], begin: np.ndarray, end: np.ndarray, panels: np.ndarray
+) -> np.ndarray:
+    """Integrals by Gauss's rule of ten nodes a panel.
+
+    Args:
+        f: value at times [s] of shape (m,), as shape (m, 2).
+        begin: of each interval [s], shape (n,).
+        end: of each interval [s], shape (n,).
+        panels: into how many equal parts each is divided, shape (n,).
+
+    Returns:
+        Shape (n, 2).
+    """
+    out = np.zeros((len(begin), 2))
+    for which in np.array_split(np.arange(len(begin)), panels.sum() // PANELS + 1):
+        of = np.repeat(which, panels[which])
+        if not len(of):
+            continue
+        part = np.arange(len(of)) - np.repeat(np.cumsum(panels[which]), panels[which])
+        half = 0.5 * ((end - begin) / panels)[of]
+        middle = end[of] + (2.0 * part + 1.0) * half
+        values = f((middle[:, None] + half[:, None] * GAUSS).ravel()).reshape(len(of), -1, 2)
+        each = half[:, None] * np.einsum("j,mji->mi", WEIGHTS, values)
+        for i in (0, 1):
+            out[:, i] += np.bincount(of, each[:, i], len(begin))
+    return out

@@ -1,0 +1,245 @@
+"""Signals that are measured, or computed by a function of the user's."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from ..errors import ParameterError, choice
+from . import pieces
+from .signals import Signal
+
+Between = Literal["linear", "hold"]
+Outside = Literal["hold", "zero"]
+CSV_COLUMNS = ("t", "fx", "fy")
+
+
+@dataclass(frozen=True)
+class Samples(Signal):
+    """Samples (t, values), in between straight lines or held.
+
+    Attributes:
+        t: times [s], ascending, at least one.
+        values: (x, y) at each of them, -1e6 to 1e6, shape (n, 2).
+        between: "linear" from sample to sample, or "hold" each sample up to the next.
+        outside: before the first and from the last sample on, "hold" that sample, or "zero".
+    """
+
+    t: tuple[float, ...]
+    values: tuple[tuple[float, float], ...]
+    between: Between = "linear"
+    outside: Outside = "hold"
+
+    def __post_init__(self):
+        t, values = (_array(f"samples.{x}", getattr(self, x)) for x in ("t", "values"))
+        if t.ndim != 1 or not len(t):
+            raise ParameterError("samples.t", self.t, "must be a sequence of times")
+        if values.shape != (len(t), 2):
+            bound = f"must be a pair (x, y) for each of the {len(t)} times"
+            raise ParameterError("samples.values", self.values, f"{bound}, has {values.shape}")
+        for name, x, most in (("t", t, 1e9), ("values", values, 1e6)):
+            good = (np.abs(x) <= most).reshape(len(t), -1).all(axis=1)
+            if not good.all():
+                i = int(np.argmin(good))
+                bound = f"must be finite and {most:g} at most"
+                raise ParameterError(f"samples.{name}[{i}]", x[i].tolist(), bound)
+        if (np.diff(t) <= 0.0).any():
+            i = int(np.argmax(np.diff(t) <= 0.0)) + 1
+            bound = f"times must ascend, and the one before is {t[i - 1]:.12g} s"
+            raise ParameterError(f"samples.t[{i}]", float(t[i]), bound)
+        choice("samples.between", self.between, get_args(Between))
+        choice("samples.outside", self.outside, get_args(Outside))
+        object.__setattr__(self, "t", tuple(t.tolist()))
+        object.__setattr__(self, "values", tuple(map(tuple, values.tolist())))
+
+    @classmethod
+    def csv(
+        cls,
+        path: str | os.PathLike[str],
+        columns: Sequence[str] = CSV_COLUMNS,
+        between: Between = "linear",
+        outside: Outside = "hold",
+    ) -> Samples:
+        """Reads samples from a file of comma-separated values.
+
+        The first line names the columns.
+
+        Args:
+            path: the file.
+            columns: names of those with time [s], x and y.
+            between: as the attribute.
+            outside: as the attribute.
+
+        Raises:
+            ParameterError: a column is missing, a cell is no number, or the samples are refused;
+                or the file is no text in UTF-8.
+            OSError: the file cannot be read.
+        """
+        if isinstance(columns, str) or len(columns) != 3:
+            raise ParameterError("columns", columns, "must name three columns: time, x, y")
+        try:
+            rows = csv.reader(Path(path).read_text("utf-8-sig").splitlines(keepends=True))
+            head = [x.strip() for x in next(rows, [])]
+            if not any(head):
+                raise ParameterError("path", str(path), "must begin with a line of column names")
+            where = [head.index(choice("columns", x, head)) for x in columns]
+            numbers = [
+                [
+                    _csv_number(row[i] if i < len(row) else "", head[i], rows.line_num, path)
+                    for i in where
+                ]
+                for row in rows
+                if any(x.strip() for x in row)
+            ]
+        except UnicodeDecodeError:
+            raise ParameterError("path", str(path), "must be text in UTF-8") from None
+        except csv.Error as error:
+            raise ParameterError("path", str(path), f"must be lines of cells ({error})") from None
+        table = np.array(numbers).reshape(-1, 3)
+        if not len(table):
+            raise ParameterError("path", str(path), "must have a line of numbers")
+        return cls(table[:, 0], table[:, 1:], between, outside)  # type: ignore[arg-type]
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        """All pieces; the first is the one before the first sample."""
+        t, values = np.array(self.t), np.array(self.values)
+        slopes = np.zeros_like(values)
+        if self.between == "linear" and len(t) > 1:
+            slopes[:-1] = np.diff(values, axis=0) / np.diff(t)[:, None]
+        before = values[:1]
+        if self.outside == "zero":
+            before = np.zeros((1, 2))
+            values[-1] = 0.0
+        t = np.append(t[0] - 1.0, t)
+        slopes = np.concatenate((np.zeros((1, 2)), slopes))
+        return pieces.straight_pieces(t, np.concatenate((before, values)), slopes)
+
+    def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
+        """As Signal.pieces.
+
+        Args:
+            begin: as there.
+            end: as there.
+            step: as there.
+        """
+        first, last = np.searchsorted(self._rows[:, 0], (begin, end), "right")
+        return self._rows[max(first - 1, 0) : max(last, 1)]
+
+
+def _array(field: str, given: Any) -> np.ndarray:
+    try:
+        return np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(field, given, "must be numbers") from None
+
+
+def _csv_number(text: str, column: str, line: int, path: Any) -> float:
+    """The number in a cell of a file."""
+    try:
+        x = float(text)
+    except ValueError:
+        x = math.nan
+    if not math.isfinite(x):
+        bound = f"must be a finite number (line {line} of {Path(path).name})"
+        raise ParameterError(f"column {column}", text, bound)
+    return x
+
+
+@dataclass(frozen=True)
+class Function(Signal):
+    """Any function of time; it must be smooth, or a run loses order where it is not.
+
+    A run asks it at the ends of each half step and twice in between, each time once, and takes the
+    cubic through the four values. `mean` of the function itself is by ten values.
+
+    Attributes:
+        f: returns (x, y) at a time [s]; it may be asked for many at once, as an array, and then
+            return arrays; a function that does not is asked time by time. It is not asked for
+            times before 0 or after t_max. A signal with a function cannot be written to a file.
+    """
+
+    f: Callable[[Any], Any]
+
+    def __post_init__(self):
+        if not callable(self.f):
+            raise ParameterError("function.f", self.f, "must be a function of time: f(t) = (x, y)")
+
+    def _at(self, t: float) -> tuple[float, float]:
+        """Value at one time."""
+        told = f"f({t:.12g}) must be a pair (x, y) of finite numbers"
+        try:
+            given = self.f(t)
+        except Exception as error:  # noqa: BLE001  # whatever a user's function may raise
+            why = " ".join(f"{type(error).__name__}: {error}".split())
+            raise ParameterError("function.f", self.f, f"{told}, but raised {why}") from error
+        try:
+            x, y = (float(v) for v in given)
+        except (TypeError, ValueError):
+            raise ParameterError("function.f", self.f, f"{told}, not {given!r:.60}") from None
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise ParameterError("function.f", self.f, f"{told}, not ({x}, {y})")
+        return x, y
+
+    def _together(self, t: np.ndarray) -> np.ndarray | None:
+        """Values at many times by one call; None where the function cannot do that."""
+        try:
+            x, y = self.f(t)
+            out = np.column_stack([np.broadcast_to(np.asarray(v, float), t.shape) for v in (x, y)])
+        except Exception:  # noqa: BLE001  # whatever a user's function may raise
+            return None
+        return out if np.isfinite(out).all() else None
+
+    @cached_property
+    def _takes_arrays(self) -> list[bool]:
+        """Whether one call may ask for many times; empty until it is known."""
+        return []
+
+    def _agrees(self, t: np.ndarray, values: np.ndarray) -> bool:
+        """Whether three of the values are those of the function asked time by time."""
+        ask, size = (0, len(t) // 2, len(t) - 1), np.abs(values).max()
+        return all(np.allclose(values[i], self._at(float(t[i])), 1e-6, 1e-6 * size) for i in ask)
+
+    def _values(self, t: np.ndarray) -> np.ndarray:
+        known = self._takes_arrays
+        if known != [False] and len(t) > 2:
+            out = self._together(t)
+            if not known:
+                known.append(out is not None and self._agrees(t, out))
+            if out is not None and known == [True]:
+                return out
+        return np.array([self._at(x) for x in t.tolist()]).reshape(-1, 2)
+
+    def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
+        """As Signal.pieces.
+
+        Args:
+            begin: as there.
+            end: as there.
+            step: as there.
+        """
+        return pieces.interpolate(self._values, pieces.cell_edges(begin, end, 0.5 * step))
+
+    def breaks(self, begin: float, end: float) -> np.ndarray:
+        """None that are known.
+
+        Args:
+            begin: as Signal.breaks.
+            end: as Signal.breaks.
+        """
+        return np.zeros(0)
+
+    def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        if not h.any():
+            return self._values(t)
+        one = np.ones(len(t), dtype=int)
+        wide = pieces.integrals(self._values, t - h, t + h, one)
+        return np.where(h[:, None] > 0.0, wide / np.where(h > 0.0, 2.0 * h, 1.0)[:, None], self(t))

@@ -1,0 +1,199 @@
+"""Scenarios as files, TOML or JSON: plain data of a scenario, or of an experiment and changes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import ParameterError, choice
+from ..files import atomic
+from .experiments import EXPERIMENTS, from_words, parameter_names
+from .fields import merged_values, nested, no_field, plain_data, values_of
+from .scenario import Scenario
+
+SCENARIO_SCHEMA = "hapticclay-scenario-1"
+SCENARIO_FILES = (".toml", ".json")
+
+
+def is_scenario_file(word: str) -> bool:
+    """Whether a word is the name of a scenario file.
+
+    Args:
+        word: the word.
+    """
+    return Path(word).suffix.lower() in SCENARIO_FILES
+
+
+def load_scenario(path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
+    """The scenario of a file.
+
+    Args:
+        path: the file, .toml or .json.
+        *changes: values by dotted name that go before those of the file, the later ones on top.
+
+    Raises:
+        ParameterError: the file cannot be read, or a field was refused.
+    """
+    try:
+        settings = read_settings(path)
+        scenario_of(settings)
+    except ParameterError as error:
+        if error.field != "scenario":
+            error = ParameterError(error.field, error.value, f"{error.bound} (in {Path(path)})")
+        raise error from None
+    return scenario_of(settings, *changes)
+
+
+def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Plain data of a scenario file; the name of the file is that of a scenario without one.
+
+    Args:
+        path: the file, .toml or .json.
+
+    Raises:
+        ParameterError: the file cannot be read, or is neither TOML nor JSON.
+    """
+    file = Path(path)
+    kind = _file_kind(file)
+    try:
+        text = file.read_bytes().decode()
+        data = tomllib.loads(text) if kind == "TOML" else json.loads(text, object_pairs_hook=_table)
+        if not isinstance(data, dict):
+            raise ValueError("it holds no table")
+    except OSError as error:
+        bound = f"must be a file that can be read ({error.strerror})"
+        raise ParameterError("scenario", str(path), bound) from None
+    except (ValueError, RecursionError) as error:
+        fault = " ".join(str(error).split())
+        if isinstance(error, UnicodeDecodeError):
+            fault = f"byte {error.start} is no UTF-8"
+        bound = f"must be {kind}: {fault}"
+        raise ParameterError("scenario", str(path), bound) from None
+    return {"name": file.stem, **data}
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    out = dict(pairs)
+    if len(out) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(n for n in names if names.count(n) > 1)
+        raise ValueError(f"{twice!r} is given twice")
+    return out
+
+
+def _file_kind(file: Path) -> str:
+    if not is_scenario_file(file.name):
+        raise ParameterError("scenario", str(file), "must be a .toml or a .json file")
+    return file.suffix[1:].upper()
+
+
+def scenario_of(settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
+    """The scenario of plain data: its fields; or an experiment, its parameters and other fields.
+
+    Args:
+        settings: from `read_settings`.
+        *changes: values by dotted name, the later ones on top.
+
+    Raises:
+        ParameterError: there is no such field, or a value was refused.
+    """
+    data = nested(settings)
+    choice("schema", data.pop("schema", SCENARIO_SCHEMA), (SCENARIO_SCHEMA,))
+    if "experiment" in data:
+        kind = EXPERIMENTS[choice("experiment", data.pop("experiment"), tuple(EXPERIMENTS))]
+        return from_words(kind, {}, data, *changes)
+    values = values_of(Scenario())
+    for name in data:
+        if name not in values:
+            raise no_field(name, data[name], [*parameter_names(None), "experiment", "schema"])
+    for given in (data, *map(nested, changes)):
+        values = merged_values(Scenario, given, values)
+    return Scenario(**values)
+
+
+def save_scenario(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
+    """Writes the fields of a scenario that differ from the defaults, and its name.
+
+    Args:
+        scenario: the scenario.
+        path: the file, .toml or .json.
+
+    Returns:
+        The file.
+
+    Raises:
+        ParameterError: the file cannot be written, or the scenario holds what is no data.
+    """
+    file, units = Path(path), {}
+    kind = _file_kind(file)
+    data = {"schema": SCENARIO_SCHEMA, "name": scenario.name, **plain_data(scenario, False, units)}
+    text = toml_text(data, units) if kind == "TOML" else json.dumps(data, indent=2) + "\n"
+    try:
+        raw = text.encode()
+    except UnicodeEncodeError:
+        raise ParameterError("name", scenario.name, "must be text that UTF-8 can hold") from None
+    with atomic(file) as f:
+        f.write(raw)
+    return file
+
+
+def toml_text(data: Mapping[str, Any], units: Mapping[str, str] = {}) -> str:
+    """Plain data as TOML, the unit of a number behind it; "none" stands for None.
+
+    Args:
+        data: the data.
+        units: by dotted name.
+    """
+    return "\n".join(_toml_table(data, units)).strip("\n") + "\n"
+
+
+def _toml_table(
+    data: Mapping[str, Any],
+    units: Mapping[str, str],
+    names: tuple[str, ...] = (),
+    key: str = "",
+    row: bool = False,
+) -> list[str]:
+    """Lines of a table, or of a row of an array of tables: its values, then the tables in it."""
+    values = {k: v for k, v in data.items() if not _holds_tables(v)}
+    shown = key and (values or row or not data)
+    lines = ["", f"[[{key}]]" if row else f"[{key}]"] if shown else []
+    for name, value in values.items():
+        unit = units.get(".".join((*names, name)), "")
+        lines.append(f"{_toml_key(name)} = {_toml_value(value)}{f'  # {unit}' if unit else ''}")
+    for name, value in data.items():
+        inner = f"{key}.{_toml_key(name)}" if key else _toml_key(name)
+        if isinstance(value, Mapping):
+            lines += _toml_table(value, units, (*names, name), inner)
+        elif name not in values:
+            for i, table in enumerate(value):
+                lines += _toml_table(table, units, (*names, name, str(i)), inner, True)
+    return lines
+
+
+def _holds_tables(value: Any) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(isinstance(v, Mapping) for v in value)
+    return isinstance(value, Mapping)
+
+
+def _toml_key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _toml_value(name)
+
+
+def _toml_value(value: Any) -> str:
+    if value is None:
+        return '"none"'
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    if isinstance(value, Mapping):
+        inner = (f"{_toml_key(k)} = {_toml_value(v)}" for k, v in value.items())
+        return f"{{{', '.join(inner)}}}"
+    if isinstance(value, str):  # escapes of JSON are those of TOML, but for one character
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value).lower()  # true, false; numbers to the last bit

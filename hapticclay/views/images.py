@@ -1,0 +1,38 @@
+"""Images from disk, for clay that is drawn."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from ..errors import ParameterError
+
+LUMA = (0.299, 0.587, 0.114)  # brightness of red, green and blue (ITU-R BT.601)
+
+
+def gray_image(path: str | os.PathLike[str]) -> np.ndarray:
+    """Reads the brightness of an image, as `Grid.of_image` takes it.
+
+    Args:
+        path: of the file, PNG or any other format that Pillow reads; transparency is ignored.
+
+    Returns:
+        0 (black) to 1 (white), shape (rows, columns), from the top row down.
+
+    Raises:
+        ParameterError: there is no such image.
+    """
+    import imageio.v3 as iio
+
+    try:
+        image = np.asarray(iio.imread(os.fspath(path), plugin="pillow"))
+    except (OSError, ValueError, TypeError) as error:
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise ParameterError("image", str(path), f"must be an image file ({what})") from None
+    if image.dtype.kind not in "ub" or image.ndim not in (2, 3):
+        raise ParameterError("image", str(path), "must hold pixels of whole numbers")
+    gray = image.astype(float) / (np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1.0)
+    if gray.ndim == 3:
+        gray = gray[..., :3] @ np.array(LUMA) if gray.shape[2] >= 3 else gray[..., 0]
+    return np.clip(gray, 0.0, 1.0)

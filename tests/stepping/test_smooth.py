@@ -1,0 +1,215 @@
+"""Clay that changes smoothly with the place, against solutions that are not ours."""
+
+import dataclasses
+import importlib.util
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.errors import ParameterError
+from tests.oracles.cells import cells
+from tests.oracles.hybrid import hybrid
+from tests.oracles.spline import even_spline
+
+FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+NUMBA = importlib.util.find_spec("numba") is not None
+ENGINES = ("python", "native") if NUMBA else ("python",)
+METHODS = {
+    "default": {},
+    "accurate": dict(integrator="accurate", dt=1e-3),
+    "held": dict(control="sampled"),
+    "implicit": dict(control="sampled", render="implicit"),
+    "late": dict(control="sampled", render="implicit", interface=hc.Interface(delay=2e-4)),
+    "hand": dict(operator=hc.Operator(), shaping=True),
+    "muscle": dict(muscle=hc.Multisine(rms=(1.0, 0.5), high=3.0)),
+}
+RANDOM = np.random.default_rng(3)
+SPANS = ((0.02, 0.16), (-0.01, 0.05)), ((0.0, 0.2), (0.0, 0.04))
+VALUES = tuple(np.round(RANDOM.uniform(0.0, 120.0, shape), 1) for shape in ((7, 6), (5, 4)))
+LAWS = tuple(hc.Smooth(*spans, values) for spans, values in zip(SPANS, VALUES, strict=True))
+SPLINES = tuple(even_spline(*spans, values) for spans, values in zip(SPANS, VALUES, strict=True))
+
+
+def path_through(clay, **more):
+    """A slanted path through the clay."""
+    free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), shaping=True, t_max=2.0)
+    return dataclasses.replace(free, **{"clay": clay, "length": None, **more})
+
+
+def exact(s, angle=0.0):
+    th = (s.operator.mass, s.operator.damper, s.operator.spring) if s.operator else (0.0,) * 3
+    return cells(
+        ((), ()), None, s.gain, s.force, [0.5 * s.t_max, s.t_max], th, s.shaping, angle,
+        place=lambda p: [b(p) for b in SPLINES],
+    )  # fmt: skip
+
+
+def same(a, b):
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(a, field), getattr(b, field), err_msg=field)
+    assert a.outcome == b.outcome and a.crossings == b.crossings and a.energy == b.energy
+    assert a.steps == b.steps
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+@pytest.mark.parametrize("hand,shaping", [(None, True), (hc.Operator(0.25, 2.0, 6.0), False)])
+@pytest.mark.parametrize("kind,order,limit", [("fast", 2, 1e-7), ("accurate", 4, 1e-11)])
+def test_the_order_is_kept(kind, order, limit, hand, shaping, angle):
+    s = path_through(hc.Clay(*LAWS, angle), integrator=kind, operator=hand, shaping=shaping)
+    truth, errors, steps = exact(s, angle), [], np.array([4e-3, 2e-3, 1e-3])
+    for dt in steps:
+        r = hc.simulate(dataclasses.replace(s, dt=float(dt)))
+        middle = len(r.t) // 2
+        errors.append(np.abs(r.p[[middle, -1]] - truth.p).max())
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order - 0.3 < slope < order + 0.7, errors
+    assert errors[-1] < limit
+
+
+@pytest.mark.parametrize("render", ["held", "implicit"])
+def test_sampled_control_is_that_of_the_oracle(render):
+    """Second order in the step of the physics, Ts kept."""
+    values, Ts = [[10.0], [100.0], [30.0], [120.0], [60.0]], 4e-3
+    law, b = hc.Smooth((0.0, 0.12), (0.0, 1.0), values), even_spline((0, 0.12), (0, 1), values)
+    s = hc.constant_cut(
+        gain=(1.0, 0.5), force=(2.0, 0.0), t_max=0.4, control="sampled", render=render, dt=Ts, Ts=Ts
+    )
+    s = dataclasses.replace(s, clay=hc.Clay(law, law))
+    P, V, _ = hybrid(lambda x: b((x, 0.0)), Ts, s.gain, s.force, render=render, t_end=0.4, edges=())
+    errors = []
+    for n in (1, 2, 4):
+        r = hc.simulate(dataclasses.replace(s, dt=Ts / n))
+        errors.append(np.abs(r.p[::n][: len(P)] - P).max())
+    order = np.polyfit(np.log([1, 2, 4]), -np.log(errors), 1)[0]
+    assert 1.7 < order < 2.6, errors
+
+
+@pytest.mark.parametrize("render", ["held", "implicit"])
+def test_sampled_control_tends_to_the_continuous(render):
+    """Of first order in Ts."""
+    s = path_through(hc.Clay(*LAWS), control="sampled", render=render)
+    truth, errors = exact(s), []
+    for dt in (4e-4, 2e-4):
+        r = hc.simulate(dataclasses.replace(s, dt=dt))
+        errors.append(np.abs(r.p[-1] - truth.p[-1]).max())
+    assert errors[0] < 1e-5 and errors[1] < 0.6 * errors[0]
+
+
+@pytest.mark.skipif(not NUMBA, reason="needs hapticclay[fast]")
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+@pytest.mark.parametrize("name", METHODS)
+def test_all_engines_make_the_same_run(name, angle):
+    s = path_through(hc.Clay(*LAWS, angle), **METHODS[name])
+    first = hc.simulate(s, engine="python")
+    same(hc.simulate(s, engine="native"), first)
+    for r in hc.simulate_batch([s, s], threads=2):
+        same(r, first)
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_record_holds_the_clay_of_the_place(name, engine):
+    """b by SciPy at the recorded places, to the rounding of values near 100; fe = b v."""
+    r = hc.simulate(path_through(hc.Clay(*LAWS), **METHODS[name]), engine=engine)
+    want = np.array([[b(p) for b in SPLINES] for p in r.p[::7]])
+    np.testing.assert_allclose(r.b[::7], want, rtol=0.0, atol=1e-11)
+    if name != "late":  # there the motors' force, or the handle's, is beside the sample
+        np.testing.assert_allclose(r.fe, r.b * r.v, rtol=1e-14, atol=1e-16)
+    assert np.ptp(r.b[:, 0]) > 20.0
+    assert not r.crossings
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_energy_closes(name, engine):
+    for clay in (hc.Clay(*LAWS), hc.Clay(*LAWS, 0.5)):
+        s = path_through(clay, **METHODS[name], torque_limit=(0.3, 0.15))
+        e = hc.simulate(s, engine=engine).energy
+        # the accurate method integrates the works, to fourth order; a hand is no part of the
+        # balance of a kick but for its order
+        assert abs(e["residual"]) < (1e-6 if name in ("accurate", "hand") else 1e-13)
+        assert e["clay"] > 0.0 or name == "held"  # the work of held clay is the motors'
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_smooth_clay_that_is_constant_is_the_layer(name):
+    """One control point, or many alike; but for the rounding of b."""
+    layer = hc.Profile((), (90.0,))
+    first = hc.simulate(path_through(hc.Clay(layer, layer), **METHODS[name]))
+    for values in ([[90.0]], np.full((4, 5), 90.0)):
+        law = hc.Smooth((0.0, 0.1), (0.0, 0.1), values)
+        for clay in (hc.Clay(law, law), hc.Clay(law, layer), hc.Clay(layer, law)):
+            r = hc.simulate(path_through(clay, **METHODS[name]))
+            np.testing.assert_allclose(r.p, first.p, rtol=0.0, atol=1e-12)
+            np.testing.assert_allclose(r.b, first.b, rtol=1e-15)
+            assert r.outcome == first.outcome
+
+
+def test_beside_clay_of_layers_that_grow_or_are_stiff():
+    """Each axis has its own law; x is crossed by borders of the other."""
+    for other in (
+        hc.Profile((0.01, 0.03), (10.0, 50.0, 20.0), growth=(0.0, 30.0, 10.0)),
+        hc.Profile((0.01, 0.03), (10.0, 1e6, 20.0)),
+    ):
+        s = path_through(hc.Clay(LAWS[0], other))
+        runs = [hc.simulate(s, engine=engine) for engine in ENGINES]
+        same(runs[0], runs[-1])
+        assert [c.border for c in runs[0].crossings] == [0.01, 0.03]
+        want = [SPLINES[0](p) for p in runs[0].p[::7]]
+        np.testing.assert_allclose(runs[0].b[::7, 0], want, rtol=0.0, atol=1e-11)
+        assert abs(runs[0].energy["residual"]) < 1e-13
+
+
+def test_steady_motion_feels_the_clay_of_the_place():
+    """fe/v is b(p), and the speed K f/(10 + K b) where b has long been constant."""
+    law = hc.Smooth.of_function(
+        lambda x, y: 20.0 + 2e3 * min(x, 0.02), (0.0, 0.04), (0.0, 1.0), (21, 1)
+    )
+    s = dataclasses.replace(hc.constant_cut(shaping=True), clay=hc.Clay(law, law))
+    r = hc.simulate(s)
+    assert r.v[-1, 0] == pytest.approx(s.gain[0] * s.force[0] / (10.0 + s.gain[0] * 60.0), rel=1e-6)
+    b = even_spline((0.0, 0.04), (0.0, 1.0), law.values)
+    moving = np.flatnonzero(r.v[:, 0] > 1e-4)[::50]
+    want = [b(p) for p in r.p[moving]]
+    assert min(want) < 25.0 and want[-1] == pytest.approx(60.0, rel=1e-9)
+    np.testing.assert_allclose(r.fe[moving, 0] / r.v[moving, 0], want, rtol=1e-10)
+
+
+def test_stiff_smooth_clay_is_refused_and_the_step_named():
+    soft, stiff = (hc.Smooth((0.0, 0.1), (0.0, 0.1), [[0.0, b]]) for b in (6000.0, 7000.0))
+    s = path_through(hc.Clay(soft, LAWS[0]))
+    with pytest.raises(ParameterError, match="dt = 0.00036: must be at most 0.00031 s in smooth"):
+        path_through(hc.Clay(LAWS[0], stiff))
+    for more in (
+        dict(dt=3e-4),
+        dict(integrator="accurate"),
+        dict(control="sampled"),
+        dict(operator=hc.Operator(mass=1.0)),
+    ):
+        assert path_through(hc.Clay(soft, stiff), **more).clay != s.clay
+    with pytest.raises(ParameterError, match="must be at most"):
+        path_through(hc.Clay(soft, stiff), control="sampled", render="implicit")
+
+
+def test_a_run_goes_on_step_by_step_as_in_one():
+    s = path_through(hc.Clay(*LAWS), t_max=0.3)
+    whole, steps = hc.simulate(s), hc.Simulation(s)
+    while steps.outcome is None:
+        steps.step()
+    np.testing.assert_array_equal(steps.record().p, whole.p)
+
+
+def test_the_loop_of_a_scenario_has_the_control_point_of_the_least_limit():
+    s = path_through(hc.Clay(*LAWS))
+    for i, axis in enumerate("xy"):
+        least = min(VALUES[i].ravel(), key=lambda b: hc.gain_limit(axis, b))
+        assert hc.Loop.of(s, axis).b == least
+
+
+def test_the_monitor_names_the_limit_of_the_clay():
+    law = hc.Smooth((0.05, 0.15), (-0.1, 0.1), np.full((6, 6), 90.0))
+    layer = hc.Profile((), (90.0,))
+    cut = hc.constant_cut(gain=(1.0, 1.0))
+    a, b = (hc.simulate(dataclasses.replace(cut, clay=hc.Clay(x, x))).outcome for x in (law, layer))
+    assert a.code == b.code == "diverged" and a.step == b.step and a.advice == b.advice
