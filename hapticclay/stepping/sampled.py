@@ -193,7 +193,6 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
         bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, _, _,
         H, step, springx, springy, massx, massy, dampx0, dampy0, dampx1, dampy1,
     ) = x  # fmt: skip
-    _, _, I1, I2, _ = s["arm"]
     u1x, u1y, u2x, u2y, px, py, sxx, sxy, syy, det = s["pose"]
     r2 = w1 + w2
     vx = u1x * w1 + u2x * r2
@@ -219,12 +218,13 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
             )
         fx -= springx * px - massx * cx + dampx0 * vx
         fy -= springy * py - massy * cy + dampy0 * vy
-    a1, a2 = (t1 - t2) / I1, t2 / I2
+    links = s["arm"]
+    a1, a2 = (t1 - t2) / links[2], t2 / links[3]
     restx, resty, softx, softy = 0.0, 0.0, 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
         hx, hy = uhx - springx * px, uhy - springy * py
-        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y), s["arm"])
+        hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y), links)
         hx, hy = clay.slow_force(
             hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )

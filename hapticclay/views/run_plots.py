@@ -13,9 +13,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from ..model.arm import PAPER
 from ..model.clay import Clay, Profile, Smooth
 from ..model.compensator import PRINTED
 from ..model.constants import AXES
+from ..model.controller import SERVO
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
@@ -346,6 +348,9 @@ def _scenario_parts(s: Scenario) -> list[str]:
         rates = [g for f in s.clay.laws for g in f.rates.ravel().tolist() if g]
         out += [f"growing {g:g} a second" for g in rates][:1]
         out += [f"turned by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
+    printed = {"arm": PAPER, "servo": SERVO, "compensator": (PRINTED, PRINTED)}
+    own = {"arm": s.arm, "servo": s.servo, "compensator": s.compensators}
+    out += [f"another {name}" for name, part in own.items() if part != printed[name]]
     return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.shaping
 
 

@@ -65,6 +65,10 @@ SCENARIOS = {
     "driven": hc.stability_test(25.0, shaping=True, t_max=3.0),
     "short": hc.constant_cut(t_max=0.1),
     "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+    "other parts": hc.with_fields(
+        hc.constant_cut(**LONG),
+        {"arm.l1": 0.3, "servo.x.S.damping": 50.0, "compensator.den.1": 8.0},
+    ),
 }
 
 
@@ -87,6 +91,15 @@ def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
                 )
                 assert not box.overlaps(key), (name, said)
         assert figure.axes[0].get_title(loc="left").startswith(scenario.name)
+
+
+def test_a_title_names_the_parts_that_are_not_the_papers():
+    record = hc.simulate(SCENARIOS["other parts"])
+    for figure in run_plots.figures(record).values():
+        said = " ".join(figure.axes[0].get_title(loc="left").split())
+        assert "another arm, another servo, another compensator" in said
+    own = run_plots._scenario_parts(SCENARIOS["long"])
+    assert not any("another" in x for x in own)
 
 
 def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
