@@ -184,6 +184,12 @@ class Scenario:
         return each_axis(self.compensator)
 
     @property
+    def mobility(self) -> float:
+        """Largest acceleration of handle and hand per unit of force [1/kg]."""
+        trace = self.arm.links[4]
+        return trace / (1.0 + min(th.mass if th else 0.0 for th in self.operators) * trace)
+
+    @property
     def driven(self) -> bool:
         """Whether the muscle force or the command varies."""
         return any(x is not None and x.varies for x in (self.muscle, self.command))
@@ -242,9 +248,7 @@ class Scenario:
         held = self.control == "sampled" and self.render == "held"
         if held or self.integrator == "accurate":
             return math.inf
-        trace = self.arm.links[4]
-        mobility = trace / (1.0 + min(th.mass if th else 0.0 for th in self.operators) * trace)
-        return 2.0 / (self.dt * mobility)
+        return 2.0 / (self.dt * self.mobility)
 
     def _check_smooth_clay(self) -> None:
         """Refuses smooth clay that is stiff, which the steps would have to land on."""

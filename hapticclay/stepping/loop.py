@@ -84,10 +84,8 @@ def step_inputs(s, b0, b1, uh, before, after):
     """
     span = before + after
     L = before / span
-    handx, handy, trace = s["handx"], s["handy"], s["arm"][4]
-    W = trace / (1.0 + min(handx[0], handy[0]) * trace)
     bx0, bx1, by0, by1, stiff, sharex, sharey, softx, softy = clay.split_damping(
-        b0, b1, 0.5 * span, L, after / span, W, handx[1], handy[1]
+        b0, b1, 0.5 * span, L, after / span, s["mobility"], s["handx"][1], s["handy"][1]
     )
     uhx, uhy = uh
     return bx0, bx1, by0, by1, L, uhx, uhy, stiff, sharex, sharey, softx, softy

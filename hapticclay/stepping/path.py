@@ -44,6 +44,7 @@ SCENARIO = [  # in numbers, see model.scenario
     ("handx", "f8", 3),  # mass, damper, spring of the operator's arm; zeros for Th = 0
     ("handy", "f8", 3),
     ("held", "i8"),  # whether there is an operator's arm
+    ("mobility", "f8"),  # largest acceleration of both per unit of force [1/kg]
     ("shaping", "i8"),
     ("dampers", "i8"),  # whether there is clay
     ("turned_clay", "i8"),  # whether its axes are not x and y

@@ -309,6 +309,7 @@ class Run:
         names = "gain", "origin", "torque_limit"
         self._put(force=_steady_force(s), **{x: getattr(s, x) for x in names})
         self._put(handx=(x.mass, x.damper, x.spring), handy=(y.mass, y.damper, y.spring))
+        now["mobility"] = s.mobility
         self._put(arm=s.arm.links, servox=s.servo[0].numbers, servoy=s.servo[1].numbers)
         self._tell_compensator(s.compensators)
         now["held"], now["shaping"] = int(any(s.operators)), int(s.shaping)
