@@ -78,6 +78,7 @@ class Simulation:
         self._wall = 0.0
         self._state: Sample | None = None
         self._torque: tuple[float, float] | None = None
+        self._record: record.Record | None = None
 
     def __enter__(self) -> Simulation:
         return self
@@ -88,6 +89,8 @@ class Simulation:
     def close(self) -> None:
         """Gives the engine back, after which no step can be made."""
         if self._store is not None:
+            if self._run.filled or self._run.looked:
+                self.record()  # while rows and state are this run's
             self._store.__exit__(None, None, None)
             self._store = None
 
@@ -110,9 +113,11 @@ class Simulation:
         """
         if self._state is None:
             if self._run.outcome is None:
+                if self._store is None:
+                    raise RuntimeError("the simulation is closed")
                 found = {"t": np.array([self._run.i * self.scenario.dt]), **self._run.ahead()}
             else:
-                found = self._run.arrays()
+                found = {name: getattr(self.record(), name) for name in Sample._fields}
             last = {name: x[-1] for name, x in found.items()}
             self._state = Sample(**last)
         return self._state
@@ -161,11 +166,14 @@ class Simulation:
         Raises:
             RuntimeError: no step has been made.
         """
+        if self._record is not None:
+            return self._record
         if self._run.outcome is None:
             if not (self._run.filled or self._run.looked):
                 raise RuntimeError("no step has been made")
             self._run.interrupt()
-        return record.Record.of(self._run, self._wall)
+        self._record = record.Record.of(self._run, self._wall)
+        return self._record
 
     def _drive(self, torque: tuple[float, ...]) -> None:
         if self._torque is None:

@@ -104,6 +104,25 @@ def test_engines_are_given_back_and_runs_side_by_side_do_not_meet():
         a.step()
 
 
+def test_a_closed_run_keeps_its_record_while_its_engine_runs_another():
+    def halves(n):
+        with hc.Simulation(CUT) as sim:
+            for _ in range(n):
+                sim.step()
+        return sim
+
+    want = halves(300).record()
+    sim = halves(300)
+    halves(500)  # in the same engine, rows and state
+    got = sim.record()
+    assert np.array_equal(want.p, got.p) and want.energy == got.energy and want.steps == got.steps
+    assert np.array_equal(sim.state.p, want.p[-1]) and got.outcome == want.outcome
+    with hc.Simulation(CUT) as unused:
+        pass
+    with pytest.raises(RuntimeError, match="closed"):
+        _ = unused.state
+
+
 @pytest.mark.parametrize(
     "do,field",
     [
