@@ -14,7 +14,7 @@ import numpy as np
 
 from ..model import arm, clay, compensator, controller, regions
 from . import energy, loop, path
-from .path import INF, OPEN, TOUCH, put6, put12, put33
+from .path import INF, TOUCH, put6, put12, put33
 
 FIRST_OF_HIT = 0.02  # first step of a hit that saturates the motors, in decay times of the speed
 HIT_GROWTH = 1.01  # of each step of it over the one before
@@ -650,12 +650,9 @@ class Leapfrog(NamedTuple):
     order: int = 2
 
     def glide(self, s, e, room):
-        t, i, dt, base, rate, old = s["t"], s["i"], s["dt"], s["base"], s["rate"], s["old"]
+        i, dt = s["i"], s["dt"]
         n = min(s["last"] - i, room - s["filled"])
-        if n < 1 or s["before"] != dt or t != i * dt or s["closing"] != OPEN or s["struck"]:
-            return 0
-        same = old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
-        if not same or s["fine"] < INF:
+        if n < 1 or not path.may_glide(s) or s["fine"] < INF:
             return 0
         if s["first"] >= 0:
             n = min(n, s["first"] + len(e.ahead) - i, VARIED_BLOCK)

@@ -481,6 +481,18 @@ def settle(s, table):
         feel_place(s, table)
 
 
+def may_glide(s):
+    """Whether whole steps within one region of the clay may follow in a method that leaps.
+
+    Args:
+        s: state of the run.
+    """
+    dt, base, rate, old = s["dt"], s["base"], s["rate"], s["old"]
+    if s["before"] != dt or s["t"] != s["i"] * dt or s["closing"] != OPEN or s["struck"]:
+        return False
+    return old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
+
+
 def feel_place(s, table):
     """Takes the clay of the place of the handle, where it is smooth: that before and after it too.
 

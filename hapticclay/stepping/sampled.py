@@ -19,7 +19,7 @@ from ..model.compensator import Compensator
 from ..model.controller import Servo
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
 from . import energy, loop, path
-from .path import INF, OPEN, TOUCH, put4, put6, put8, put10, put14, put22
+from .path import INF, TOUCH, put4, put6, put8, put10, put14, put22
 from .run import CHUNK, Run
 
 SLACK = 1e-9  # of dt: events so close are one
@@ -1069,12 +1069,9 @@ class Sampled(NamedTuple):
     order: int = 2
 
     def glide(self, s, e, room):
-        i, dt, base, rate, old = s["i"], s["dt"], s["base"], s["rate"], s["old"]
+        i, dt, rate = s["i"], s["dt"], s["rate"]
         n, row = min(s["last"] - i, room - s["filled"]), -1
-        if n < 1 or s["before"] != dt or s["t"] != i * dt or s["closing"] != OPEN or s["struck"]:
-            return 0
-        same = old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
-        if not same:
+        if n < 1 or not path.may_glide(s):
             return 0
         if s["first"] >= 0:
             row = i - s["first"]
