@@ -7,6 +7,7 @@ from .model.clay import Clay as Clay
 from .model.clay import Grid as Grid
 from .model.clay import Profile as Profile
 from .model.clay import Smooth as Smooth
+from .model.clay import slab as slab
 from .model.compensator import Compensator as Compensator
 from .model.constants import SecondOrder as SecondOrder
 from .model.controller import Servo as Servo
@@ -18,8 +19,13 @@ from .model.experiments import free as free
 from .model.experiments import stability_test as stability_test
 from .model.experiments import variable_cut as variable_cut
 from .model.fields import with_fields as with_fields
+from .model.flow import Flow as Flow
+from .model.groove import Groove as Groove
 from .model.hardware import Coupling as Coupling
 from .model.hardware import Interface as Interface
+from .model.materials import MATERIALS as MATERIALS
+from .model.materials import Material as Material
+from .model.materials import material as material
 from .model.operator import Operator as Operator
 from .model.sampled_controller import Controller as Controller
 from .model.samples import Function as Function
@@ -33,6 +39,8 @@ from .model.shapes import Step as Step
 from .model.signals import Multisine as Multisine
 from .model.signals import Signal as Signal
 from .model.signals import Sum as Sum
+from .model.spring import Spring as Spring
+from .model.tool import Tool as Tool
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record
@@ -45,6 +53,8 @@ from .simulation.stepwise import Simulation as Simulation
 from .stepping.engine import build as build
 from .stepping.monitor import Outcome as Outcome
 from .stepping.run import Crossing as Crossing
+from .studies.fitting import Fitted as Fitted
+from .studies.fitting import fit_flow as fit_flow
 from .studies.identification import Identified as Identified
 from .studies.identification import Noise as Noise
 from .studies.identification import identify as identify
@@ -53,6 +63,11 @@ from .studies.measurement import identify_data as identify_data
 from .studies.removal import removed as removed
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map
+from .theory.describing import LimitCycle as LimitCycle
+from .theory.describing import describing_function as describing_function
+from .theory.describing import limit_cycles as limit_cycles
+from .theory.describing import push_outcomes as push_outcomes
+from .theory.describing import unstable_dampings as unstable_dampings
 from .theory.design import Design as Design
 from .theory.design import compare as compare
 from .theory.design import design_gain as design_gain
@@ -73,6 +88,8 @@ from .theory.margins import transparency as transparency
 from .theory.margins import worst_case as worst_case
 from .theory.passivity import clay_passivity as clay_passivity
 from .theory.passivity import passivity as passivity
+from .theory.relay_cycle import ExactCycle as ExactCycle
+from .theory.relay_cycle import exact_cycles as exact_cycles
 from .views.images import gray_image as gray_image
 
 __version__: str

@@ -362,7 +362,8 @@ def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
 def _is_pair(hint: Any) -> bool:
     """Whether a type is a pair of parts, one an axis."""
     kinds = get_args(hint)
-    return get_origin(hint) is tuple and len(kinds) == 2 and _part_of(kinds[0]) is not None
+    two = get_origin(hint) is tuple and len(kinds) == 2 and kinds[1] is not ...
+    return two and _part_of(kinds[0]) is not None
 
 
 def _part_of(hint: Any) -> Any:
@@ -391,9 +392,11 @@ def _check_each_axis(pair_hint: Any, single: list[Any], bound: Bound) -> Check:
 
 
 def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
-    """As many floats as the bound names, or any number of them, or any number of rows of them."""
+    """As many floats as the bound names, or any number of them, of rows of them, or of parts."""
     if get_origin(kinds[0]) is tuple:
         return lambda field, value, part: table_of(field, value, **_bound_limits(bound, part))
+    if _part_of(kinds[0]) is not None:
+        return _check_parts(kinds[0])
 
     def check(field: str, value: Any, part: Any) -> Any:
         names: Sequence[str] = bound.names
@@ -402,6 +405,20 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
                 raise ParameterError(field, value, "must be a sequence of numbers")
             names = [str(i) for i in range(len(value))]
         return numbers_of(field, value, names, **_bound_limits(bound, part))
+
+    return check
+
+
+def _check_parts(kind: type) -> Check:
+    """Any number of parts of one class."""
+
+    def check(field: str, value: Any, part: Any) -> Any:
+        if not isinstance(value, tuple | list):
+            raise ParameterError(field, value, f"must be a sequence of {kind.__name__}")
+        for i, x in enumerate(value):
+            if not isinstance(x, kind):
+                raise ParameterError(f"{field}[{i}]", x, f"must be a {kind.__name__}")
+        return tuple(value)
 
     return check
 

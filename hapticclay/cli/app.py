@@ -32,8 +32,10 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
+    "fit": "hapticclay.cli.fit:FitCommand",
     "bench": "hapticclay.cli.bench:BenchCommand",
     "fields": "hapticclay.cli.fields:FieldsCommand",
+    "materials": "hapticclay.cli.materials:MaterialsCommand",
     "view": "hapticclay.cli.view:ViewCommand",
     "video": "hapticclay.cli.video:VideoCommand",
     "version": "hapticclay.cli.app:VersionCommand",
@@ -250,7 +252,7 @@ def _hints(kind: type) -> dict[str, Any]:
 
 
 def _option_names(known: dict[str, Any]) -> list[str]:
-    names = [n for n in known if n not in ("scenario", "spec")]  # these two are words
+    names = [n for n in known if n not in ("scenario", "spec", "data")]  # these are words
     return names + [f"no-{n}" for n in names if known[n] is bool]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -91,10 +91,10 @@ class IdentifyCommand:
                 raise ParameterError(name, value, bound)
 
     def _measured(self, file: Path) -> int:
-        from ..studies.measurement import Measurement, identify_data
+        from ..studies.measurement import COLUMNS, Measurement, identify_data
 
         writable(self.out)
-        data = Measurement.load(file, column_names(self.columns))
+        data = Measurement.load(file, column_names(self.columns, COLUMNS))
         axis = "x" if self.axis == "both" else self.axis
         result = identify_data(data, self.what or "G", axis, band=self.band, held=self.held)
         try:
@@ -151,24 +151,27 @@ class IdentifyCommand:
         console.save_figures(figures, self.out)
 
 
-def column_names(words: Sequence[str]) -> dict[str, str]:
+def column_names(
+    words: Sequence[str],
+    columns: Collection[str],
+    example: str = "t=time input=cmd output=pos",
+) -> dict[str, str]:
     """Names of columns from words such as "input=cmd".
 
     Args:
         words: of the command line.
+        columns: what there may be.
+        example: of such words.
 
     Raises:
         ParameterError: a word has another form, or a column stands twice.
     """
-    from ..studies.measurement import COLUMNS
-
     out: dict[str, str] = {}
     for word in words:
         key, _, name = word.partition("=")
         if not name:
-            bound = "must be words such as t=time input=cmd output=pos"
-            raise ParameterError("columns", word, bound)
-        if choice("columns", key, tuple(COLUMNS)) in out:
+            raise ParameterError("columns", word, f"must be words such as {example}")
+        if choice("columns", key, tuple(columns)) in out:
             raise ParameterError("columns", word, f"must give {key} once")
         out[key] = name
     return out

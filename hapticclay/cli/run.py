@@ -122,8 +122,13 @@ def run_table(record: Record) -> str:
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
     head = ("path\n[cm]", "b\n[N.s/m]", "fe/v\n[N.s/m]", "fh/v\n[N.s/m]", "steady v\n[m/s]",
             "expected v\n[m/s]")  # fmt: skip
-    rows = [_table_row(way, r) for way, r in pieces[:MOST_ROWS]]
-    lines = [console.text_table(rows, head, "rrrrrr"), ""]
+    row = _table_row
+    if s.clay and s.clay.yields:
+        head = ("path\n[cm]", "Fy\n[N]", "K\n[N/(m/s)^n]", "n", "b\n[N.s/m]", "steady fe\n[N]",
+                "held\n[% of time]", "steady v\n[m/s]", "expected v\n[m/s]")  # fmt: skip
+        row = _yielding_row
+    rows = [row(way, r) for way, r in pieces[:MOST_ROWS]]
+    lines = [console.text_table(rows, head, "r" * len(head)), ""]
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     for c in record.crossings[:MOST_ROWS]:
@@ -131,11 +136,19 @@ def run_table(record: Record) -> str:
         lines.append(f"{at} crossed at {c.time:.6f} s with {console.fixed(c.speed, 6)} m/s")
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
+    told = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
+    for x in told:
+        until = "to the end" if x.end is None else f"to {x.end:.6f} s"
+        lines.append(f"{' and '.join(x.axis)} held still from {x.start:.6f} s {until}")
+    if len(record.stops) > len(told):
+        lines.append(f"... and {len(record.stops) - len(told)} more stops")
     if isinstance(s.muscle, Multisine) and len(record.t) >= 32:  # the fewest for irregularity()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
+    elif _chatters(s, [r for _, r in pieces]):
+        lines.append("advice: --render implicit; clay that motors render cannot hold the handle")
     if record.error is not None:
         lines.append(f"error: {record.error}")
         if record.error.note:
@@ -145,10 +158,35 @@ def run_table(record: Record) -> str:
     return "\n".join(lines)
 
 
+def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:
+    """Whether clay that should hold the handle is rendered by the motors from the velocity."""
+    rendered = s.control == "sampled" and s.render == "held"
+    if not rendered or (s.interface and (s.interface.coupling or s.interface.passivity)):
+        return False
+    return any(r.get("Fy") and r["expected_speed"] == 0.0 for r in stretches)
+
+
+def _stretch(way: str, r: dict[str, Any]) -> str:
+    return f"{way}: {console.fixed(100 * r['from_m'], 2)} - {console.fixed(100 * r['to_m'], 2)}"
+
+
+def _yielding_row(way: str, r: dict[str, Any]) -> list[str]:
+    grows = r["b"] != r["b_end"]
+    return [
+        _stretch(way, r),
+        *(f"{r[name]:.4g}" if name in r else "-" for name in ("Fy", "K", "n")),
+        f"{r['b']:.4g} - {r['b_end']:.4g}" if grows else f"{r['b']:.4g}",
+        "-" if r["steady_fe"] is None else f"{r['steady_fe']:.5g}",
+        f"{100 * r['held']:.1f}",
+        console.fixed(r["steady_speed"], 6),
+        console.fixed(r["expected_speed"], 6),
+    ]
+
+
 def _table_row(way: str, r: dict[str, Any]) -> list[str]:
     fe, fh, grows = r["fe_over_v"], r["steady_fh_over_v"], r["b"] != r["b_end"]
     return [
-        f"{way}: {console.fixed(100 * r['from_m'], 2)} - {console.fixed(100 * r['to_m'], 2)}",
+        _stretch(way, r),
         f"{r['b']:.4g} - {r['b_end']:.4g}" if grows else f"{r['b']:g}",
         f"{fe['mean']:.5g}" if fe and not grows else "-",
         f"{fh['mean']:.5g}" if fh else "-",

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..errors import ParameterError, choice
 from ..files import versions, writable
 from ..model.constants import AXES, B_CONSTANT, C_DEN, C_NUM, GAIN, TS, SecondOrder
 from . import console
 
 if TYPE_CHECKING:
     from ..model.controller import Servo
+    from ..model.flow import Flow
     from ..studies.boundary import PushedLoop
     from ..studies.stability_map import StabilityMap
+    from ..studies.yield_map import YieldMap
     from ..theory.margins import Verdict
 
 VERDICTS_SCHEMA = "hapticclay-stability-1"
@@ -24,6 +28,10 @@ VERDICTS_UNITS = {
     "Ts": "s",
     "delay": "s",
     "omega": "rad/s",
+    "speed": "m/s",
+    "amplitude": "m",
+    "damping": "N.s/m",
+    "flow": "N, N/(m/s)^n, 1, N.s/m",
 }
 ONE_HZ = 2.0 * math.pi  # [rad/s]
 
@@ -34,7 +42,7 @@ class StabilityCommand:
 
     Attributes:
         axis: Axis of the loop.
-        b: Damping of the clay [N.s/m].
+        b: Damping of the clay [N.s/m]; by default 90, and 0 beside --clay Fy=5.
         gain: K of the compensator; by default 1 on x and 0.5 on y.
         Ts: Control sample [s]; None for runs in continuous time.
         delay: From a measurement to the torque computed from it [s].
@@ -45,13 +53,16 @@ class StabilityCommand:
             it is that of the arm.
         impedance: Put the operator's arm Th (Eq. 19) in the loop.
         shaping: Let the servo of the runs shape the inertia, so that Sh holds at every pose.
-        map: Plane of the map: a boundary in K or b over clay, delay or pose.
+        clay: Clay that yields, Fy=5 K=2 n=0.5 beside b, or a material, "stiff clay": predict what
+            sticks, and limit cycles.
+        map: Plane of the map: a boundary in K or b over clay, delay or pose; or what a push ends
+            in, over yield force and gain, in Bingham clay of this b.
         out: Folder for stability.json and the map.
         quick: Draw a coarse map.
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float = B_CONSTANT
+    b: float | None = None
     gain: float | None = None
     Ts: float | None = TS
     delay: float = 0.0
@@ -61,7 +72,8 @@ class StabilityCommand:
     S: tuple[float, float, float] | None = None
     impedance: bool = True
     shaping: bool = False
-    map: Literal["none", "gain-damping", "delay-damping", "gain-pose"] = "none"
+    clay: tuple[str, ...] | None = None
+    map: Literal["none", "gain-damping", "delay-damping", "gain-pose", "gain-yield"] = "none"
     out: Path = Path("out/stability")
     quick: bool = False
 
@@ -71,10 +83,11 @@ class StabilityCommand:
         from ..studies.boundary import PushedLoop
 
         writable(self.out)
-        i = AXES.index(self.axis)
+        i, b = AXES.index(self.axis), B_CONSTANT if self.b is None else self.b
+        flow = None if self.clay is None else clay_of(self.clay, self.b)
         loop = PushedLoop(
             self.axis,
-            b=self.b,
+            b=flow.b if flow else b,
             K=GAIN[i] if self.gain is None else self.gain,
             operator=Operator() if self.impedance else None,
             servo=self._servo(i),
@@ -84,7 +97,12 @@ class StabilityCommand:
             shaping=self.shaping,
         )
         rows = verdicts(loop, self.delay)
+        if flow:
+            print(linear_heading(flow))
         print(verdict_table(rows))
+        clay = flow and clay_predictions(loop, flow)
+        if clay:
+            print(clay_table(clay))
         operator = loop.operator and asdict(loop.operator)
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": operator, "Ts": self.Ts,
                  "compensator": asdict(loop.compensator), "servo": asdict(loop.servo),
@@ -92,7 +110,7 @@ class StabilityCommand:
                  "quick": self.quick}  # fmt: skip
         chart = self._map(loop)
         found = {"schema": VERDICTS_SCHEMA, "asked": asked, "units": VERDICTS_UNITS,
-                 "verdicts": rows, "map": chart and asdict(chart),
+                 "verdicts": rows, "clay": clay, "map": chart and asdict(chart),
                  "versions": versions()}  # fmt: skip
         console.save_json(found, self.out / "stability.json")
         print(f"written to {self.out}")
@@ -108,9 +126,11 @@ class StabilityCommand:
             S=SecondOrder(*self.S) if self.S else printed.S,
         )
 
-    def _map(self, loop: PushedLoop) -> StabilityMap | None:
+    def _map(self, loop: PushedLoop) -> StabilityMap | YieldMap | None:
         if self.map == "none":
             return None
+        if self.map == "gain-yield":
+            return self._yield_map(loop)
         from ..studies.stability_map import stability_map
         from ..views import study_plots
 
@@ -122,6 +142,155 @@ class StabilityCommand:
         console.save_figures({chart.kind: study_plots.stability_map_plot(chart)}, self.out)
         print(disagreements(chart))
         return chart
+
+    def _yield_map(self, loop: PushedLoop) -> YieldMap:
+        from ..studies.yield_map import yield_map
+        from ..views import study_plots
+
+        chart = yield_map(loop, self.quick, lambda gains: console.progress_bar(gains, desc="map"))
+        console.save_figures({self.map: study_plots.yield_map_plot(chart)}, self.out)
+        print(yield_differences(chart))
+        return chart
+
+
+def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
+    """The law of clay that is given by its numbers, or by the name of a material.
+
+    Args:
+        words: NAME=NUMBER each, one text or several, of Fy, K, n, and b; or a name of `material`.
+        b: damping where words name none [N.s/m]; None for 0, or for that of a material.
+
+    Raises:
+        ParameterError: no words, an unknown name, one given twice, n without K, b beside a
+            material, no number, or one out of its bounds.
+    """
+    from ..model.flow import Flow
+    from ..model.materials import material
+
+    text = " ".join(words)
+    if not text.strip():
+        bound = "must be numbers with their names, Fy=5 b=30, or a material"
+        raise ParameterError("clay", text, bound)
+    if "=" not in text:
+        if b is not None:
+            raise ParameterError("b", b, f"must not be given beside {text!r}, which has its own")
+        return material(text)
+    found = {} if b is None else {"b": b}
+    for word in text.split():
+        name, equals, value = word.partition("=")
+        if not equals:
+            raise ParameterError("clay", word, "must be numbers with their names: Fy=5 K=2 n=0.5")
+        if choice("clay", name, ("Fy", "K", "n", "b")) in found:
+            raise ParameterError(f"clay {name}", value, "must be given once, here or as --b")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise ParameterError(f"clay {name}", value, "must be a number") from None
+    if "n" in found and not found.get("K"):
+        raise ParameterError("clay n", found["n"], "must be given beside K > 0, whose power it is")
+    return Flow(**found)
+
+
+def clay_predictions(loop: PushedLoop, flow: Flow) -> dict[str, Any]:
+    """What theory says of a loop in clay that yields, in continuous time.
+
+    Args:
+        loop: the loop.
+        flow: the law of the clay.
+
+    Returns:
+        The law; bands of b in which the loop is unstable; what becomes of a small and of a large
+        push; the cycles by the describing function and, in Coulomb and Bingham clay, the exact ones
+        (None in another).
+    """
+    from ..theory import describing, relay_cycle
+    from ..theory.linear_loop import TIMING
+
+    linear = replace(loop.linear, **TIMING)
+    small, large = describing.push_outcomes(linear, flow=flow)
+    cycles = describing.limit_cycles(linear, flow=flow)
+    exact = None
+    if flow.Fy and (not flow.K or flow.n == 1.0):
+        exact = [asdict(x) for x in relay_cycle.exact_cycles(linear, flow=flow)]
+    return {
+        "flow": asdict(flow),
+        "kind": flow.kind,
+        "unstable_b": describing.unstable_dampings(linear),
+        "small_push": small,
+        "large_push": large,
+        "predicted": [
+            {**asdict(x), "amplitude": x.amplitude, "trusted": x.trusted} for x in cycles
+        ],
+        "exact": exact,
+    }
+
+
+def linear_heading(flow: Flow) -> str:
+    """Says of which clay the verdicts of the linear loop are.
+
+    Args:
+        flow: the law of the clay.
+    """
+    parts = [name for name, x in (("yield force", flow.Fy), ("consistency", flow.K)) if x]
+    left_out = f" ({' and '.join(parts)} left out)" if parts else ""
+    return f"Linear loop in clay of b = {flow.b:g} N.s/m alone{left_out}"
+
+
+def clay_table(clay: dict[str, Any]) -> str:
+    """The predictions, for a terminal.
+
+    Args:
+        clay: from `clay_predictions`.
+    """
+    number = console.significant
+    bands = ", ".join(
+        f"{low:.4g} to {'any' if high == math.inf else f'{high:.4g}'}"
+        for low, high in clay["unstable_b"]
+    )
+    flow = {k: v for k, v in clay["flow"].items() if v and (k != "n" or clay["flow"]["K"])}
+    law = "".join(f", {name} = {value:g}" for name, value in flow.items())
+    unstable = f"unstable at a damping of {bands} N.s/m" if bands else "stable at any damping"
+    lines = [
+        "",
+        f"{clay['kind']} clay{law}; in continuous time without delay:",
+        f"the linear loop is {unstable}",
+        f"by the describing function a small push: {clay['small_push']}, "
+        f"a large one: {clay['large_push']}",
+    ]
+
+    def row(name: str, x: dict[str, Any], third: str, trusted: str) -> list[str]:
+        size = [number(1e3 * x["speed"]), number(1e3 * x["amplitude"])]
+        return [name, *size, number(x["omega"] / ONE_HZ), third, trusted]
+
+    cells = []
+    for x in clay["predicted"]:
+        trusted = "yes" if x["trusted"] else f"no, off by {100.0 * x['speed_shift']:+.0f} %"
+        cells.append(row(f"{x['kind']}, predicted", x, f"{100.0 * x['third']:.2g} %", trusted))
+    for x in clay["exact"] or ():
+        name = "limit cycle" if x["multiplier"] < 1.0 else "threshold"
+        stuck = f" ({100.0 * x['stuck']:.0f} % stuck)" if x["stuck"] else ""
+        cells.append(row(f"{name}, exact{stuck}", x, "", ""))
+    if cells:
+        head = ["", "mm/s", "mm", "Hz", "3rd", "to be trusted"]
+        lines.append(console.text_table(cells, head, "llllll"))
+    return "\n".join(lines)
+
+
+def yield_differences(chart: YieldMap) -> str:
+    """How the runs of a map of yield force and gain compare with theory.
+
+    Args:
+        chart: the map.
+    """
+    wrong = [c for c in chart.cells if c.simulated != c.expected]
+    gaps = [abs(c.speed / c.exact - 1.0) for c in chart.cells if c.exact > 0.0 and c.speed > 0.0]
+    lines = [f"{len(wrong)} of {len(chart.cells)} runs end otherwise than theory says"]
+    if gaps:
+        lines.append(f"largest speed of the cycles: within {100.0 * max(gaps):.2g} % of the exact")
+    if wrong:
+        cells = [[f"{c.Fy:.4g}", f"{c.K:.4g}", c.expected, c.simulated] for c in wrong]
+        lines.append(console.text_table(cells, ["Fy [N]", "K", "theory", "run"], "llll"))
+    return "\n".join(lines)
 
 
 def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:

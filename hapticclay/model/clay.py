@@ -12,6 +12,9 @@ import numpy as np
 
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
 from .constants import AXES, B_MAX
+from .flow import Consistency, Flow, FlowIndex, YieldForce
+from .groove import Groove
+from .spring import Spring
 
 
 def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # plain numbers
@@ -147,19 +150,34 @@ def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"
     return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
 
 
-def slab(b: float, start: float, end: float) -> Clay:
-    """A slab across the x axis that damps both axes alike (the constant cut, Sec. 4.1).
+def slab(resists: float | Flow, start: float | None = None, end: float | None = None) -> Clay:
+    """A slab across the x axis that resists motion along both axes alike (Sec. 4.1).
 
     Args:
-        b: damping [N.s/m].
-        start: lower border on x [m].
-        end: upper border on x [m].
+        resists: damping [N.s/m], or a flow, whose force is then opposite to the motion.
+        start: lower border on x [m]; None for clay without borders.
+        end: upper border on x [m], given with start.
 
     Returns:
         The clay.
+
+    Raises:
+        ParameterError: a value is out of bounds, or one border alone is given.
     """
-    profile = constant_profile(b, start, end)
-    return Clay(x=profile, y=profile)
+    if (start is None) != (end is None):
+        raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
+    if isinstance(resists, str):
+        bound = f"must be a damping, or a flow as hc.material({resists!r}) returns"
+        raise ParameterError("resists", resists, bound)
+    flow = resists if isinstance(resists, Flow) else Flow(b=number("b", resists, 0.0, B_MAX))
+    edges = () if start is None or end is None else (start, end)
+
+    def of(x: float, outside: float = 0.0) -> tuple[float, ...]:
+        return (outside, x, outside) if edges else (x,)
+
+    n = of(flow.n, 1.0) if flow.K else ()
+    profile = Profile(edges, of(flow.b), Fy=of(flow.Fy), K=of(flow.K), n=n)
+    return Clay(profile, profile, isotropic=profile.yields)
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
@@ -249,6 +267,9 @@ def smooth_damping(table, at, x, y):
     ) / 36.0
 
 
+OPTIONAL = ("growth", "Fy", "K", "n")  # of each region or cell, beside values
+
+
 class CellLaw:
     """What the laws of one axis share: damping that is constant in each cell of a grid.
 
@@ -263,7 +284,19 @@ class CellLaw:
     @property
     def some(self: Any) -> np.ndarray:
         """Whether each cell between the lines holds clay, shape (n, m)."""
-        return (self.damping > 0.0) | (self.rates > 0.0)
+        Fy, K, _ = self.flows
+        some = (self.damping > 0.0) | (self.rates > 0.0) | (Fy > 0.0) | (K > 0.0)
+        return some | (self.elastic[..., 0] + self.elastic[..., 2] > 0.0)
+
+    @property
+    def elastic(self: Any) -> np.ndarray:
+        """Springs of the cells, see `Profile.elastic`: none."""
+        return np.broadcast_to(Spring().numbers, (*self.damping.shape, 5))
+
+    @property
+    def yields(self: Any) -> bool:
+        """Whether it has a yield force or a consistency anywhere."""
+        return bool(self.Fy or self.K)
 
     def at(self: Any, x: Any, y: Any) -> np.ndarray:
         """Damping at some places, growth aside [N.s/m].
@@ -273,6 +306,17 @@ class CellLaw:
             y: the same along y.
         """
         return self.damping[self.index(x, y)]
+
+    def flows_at(self: Any, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Yield force [N], consistency [N/(m/s)^n] and flow index at some places.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        cell = self.index(x, y)
+        Fy, K, n = (part[cell] for part in self.flows)
+        return Fy, K, n
 
     def index(self: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """Cells of some places; on a line between them, the one beyond it.
@@ -310,21 +354,35 @@ class Profile(CellLaw):
         along: coordinate that decides, "x" or "y".
         growth: rate at which b of each region grows from when the handle first enters it
             [N.s/m per s], shape (n + 1,), 0 to 1e9; empty for none (Sec. 4.2).
+        Fy: yield force of each region [N], as values, 0 to 1e6; empty for none.
+        K: consistency of each region [N/(m/s)^n], as values, 0 to 1e6; empty for none.
+        n: flow index of each region, as values, 0.05 to 4; empty for 1, and without K.
+        springs: spring of each region, along the axis of the law, as values; empty for none.
     """
 
     edges: Annotated[tuple[float, ...], Bound(unit="m")]
     values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
     along: Literal["x", "y"] = "x"
     growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[float, ...], YieldForce] = ()
+    K: Annotated[tuple[float, ...], Consistency] = ()
+    n: Annotated[tuple[float, ...], FlowIndex] = ()
+    springs: tuple[Spring, ...] = ()
 
     def __post_init__(self):
         check_fields(self, "clay.")
         regions = [str(i) for i in range(len(self.edges) + 1)]
+        if self.springs and len(self.springs) != len(regions):
+            bound = f"must be {len(regions)} springs, one a region, got {len(self.springs)}"
+            raise ParameterError("clay.springs", self.springs, bound)
+        if not any(x.k or x.k1 for x in self.springs):
+            object.__setattr__(self, "springs", ())
         numbers_of("clay.values", self.values, regions)
-        numbers_of("clay.growth", self.growth, regions if self.growth else ())
+        for name in OPTIONAL:
+            given = getattr(self, name)
+            numbers_of(f"clay.{name}", given, regions if given else ())
         check_ascending("clay.edges", self.edges)
-        if not any(self.growth):
-            object.__setattr__(self, "growth", ())
+        _leave_out(self)
 
     @property
     def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -340,6 +398,21 @@ class Profile(CellLaw):
     def rates(self) -> np.ndarray:
         """As `Grid.rates`."""
         return self._cells(self.growth or (0.0,) * len(self.values))
+
+    @property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows`."""
+        Fy, K, n = (
+            self._cells(x or (usual,) * len(self.values))
+            for x, usual in zip(*_flow_of(self), strict=True)
+        )
+        return Fy, K, n
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """`Spring.numbers` of each cell, shape (n, m, 5)."""
+        rows = np.array([x.numbers for x in self.springs or (Spring(),) * len(self.values)])
+        return rows[:, None] if self.along == "x" else rows[None]
 
     def _cells(self, values: tuple[float, ...]) -> np.ndarray:
         return np.array([values]).T if self.along == "x" else np.array([values])
@@ -358,25 +431,31 @@ class Grid(CellLaw):
             x_edges i - 1 and i and y_edges j - 1 and j; the outer cells have no end.
         growth: rate at which b of each cell grows from when the handle first enters it
             [N.s/m per s], as values, 0 to 1e9; empty for none.
+        Fy: yield force of each cell [N], as values, 0 to 1e6; empty for none.
+        K: consistency of each cell [N/(m/s)^n], as values, 0 to 1e6; empty for none.
+        n: flow index of each cell, as values, 0.05 to 4; empty for 1, and without K.
     """
 
     x_edges: Annotated[tuple[float, ...], Bound(unit="m")]
     y_edges: Annotated[tuple[float, ...], Bound(unit="m")]
     values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
     growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[tuple[float, ...], ...], YieldForce] = ()
+    K: Annotated[tuple[tuple[float, ...], ...], Consistency] = ()
+    n: Annotated[tuple[tuple[float, ...], ...], FlowIndex] = ()
 
     def __post_init__(self):
         check_fields(self, "clay.")
         check_ascending("clay.x_edges", self.x_edges)
         check_ascending("clay.y_edges", self.y_edges)
         shape = len(self.x_edges) + 1, len(self.y_edges) + 1
-        for name, table in (("values", self.values), ("growth", self.growth)):
+        for name in ("values", *OPTIONAL):
+            table = getattr(self, name)
             got = len(table), len(table[0]) if table else 0
             if got != shape and (name == "values" or table):
                 bound = f"must have shape {shape}, one more than borders each way, has {got}"
                 raise ParameterError(f"clay.{name}", table, bound)
-        if not np.any(self.growth):
-            object.__setattr__(self, "growth", ())
+        _leave_out(self)
 
     @property
     def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -392,6 +471,16 @@ class Grid(CellLaw):
     def rates(self) -> np.ndarray:
         """Rates at which it grows [N.s/m per s], as damping."""
         return np.array(self.growth) if self.growth else np.zeros(self.damping.shape)
+
+    @functools.cached_property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Yield force [N], consistency [N/(m/s)^n] and flow index, each as damping."""
+        shape = self.damping.shape
+        Fy, K, n = (
+            np.array(x) if x else np.full(shape, usual)
+            for x, usual in zip(*_flow_of(self), strict=True)
+        )
+        return Fy, K, n
 
     @property
     def along(self) -> str:
@@ -487,7 +576,7 @@ class Smooth(CellLaw):
             raise ParameterError("clay.values", self.values, "must have a node or more each way")
 
     borders = ((), ())
-    growth = ()
+    growth = Fy = K = springs = ()
 
     @functools.cached_property
     def damping(self) -> np.ndarray:
@@ -498,6 +587,22 @@ class Smooth(CellLaw):
     def rates(self) -> np.ndarray:
         """As `Grid.rates`: zeros."""
         return np.zeros(self.damping.shape)
+
+    @property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows`: it does not yield."""
+        none = np.zeros(self.damping.shape)
+        return none, none, none + 1.0
+
+    def flows_at(self, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows_at`: it does not yield.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        none = np.zeros(np.broadcast(x, y).shape)
+        return none, none, none + 1.0
 
     @property
     def along(self) -> str:
@@ -615,6 +720,22 @@ class Smooth(CellLaw):
         return cls(ends[0], ends[1], values)  # pyright: ignore[reportArgumentType]
 
 
+def _flow_of(law: Profile | Grid) -> tuple[Any, tuple[float, float, float]]:
+    """Fy, K and n of a law as given, and what stands for those left out."""
+    return (law.Fy, law.K, law.n), (0.0, 0.0, 1.0)
+
+
+def _leave_out(law: Profile | Grid) -> None:
+    """Empties what changes nothing, so that laws alike are equal; refuses n without any K."""
+    if not law.K and np.any(np.array(law.n) != 1.0):
+        raise ParameterError("clay.n", law.n, "must be empty without K")
+    for name in ("growth", "Fy", "K"):
+        if not np.any(getattr(law, name)):
+            object.__setattr__(law, name, ())
+    if not law.K:
+        object.__setattr__(law, "n", ())
+
+
 def _outline(
     x: tuple[float, float], y: tuple[float, float], prefix: str = ""
 ) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -654,22 +775,50 @@ def check_ascending(field: str, edges: tuple[float, ...]) -> None:
         raise ParameterError(field, edges, "must be strictly ascending")
 
 
+NOTHING = Profile((), (0.0,))
+
+
 @dataclass(frozen=True)
 class Clay:
-    """Viscous clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1).
+    """Clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1), or clay that
+    also yields, with Fy_i sign v_i + K_i |v_i|^n_i sign v_i beside it along each axis.
 
     Attributes:
-        x: damping bx of motion along x, or along the clay's own first axis where it is turned.
-        y: damping by of motion along y, or along the clay's own second axis.
+        x: law of motion along x, or along the clay's own first axis where it is turned.
+        y: law of motion along y, or along the clay's own second axis.
         angle: by which those axes are turned from x and y, counterclockwise [rad], -pi to pi.
+        isotropic: whether Fy and K, alike on both axes, resist along the motion whatever its
+            direction, (Fy + K |v|^n) v/|v|; else each axis yields by itself.
+        groove: a block of clay that stays cut, beside x and y, which then neither yield, grow nor
+            spring back and are not smooth; None for none.
     """
 
     x: Profile | Grid | Smooth
     y: Profile | Grid | Smooth
     angle: Annotated[float, Bound(-math.pi, math.pi, "rad")] = 0.0
+    isotropic: bool = False
+    groove: Groove | None = None
 
     def __post_init__(self):
         check_fields(self, "clay.")
+        x, y = self.laws
+        alike = x.borders == y.borders and all(map(np.array_equal, x.flows, y.flows))
+        if self.isotropic and not alike:
+            raise ParameterError(
+                "clay.isotropic", True, "must be False where Fy, K or n differ between the axes"
+            )
+        if self.groove and (x.yields or y.yields or self.grows or self.smooth or self.springs):
+            bound = "must be None beside laws that yield, grow, spring back or are smooth"
+            raise ParameterError("clay.groove", self.groove, bound)
+
+    @classmethod
+    def of_groove(cls, groove: Groove) -> Clay:
+        """Clay that stays cut, and none beside it.
+
+        Args:
+            groove: the block.
+        """
+        return cls(NOTHING, NOTHING, groove=groove)
 
     @property
     def laws(self) -> tuple[Profile | Grid | Smooth, Profile | Grid | Smooth]:
@@ -695,7 +844,8 @@ class Clay:
     @property
     def largest(self) -> float:
         """Largest damping, growth aside [N.s/m]."""
-        return float(max(law.damping.max() for law in self.laws))
+        most = float(max(law.damping.max() for law in self.laws))
+        return most + self.groove.thickest if self.groove else most
 
     @property
     def fastest(self) -> float:
@@ -706,6 +856,16 @@ class Clay:
     def grows(self) -> bool:
         """Whether it grows anywhere."""
         return bool(self.x.growth or self.y.growth)
+
+    @property
+    def yields(self) -> bool:
+        """Whether it has a yield force or a consistency anywhere; a groove has."""
+        return self.x.yields or self.y.yields or self.groove is not None
+
+    @property
+    def springs(self) -> bool:
+        """Whether it springs back anywhere."""
+        return any(getattr(law, "springs", ()) for law in self.laws)
 
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Damping of both axes at some places, growth aside.

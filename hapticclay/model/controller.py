@@ -160,6 +160,28 @@ def solve_turned(n, g, W, d):
     return (g[0] - xy * uy) / xx, uy
 
 
+def velocity_per_force(n, W, d):
+    """Velocity after a kick that each unit of a further force takes, (n + W d)^-1 W.
+
+    Args:
+        n: weight of u in the servo's law, (x, y) [1/s].
+        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
+        d: resisting force per unit of the velocity after the kick, (xx, yy, xy) [N.s/m].
+
+    Returns:
+        (xx, xy, yx, yy) [m/(N.s)].
+    """
+    a, b = n[0] + W[0] * d[0] + W[1] * d[2], W[0] * d[2] + W[1] * d[1]
+    c, e = W[1] * d[0] + W[2] * d[2], n[1] + W[1] * d[2] + W[2] * d[1]
+    det = a * e - b * c
+    return (
+        (e * W[0] - b * W[1]) / det,
+        (e * W[1] - b * W[2]) / det,
+        (a * W[1] - c * W[0]) / det,
+        (a * W[2] - c * W[1]) / det,
+    )
+
+
 def velocity_under_torque(H, v, u, links, tau, f, d):
     """Handle velocity after a kick under given motor torques.
 

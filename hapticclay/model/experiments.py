@@ -51,6 +51,7 @@ from .fields import (
     no_field,
     values_of,
 )
+from .flow import Flow
 from .operator import Operator
 from .scenario import (
     Control,
@@ -175,6 +176,8 @@ class ConstantCut(PathExperiment):
         gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).
         force: muscle force uh of the operator [N].
         clay: where the slab begins and ends along x [m].
+        material: name of a material in place of b, as in "stiff clay" (hapticclay materials); its
+            flow is that of a tool of 10 by 5 mm.
     """
 
     b: Damping = B_CONSTANT
@@ -182,12 +185,22 @@ class ConstantCut(PathExperiment):
     force: Force = (1.0, 0.0)
     _: dataclasses.KW_ONLY
     clay: Annotated[tuple[float, float], Bound(unit="m", names=("begin", "end"))] = CLAY_X
+    material: str | None = None
 
     def scenario(self) -> Scenario:
         begin, end = self.clay
         if end <= begin:
             raise ParameterError("clay", self.clay, "must end beyond where it begins")
-        return self.build_scenario("constant", clay=slab(self.b, begin, end))
+        return self.build_scenario("constant", clay=slab(self._resists(), begin, end))
+
+    def _resists(self) -> float | Flow:
+        if self.material is None:
+            return self.b
+        if self.b != B_CONSTANT:
+            raise ParameterError("material", self.material, "sets b: give one of the two")
+        from .materials import material
+
+        return material(self.material)
 
 
 @dataclass(frozen=True)

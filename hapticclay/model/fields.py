@@ -446,6 +446,10 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
         value: its value.
         known: dotted names that there are.
     """
+    if not known:
+        whole = name.rpartition(".")[0]
+        bound = f"{whole} is not given: give it whole, in a file as [[{whole}]], a table a part"
+        return ParameterError(name, value, bound)
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
     near = difflib.get_close_matches(name, level, n=1)
@@ -506,6 +510,10 @@ def _fields_at(hint: Any, bound: Bound, path: str, default: Any, about: str) -> 
         before = each_axis(default)
         for axis, item, part in zip(AXES, get_args(kinds[0]), before, strict=True):
             yield from _fields_at(item, Bound(), join_names(path, axis), part, about)
+        return
+    if kinds[0] is hint and get_origin(hint) is tuple:  # any number of parts
+        for i, part in enumerate(default if isinstance(default, tuple) else ()):
+            yield from _fields_at(get_args(hint)[0], Bound(), join_names(path, i), part, about)
         return
     for kind in classes.values():
         if any(kind in part_classes(h).values() for h, _ in field_types(kind).values()):

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from ..errors import Bound, ParameterError, check_fields
+from . import flow
 
 STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
@@ -313,6 +314,40 @@ def virtual_coupling(tool, p, v, b, spring, damper, Ts):
     """
     u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
     return tool + Ts * u, u
+
+
+def tool_that_yields(tool, p, v, b, law, along, spring, damper, Ts):  # noqa: PLR0913  # plain numbers
+    """As `virtual_coupling`, both axes, in clay that yields: the tool rests below the yield force.
+
+    (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
+
+    Args:
+        tool: position of the tool before the sample, (x, y) [m].
+        p: position of the handle, (x, y) [m].
+        v: velocity of the handle, (x, y) [m/s].
+        b: clay at the tool, (x, y) [N.s/m].
+        law: Fy, K, n of x, then of y.
+        along: whether the clay yields along the motion, by the law of x; else each axis by itself.
+        spring: stiffness of the coupling [N/m].
+        damper: damping of the coupling [N.s/m].
+        Ts: control sample [s].
+
+    Returns:
+        Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N].
+    """
+    qx, qy = spring * (p[0] - tool[0]) + damper * v[0], spring * (p[1] - tool[1]) + damper * v[1]
+    dx, dy = b[0] + damper + spring * Ts, b[1] + damper + spring * Ts
+    if along:
+        ux, uy = flow.slowed(
+            (1.0 / dx, 0.0, 0.0, 1.0 / dy), qx / dx, qy / dy, 1.0, law[0], law[1], law[2]
+        )
+    else:
+        ux = flow.thinned(max(abs(qx) - law[0], 0.0) / dx, law[1] / dx, law[2])
+        uy = flow.thinned(max(abs(qy) - law[3], 0.0) / dy, law[4] / dy, law[5])
+        ux, uy = copysign(ux, qx), copysign(uy, qy)
+    fx, fy = flow.motion_force(law, along, ux, uy)
+    fx, fy = b[0] * ux + fx if ux else qx, b[1] * uy + fy if uy else qy
+    return ux, uy, fx, fy
 
 
 class SampleNoise:

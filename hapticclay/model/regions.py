@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .clay import Clay, Profile, Smooth, smooth_damping
+from .clay import NOTHING, Clay, Profile, Smooth, smooth_damping
 
 # A table is one row of numbers. Its head says where the rest begins, two places each: END, one
 # place, holds the end of the path itself [m], inf for none; EDGES, borders along x and along y
@@ -18,9 +18,11 @@ from .clay import Clay, Profile, Smooth, smooth_damping
 # is, by region along x and along y; SMOOTH, for smooth clay of each axis, clay.Smooth.numbers, 0.0
 # for none; of the cells, one for smooth clay, for each axis: VALUES, damping on entry [N.s/m];
 # RATES, at which it grows [N.s/m per s], 0.0 for none; ENTERED, time of the first entry [s], NaN
-# before.
-END, EDGES, LANDED, OWN, SMOOTH, VALUES, RATES, ENTERED, HEAD = 0, 1, 3, 5, 9, 11, 13, 15, 17
-NOTHING = Profile((), (0.0,))
+# before; FLOWS, where the clay yields, 0.0 elsewhere: Fy [N], K [N/(m/s)^n] and n of each cell;
+# SPRINGS, where it springs back, 0.0 elsewhere: Spring.numbers of each cell, and the place of the
+# dent in a surface [m], NaN before.
+END, EDGES, LANDED, OWN, SMOOTH, VALUES, RATES, ENTERED = 0, 1, 3, 5, 9, 11, 13, 15
+FLOWS, SPRINGS, HEAD, SPRING = 17, 19, 21, 6
 
 
 def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
@@ -64,14 +66,23 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
         else:
             put(numbers)
     cells = laws[:1] if laws[0] == laws[1] else laws  # those of both axes are one where they may be
-    for part in ("damping", "rates", "entered"):
+    yields, springs = bool(clay and clay.yields), bool(clay and clay.springs)
+    for part in ["damping", "rates", "entered", *["flows"] * yields, *["elastic"] * springs]:
+        if part == "elastic" and not yields:
+            head += [0.0, 0.0]
         for law in cells:
-            values = (
-                np.full(law.damping.size, math.nan) if part == "entered" else getattr(law, part)
-            )
-            put(values.ravel())
+            if part == "entered":
+                put(np.full(law.damping.size, math.nan))
+            elif part == "flows":
+                put(np.stack(law.flows, axis=-1).ravel())
+            elif part == "elastic":
+                dent = np.full((*law.damping.shape, 1), math.nan)
+                put(np.concatenate((law.elastic, dent), axis=2).ravel())
+            else:
+                put(getattr(law, part).ravel())
         if len(cells) < 2:
             head.append(head[-1])
+    head += [0.0] * (HEAD - len(head))
     return np.concatenate((head, *parts))
 
 
@@ -94,8 +105,9 @@ def keep_entries(table: np.ndarray, before: np.ndarray) -> None:
         table: from `region_table`; gets the times.
         before: the table up to now.
     """
-    n = len(table) - int(table[ENTERED])
-    table[-n:] = before[-n:]
+    begin = int(table[ENTERED])
+    end = int(table[FLOWS]) or int(table[SPRINGS]) or len(table)
+    table[begin:end] = before[begin:end]
 
 
 def enter_region(table, ix, iy, t):
@@ -114,6 +126,34 @@ def enter_region(table, ix, iy, t):
     basey, ratey = _cell_law(table, 1, ix, iy, t)
     x, y = int(table[EDGES]) + ix, int(table[EDGES + 1]) + iy
     return (table[x], table[y]), (table[x + 1], table[y + 1]), (basex, basey), (ratex, ratey)
+
+
+def enter_flow(table, axis, ix, iy):
+    """How the clay of an axis yields in a region; of clay that yields somewhere.
+
+    Args:
+        table: from `region_table`.
+        axis: 0 for x, 1 for y.
+        ix: index of the region along x.
+        iy: index of the region along y.
+
+    Returns:
+        (Fy [N], K [N/(m/s)^n], n).
+    """
+    at = int(table[FLOWS + axis]) + 3 * _cell(table, axis, ix, iy)
+    return table[at], table[at + 1], table[at + 2]
+
+
+def spring_place(table, axis, ix, iy):
+    """Where the table holds the spring of a region; of clay that springs back somewhere.
+
+    Args:
+        table: from `region_table`.
+        axis: 0 for x, 1 for y.
+        ix: index of the region along x.
+        iy: index of the region along y.
+    """
+    return int(table[SPRINGS + axis]) + SPRING * _cell(table, axis, ix, iy)
 
 
 def smooth_clay(table, which, x, y, bx, by):  # noqa: PLR0913  # plain numbers, for speed
@@ -156,6 +196,17 @@ def is_alike(table, ix, iy, i, up):
         values, rates = int(table[VALUES + axis]), int(table[RATES + axis])
         if table[values + a] != table[values + b] or table[rates + a] or table[rates + b]:
             return False
+        springs = int(table[SPRINGS + axis])
+        if springs and a != b:  # each has a rest of its own
+            for cell in (a, b):
+                at = springs + SPRING * cell
+                if table[at] > 0.0 or table[at + 2] > 0.0:
+                    return False
+        flows = int(table[FLOWS + axis])
+        if flows:
+            for j in range(3):
+                if table[flows + 3 * a + j] != table[flows + 3 * b + j]:
+                    return False
     return True
 
 

@@ -135,6 +135,8 @@ class Scenario:
         self._check_interface()
         self._check_turned_clay()
         self._check_smooth_clay()
+        self._check_springs()
+        self._check_groove()
         self._check_reach("start", self.start)
         if self.length is not None:
             if self.length <= self.start[0]:
@@ -259,6 +261,40 @@ class Scenario:
             bound = (
                 f"must be at most {self.dt * most / b:.3g} s in smooth clay of {b:.4g} N.s/m, "
                 f"which may have {most:.4g} at this dt; or integrator 'accurate', or clay of cells"
+            )
+            raise ParameterError("dt", self.dt, bound)
+
+    def _check_springs(self) -> None:
+        """Refuses springs where no law of them is known."""
+        if self.clay is None or not self.clay.springs:
+            return
+        given = self.interface
+        if given and (given.passivity or given.coupling):
+            bound = "must be without passivity controller and coupling in clay that springs back"
+            raise ParameterError("interface", given, bound)
+        if self.integrator != "fast":
+            bound = "must be 'fast' in clay that springs back"
+            raise ParameterError("integrator", self.integrator, bound)
+        if self.clay.angle:
+            raise ParameterError("clay.angle", self.clay.angle, "must be 0 for springs")
+
+    def _check_groove(self) -> None:
+        """Refuses clay that stays cut where no step takes it away, or where it is stiff."""
+        given = self.interface
+        clay = self.clay
+        if clay is None or clay.groove is None:
+            return
+        if self.integrator != "fast":
+            bound = "must be 'fast' in clay that stays cut"
+            raise ParameterError("integrator", self.integrator, bound)
+        if given and (given.passivity or given.coupling):
+            bound = "must be without passivity controller and coupling in clay that stays cut"
+            raise ParameterError("interface", given, bound)
+        b, most = clay.largest, self._soft_damping()
+        if b > most:
+            bound = (
+                f"must be at most {self.dt * most / b:.3g} s in a groove where b reaches {b:.4g} "
+                f"N.s/m; at this dt it may reach {most:.4g}"
             )
             raise ParameterError("dt", self.dt, bound)
 

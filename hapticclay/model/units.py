@@ -21,6 +21,7 @@ SIZES: dict[str, tuple[Decimal, tuple[int, ...]]] = {  # in SI; powers of m, kg,
     "Hz": (Decimal(math.tau), (0, 0, -1, 1)),
     "N": (Decimal(1), (1, 1, -2, 0)),
     "J": (Decimal(1), (2, 1, -2, 0)),
+    "Pa": (Decimal(1), (-1, 1, -2, 0)),
 }
 
 

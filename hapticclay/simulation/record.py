@@ -20,7 +20,7 @@ from ..model.fields import make_part, plain_data
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..stepping.monitor import Outcome
-from ..stepping.run import Crossing, Run
+from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
 from ..theory.margins import Verdict
 
@@ -75,14 +75,19 @@ class Record:
         crossings: of borders, in order.
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
             damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
-            what is left over (residual) and what went through (throughput) [J].
+            what is left over (residual) and what went through (throughput) [J]; of clay that
+            springs back, what its springs hold of the clay's share and have lost (springs_stored,
+            springs_lost).
         steps: engine steps made.
         wall_time: run time [s].
         versions: of the packages used.
         extra: further arrays by name: removed clay and its rate, shape (n,); of sessions, the
             target of the hand and the gain K, shape (n, 2).
         notes: of sessions, how well they kept real time.
+        stops: where clay that yields held the handle still, in order.
         error: of a run to an asked error, what was asked and reached; else None.
+        ground: of clay that stays cut, height of what is left of each cell at the end [m], shape
+            (n, m), between the `edges` of its Groove; else None.
     """
 
     t: np.ndarray
@@ -104,7 +109,9 @@ class Record:
     versions: dict[str, str] = dataclasses.field(default_factory=lambda: dict(versions()))
     extra: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     notes: dict[str, Any] = dataclasses.field(default_factory=dict)
+    stops: tuple[Stop, ...] = ()
     error: Accuracy | None = None
+    ground: np.ndarray | None = None
 
     @classmethod
     def of(cls, run: Run, wall: float) -> Record:
@@ -116,11 +123,15 @@ class Record:
         """
         assert run.outcome is not None
         arrays: Any = run.arrays()
+        extra = {name: arrays.pop(name) for name in EXTRA if name in arrays}
         return cls(
             **arrays,
+            extra=extra,
+            ground=run.left_ground(),
             scenario=run.scenario,
             outcome=run.outcome,
             crossings=tuple(run.crossings),
+            stops=tuple(run.stops),
             energy=run.balance(),
             steps=run.steps,
             wall_time=wall,
@@ -165,7 +176,7 @@ class Record:
             Arrays of indices, in order.
         """
         s = self.scenario
-        if s.clay and (s.clay.grows or s.clay.smooth):
+        if s.clay and (s.clay.grows or s.clay.smooth or s.clay.yields):
             along = "".join(getattr(s.clay, a).along for a in ([axis] if axis else AXES))
             cuts = np.searchsorted(self.t, [c.time for c in self.crossings if c.axis in along])
             change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t) - 1)])
@@ -178,7 +189,8 @@ class Record:
         """Means over each of the `stretches`, in order of time.
 
         For each axis: fe/v against b over the stretch (mean and deviation); where the speed is
-        steady, the speed, fe/v and fh/v, beside K f/(10 + K b) where force and clay are constant.
+        steady, the speed, fe/v and fh/v, beside `expected_speed`. In clay that yields also its law,
+        fe where the speed is steady, and the share of the time for which it held the handle.
 
         Args:
             axis: "x" or "y" for that axis and its stretches alone; None for both.
@@ -189,6 +201,8 @@ class Record:
         if not len(self.t):
             return []
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
+        still, clay = self.held(), self.scenario.clay
+        grooved = clay is not None and clay.groove is not None
         out = []
         for piece in self.stretches(axis):
             entry: dict[str, Any] = {
@@ -199,7 +213,6 @@ class Record:
                 i = AXES.index(name)
                 s = piece[steady[piece, i]]
                 b, last = float(self.b[piece[0], i]), float(self.b[piece[-1], i])
-                constant = bool(np.all(self.b[piece, i] == b))
                 entry[name] = {
                     "from_m": float(self.p[piece[0], i]),
                     "to_m": float(self.p[piece[-1], i]),
@@ -207,19 +220,80 @@ class Record:
                     "b_end": last,
                     "fe_over_v": _mean_and_std(fe_v[piece, i]),
                     "steady_speed": float(np.mean(self.v[s, i])) if len(s) else None,
-                    "expected_speed": self._expected(i, b) if constant else None,
+                    "expected_speed": self.expected_speed(name, piece),
                     "steady_fe_over_v": _mean_and_std(fe_v[s, i]),
                     "steady_fh_over_v": _mean_and_std(fh_v[s, i]),
                 }
+                if self._yields:
+                    held = float(np.mean(still[piece, i]))
+                    fe = float(np.mean(self.fe[s, i])) if len(s) else None
+                    entry[name] |= {"steady_fe": fe, "held": held}
+                    if not grooved:
+                        Fy, K, n = self._flows(i, piece)
+                        entry[name] |= {"Fy": Fy, "K": K, "n": n}
             out.append(entry)
         return out
 
-    def _expected(self, i: int, b: float) -> float | None:
-        s = self.scenario
-        alone = s.operators[i] is None and s.muscle is None and not s.driven
-        if not alone or s.controller is not None or s.turned:
+    def expected_speed(self, axis: str, piece: np.ndarray) -> float | None:
+        """Steady speed under the scenario's force in the clay of a stretch [m/s].
+
+        K f/(10 + K b) with the printed parts, where the clay is a damper. Where it yields, 0 up to
+        the yield force, and beyond it the solution of f = (10/K + b) v + (Fy + K |v|^n) v/|v|.
+
+        Args:
+            axis: "x" or "y".
+            piece: samples of one of the `stretches`.
+
+        Returns:
+            None where the force is not constant, a hand is at the handle, the clay changes over the
+            stretch, stays cut, springs back or is turned, or the controller is the user's own.
+        """
+        i, s = AXES.index(axis), self.scenario
+        if s.clay and (s.clay.groove or s.clay.springs):
             return None
-        return linear_loop.steady_speed(s.gain[i], s.force[i], b, s.compensators[i], s.servo[i])
+        together = bool(self._yields and s.clay and s.clay.isotropic)
+        axes = [0, 1] if together else [i]
+        alone = not any(s.operators[j] for j in axes) and s.muscle is None and not s.driven
+        b = self.b[piece[0]]
+        if (
+            not alone
+            or s.controller is not None
+            or s.turned
+            or np.any(self.b[piece][:, axes] != b[axes])
+        ):
+            return None
+        Fy, K, n = self._flows(i, piece)
+        if not Fy and not K:
+            return linear_loop.steady_speed(
+                s.gain[i], s.force[i], float(b[i]), s.compensators[i], s.servo[i]
+            )
+        dampers = [
+            linear_loop.steady_damper(s.gain[j], s.compensators[j], s.servo[j]) + b[j] for j in axes
+        ]
+        v = linear_loop.steady_velocity([s.force[j] for j in axes], dampers, Fy, K, n)
+        return float(v[axes.index(i)])
+
+    def held(self) -> np.ndarray:
+        """Samples at which clay that yields held the handle, along each axis, shape (n, 2)."""
+        out = np.zeros(self.v.shape, dtype=bool)
+        for stop in self.stops:
+            end = math.inf if stop.end is None else stop.end
+            during = (self.t >= stop.start) & (self.t < end)
+            for name in stop.axis:
+                out[during, AXES.index(name)] = True
+        return out
+
+    @property
+    def _yields(self) -> bool:
+        return self.scenario.clay is not None and self.scenario.clay.yields
+
+    def _flows(self, i: int, piece: np.ndarray) -> tuple[float, float, float]:
+        """Fy, K and n of an axis in the middle of a stretch."""
+        clay = self.scenario.clay
+        if clay is None or not clay.yields:
+            return 0.0, 0.0, 1.0
+        Fy, K, n = clay.laws[i].flows_at(*self.p[piece[len(piece) // 2]])
+        return float(Fy), float(K), float(n)
 
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
@@ -230,7 +304,11 @@ class Record:
         more: dict[str, Any] = {"notes": notes} if notes else {}
         if self.error is not None:
             more["error"] = dataclasses.asdict(self.error)
+        if self.stops:
+            more["stops"] = [dataclasses.asdict(x) for x in self.stops]
         extra = {name: EXTRA[name] for name in self.extra}
+        if self.ground is not None:
+            extra["ground"] = "m"
         return {
             "schema": RECORD_SCHEMA,
             "status": self.status,
@@ -270,6 +348,8 @@ class Record:
         folder = Path(path)
         head = {k: v for k, v in self.summary().items() if k != "regions"}
         arrays = {name: getattr(self, name) for name in ARRAYS} | self.extra
+        if self.ground is not None:
+            arrays["ground"] = self.ground
         with atomic(folder / "record.npz") as f:
             np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
@@ -301,10 +381,12 @@ class Record:
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
+                ground = z["ground"] if "ground" in z else None
             _check(arrays | extra)
             schema = head["schema"]
             if schema == RECORD_SCHEMA:
                 scenario, lost = _scenario(head["scenario"])
+                _check_ground(ground, scenario)
                 return cls(
                     **arrays,
                     scenario=scenario,
@@ -316,7 +398,9 @@ class Record:
                     versions=head["versions"],
                     extra=extra,
                     notes=head.get("notes", {}) | ({"left_out": lost} if lost else {}),
+                    stops=tuple(Stop(**x) for x in head.get("stops", ())),
                     error=_accuracy(head.get("error")),
+                    ground=ground,
                 )
         except (
             OSError,
@@ -345,6 +429,14 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
             raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
     if (np.diff(t) < 0.0).any():
         raise ValueError("array t must not go back")
+
+
+def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
+    """Raises ValueError unless there is a height a cell of clay that stays cut, if there is any."""
+    block = scenario.clay and scenario.clay.groove
+    shape, got = block.shape if block else None, None if ground is None else ground.shape
+    if shape != got or (ground is not None and not np.isfinite(ground).all()):
+        raise ValueError(f"array ground must be finite and of shape {shape}, has {got}")
 
 
 def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:

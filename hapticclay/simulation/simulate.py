@@ -20,6 +20,7 @@ from . import record
 ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step [us]; that it takes to load, and to compile [s]
 SAVED = {"LeapfrogRun": 2.5, "RungeKuttaRun": 10.0, "SampledRun": 20.0}
+SAVED_IN_GROOVE = 400.0  # more, where clay stays cut [us]
 LOADING, COMPILING = 0.6, {"LeapfrogRun": 3.5, "RungeKuttaRun": 4.0, "SampledRun": 10.0}
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
@@ -103,7 +104,9 @@ def _pays(scenario: Scenario) -> bool:
     if compiled is not None and compiled.is_warm(kind):
         return True
     name, steps = kind.__name__, scenario.t_max / scenario.dt
-    saved = 0.5e-6 * SAVED[name] * steps  # half: runs tend to end before t_max
+    grooved = scenario.clay is not None and scenario.clay.groove is not None
+    each = SAVED[name] + (SAVED_IN_GROOVE if grooved else 0.0)
+    saved = 0.5e-6 * each * steps  # half: runs tend to end before t_max
     if saved < LOADING or not has_numba():
         return False
     with contextlib.suppress(OSError, RuntimeError):  # no home: nothing is kept

@@ -26,15 +26,27 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload, overload_method, register_jitable
 
-from ..model import arm, clay, compensator, controller, hardware, operator, pieces, regions
+from ..model import (
+    arm,
+    clay,
+    compensator,
+    controller,
+    flow,
+    groove,
+    hardware,
+    operator,
+    pieces,
+    regions,
+    spring,
+)
 from ..model.sampled_controller import DESK, TORQUE, LawCaller
 from ..model.scenario import Scenario
-from . import energy, leapfrog, loop, monitor, path, run, runge_kutta, sampled
+from . import energy, leapfrog, loop, modes, monitor, path, run, runge_kutta, sampled
 from .engine import mujoco
 
 SOURCES = (
-    arm, clay, compensator, controller, hardware, operator, regions, pieces, energy, leapfrog,
-    loop, path, runge_kutta, sampled,
+    arm, clay, compensator, controller, flow, groove, hardware, operator, regions, pieces, spring,
+    energy, leapfrog, loop, modes, path, runge_kutta, sampled,
 )  # fmt: skip
 LOOPS = (leapfrog.Leapfrog, runge_kutta.RungeKutta, sampled.Sampled)
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}

@@ -39,6 +39,7 @@ LEAPFROG_STATE = [  # beside path.STATE
     ("form_kept", "f8", 2 * compensator.ORDER),
     ("form_kick", "f8", 2 * compensator.KICK),  # compensator.form_kick of each axis
     ("form_work", "f8", compensator.WORK),
+    ("leapt", "i8"),  # whole steps of `leap_block` before this block
     ("form_of", "f8", 2),  # lengths of the steps that these are for [s]
     # of the kick last worked out, beside its raw row, the first of Engine.raw:
     ("coefficients", "f8", 33),  # loop.loop_coefficients
@@ -75,7 +76,7 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
     ratiox, _, _, SXX, _, _ = s["servox"]
     ratioy, _, _, SYY, _, _ = s["servoy"]
     formed, turned, grain = s["formed"], s["turned_clay"], s["grain"]
-    smooth, table = s["smooth"] if n > 0 else 0, e.table
+    smooth, table, grooved = s["smooth"] if n > 0 else 0, e.table, s["grooved"] if n > 0 else 0
     q, w, ctrl, push, mj_step, model, data = e.q, e.w, e.ctrl, e.push, e.step, e.model, e.data
     low, high = s["low"], s["high"]
     lowx, lowy, highx, highy = low[0], low[1], high[0], high[1]
@@ -86,8 +87,10 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
     if n > 0 and s["dampers"]:
         ctrl[2], ctrl[3] = bx1, by1
     made = 0
-    p1, p2, dz = 0.0, 0.0, 0.0
-    odd = stiff > 0.0 or turned > 0
+    p1, p2, dz, rx, ry = 0.0, 0.0, 0.0, 0.0, 0.0
+    beyond, yields, still, felt = s["beyond"], s["yields"], False, s["felt"]
+    pullx, pully = 0.0, 0.0  # of springs
+    odd = stiff > 0.0 or turned > 0 or beyond > 0
     feedx, feedy, throughx, throughy, startx, starty = 0.0, 0.0, 0.0, 0.0, deltax, deltay
     form, kick, gainsx, gainsy = s["form_next"], s["form_kick"], s["gain"][0], s["gain"][1]
     if formed:
@@ -106,7 +109,7 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             )  # fmt: skip
             uhx, uhy, stiff = varied[made, 5], varied[made, 6], varied[made, 7]
             sharex, sharey = varied[made, 8], varied[made, 9]
-            odd = stiff > 0.0 or turned > 0
+            odd = stiff > 0.0 or turned > 0 or beyond > 0
             if s["dampers"]:
                 ctrl[2], ctrl[3] = bx1, by1
 
@@ -128,6 +131,15 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         r2 = w1 + w2
         vx = u1x * w1 + u2x * r2
         vy = u1y * w1 + u2y * r2
+        if grooved:
+            path.cut_clay(s, e, px, py, vx, vy)
+            if grooved == 2:  # and never stiff, see Scenario
+                x, y = s["base"]
+                bx0 = bx1 = 0.5 * x
+                by0 = by1 = 0.5 * y
+                varied[made, 0], varied[made, 1], varied[made, 12] = bx0, bx1, x
+                varied[made, 2], varied[made, 3], varied[made, 13] = by0, by1, y
+                ctrl[2], ctrl[3] = bx1, by1
         s1 = w1 + half * g1
         s2 = r2 + half * g2
         s1 = s1 * s1
@@ -152,10 +164,16 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
                 x, y = clay.turned_force(grain[0], grain[1], bx0, by0, vx, vy)
                 fx, fy = uhx - x, uhy - y
                 dx, dy, dz = clay.turned_damping(grain[0], grain[1], bx1, by1)
-            else:  # after the sample the handle stands still where the clay is stiff
+            elif stiff:  # after the sample the handle stands still where the clay is stiff
                 cx, cy = arm.centripetal_about_sample(
                     L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
                 )
+            if w1 == 0.0 and w2 == 0.0 and yields:  # at rest, whatever stopped it
+                cx, cy = 0.0, 0.0
+            if beyond:
+                pullx, pully = loop.spring_force(s, L)
+                fx -= pullx
+                fy -= pully
         if held:
             fx -= springx * px - massx * cx + dampx0 * vx
             fy -= springy * py - massy * cy + dampy0 * vy
@@ -173,13 +191,17 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         ax = nx * vrx + mx * (vx - ydx) + kpx * (yx - px) + cx
         ay = ny * vry + my * (vy - ydy) + kpy * (yy - py) + cy
         newx, newy = owedx, owedy
+        if odd and beyond:
+            restx, resty = 0.0, 0.0
         if stiff:
             restx, resty = owedx / H, owedy / H
             fex, fey = (bx0 + bx1) * vx, (by0 + by1) * vy
-            hx, hy = uhx - springx * px, uhy - springy * py
+            hx, hy = uhx - springx * px - pullx, uhy - springy * py - pully
             gx = ax - mx * vx + sxx * hx + sxy * hy
             gy = ay - my * vy + sxy * hx + syy * hy
             gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
+            if yields:
+                gx, gy = loop.creeping_force(s, L, (gx, gy), (bx0 + bx1, by0 + by1), (vx, vy))
             newx, newy, softx, softy = loop.owed_impulse(
                 step, springx, springy, sharex, sharey, gx, gy
             )
@@ -204,6 +226,21 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             ux, uy = controller.solve_turned((nx, ny), (gx, gy), (sxx, sxy, syy), (dx, dy, dz))
             ffx = fx - dx * ux - dz * uy
             ffy = fy - dy * uy - dz * ux
+        if odd and yields:
+            ux, uy, rx, ry = loop.yield_in_kick(
+                s,
+                H,
+                L,
+                (nx, ny),
+                (sxx, sxy, syy),
+                (dx, dy, dz),
+                (vx, vy),
+                (ux, uy),
+                (cx, cy),
+                (px, py),
+            )
+            ffx = fx - rx - dx * ux - dz * uy
+            ffy = fy - ry - dy * uy - dz * ux
         gx = ux - vx
         gy = uy - vy
         det = H * (u1x * u2y - u2x * u1y)
@@ -211,7 +248,8 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         h2 = (gy * u1x - gx * u1y) / det
         t2 = I2 * h2 - u2x * ffx - u2y * ffy
         t1 = I1 * h1 - u1x * ffx - u1y * ffy + t2
-        if t1 * t1 > square1 or t2 * t2 > square2:
+        cut = t1 * t1 > square1 or t2 * t2 > square2
+        if cut:
             if dz:
                 ux, uy, h1, h2, ffx, ffy, t1, t2 = controller.turned_kick_at_limit(
                     H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy),
@@ -222,40 +260,75 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
                     H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy), (dx, dy),
                     (t1, t2), (limit1, limit2),
                 )  # fmt: skip
-        if odd and not turned:
-            # motors at their limits hold less against the clay
-            if t1 * t1 >= square1 or t2 * t2 >= square2:
-                gx, gy = arm.handle_acceleration(
-                    (t1 - t2) / I1, t2 / I2, hx, hy, (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace)
-                )
-                sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace))
-                gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
-                fx -= newx
-                fy -= newy
-                newx, newy, _, _ = loop.owed_impulse(step, springx, springy, sharex, sharey, gx, gy)
-                fx += newx
-                fy += newy
-                ux, uy = controller.velocity_under_torque(
-                    H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (t1, t2), (fx, fy),
-                    (dx, dy),
+        if odd:
+            if stiff:
+                # motors at their limits hold less against the clay
+                if t1 * t1 >= square1 or t2 * t2 >= square2:
+                    cut = True
+                    gx, gy = arm.handle_acceleration(
+                        (t1 - t2) / I1,
+                        t2 / I2,
+                        hx,
+                        hy,
+                        (u1x, u1y, u2x, u2y),
+                        (L1, L2, I1, I2, trace),
+                    )
+                    sxx, sxy, syy = arm.mobility((u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace))
+                    gx, gy = clay.slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fex, fey)
+                    if yields:
+                        gx, gy = loop.creeping_force(
+                            s, L, (gx, gy), (bx0 + bx1, by0 + by1), (vx, vy)
+                        )
+                    fx -= newx
+                    fy -= newy
+                    newx, newy, _, _ = loop.owed_impulse(
+                        step, springx, springy, sharex, sharey, gx, gy
+                    )
+                    fx += newx
+                    fy += newy
+                    ux, uy = controller.velocity_under_torque(
+                        H, (vx, vy), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (t1, t2),
+                        (fx, fy), (dx, dy),
+                    )  # fmt: skip
+                    ffx = fx - dx * ux
+                    ffy = fy - dy * uy
+                    h1, h2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
+            if yields and cut:
+                ux, uy, rx, ry = loop.yield_in_kick(
+                    s, H, L, (1.0 / H, 1.0 / H),
+                    arm.mobility((u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace)), (dx, dy, dz),
+                    (vx, vy), (ux, uy), (cx, cy), (px, py),
                 )  # fmt: skip
-                ffx = fx - dx * ux
-                ffy = fy - dy * uy
+                ffx = fx - rx - dx * ux - dz * uy
+                ffy = fy - ry - dy * uy - dz * ux
                 h1, h2 = arm.joint_velocity(ux - vx, uy - vy, (u1x, u1y, u2x, u2y), H)
-            newx -= softx * ux
-            newy -= softy * uy
-            restx -= newx
-            resty -= newy
-            fx -= softx * ux
-            fy -= softy * uy
-            newx *= H
-            newy *= H
-
-        elif odd:
-            restx, resty = loop.turned_rest(grain, (bx0, bx1, by0, by1), vx, vy, ux, uy)
+            if stiff:
+                newx -= softx * ux
+                newy -= softy * uy
+                restx -= newx
+                resty -= newy
+                fx -= softx * ux
+                fy -= softy * uy
+                newx *= H
+                newy *= H
+            elif turned:
+                restx, resty = loop.turned_rest(grain, (bx0, bx1, by0, by1), vx, vy, ux, uy)
 
         n1 = w1 + H * h1
         n2 = w2 + H * (h2 - h1)
+        if beyond:
+            if yields:
+                still = felt[8] > 0.0
+                if still:
+                    n1, n2 = 0.0, 0.0
+            else:
+                felt[2], felt[3] = vx + L * (ux - vx), vy + L * (uy - vy)
+                felt[4], felt[5] = 0.0, 0.0
+            fx -= rx
+            fy -= ry
+            felt[0], felt[1], felt[12], felt[13] = rx, ry, pullx, pully
+            restx += rx + pullx
+            resty += ry + pully
         if n:  # a step that would leave the region is left to path.careful
             r2 = n1 + n2
             slack = reach * (L1 * n1 * n1 + L2 * r2 * r2) + TOUCH  # where the velocity points
@@ -306,6 +379,14 @@ def kicks(s, e, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             startx += varied[made, 14]
             starty += varied[made, 15]
         mj_step(model, data)
+        if beyond:
+            for j in range(path.FELT):
+                e.felt[made, j] = felt[j]
+            if yields:
+                t = (s["i"] + s["leapt"] + made) * step
+                path.note_stop(s, e, t, int(felt[6]), int(felt[7]))
+                if still:
+                    w[0], w[1] = 0.0, 0.0
         made += 1
         if made == n:
             break
@@ -422,6 +503,7 @@ def leap_block(s, e, n):
     total = 0
     while total < n:  # in blocks that stay in the cache
         most = min(n - total, len(e.raw))
+        s["leapt"] = total
         made = kicks(s, e, most)
         if made:
             accept(s)
@@ -429,6 +511,8 @@ def leap_block(s, e, n):
                 s["q"][j], s["w"][j] = e.q[j], e.w[j]
             if s["smooth"]:
                 path.feel_place(s, e.table)
+            if s["grooved"]:
+                path.cut_place(s, e)
             tabulate(s, e, made)
             s["filled"] += made
             total += made
@@ -461,6 +545,8 @@ def tabulate(s, e, n):
         if s["held"]:
             out[6 + i] = raw[8 + i] + k[2 * i] * before[i] + k[2 * i + 1] * after[i] + rest[i]
         out[12 + i] = k[12 + i]
+    if s["beyond"]:
+        tabulate_felt(s, e, n, k, raw)
     out[8:10] = raw[10:12]
     out[10], out[11] = raw[12] / s["servox"][0], raw[13] / s["servoy"][0]
     r1, r2 = arm.joint_velocity(out[4], out[5], raw[20:24], 1.0)
@@ -472,6 +558,35 @@ def tabulate(s, e, n):
     for j, x in enumerate(done):  # one after the other, as in the loop below
         work[j] = float(np.cumsum(np.append(work[j], x))[-1])
     put6(s["final"], 0, *raw[[2, 3, 6, 7, 16, 17], n - 1].tolist())
+
+
+def tabulate_felt(s, e, n, k, raw):
+    """As `write_felt`, of a block.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        n: number of steps.
+        k: loop.step_inputs of them and clay, a row each.
+        raw: their raw rows as columns.
+    """
+    at, felt = s["filled"], np.asarray(e.felt)[:n].T
+    out, fe = np.asarray(e.rows)[at : at + n].T, np.asarray(e.rendered)[at : at + n].T
+    v = [felt[2], felt[3]]
+    for i in (0, 1):
+        rest = raw[18 + i] - felt[i] - felt[12 + i]
+        slow = k[10 + i] * (k[2 * i] * raw[4 + i] + k[2 * i + 1] * raw[6 + i] + rest)
+        v[i] = np.where((k[10 + i] > 0.0) & (v[i] != 0.0), slow, v[i])
+    if s["yields"] and not s["turned_clay"]:
+        x, y = v[0] * felt[4], v[1] * felt[5]
+        if s["yields"] == 2:
+            x = y = x + y
+        v[0], v[1] = np.where(x < 0.0, 0.0, v[0]), np.where(y < 0.0, 0.0, v[1])
+    out[4], out[5] = v
+    fex, fey = path.viscous_parts(s, out[12], out[13], out[4], out[5])
+    fe[0], fe[1] = fex + felt[4] + felt[12], fey + felt[5] + felt[13]
+    if s["grooved"]:
+        fe[2] = felt[9]
 
 
 def tabulate_each(s, e, n):
@@ -534,7 +649,43 @@ def write_row(s, e, j, i, x):
     else:
         rows[i, 6], rows[i, 7] = x[5], x[6]
     rows[i, 12], rows[i, 13] = x[12], x[13]
+    if s["beyond"]:
+        write_felt(s, e, j, i, x)
     write_rates(e, j, i)
+
+
+def write_felt(s, e, j, i, x):
+    """Writes velocity and force of clay that yields of a row.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        j: raw row of the kick.
+        i: row of the record.
+        x: as in `write_row`.
+    """
+    raw, felt, rows = e.raw, e.felt, e.rows
+    for n in range(2):
+        v = felt[j, 2 + n]
+        if x[10 + n] > 0.0 and v != 0.0:
+            rest = raw[j, 18 + n] - felt[j, n] - felt[j, 12 + n]
+            v = loop.velocity_at_sample(x, n, raw[j, 4 + n], raw[j, 6 + n], rest)
+        rows[i, 4 + n] = v
+    # in stiff clay v is what its damping feels; where that is against the yield force, the clay
+    # holds the handle
+    if s["yields"] and not s["turned_clay"]:  # which is never stiff, see Scenario
+        px, py = rows[i, 4] * felt[j, 4], rows[i, 5] * felt[j, 5]
+        if s["yields"] == 2:
+            px = py = px + py
+        if px < 0.0:
+            rows[i, 4] = 0.0
+        if py < 0.0:
+            rows[i, 5] = 0.0
+    fex, fey = path.viscous_parts(s, x[12], x[13], rows[i, 4], rows[i, 5])
+    e.rendered[i, 0] = fex + felt[j, 4] + felt[j, 12]
+    e.rendered[i, 1] = fey + felt[j, 5] + felt[j, 13]
+    if s["grooved"]:
+        e.rendered[i, 2] = felt[j, 9]
 
 
 def write_rates(e, j, i):
@@ -612,8 +763,12 @@ def step_engine(s, e, command, after):
     e.step(e.model, e.data)
     e.timestep[0] = s["dt"]
     s["steps"] += 1
+    if s["yields"] and s["stuck"][0] and s["stuck"][1]:
+        e.w[0], e.w[1] = 0.0, 0.0  # the engine's rounding would creep
     for j in range(2):
         s["q"][j], s["w"][j] = e.q[j], e.w[j]
+    if s["springs"]:
+        path.feel_spring(s, e.table, after)
     if s["smooth"]:
         path.feel_place(s, e.table)
 
@@ -732,6 +887,9 @@ class Leapfrog(NamedTuple):
     def propose(self, s, e, after):
         propose(s, e, s["before"], after)
 
+    def meet(self, s, e, after, lands):
+        return after
+
     def finite(self, s, e):
         return abs(e.raw[0, 16]) + abs(e.raw[0, 17]) < INF
 
@@ -742,6 +900,9 @@ class Leapfrog(NamedTuple):
 
     def keep(self, s, e, after, shows):
         x = s["inputs"]
+        if s["beyond"]:
+            for j in range(path.FELT):
+                e.felt[0, j] = s["felt"][j]
         add_work(s, e, 0, 0.5 * (s["before"] + after), x)
         if not shows:
             return
@@ -752,6 +913,10 @@ class Leapfrog(NamedTuple):
         if after == 0.0 and x[7] > 0.0:
             e.rows[i, 4] = self.speed(s, e, 0)
             e.rows[i, 5] = self.speed(s, e, 1)
+            if s["beyond"]:
+                f = s["felt"]
+                fx, fy = path.viscous_parts(s, b[0], b[1], e.rows[i, 4], e.rows[i, 5])
+                e.rendered[i, 0], e.rendered[i, 1] = fx + f[4] + f[12], fy + f[5] + f[13]
             write_rates(e, 0, i)
         s["filled"] = i + 1
 
@@ -762,6 +927,8 @@ class Leapfrog(NamedTuple):
             n1, n2 = e.raw[0, 16], e.raw[0, 17]
             command = loop.whole_kick(s, w[0], w[1], n1, n2, c[0], c[1], after)
         accept(s)
+        if s["yields"]:
+            path.note_stop(s, e, s["t"], int(s["felt"][6]), int(s["felt"][7]))
         step_engine(s, e, command, after)
         if len(e.command):
             x, y = path.command_change(e, s["t"], s["t"] + after, 0.5 * dt)
@@ -781,5 +948,10 @@ class Leapfrog(NamedTuple):
         propose(s, e, before, before if felt else 0.0)
         raw = e.raw
         if felt:
-            return loop.velocity_at_sample(k, i, raw[0, 4 + i], raw[0, 6 + i], raw[0, 18 + i])
+            rest = raw[0, 18 + i]
+            if s["beyond"]:
+                rest = rest - s["felt"][i] - s["felt"][12 + i]
+                if s["yields"] and s["felt"][2 + i] == 0.0:
+                    return 0.0
+            return loop.velocity_at_sample(k, i, raw[0, 4 + i], raw[0, 6 + i], rest)
         return raw[0, 6 + i]

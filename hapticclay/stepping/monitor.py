@@ -167,7 +167,19 @@ class StabilityMonitor:
         if any(th and th.spring for th in s.operators):
             holds = "the spring of the hand holds the muscle's force"
             return f"{holds}: raise force, or lower operator.spring"
-        return "raise force, or lower b" if any(s.force) else "give a force"
+        if not any(s.force):
+            return "give a force"
+        way = int(abs(s.force[1]) > abs(s.force[0]))
+        Fy, push, lower = 0.0, abs(s.force[way]), "Fy"
+        if s.clay:
+            Fy = float(s.clay.laws[way].flows[0].max())
+            if s.clay.isotropic or s.clay.groove:
+                push = math.hypot(*s.force)
+            if s.clay.groove:
+                Fy, lower = s.clay.groove.hardest, "the pressure"
+        if push > Fy:
+            return "raise force, or lower b"
+        return f"raise the force above the yield force, {Fy:.6g} N, or lower {lower}"
 
     def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
         """Notes when the handle last moved, and when the motors were at their limits."""

@@ -11,16 +11,19 @@ when not. `e` holds its arrays: NumPy's when compiled, memoryviews when not.
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..model import arm, clay, compensator, pieces, regions
+from ..model import arm, clay, compensator, groove, pieces, regions
+from ..model import spring as springs
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # how a run stands
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
+FELT = 14  # see loop.yield_in_kick
 SUMS = 8  # of energy.kick_work, and energy.HARDWARE_WORK
 INF = np.inf
 NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
@@ -50,6 +53,12 @@ SCENARIO = [  # in numbers, see model.scenario
     ("turned_clay", "i8"),  # whether its axes are not x and y
     ("smooth", "i8"),  # which axes have smooth clay, see clay.Clay.smooth
     ("grain", "f8", 2),  # cosine and sine of the angle between them
+    ("grooved", "i8"),  # whether clay stays cut: 1, or 2 where it damps too
+    ("block", "f8", groove.BLOCK_NUMBERS),  # Groove.numbers
+    ("drag", "f8"),  # Groove.damping
+    ("springs", "i8"),  # whether clay springs back anywhere: 1 by itself, 2 by motors that hold
+    ("beyond", "i8"),  # whether clay has a force that b v does not tell
+    ("yields", "i8"),  # whether clay yields anywhere: 1 each axis by itself, 2 along the motion
     ("ramp", "f8", 5),  # muscle force that changes evenly: since [s], x, y [N], rate x, y [N/s]
     ("landings_most", "i8"),  # landings on borders in one step
 ]
@@ -74,6 +83,30 @@ STATE = [
     ("base", "f8", 2),  # its clay, see clay.damping_at
     ("rate", "f8", 2),
     ("old", "f8", 4),  # base and rate of the clay before the sample
+    # of clay that stays cut: base without it, now and before the sample; groove.cut's rim and
+    # removed volume [m^3]; place of the last cut [m], NaN before the first
+    ("bare", "f8", 4),
+    ("dragging", "f8"),  # damping of it [N.s/m]
+    ("rim", "f8", groove.RIM),
+    ("removed", "f8", 2),
+    ("cut_at", "f8", 2),
+    # of clay that yields: Fy, K, n of x and of y now, and before the sample; whether x and y rest
+    ("flow", "f8", 6),
+    ("flow_old", "f8", 6),
+    ("stuck", "i8", 2),
+    # of clay that springs back: Spring.numbers and the direction of a surface now, of x and of y;
+    # rest of the first spring [m] and elongation of the second [m] of each; place of the handle at
+    # the last sample [m]; force now, and at the end of the clay before (x, y each) [N]; energy lost
+    # and stored [J]; longest step that resolves it [s]
+    ("spring", "f8", 2 * regions.SPRING),
+    ("stretch", "f8", 4),
+    ("sprung_at", "f8", 2),
+    ("sprung", "f8", 4),
+    ("sprung_energy", "f8", 2),
+    ("resolved", "f8"),
+    ("anchor", "f8", 2),  # where an axis came to rest beside one that slides [m], NaN elsewhere
+    ("stopped", "i8"),  # rows of Engine.stops filled since the last look
+    ("felt", "f8", FELT),  # of the kick or stage last worked out, see loop.yield_in_kick
     ("work", "f8", SUMS),  # [J]
     ("final", "f8", 6),  # of the last kick: position, velocity and joint rates after it
 ]
@@ -112,7 +145,13 @@ class Engine(NamedTuple):
         ring: its memory, shape (n, 11), three rings one after the other: index and angles [rad] of
             past samples, `window` rows; forces of the clay at past samples [N], whole_delay + 2;
             the queue: time [s] and what to hold from then on, whole_delay + 4.
-        rendered: force of the clay as rendered [N], a line a row, shape (n, 2) or (0, 2).
+        rendered: force of the clay [N] where b v does not tell it, a line a row, shape (n, 2), and
+            in a third column the volume removed where clay stays cut [m^3]; (0, 2) elsewhere.
+        felt: of clay that yields, what each kick of a block felt, as state felt, shape (n, FELT).
+        stops: where it stops the handle or lets it go, shape (n, 3): coordinate, or 2.0 for both;
+            1.0 for a stop, 0.0 for the end of one; time [s].
+        ground: of clay that stays cut, share of each cell that is left, shape (n, m).
+        relief: height of the cells before any cut [m], as ground.
         breaks: times at which steps of an accurate run must end: a signal jumps there [s].
         law: of a sampled controller of the user's own, called with law_data.
         law_data: what it is called with.
@@ -140,6 +179,10 @@ class Engine(NamedTuple):
     chance: Any
     ring: Any
     rendered: Any
+    felt: Any
+    stops: Any
+    ground: Any
+    relief: Any
     breaks: Any
     law: Any
     law_data: Any
@@ -208,6 +251,20 @@ class Method(Protocol):
             s: state of the run.
             e: its arrays.
             after: its length [s].
+        """
+        ...
+
+    def meet(self, s: Any, e: Any, after: float, lands: bool) -> float:
+        """Shortens that step to where clay that yields begins or ceases to hold the handle.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            after: its length [s].
+            lands: whether it ends on a border, and is not to be shortened.
+
+        Returns:
+            Length of the step, which is worked out [s].
         """
         ...
 
@@ -477,8 +534,142 @@ def settle(s, table):
     low, high, base, rate = regions.enter_region(table, s["index"][0], s["index"][1], s["t"])
     for j in range(2):
         s["low"][j], s["high"][j], s["base"][j], s["rate"][j] = low[j], high[j], base[j], rate[j]
+    if s["yields"]:
+        for axis in range(2):
+            Fy, K, n = regions.enter_flow(table, axis, s["index"][0], s["index"][1])
+            flow = s["flow"]
+            flow[3 * axis], flow[3 * axis + 1], flow[3 * axis + 2] = Fy, K, n
+    if s["springs"]:
+        enter_spring(s, table)
     if s["smooth"]:
         feel_place(s, table)
+    if s["grooved"]:
+        for j in range(2):
+            s["bare"][j] = base[j]
+            s["base"][j] += s["dragging"]
+
+
+def enter_spring(s, table):
+    """Takes the springs of the region in which the run continues; those left behind lose theirs.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+    """
+    spring, stretch, sprung, n = s["spring"], s["stretch"], s["sprung"], regions.SPRING
+    q1, q2 = s["q"]
+    ox, oy = s["origin"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
+    at, stiffest = s["sprung_at"], 0.0
+    at[0], at[1] = u1y + u2y - ox, -oy - u1x - u2x
+    sprung[2], sprung[3] = sprung[0], sprung[1]
+    s["sprung_energy"][0] += s["sprung_energy"][1]
+    s["sprung_energy"][1] = 0.0
+    for i in range(2):
+        place = regions.spring_place(table, i, s["index"][0], s["index"][1])
+        for j in range(n - 1):
+            spring[n * i + j] = table[place + j]
+        stiffest = max(stiffest, spring[n * i] + spring[n * i + 2])
+        way, rest = 0.0, at[i]
+        if spring[n * i + 4] > 0.0:  # pushed from the border that is nearer
+            up = at[i] - s["low"][i] <= s["high"][i] - at[i]
+            way, rest = (1.0, s["low"][i]) if up else (-1.0, s["high"][i])
+            dent = table[place + n - 1]
+            if dent == dent and way * (dent - rest) > 0.0:
+                rest = dent
+            if abs(rest) == INF:
+                rest = at[i]
+        spring[n * i + n - 1] = way
+        stretch[2 * i], stretch[2 * i + 1], sprung[i] = rest, 0.0, 0.0
+    s["resolved"] = INF
+    if stiffest > 0.0:
+        if s["springs"] == 1:
+            s["resolved"] = springs.RESOLVED / math.sqrt(stiffest * s["mobility"])
+        feel_spring(s, table, 0.0)
+
+
+def feel_spring(s, table, h):
+    """Moves the springs on to the place of the handle.
+
+    Args:
+        s: state of the run.
+        table: from regions.region_table.
+        h: time since the last place [s].
+    """
+    spring, stretch, at, n = s["spring"], s["stretch"], s["sprung_at"], regions.SPRING
+    q1, q2 = s["q"]
+    ox, oy = s["origin"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
+    px, py = u1y + u2y - ox, -oy - u1x - u2x
+    stored = 0.0
+    for i in range(2):
+        p, way = (py if i else px), spring[n * i + 5]
+        rest, f, kept, lost = springs.spring_step(
+            spring[n * i], spring[n * i + 1], way, stretch[2 * i], p
+        )
+        z, f1, kept1, lost1 = springs.relaxing_step(
+            spring[n * i + 2], spring[n * i + 3], way, stretch[2 * i + 1], p - at[i], h
+        )
+        if lost > 0.0 and way != 0.0:
+            table[regions.spring_place(table, i, s["index"][0], s["index"][1]) + n - 1] = rest
+        stretch[2 * i], stretch[2 * i + 1], s["sprung"][i] = rest, z, f + f1
+        s["sprung_energy"][0] += lost + lost1
+        stored += kept + kept1
+        at[i] = p
+        if h > 0.0:
+            s["sprung"][2 + i] = s["sprung"][i]
+    s["sprung_energy"][1] = stored
+
+
+def viscous_parts(s, bx, by, vx, vy):
+    """Force of the clay's damping, (x, y) [N]. Floats, or arrays over samples.
+
+    Args:
+        s: state of the run.
+        bx: damping, x or the clay's own first axis [N.s/m].
+        by: the same, y or its second axis [N.s/m].
+        vx: velocity, x [m/s].
+        vy: the same, y [m/s].
+    """
+    if s["turned_clay"]:
+        return clay.turned_force(s["grain"][0], s["grain"][1], bx, by, vx, vy)
+    return clay.viscous_force(bx, by, vx, vy)
+
+
+def is_one_flow(s):
+    """Whether clay yields alike before and after the sample.
+
+    Args:
+        s: state of the run.
+    """
+    for j in range(6):
+        if s["flow"][j] != s["flow_old"][j]:
+            return False
+    return True
+
+
+def note_stop(s, e, t, stuckx, stucky):
+    """Notes where clay that yields stops the handle or lets it go.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        t: time of the sample [s], in whose kick it does; state felt tells when.
+        stuckx: whether x rests now.
+        stucky: whether y rests now.
+    """
+    stuck, felt = s["stuck"], s["felt"]
+    if stuckx == stuck[0] and stucky == stuck[1]:
+        return
+    stops, along = e.stops, s["yields"] == 2
+    for i in range(2):
+        now = stucky if i else stuckx
+        if now != stuck[i] and not (along and i):
+            n = s["stopped"]
+            stops[n, 0], stops[n, 1] = 2.0 if along else float(i), float(now)
+            stops[n, 2] = t + felt[10 + i] if now else t
+            s["stopped"] = n + 1
+    stuck[0], stuck[1] = stuckx, stucky
 
 
 def may_glide(s):
@@ -489,6 +680,8 @@ def may_glide(s):
     """
     dt, base, rate, old = s["dt"], s["base"], s["rate"], s["old"]
     if s["before"] != dt or s["t"] != s["i"] * dt or s["closing"] != OPEN or s["struck"]:
+        return False
+    if s["beyond"] and not (is_one_flow(s) and s["resolved"] == INF):
         return False
     return old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
 
@@ -509,6 +702,55 @@ def feel_place(s, table):
     for j in range(2):
         if which != 2 - j:
             old[j], old[2 + j] = base[j], 0.0
+
+
+def cut_place(s, e):
+    """As `cut_clay`, at the handle.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+    """
+    q1, q2 = s["q"]
+    w1, w2 = s["w"]
+    ox, oy = s["origin"]
+    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
+    r2 = w1 + w2
+    x, y = u1y + u2y - ox, -oy - u1x - u2x
+    cut_clay(s, e, x, y, u1x * w1 + u2x * r2, u1y * w1 + u2y * r2)
+
+
+def cut_clay(s, e, x, y, vx, vy):
+    """Takes away the clay between here and the last cut; where it damps, that is felt.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        x: place of the tool, x [m].
+        y: the same, y [m].
+        vx: velocity on the way here, x [m/s].
+        vy: the same, y [m/s].
+    """
+    at, grid = s["cut_at"], s["block"]
+    ax, ay = at[0], at[1]
+    if x != ax or y != ay:
+        whole, n = 1, 1
+        if ax == ax:
+            dx, dy = x - ax, y - ay
+            whole, n = 0, 1 + int(math.sqrt(dx * dx + dy * dy) / (groove.STRIDE * grid[7]))
+            for k in range(1, n):
+                groove.cut(
+                    grid, e.ground, e.relief, ax + k * dx / n, ay + k * dy / n, 0, s["rim"],
+                    s["removed"],
+                )  # fmt: skip
+        groove.cut(grid, e.ground, e.relief, x, y, whole, s["rim"], s["removed"])
+        at[0], at[1] = x, y
+    if s["grooved"] == 2:
+        _, area = groove.resistance(s["rim"], vx, vy)
+        base, old, bare, b = s["base"], s["old"], s["bare"], s["drag"] * area
+        s["dragging"] = b
+        base[0], base[1] = bare[0] + b, bare[1] + b
+        old[0], old[1] = bare[2] + b, bare[3] + b
 
 
 def move_on(s, table, i, up):
@@ -630,21 +872,24 @@ def careful(m, s, e):
         s["closing"] = TIME_LIMIT
     if on_grid:
         s["landings"] = 0
-    after = min(after, s["fine"])
     axis, up = -1, 0  # border that the step ends on
     overx, overy = 0, 0  # borders stepped over without a step
     act = True
     while True:
+        after = min(after, s["resolved"])
         if s["closing"] != OPEN:
             after = 0.0
         elif act:  # once; anew in other clay
             m.act(s, e)
             act = False
+            after = min(after, s["fine"])
         if s["struck"] and after > 0.0:
             s["struck"] = 0
             after = m.strike(s, e, after)
         m.propose(s, e, after)
         good = m.finite(s, e)
+        if s["yields"] and after > 0.0 and good:
+            after = m.meet(s, e, after, axis >= 0)
         if after == 0.0 or axis >= 0 or not good:
             break
         x, y = m.place(s, e, after)
@@ -684,6 +929,12 @@ def careful(m, s, e):
         m.commit(s, e, after)
         for j in range(2):
             s["old"][j], s["old"][2 + j] = s["base"][j], s["rate"][j]
+        if s["yields"]:
+            for j in range(6):
+                s["flow_old"][j] = s["flow"][j]
+        if s["grooved"]:
+            s["bare"][2], s["bare"][3] = s["bare"][0], s["bare"][1]
+            cut_place(s, e)
         s["before"] = after
         s["t"] += after
         if target - s["t"] <= 1e-9 * s["dt"]:
@@ -703,5 +954,7 @@ def advance(m, s, e, room):
         room: largest number of rows to fill.
     """
     while s["code"] == OPEN and s["filled"] < room and s["crossed"] < len(e.crossings) - 3:
+        if s["yields"] and s["stopped"] > len(e.stops) - 8:
+            break
         if not m.glide(s, e, room):
             careful(m, s, e)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
-from ..model import arm, clay, compensator, regions
+from ..model import arm, compensator, regions
 from ..model.compensator import Compensator
 from ..model.constants import AXES
 from ..model.operator import NO_HAND
@@ -46,6 +46,22 @@ class Crossing:
     border: float
     time: float
     speed: float
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The clay held the handle still.
+
+    Attributes:
+        axis: "x" or "y" where that axis alone was held by its own law, "xy" for the handle as a
+            whole.
+        start: when it came to rest [s].
+        end: when it moved on [s]; None if it still rested at the end of the run.
+    """
+
+    axis: str
+    start: float
+    end: float | None = None
 
 
 class State(dict[str, Any]):
@@ -189,7 +205,7 @@ class EngineStore:
             engine.timestep_view(model), regions.region_table(None, None), none, none, none,
             self.rows, self.crossings,
             np.zeros((block, leapfrog.RAW)), np.zeros((block, leapfrog.VARIED)),
-            none, none, none, np.zeros(0),
+            none, none, none, none, none, none, none, np.zeros(0),
         )  # fmt: skip
         desk: Any = np.zeros(0)
         views: Any = map(memoryview, arrays)
@@ -272,6 +288,11 @@ class Run:
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray]] = []  # index, rows
         self.crossings: list[Crossing] = []
+        self.stops: list[Stop] = []
+        self.rendered = np.zeros((0, 2))  # force of the clay where b v does not tell it
+        self.rendered_kept: list[np.ndarray] = []
+        self.last_rendered: Any = None
+        self.ground: Any = None  # of clay that stays cut, share of each cell that is left
         self.outcome: monitor.Outcome | None = None
         self.end_time: float | None = None
         self.without_samples = brief
@@ -296,10 +317,29 @@ class Run:
         self._put(q=data.qpos, w=data.qvel)
         now["fine"], now["struck"], now["first"] = math.inf, 1, -1
         self._put(index=regions.region_of(self.table, s.start))
+        now["resolved"] = math.inf
+        if now["beyond"]:
+            self.render()
+            self.stop_rows = np.zeros((4 * CHUNK, 3))  # an axis stops and goes on in each step
+            felt = np.zeros((self.kernel.block, path.FELT))
+            self._arrays(stops=self.stop_rows, felt=felt)
+        if now["grooved"]:
+            block: Any = s.clay and s.clay.groove
+            self._put(block=block.numbers, cut_at=(math.nan, math.nan))
+            now["drag"], self.ground = block.damping, block.shares.copy()
+            self._arrays(ground=self.ground, relief=block.relief)
         path.settle(now, self.e.table)
-        self._put(old=(*now["base"], *now["rate"]))
+        if now["grooved"]:
+            self._put(bare=(*now["base"], *now["base"]))
+            path.cut_place(now, self.e)
+        self._put(old=(*now["base"], *now["rate"]), flow_old=now["flow"])
         w1, w2 = now["w"]
         self.first = energy.stored_energy(s, w1, w1 + w2, s.start, s.velocity)
+
+    def render(self) -> None:
+        """Keeps the force of the clay, which b v does not tell."""
+        self.rendered = np.zeros((CHUNK - 1, 3 if self.s["grooved"] else 2))
+        self._arrays(rendered=self.rendered)
 
     def _tell(self, s: Scenario) -> None:
         """Gives the scenario's numbers to the loops."""
@@ -318,6 +358,12 @@ class Run:
         angle = s.clay.angle if s.clay else 0.0
         now["turned_clay"] = int(angle != 0.0)
         now["smooth"] = s.clay.smooth if s.clay else 0
+        held = s.control == "sampled" and s.render == "held"
+        now["springs"] = (2 if held else 1) if s.clay is not None and s.clay.springs else 0
+        now["beyond"] = int(s.clay is not None and (s.clay.yields or s.clay.springs))
+        now["yields"] = (2 if s.clay.isotropic else 1) if s.clay and s.clay.yields else 0
+        if s.clay and s.clay.groove:
+            now["yields"], now["grooved"] = 2, 2 if s.clay.groove.damping else 1
         self._put(grain=(math.cos(angle), math.sin(angle)))
 
     def _tell_compensator(self, shapes: tuple[Compensator, Compensator]) -> None:
@@ -379,11 +425,23 @@ class Run:
         self._make(room)
         for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
             self.crossings.append(Crossing(AXES[int(axis)], *crossing))
+        if self.s["stopped"]:
+            for axis, stops, t in self.stop_rows[: int(self.s["stopped"])].tolist():
+                self._note_stop(("x", "y", "xy")[int(axis)], stops > 0.0, t)
         code = int(self.s["code"])
         if code == path.NOT_FINITE:
             raise ArithmeticError
         if code:
             self.finish("finished" if code == path.FINISHED else "time limit")
+
+    def _note_stop(self, axis: str, stops: bool, t: float) -> None:
+        if stops:
+            self.stops.append(Stop(axis, t))
+            return
+        for i in reversed(range(len(self.stops))):
+            if self.stops[i].axis == axis:
+                self.stops[i] = replace(self.stops[i], end=t)
+                break
 
     def _prepare_drives(self, n: int, further: int = 0) -> tuple[float, float]:
         """Readies the signals for the next n whole steps, and further ones to look ahead.
@@ -400,15 +458,21 @@ class Run:
         return begin, end
 
     def _make(self, room: int) -> None:
-        self.s["crossed"] = 0
+        self.s["crossed"] = self.s["stopped"] = 0
         self.kernel.advance(self, room)
 
     def _save(self) -> Any:
-        return self.s.save(), self.data.qpos.copy(), self.data.qvel.copy()
+        dents = self.table.copy() if self.s["springs"] else None
+        ground = None if self.ground is None else self.ground.copy()
+        return self.s.save(), self.data.qpos.copy(), self.data.qvel.copy(), dents, ground
 
     def _restore(self, saved: Any) -> None:
-        state, self.data.qpos[:], self.data.qvel[:] = saved
+        state, self.data.qpos[:], self.data.qvel[:], dents, ground = saved
         self.s.load(state)
+        if dents is not None:
+            self.table[:] = dents
+        if ground is not None:
+            self.ground[:] = ground
 
     def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
         """Runs to the end, until progress returns True, or until sample `pause`.
@@ -515,6 +579,8 @@ class Run:
     def flush(self) -> None:
         """Judges the rows since the last look."""
         n, self.s["filled"] = self.filled, 0
+        if n and len(self.rendered):
+            self.last_rendered = self.rendered[n - 1, :2].tolist()
         if self.without_samples and n and self._still_calm(n):
             if self.outcome is not None:
                 self.outcome = self.watch.end(self.outcome)
@@ -571,12 +637,12 @@ class Run:
         good, found = self.look(rows)
         if found is not None:
             self.outcome, self.end_time = found, None
-            self.crossings = [c for c in self.crossings if c.time <= found.time]
+            self._cut_events(found.time)
         elif self.outcome is not None:
             if self.outcome.code == "interrupted":  # anywhere: the record ends with its last sample
                 step = self.looked + good - 1
                 self.outcome = replace(self.outcome, time=step * self.scenario.dt, step=step)
-                self.crossings = [c for c in self.crossings if c.time <= self.outcome.time]
+                self._cut_events(self.outcome.time)
             self.outcome = self.watch.end(self.outcome)
         if good:
             keep = np.arange(-self.looked % self.every, good, self.every)
@@ -584,15 +650,39 @@ class Run:
                 keep = np.append(keep, good - 1)
             everything = len(keep) == len(rows)
             self.kept.append((self.looked + keep, rows.copy() if everything else rows[keep]))
+            if len(self.rendered):
+                self.rendered_kept.append(self.rendered[keep])
         self.looked += good
         return good
+
+    def _cut_events(self, t: float) -> None:
+        """Leaves out what came after the end of the record."""
+        self.crossings = [c for c in self.crossings if c.time <= t]
+        self.stops = [
+            replace(x, end=None) if x.end is not None and x.end > t else x
+            for x in self.stops
+            if x.start <= t
+        ]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
         t = np.concatenate([index for index, _ in self.kept]) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
-        return {"t": t} | self._columns([rows for _, rows in self.kept])
+        out = {"t": t} | self._columns([rows for _, rows in self.kept])
+        if self.rendered_kept:
+            kept = np.concatenate(self.rendered_kept)
+            out["fe"] = kept[:, :2]
+            if self.ground is not None:
+                out["removed"] = kept[:, 2]
+        return out
+
+    def left_ground(self) -> np.ndarray | None:
+        """As Record.ground."""
+        clay = self.scenario.clay
+        if self.ground is None or clay is None or clay.groove is None:
+            return None
+        return clay.groove.relief * self.ground
 
     def columns(self, rows: np.ndarray, first: int) -> dict[str, np.ndarray]:
         """Rows by the names of Record's arrays, without their times.
@@ -601,7 +691,10 @@ class Run:
             rows: shape (n, path.ROW).
             first: index of the first one among those not yet judged.
         """
-        return self._columns([rows])
+        out = self._columns([rows])
+        if len(self.rendered):
+            out["fe"] = self.rendered[first : first + len(rows), :2].copy()
+        return out
 
     def _columns(self, rows: list[np.ndarray]) -> dict[str, np.ndarray]:
         columns = (np.concatenate([x[:, j : j + 2] for x in rows]) for j in range(0, path.ROW, 2))
@@ -610,17 +703,14 @@ class Run:
         return dict(p=p, v=v, fh=fh, fe=fe, b=b, q=q, qd=qd, tau=tau, delta=delta)
 
     def _force(self, bx: Any, by: Any, vx: Any, vy: Any) -> tuple[Any, Any]:
-        """Force of the clay, (x, y) [N]."""
-        if self.s["turned_clay"]:
-            c, s = self.s["grain"]
-            return clay.turned_force(c, s, bx, by, vx, vy)
-        return clay.viscous_force(bx, by, vx, vy)
+        """Force of the clay's damping, (x, y) [N]."""
+        return path.viscous_parts(self.s, bx, by, vx, vy)
 
     def brief(self) -> tuple[Any, ...]:
         """The end of the run: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
         if self.without_samples:
             px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.last_row[2:14]
-            force = self._force(bx, by, vx, vy)
+            force = self.last_rendered or self._force(bx, by, vx, vy)
             last: Any = [(px, py), (vx, vy), (fx, fy), force, (bx, by)]
             return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
         arrays = self.arrays()
@@ -633,7 +723,11 @@ class Run:
         px, py, vx, vy, w1, w2 = (float(x) for x in self.s["final"])
         last = energy.stored_energy(self.scenario, w1, w1 + w2, (px, py), (vx, vy))
         work = [float(x) for x in self.s["work"]][:5]
-        return energy.energy_balance(work, self.first if self.looked else last, last)
+        out = energy.energy_balance(work, self.first if self.looked else last, last)
+        if self.s["springs"]:
+            lost, stored = self.s["sprung_energy"]
+            out |= {"springs_stored": float(stored), "springs_lost": float(lost)}
+        return out
 
 
 def _columns(rows: np.ndarray) -> np.ndarray:
@@ -679,7 +773,7 @@ class LeapfrogRun(Run):
             self._put(form_of=(-1.0, -1.0), form_states=self.moving_states())
 
     def _make(self, room: int) -> None:
-        if self.varies or self.s["smooth"]:  # b varies too
+        if self.varies or self.s["smooth"] or self.s["grooved"] == 2:  # b varies too
             n = min(room - self.filled + 1, max(self.last - self.i, 0) + 1)
             self.s["first"] = self.i
             self._prepare_drives(n)

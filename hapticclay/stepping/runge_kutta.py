@@ -18,12 +18,13 @@ from ..errors import ParameterError
 from ..model import arm, clay, compensator, controller, regions
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
-from . import energy, loop, path
+from . import energy, loop, modes, path
+from .modes import FREE, RESTS, SLIDING, STABLE_STEP, SUBSTEPS, TURNED_IN
 from .path import INF, OPEN, ROW, TOUCH, put5, put6, put8, put10, put17
 from .run import Run
 
-STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
-SUBSTEPS = 1000  # most of them for one sample
+REFERENCE_SPEED = 0.1  # [m/s] of a usual cut: at which the consistency counts as a damper
+CREEP_MOST = 1e-5  # [m/s] a slower creep may count as rest
 POWERS = 5  # of energy.kick_work
 COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the run
 ROW_BYTES = 8 * ROW
@@ -49,6 +50,7 @@ RUNGE_KUTTA_STATE = [  # beside path.STATE
     # of the step last worked out:
     ("next", "f8", 17),  # q, q', control and works at its end
     ("sample", "f8", 10),  # p [m], v [m/s], fh [N], tau [N.m], delta [m] at its start
+    *modes.MODES_STATE,
 ]
 
 
@@ -101,6 +103,11 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
     bx, by = base
     if n > 0:
         uhx, uhy = path.mean_force(s, e, t, 0.0)
+    yields, felt, still, holds = s["yields"], s["felt"], False, False
+    rx, ry, fex0, fey0, restx, resty = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if yields:
+        still = s["mode"][0] == 0 and s["mode"][1] == 0
+        holds = s["mode"][0] == 0 or s["mode"][1] == 0
     if dampers:
         ctrl[2], ctrl[3] = bx, by
     while True:
@@ -151,6 +158,8 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             r2 = w1 + w2
             vx = u1x * w1 + u2x * r2
             vy = u1y * w1 + u2y * r2
+            if holds:
+                vx, vy = modes.without_rest(s, vx, vy)
             s1 = w1 * w1
             s2 = r2 * r2
             cx = u1y * s1 + u2y * s2
@@ -199,15 +208,28 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
                 gx = (gx - m2 * gy) / m1
                 ffx -= massx * gx
                 ffy -= massy * gy
+            if yields:
+                rx, ry, gx, gy = modes.yield_at_stage(
+                    s, (sxx, sxy, syy), (massx, massy), (vx, vy), (gx - cx, gy - cy)
+                )
+                gx, gy = gx + cx, gy + cy
+                ffx, ffy = fx - rx - massx * gx, fy - ry - massy * gy
             det = u1x * u2y - u2x * u1y
             t2 = I2 * ((gy * u1x - gx * u1y) / det) - u2x * ffx - u2y * ffy
             t1 = I1 * ((gx * u2y - gy * u2x) / det) - u1x * ffx - u1y * ffy + t2
             if t1 * t1 > square1 or t2 * t2 > square2:
                 # a kick of one second from rest, in which the velocity after it is the acceleration
-                _, _, _, _, ffx, ffy, t1, t2 = controller.kick_at_limit(
+                gx, gy, _, _, ffx, ffy, t1, t2 = controller.kick_at_limit(
                     1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy),
                     (massx, massy), (t1, t2), (limit1, limit2),
                 )  # fmt: skip
+                if yields:
+                    rx, ry, gx, gy = modes.yield_at_stage(
+                        s, arm.mobility((u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace)),
+                        (massx, massy), (vx, vy), (gx - cx, gy - cy),
+                    )  # fmt: skip
+                    gx, gy = gx + cx, gy + cy
+                    ffx, ffy = fx - rx - massx * gx, fy - ry - massy * gy
             if formed:
                 shownx += feedx * ffx
                 showny += feedy * ffy
@@ -218,6 +240,9 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             if stage == 0:
                 px0, py0, vx0, vy0, hx0, hy0 = px, py, vx, vy, hx, hy
                 t10, t20, dx0, dy0, bx0, by0 = t1, t2, shownx, showny, bx, by
+                if yields:
+                    hx0, hy0, fex0, fey0 = hx + rx, hy + ry, fex + rx, fey + ry
+                    restx, resty = felt[8], felt[9]
                 if h == 0.0:
                     break
 
@@ -229,6 +254,11 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             push[0], push[1] = u1x * hx + u1y * hy + m2, m2
             forward(model, data)
             a1, a2 = acceleration[0], acceleration[1]
+            if yields:
+                fex += rx
+                fey += ry
+                if still:  # but for the engine's rounding
+                    a1, a2 = 0.0, 0.0
 
             # derivative of all states, and the point of the next stage
             if formed:
@@ -287,12 +317,22 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
         q2 = Q2 + h * (W2 + k * f2)
         w1 = W1 + k * (f1 + g1)
         w2 = W2 + k * (f2 + g2)
+        if holds and not still:
+            q1, q2, w1, w2 = modes.back_to_rest(s, q1, q2, w1, w2)
         if n > 0:  # a step that would leave the region is left to path.careful
             if not abs(w1) + abs(w2) < INF:
                 break
             x, y = arm.handle_position(q1, q2, (L1, L2, I1, I2, trace))
             if not (lowx <= x - ox <= highx and lowy <= y + noy <= highy):
                 break
+            if yields:
+                x, y = arm.handle_velocity(
+                    w1, w1 + w2, arm.jacobian(q1, q2, (L1, L2, I1, I2, trace))
+                )
+                if not modes.goes_on(s, h, x, y, restx, resty):
+                    break
+                if part == 0:
+                    e.rendered[at, 0], e.rendered[at, 1] = fex0, fey0
             if part == 0:
                 put_sample(
                     rows, at * ROW_BYTES, Q1, Q2, px0, py0, vx0, vy0, hx0, hy0, t10, t20, dx0, dy0,
@@ -324,6 +364,7 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
                 muscle, motors, melted, damped, through,
             )  # fmt: skip
             put10(s["sample"], 0, px0, py0, vx0, vy0, hx0, hy0, t10, t20, dx0, dy0)
+            s["resisted"][0], s["resisted"][1] = fex0, fey0
             return 0
         steps += 1
         part += 1
@@ -428,6 +469,277 @@ def next_break(s, e):
     return breaks[low] if low < len(breaks) else INF
 
 
+def feel(s, e):
+    """Works out what the clay does now, in the modes chosen, into state felt.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+    """
+    march(s, e, 0.0, 0)
+
+
+def choose_modes(s, e):
+    """Chooses the modes in which clay that yields acts from now on, and the longest step in them.
+
+    Args:
+        s: state of the run, which is put to rest where it nearly is.
+        e: its arrays.
+    """
+    s["fine"] = INF
+    if s["yields"] == 2:
+        choose_way(s, e)
+    else:
+        choose_signs(s, e)
+    s["fine"] = modes.longest_step(s)
+    path.note_stop(s, e, s["t"], is_stopped(s, 0), is_stopped(s, 1))
+
+
+def is_stopped(s, i):
+    """Whether an axis rests in clay that can bring it to rest, 1 or 0.
+
+    Args:
+        s: state of the run.
+        i: the axis, 0 or 1.
+    """
+    thins = s["flow"][3 * i + 1] > 0.0 and s["flow"][3 * i + 2] < 1.0
+    return 1 if s["mode"][i] == 0 and (s["flow"][3 * i] > 0.0 or thins) else 0
+
+
+def stand(s, e, vx, vy):
+    """Gives the handle a velocity along the axes of the clay, 0.0 where it comes to rest.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        vx: along the first axis [m/s].
+        vy: along the second one [m/s].
+    """
+    q1, q2 = s["q"]
+    w1, w2 = 0.0, 0.0
+    if vx != 0.0 or vy != 0.0:
+        w1, w2 = modes.joint_rates(s, q1, q2, vx, vy)
+    take(s, e, q1, q2, w1, w2)
+
+
+def choose_signs(s, e):
+    """As `choose_modes`, of clay whose axes yield each by itself.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+    """
+    mode, ended = s["mode"], s["ended"]
+    q1, q2 = s["q"]
+    vx, vy = modes.clay_velocity(s, q1, q2, s["w"][0], s["w"][1])
+    restx, resty = False, False
+    for i in range(2):
+        v = vy if i else vx
+        rests = False
+        if not modes.is_active(s, i):
+            mode[i] = 1
+        elif ended[i] == FREE or ended[i] == -FREE:
+            rests = True
+        elif mode[i] == 0 or ended[i] == RESTS or v == 0.0:
+            rests = True
+        else:
+            mode[i] = 1 if v > 0.0 else -1
+        if i:
+            resty = rests
+        else:
+            restx = rests
+    before = (mode[0], mode[1])
+    feel(s, e)
+    if not restx and modes.is_active(s, 0):
+        restx = modes.is_nearly_at_rest(s, 0)
+    if not resty and modes.is_active(s, 1):
+        resty = modes.is_nearly_at_rest(s, 1)
+    if not (restx or resty):
+        return
+    x, y = modes.clay_place(s, q1, q2)
+    if restx and before[0] != 0:
+        s["anchor"][0] = x
+    if resty and before[1] != 0:
+        s["anchor"][1] = y
+    if (restx and vx != 0.0) or (resty and vy != 0.0):
+        stand(s, e, 0.0 if restx else vx, 0.0 if resty else vy)
+    least, bestx, besty = INF, 0, 0
+    for j in range(3 if restx else 1):
+        for k in range(3 if resty else 1):
+            if least <= 0.0:
+                continue
+            mode[0] = tried_mode(j, restx, ended[0], before[0])
+            mode[1] = tried_mode(k, resty, ended[1], before[1])
+            feel(s, e)
+            wrong = max(
+                modes.misfit(s, 0, restx and abs(ended[0]) != FREE),
+                modes.misfit(s, 1, resty and abs(ended[1]) != FREE),
+            )
+            if wrong < least:
+                least, bestx, besty = wrong, mode[0], mode[1]
+    mode[0], mode[1] = bestx, besty
+    feel(s, e)
+
+
+def tried_mode(k, rests, ended, now):
+    """A mode to be tried: the present one unless the axis rests; the first is rest.
+
+    Args:
+        k: number of the trial.
+        rests: whether the axis rests.
+        ended: see state ended.
+        now: its mode.
+    """
+    if not rests:
+        return now
+    if ended == FREE:
+        return 1
+    if ended == -FREE:
+        return -1
+    return 0 if k == 0 else 1 if k == 1 else -1
+
+
+def choose_way(s, e):
+    """As `choose_modes`, of clay that resists along the motion.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+    """
+    mode, way, ended = s["mode"], s["way"], s["ended"][0]
+    if not modes.is_active(s, 0):
+        mode[0] = mode[1] = SLIDING
+        feel(s, e)
+        return
+    vx, vy = modes.clay_velocity(s, s["q"][0], s["q"][1], s["w"][0], s["w"][1])
+    rests = mode[0] == 0 or ended != 0 or (vx == 0.0 and vy == 0.0)
+    if not rests:
+        mode[0] = mode[1] = SLIDING
+        feel(s, e)
+        rests = modes.is_nearly_at_rest(s, 0)
+    if rests:
+        if vx != 0.0 or vy != 0.0:
+            stand(s, e, 0.0, 0.0)
+            vx, vy = 0.0, 0.0
+        mode[0] = mode[1] = 0
+        feel(s, e)
+        if ended != FREE and modes.gap_of_mode(s, 0) >= 0.0:
+            return
+        modes.set_out(s)
+        mode[0] = mode[1] = SLIDING
+        feel(s, e)
+    m = math.sqrt(vx * vx + vy * vy)
+    if m > 0.0:
+        way[0], way[1] = vx / m, vy / m
+    if modes.is_turned_in(s, way[0], way[1]):
+        modes.turn_in(s, m, way[0], way[1])
+        mode[0] = mode[1] = TURNED_IN
+        if m > 0.0:
+            stand(s, e, m * way[0], m * way[1])
+        feel(s, e)
+
+
+def feel_end(s, e, h):
+    """Makes the run feel the clay at the end of the step worked out, without effect on it else.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        h: length of the step [s].
+    """
+    q, w, control, form = s["q"], s["w"], s["control"], s["form_states"]
+    kept, after, t = s["kept"], s["next"], s["t"]
+    for j in range(2):
+        kept[j], kept[2 + j] = q[j], w[j]
+        q[j], w[j] = after[j], after[2 + j]
+    for j in range(8):
+        kept[4 + j], kept[12 + j] = control[j], form[j]
+        control[j], form[j] = after[4 + j], s["form_next"][j]
+    s["t"] = t + h
+    feel(s, e)
+    s["t"] = t
+    for j in range(2):
+        q[j], w[j] = kept[j], kept[2 + j]
+    for j in range(8):
+        control[j], form[j] = kept[4 + j], kept[12 + j]
+
+
+def gap_at_end(h, m, s, e, i):
+    """As modes.gap_of_mode, of a step.
+
+    Args:
+        h: length of the step [s].
+        m: the method.
+        s: state of the run.
+        e: its arrays.
+        i: the axis; 0 for clay along the motion.
+    """
+    m.propose(s, e, h)
+    feel_end(s, e, h)
+    return modes.gap_of_mode(s, i)
+
+
+def strays(s, e, h):
+    """Whether a step along the motion turns back, or leaves the speeds of its mode.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+        h: length of the step [s].
+    """
+    x, way = s["next"], s["way"]
+    vx, vy = modes.clay_velocity(s, x[0], x[1], x[2], x[3])
+    along = vx * way[0] + vy * way[1]
+    if s["mode"][0] == SLIDING:
+        return along < 0.0
+    if s["mode"][0] != TURNED_IN:
+        return False
+    turns = modes.strength(s, 0, along) * modes.across(s, way[0], way[1])
+    return modes.TURN * along > 2.0 * modes.TURNING * s["dt"] * turns
+
+
+def next_end(m, s, e, after):
+    """Shortens a step to where clay that yields first ends a mode; notes that in state event.
+
+    Args:
+        m: the method.
+        s: state of the run, with the step worked out.
+        e: its arrays.
+        after: its length [s].
+
+    Returns:
+        Length of the step, which is worked out [s].
+    """
+    event, mode, along = s["event"], s["mode"], s["yields"] == 2
+    shortest, moved = modes.shortest_step(s), False
+    while along and after > shortest and strays(s, e, after):
+        after = max(0.5 * after, shortest)
+        m.propose(s, e, after)
+    span, axis, x = after, -1, s["next"]
+    vx, vy = modes.clay_velocity(s, x[0], x[1], x[2], x[3])
+    for i in range(1 if along else 2):
+        if not modes.is_active(s, i) or (along and mode[i] == SLIDING):
+            continue
+        if mode[i] != 0 and not along and mode[i] * (vy if i else vx) >= 0.0:
+            continue
+        moved = True
+        gap = gap_at_end(after, m, s, e, i)
+        if gap < 0.0:
+            h = path.find_root(gap_at_end, after, gap, m, s, e, i)
+            if axis < 0 or h < span:
+                span, axis = h, i
+    if axis >= 0:
+        span = min(max(span, shortest), after)
+        event[axis] = RESTS
+        if mode[axis] == 0:
+            m.propose(s, e, span)
+            feel_end(s, e, span)
+            event[axis] = FREE if along or s["felt"][8 + axis] > 0.0 else -FREE
+    if moved:
+        m.propose(s, e, span)
+    return span
+
+
 class RungeKutta(NamedTuple):
     """The method; `path.Method` says what each part does.
 
@@ -447,7 +759,14 @@ class RungeKutta(NamedTuple):
                 n = math.ceil(s["break"] / s["dt"] - path.NEAR) - 1 - i
         if n < 1 or s["part"] > 0 or s["t"] != i * s["dt"] or s["closing"] != OPEN:
             return 0
-        return self.block(s, e, n)
+        if s["yields"]:
+            choose_modes(s, e)
+            if s["fine"] < s["dt"] / parts or (s["yields"] == 2 and s["mode"][0] == TURNED_IN):
+                return 0
+        made = self.block(s, e, n)
+        if made and s["yields"]:
+            s["ended"][0] = s["ended"][1] = 0
+        return made
 
     def block(self, s, e, n):
         """As march_block.
@@ -470,6 +789,9 @@ class RungeKutta(NamedTuple):
             if s["part"] == 0:
                 s["share"] = after / s["substeps"]
             after = s["share"] if s["part"] < s["substeps"] - 1 else goal - t
+            if s["yields"]:  # steps end anywhere
+                parts = math.ceil((goal - t) / s["dt"] * s["substeps"] - path.NEAR)
+                after = (goal - t) / parts if parts > 1 else goal - t
         return target, after, on_grid
 
     def arrive(self, s, target):
@@ -478,7 +800,12 @@ class RungeKutta(NamedTuple):
         s["part"] = 0
 
     def act(self, s, e):
-        pass
+        if s["yields"]:
+            choose_modes(s, e)
+
+    def meet(self, s, e, after, lands):
+        s["event"][0] = s["event"][1] = 0
+        return after if lands else next_end(self, s, e, after)
 
     def strike(self, s, e, after):
         return after
@@ -508,6 +835,8 @@ class RungeKutta(NamedTuple):
             e.rows, i * ROW_BYTES, s["q"][0], s["q"][1], px, py, vx, vy, fx, fy, t1, t2, deltax,
             deltay, bx, by, s["w"][0], s["w"][1],
         )  # fmt: skip
+        if s["yields"]:
+            e.rendered[i, 0], e.rendered[i, 1] = s["resisted"][0], s["resisted"][1]
         put6(s["final"], 0, px, py, vx, vy, s["w"][0], s["w"][1])
         for j in range(POWERS):
             s["work"][j] = s["done"][j]
@@ -522,6 +851,8 @@ class RungeKutta(NamedTuple):
         for j in range(POWERS):
             s["done"][j] = x[12 + j]
         s["part"] = (s["part"] + 1) % s["substeps"]
+        for j in range(2):
+            s["ended"][j] = s["event"][j]
 
     def speed(self, s, e, i):
         u = arm.jacobian(s["q"][0], s["q"][1], path.arm_of(s))
@@ -538,17 +869,54 @@ def fastest_rate(scenario: Scenario) -> float:
     Args:
         scenario: the scene.
     """
-    clay, hands = scenario.clay, [th or NO_HAND for th in scenario.operators]
-    b = clay.largest if clay else 0.0
+    hands = [th or NO_HAND for th in scenario.operators]
     damper, spring = max(th.damper for th in hands), max(th.spring for th in hands)
+    b, W = steepest_clay(scenario), largest_lightness(scenario)
+    return max((b + damper) * W + math.sqrt(spring * W), 0.5 * own_rate(scenario))
+
+
+def steepest_clay(scenario: Scenario) -> float:
+    """Largest damping of the clay, with that of its consistency at REFERENCE_SPEED [N.s/m].
+
+    Args:
+        scenario: the scene.
+    """
+    most, clay = 0.0, scenario.clay
+    for law in clay.laws if clay else ():
+        b = law.damping
+        if clay and clay.yields:
+            _, K, n = law.flows
+            b = b + n * K * REFERENCE_SPEED ** (n - 1.0)
+        most = max(most, float(b.max()))
+    return most
+
+
+def largest_lightness(scenario: Scenario) -> float:
+    """Largest acceleration of the handle per unit of force [1/kg].
+
+    Args:
+        scenario: the scene.
+    """
     W, through = scenario.arm.links[4], 0.0
     for servo, shape, K in zip(scenario.servo, scenario.compensators, scenario.gain, strict=True):
         if scenario.shaping:
             W = max(W, servo.S.gain)
         if len(shape.num) == len(shape.den):  # C passes a force on at once
             through = max(through, K * servo.G.gain * abs(shape.num[0]))
-    W += through
-    return max((b + damper) * W + math.sqrt(spring * W), 0.5 * own_rate(scenario))
+    return W + through
+
+
+def creep_limit(scenario: Scenario) -> float:
+    """Speed below which clay of n < 1 counts as at rest, as its steps would be too many [m/s].
+
+    Args:
+        scenario: the scene.
+    """
+    W, most = largest_lightness(scenario), 0.0
+    for law in scenario.clay.laws if scenario.clay else ():
+        _, K, n = (x.ravel().tolist() for x in law.flows)
+        most = max(modes.creep_speed(W, scenario.dt, *x) for x in zip(K, n, strict=True))
+    return most
 
 
 def own_rate(scenario: Scenario) -> float:
@@ -578,6 +946,13 @@ class RungeKuttaRun(Run):
         if parts > SUBSTEPS:
             bound = f"explicit: would take {parts:.4g} steps a sample in so stiff a scene"
             raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
+        if now["yields"]:
+            creep = creep_limit(s)
+            if creep > CREEP_MOST:
+                bound = f"explicit: would take a creep of {creep:.2g} m/s in this clay for rest"
+                raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
+            now["lightness"] = largest_lightness(s)
+            self._put(mode=(1, 1))
         now["substeps"], now["landings_most"], now["break"] = parts, 2**62, math.inf
         control = loop.initial_state(s.start, s.velocity, s.servo)[:8]
         if now["formed"]:

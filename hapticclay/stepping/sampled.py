@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm, clay, compensator, controller, hardware, operator
+from ..model import arm, clay, compensator, controller, flow, hardware, operator
 from ..model.compensator import Compensator
 from ..model.controller import Servo
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
@@ -25,6 +25,10 @@ from .run import CHUNK, Run
 SLACK = 1e-9  # of dt: events so close are one
 HOLD = 10  # numbers that the motors hold, see SAMPLED_STATE
 FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
+REACTION = 1e-9  # [s] so long after a sample a force is that at it
+FRICTION_ROUNDS = 80  # to find the torque of a joint that friction holds in clay that yields
+FRICTION_CLOSE = 1e-15  # agreement of it, over its limit, and of the rate over that without it
+FRICTION_NUDGE = 1e-9  # of the limit, beyond the torque that brings a joint to rest
 AHEAD = 10  # muscle force of a kick before, after and around a sample, at it; change of the command
 
 SAMPLED_STATE = [  # beside path.STATE
@@ -32,6 +36,7 @@ SAMPLED_STATE = [  # beside path.STATE
     ("ratio", "i8"),  # steps in a control sample
     ("Ts", "f8"),
     ("physical", "i8"),  # whether the clay is there all the time; else the motors render it
+    ("sticks", "i8"),  # whether it is, and yields
     ("memory", "f8", 40),  # rows (A, B) of controller.held_compensator, x and y
     (
         "form_memory",
@@ -104,6 +109,14 @@ SAMPLED_STATE = [  # beside path.STATE
     ("start", "f8", 4),  # joint rates [rad/s] and impulse owed [N.s] behind the kick to the sample
     ("early_force", "f8", 2),  # hand force of that kick [N]
     ("early_work", "f8", path.SUMS),  # and its works [J]
+    # in physical clay that yields: states felt, stuck and anchor behind that kick; the force beside
+    # b v at the sample [N]; anchor before the step, and before the kick to be worked out [m]
+    ("early_felt", "f8", path.FELT),
+    ("stuck_next", "i8", 2),
+    ("anchor_next", "f8", 2),
+    ("yield_force", "f8", 2),
+    ("anchored", "f8", 2),
+    ("anchor_from", "f8", 2),
     # kicks: `ready_kick` writes numbers of the one before a sample, after it, and around it
     ("early", "f8", 22),
     ("late", "f8", 22),
@@ -207,7 +220,8 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
     else:
         fx = uhx - bx0 * vx
         fy = uhy - by0 * vy
-    if s["held"]:
+    held, sticks, cx, cy = s["held"], s["sticks"], 0.0, 0.0
+    if held or sticks:
         s1 = w1 * w1
         s2 = r2 * r2
         cx = u1y * s1 + u2y * s2
@@ -216,18 +230,26 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
             cx, cy = arm.centripetal_about_sample(
                 L, cx, cy, 0.0 if sharex else vx, 0.0 if sharey else vy, (u1x, u1y, u2x, u2y)
             )
+    if held:
         fx -= springx * px - massx * cx + dampx0 * vx
         fy -= springy * py - massy * cy + dampy0 * vy
+    pullx, pully = 0.0, 0.0
+    if s["springs"] == 1:
+        pullx, pully = loop.spring_force(s, L)
+        fx -= pullx
+        fy -= pully
     links = s["arm"]
     a1, a2 = (t1 - t2) / links[2], t2 / links[3]
     restx, resty, softx, softy = 0.0, 0.0, 0.0, 0.0
     if stiff:
         restx, resty = owedx / H, owedy / H
-        hx, hy = uhx - springx * px, uhy - springy * py
+        hx, hy = uhx - springx * px - pullx, uhy - springy * py - pully
         hx, hy = arm.handle_acceleration(a1, a2, hx, hy, (u1x, u1y, u2x, u2y), links)
         hx, hy = clay.slow_force(
             hx, hy, sxx, sxy, syy, sharex, sharey, (bx0 + bx1) * vx, (by0 + by1) * vy
         )
+        if sticks:
+            hx, hy = loop.creeping_force(s, L, (hx, hy), (bx0 + bx1, by0 + by1), (vx, vy))
         owedx, owedy, softx, softy = loop.owed_impulse(
             step, springx, springy, sharex, sharey, hx, hy
         )
@@ -250,6 +272,12 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
     else:
         ux = gx / n
         uy = gy / n
+    rx, ry = 0.0, 0.0
+    if sticks:
+        s["anchor"][0], s["anchor"][1] = s["anchor_from"][0], s["anchor_from"][1]
+        ux, uy, rx, ry = loop.yield_in_kick(
+            s, H, L, (n, n), (sxx, sxy, syy), (dx, dy, dz), (vx, vy), (ux, uy), (cx, cy), (px, py)
+        )
     if stiff:
         owedx -= softx * ux
         owedy -= softy * uy
@@ -266,8 +294,16 @@ def kick(s, x, t1, t2, w1, w2, owedx, owedy):  # noqa: PLR0913  # flat for CPyth
         fx -= dz * uy
         fy -= dz * ux
         restx, resty = loop.turned_rest(s["grain"], (bx0, bx1, by0, by1), vx, vy, ux, uy)
+    n1, n2 = w1 + H * g1, w2 + H * (g2 - g1)
+    if sticks:
+        fx, fy = fx - rx, fy - ry
+        if s["felt"][8] > 0.0:
+            n1, n2 = 0.0, 0.0
+    if s["beyond"]:
+        s["felt"][12], s["felt"][13] = pullx, pully
+        restx, resty = restx + (rx + pullx), resty + (ry + pully)
     put10(s["sample"], 0, px, py, vx, vy, fx, fy, shown[0], shown[4], restx, resty)
-    put4(s["end"], 0, ux, uy, w1 + H * g1, w2 + H * (g2 - g1))
+    put4(s["end"], 0, ux, uy, n1, n2)
     left[0], left[1] = H * owedx, H * owedy
 
 
@@ -284,6 +320,9 @@ def push(s, x, hold, w1, w2, owedx, owedy):
         owedy: the same, y [N.s].
     """
     t1, t2 = hold[0], hold[1]
+    if s["rubs"] and s["sticks"]:
+        friction_torque(shoulder_rate, s["friction"][0], s, x, (t1, t2), (w1, w2), (owedx, owedy))
+        return
     n1, n2, f1, f2 = 0.0, 0.0, 0.0, 0.0
     end = s["end"]
     # with friction: the kick without it, and under one N.m more on either joint
@@ -304,6 +343,122 @@ def push(s, x, hold, w1, w2, owedx, owedy):
         else:
             kick(s, x, t1 + f1, t2 + f2, w1, w2, owedx, owedy)
             s["slip"][0], s["slip"][1] = f1, f2
+
+
+def friction_torque(rate, limit, *args):
+    """Coulomb friction of one joint in a kick that is not linear in the torques.
+
+    The rate after a kick grows with the torque. The joint rests under a torque within the limit, or
+    slides against the limit.
+
+    Args:
+        rate: of the joint after the kick [rad/s], function of (torque of its friction [N.m],
+            *args), which leaves the kick worked out.
+        limit: of the torque [N.m].
+        args: further arguments of rate, which was last called for the torque.
+
+    Returns:
+        The torque [N.m].
+    """
+    at = rate(0.0, *args)
+    if at == 0.0 or limit == 0.0:
+        return 0.0
+    most = -math.copysign(limit, at)
+    end = rate(most, *args)
+    if end == 0.0 or (end > 0.0) == (at > 0.0):
+        return most
+    # false position, Illinois; clay helps to hold the joint over a range of torques, within which
+    # its rate is 0.0
+    a, fa, b, fb, f = 0.0, at, most, end, most
+    for _ in range(FRICTION_ROUNDS):
+        f = b - fb * (b - a) / (fb - fa)
+        new = rate(f, *args)
+        if new == 0.0:
+            return f
+        if (new > 0.0) != (fb > 0.0):
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = f, new
+        if abs(new) <= FRICTION_CLOSE * abs(at) or abs(b - a) <= FRICTION_CLOSE * limit:
+            break
+    if rate(f + FRICTION_NUDGE * most, *args) == 0.0:  # such a range begins here
+        return f + FRICTION_NUDGE * most
+    rate(f, *args)
+    return f
+
+
+def shoulder_rate(f1, s, x, t, w, owed):
+    """Rate of joint 1 after a kick, with friction in joint 2; as `elbow_rate`.
+
+    Args:
+        f1: torque of the friction in joint 1 [N.m].
+        s: state of the run.
+        x: from `ready_kick`.
+        t: torques of the motors, (shoulder, elbow) [N.m].
+        w: rates before the kick [rad/s].
+        owed: impulse that stiff clay owes from the step before, (x, y) [N.s].
+
+    Returns:
+        The rate [rad/s].
+    """
+    f2 = friction_torque(elbow_rate, s["friction"][1], s, x, (t[0] + f1, t[1]), w, owed)
+    s["slip"][0], s["slip"][1] = f1, f2
+    return s["end"][2]
+
+
+def elbow_rate(f2, s, x, t, w, owed):
+    """Rate of joint 2 after a kick, which is worked out.
+
+    Args:
+        f2: torque of the friction in joint 2 [N.m].
+        s: state of the run.
+        x: from `ready_kick`.
+        t: other torques, (shoulder, elbow) [N.m].
+        w: rates before the kick [rad/s].
+        owed: impulse that stiff clay owes from the step before, (x, y) [N.s].
+
+    Returns:
+        The rate [rad/s].
+    """
+    kick(s, x, t[0], t[1] + f2, w[0], w[1], owed[0], owed[1])
+    return s["end"][3]
+
+
+def sample_velocity(s, x):
+    """Handle velocity at the sample of the kick last worked out.
+
+    Args:
+        s: state of the run.
+        x: from `ready_kick`, of that kick.
+
+    Returns:
+        (vx, vy) [m/s], 0.0 where clay holds the handle.
+    """
+    _, _, vx, vy, _, _, _, _, restx, resty = s["sample"]
+    ux, uy, _, _ = s["end"]
+    felt, sticks = s["felt"], s["sticks"]
+    if sticks:
+        restx, resty = restx - felt[0], resty - felt[1]
+    if s["springs"] == 1:
+        restx, resty = restx - felt[12], resty - felt[13]
+    slowx = loop.velocity_at_sample(x, 0, vx, ux, restx)
+    slowy = loop.velocity_at_sample(x, 1, vy, uy, resty)
+    if not sticks:
+        return slowx, slowy
+    vx, vy = felt[2], felt[3]
+    if s["turned_clay"]:  # which is never stiff, see Scenario
+        return vx, vy
+    if x[10] > 0.0 and vx != 0.0:
+        vx = slowx
+    if x[11] > 0.0 and vy != 0.0:
+        vy = slowy
+    # in stiff clay v is what its damping feels; where that is against the yield force, the clay
+    # holds the handle
+    px, py = vx * felt[4], vy * felt[5]
+    if s["yields"] == 2:
+        px = py = px + py
+    return 0.0 if px < 0.0 else vx, 0.0 if py < 0.0 else vy
 
 
 def add_works(s, x, hold, w1, w2, work):
@@ -358,6 +513,9 @@ def respond(s, e):
     """
     w1, w2 = s["w"]
     owedx, owedy = s["owed"]
+    for j in range(2 if s["sticks"] else 0):
+        s["anchor_from"][j] = s["anchor_next"][j] = s["anchored"][j]
+        s["stuck_next"][j] = s["stuck"][j]
     if s["before"] > 0.0:
         x, hold, work = s["early"], s["hold"], s["early_work"]
         push(s, x, hold, w1, w2, owedx, owedy)
@@ -370,13 +528,23 @@ def respond(s, e):
         s["early_force"][1] = fy + x[2] * vy + x[3] * uy + resty
         put4(s["start"], 0, n1, n2, s["left"][0], s["left"][1])
         t1, t2 = hold[0] + s["slip"][0], hold[1] + s["slip"][1]
+        if s["sticks"]:
+            for j in range(path.FELT):
+                s["early_felt"][j] = s["felt"][j]
+            for j in range(2):
+                s["stuck_next"][j] = int(s["felt"][6 + j])
+                s["anchor_next"][j] = s["anchor"][j]
         x = s["whole"]
         if x[10] or x[11]:  # half a kick holds too little of stiff clay
             n1, n2 = soft_rates(s, x, (ux, uy, n1, n2))
+        if s["sticks"]:
+            find_yield_force(s, n1, n2, t1, t2)
         fx, fy = felt_force(s, n1, n2, t1, t2)
         w1, w2 = n1, n2
     else:
         put4(s["start"], 0, w1, w2, owedx, owedy)
+        if s["sticks"]:
+            find_yield_force(s, w1, w2, 0.0, 0.0)
         fx, fy = first_force(s)
     s["shown"] = 0
     if s["acts"]:
@@ -398,9 +566,8 @@ def soft_rates(s, x, half):
     """
     ux, uy, n1, n2 = half
     push(s, x, s["hold"], s["w"][0], s["w"][1], s["owed"][0], s["owed"][1])
-    at, end = s["sample"], s["end"]
-    vx = loop.velocity_at_sample(x, 0, at[2], end[0], at[8]) if x[10] > 0.0 else ux
-    vy = loop.velocity_at_sample(x, 1, at[3], end[1], at[9]) if x[11] > 0.0 else uy
+    vx, vy = sample_velocity(s, x)
+    vx, vy = vx if x[10] > 0.0 else ux, vy if x[11] > 0.0 else uy
     if vx != ux or vy != uy:
         u1x, u1y, u2x, u2y, _, _, _, _, _, _ = s["pose"]
         r1, r2 = arm.joint_velocity(vx, vy, (u1x, u1y, u2x, u2y), 1.0)
@@ -474,12 +641,89 @@ def felt_force(s, w1, w2, t1, t2):
             fex, fey = clay.turned_force(s["grain"][0], s["grain"][1], bx, by, vx, vy)
         else:
             fex, fey = bx * vx, by * vy
+        if s["sticks"]:
+            fex, fey = fex + s["yield_force"][0], fey + s["yield_force"][1]
+        if s["springs"]:  # of the clay before the sample
+            fex, fey = fex + s["sprung"][2], fey + s["sprung"][3]
         fx, fy = restx - fex, resty - fey
     # a kick of one second from rest, in which the velocity after it is the acceleration
     ax, ay = controller.velocity_under_torque(
         1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), s["arm"], (t1, t2), (fx, fy), (massx, massy)
     )
     return restx - massx * ax, resty - massy * ay
+
+
+def find_yield_force(s, w1, w2, t1, t2):
+    """Force of physical clay beside b v at the sample, before the torques change; to yield_force.
+
+    Where clay holds the handle it is what keeps it from accelerating.
+
+    Args:
+        s: state of the run; stuck_next tells what rests.
+        w1: rate of joint 1 [rad/s].
+        w2: rate of joint 2 [rad/s].
+        t1: torque on the shoulder [N.m].
+        t2: torque on the elbow [N.m].
+    """
+    u1x, u1y, u2x, u2y, px, py, wxx, wxy, wyy, _ = s["pose"]
+    massx, damperx, springx = s["handx"]
+    massy, dampery, springy = s["handy"]
+    vx, vy, cx, cy = handle_motion(s["pose"], w1, w2)
+    bx, by = path.damping_before(s, s["t"])
+    fex, fey = path.viscous_parts(s, bx, by, vx, vy)
+    if s["springs"]:
+        fex, fey = fex + s["sprung"][2], fey + s["sprung"][3]
+    fx = s["uh"][0] - operator.operator_force(springx, massx, damperx, px, cx, vx) - fex
+    fy = s["uh"][1] - operator.operator_force(springy, massy, dampery, py, cy, vy) - fey
+    # a kick of one second from rest, in which the velocity after it is the acceleration
+    ax, ay = controller.velocity_under_torque(
+        1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), s["arm"], (t1, t2), (fx, fy), (massx, massy)
+    )
+    xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), (wxx, wxy, wyy), (massx, massy, 0.0))
+    h, c, g = REACTION, s["grain"][0], s["grain"][1]
+    B, ax, ay = (h * xx, h * xy, h * yx, h * yy), ax - cx, ay - cy
+    law = loop.NO_FLOW
+    if s["grooved"]:
+        rests = s["stuck_next"][0] and s["stuck_next"][1]
+        law = loop.groove_in_kick(s, B, (0.0, 0.0) if rests else (vx, vy), (ax, ay))
+    if s["turned_clay"]:
+        B = loop.turned_matrix(c, g, B)
+        vx, vy = controller.along_axes(c, g, vx, vy)
+        ax, ay = controller.along_axes(c, g, ax, ay)
+    vx, vy = 0.0 if s["stuck_next"][0] else vx, 0.0 if s["stuck_next"][1] else vy
+    end = vx + h * ax, vy + h * ay
+    if not s["grooved"]:
+        law = loop.law_in_kick(s, 1.0, vx, vy)
+    if s["yields"] == 2:
+        _, _, _, _, _, _, fx, fy, _, _ = flow.resist_along(B, (vx, vy), end, law, 0.0)
+    else:
+        _, _, _, _, _, _, fx, fy, _, _ = flow.resist_axes(B, (vx, vy), end, law, 0.0)
+    if s["turned_clay"]:
+        fx, fy = controller.along_axes(c, -g, fx, fy)
+    s["yield_force"][0], s["yield_force"][1] = fx, fy
+
+
+def force_in_motion(s, vx, vy):
+    """Force of clay that yields, beside b v, on a handle in motion; none at rest.
+
+    Args:
+        s: state of the run.
+        vx: handle velocity, x [m/s].
+        vy: the same, y [m/s].
+
+    Returns:
+        (x, y) [N].
+    """
+    c, g, turned = s["grain"][0], s["grain"][1], s["turned_clay"]
+    Fyx, Kx, nx, Fyy, Ky, ny = s["flow"]
+    if s["grooved"]:
+        Fyx, Kx, nx, Fyy, Ky, ny = loop.groove_law(s, vx, vy)
+    if turned:
+        vx, vy = controller.along_axes(c, g, vx, vy)
+    fx, fy = flow.motion_force((Fyx, Kx, nx, Fyy, Ky, ny), s["yields"] == 2, vx, vy)
+    if turned:
+        fx, fy = controller.along_axes(c, -g, fx, fy)
+    return fx, fy
 
 
 def sample(s, e, w1, w2, fx, fy):
@@ -519,6 +763,13 @@ def sample(s, e, w1, w2, fx, fy):
             fex, fey = clay.turned_force(s["grain"][0], s["grain"][1], bx, by, vx, vy)
         else:
             fex, fey = bx * vx, by * vy
+        if s["sticks"]:
+            fex, fey = fex + s["yield_force"][0], fey + s["yield_force"][1]
+        elif s["yields"]:
+            rx, ry = force_in_motion(s, vx, vy)
+            fex, fey = fex + rx, fey + ry
+        if s["springs"]:
+            fex, fey = fex + s["sprung"][0], fey + s["sprung"][1]
         put10(hold, 0, 0.0, 0.0, fex, fey, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if s["coupled"] or s["guarded"]:
             render(s, e.ring, (px, py), (vx, vy), (bx, by), (wxx, wyy))
@@ -744,8 +995,17 @@ def render(s, ring, p, v, b, W):
     delay, share = s["whole_delay"], s["part_delay"]
     window, n = s["window"], delay + 2
     since, before = window + (s["newest"] - delay) % n, window + (s["newest"] - delay - 1) % n
+    yields = s["yields"] > 0
+    if s["coupled"] and yields:
+        Fyx, Kx, nx, Fyy, Ky, ny = s["flow"]
+        ux, uy, fx, fy = hardware.tool_that_yields(
+            (wires[12], wires[13]), p, v, b, (Fyx, Kx, nx, Fyy, Ky, ny), s["yields"] == 2,
+            spring, damper, Ts,
+        )  # fmt: skip
+        wires[12], wires[13] = wires[12] + Ts * ux, wires[13] + Ts * uy
+        hold[2], hold[3], hold[6], hold[7], hold[8], hold[9] = fx, fy, fx, fy, ux, uy
     for i in range(2):
-        if s["coupled"]:
+        if s["coupled"] and not yields:
             wires[12 + i], u = hardware.virtual_coupling(
                 wires[12 + i], p[i], v[i], b[i], spring, damper, Ts
             )
@@ -893,8 +1153,18 @@ def work_out(s, x, event):
     """
     if event:
         w1, w2, owedx, owedy = s["start"]
+        if s["sticks"]:
+            stuck, after = s["stuck"], s["stuck_next"]
+            stuckx, stucky = stuck[0], stuck[1]
+            stuck[0], stuck[1] = after[0], after[1]
+            s["anchor_from"][0], s["anchor_from"][1] = s["anchor_next"][0], s["anchor_next"][1]
+            push(s, x, s["hold_next"], w1, w2, owedx, owedy)
+            stuck[0], stuck[1] = stuckx, stucky
+            return
         push(s, x, s["hold_next"], w1, w2, owedx, owedy)
     else:
+        if s["sticks"]:
+            s["anchor_from"][0], s["anchor_from"][1] = s["anchored"][0], s["anchored"][1]
         push(s, x, s["hold"], s["w"][0], s["w"][1], s["owed"][0], s["owed"][1])
 
 
@@ -941,8 +1211,7 @@ def enter(s, rows, rendered, x, after, shows):
     px, py, vx, vy, fx, fy, deltax, deltay, restx, resty = s["sample"]
     ux, uy, _, _ = end
     rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3] = s["q"][0], s["q"][1], px, py
-    rows[i, 4] = loop.velocity_at_sample(x, 0, vx, ux, restx)
-    rows[i, 5] = loop.velocity_at_sample(x, 1, vy, uy, resty)
+    rows[i, 4], rows[i, 5] = sample_velocity(s, x)
     rows[i, 6], rows[i, 7] = x[5], x[6]
     if s["held"]:
         rows[i, 6] = fx + x[0] * vx + x[1] * ux + restx
@@ -957,8 +1226,38 @@ def enter(s, rows, rendered, x, after, shows):
         rows[i, 6] += share * (f[0] - rows[i, 6])
         rows[i, 7] += share * (f[1] - rows[i, 7])
     if len(rendered):
-        rendered[i, 0], rendered[i, 1] = hold[2], hold[3]
+        share = after / (before + after) if early else 0.0
+        enter_force(s, rows, rendered, i, (hold[2], hold[3]), share)
     s["filled"] = i + 1
+
+
+def enter_force(s, rows, rendered, i, held, share):
+    """Enters the force of the clay where b v does not tell it.
+
+    Args:
+        s: state of the run.
+        rows: see Engine; row i has velocity and damping.
+        rendered: see Engine.
+        i: the row.
+        held: force that the motors hold, (x, y) [N].
+        share: of the kick to the sample in the force at it.
+    """
+    fx, fy = held
+    if s["physical"] or (s["own"] and not s["wired"]):
+        vx, vy = rows[i, 4], rows[i, 5]
+        fx, fy = path.viscous_parts(s, rows[i, 12], rows[i, 13], vx, vy)
+        felt, old = s["felt"], s["early_felt"]
+        rx, ry = felt[4], felt[5]
+        if not s["sticks"]:
+            rx, ry = force_in_motion(s, vx, vy) if s["yields"] else (0.0, 0.0)
+        elif share > 0.0:
+            rx, ry = rx + share * (old[4] - rx), ry + share * (old[5] - ry)
+        fx, fy = fx + rx, fy + ry
+        if s["springs"]:
+            fx, fy = fx + s["sprung"][0], fy + s["sprung"][1]
+    rendered[i, 0], rendered[i, 1] = fx, fy
+    if s["grooved"]:
+        rendered[i, 2] = s["removed"][0] + s["removed"][1]
 
 
 def enter_rates(s, rows, i):
@@ -992,7 +1291,25 @@ def command(s, ctrl, push, after):
     push[0], push[1] = p1, p2
 
 
-def observe(s, q, w, table):
+def note_stops(s, e):
+    """Notes where clay stops the handle or lets it go in the kick worked out, and that to an event.
+
+    Args:
+        s: state of the run.
+        e: its arrays.
+    """
+    felt, early, t = s["felt"], s["early_felt"], s["t"]
+    if s["event"] and s["before"] > 0.0:
+        for j in range(path.FELT):
+            felt[j], early[j] = early[j], felt[j]
+        path.note_stop(s, e, t, int(felt[6]), int(felt[7]))
+        for j in range(path.FELT):
+            felt[j], early[j] = early[j], felt[j]
+    path.note_stop(s, e, t, int(felt[6]), int(felt[7]))
+    s["anchored"][0], s["anchored"][1] = s["anchor"][0], s["anchor"][1]
+
+
+def observe(s, q, w, table, after):
     """Reads the engine after a step.
 
     Args:
@@ -1000,11 +1317,16 @@ def observe(s, q, w, table):
         q: see Engine.
         w: see Engine.
         table: see Engine.
+        after: length of the step [s].
     """
     s["steps"] += 1
+    if s["sticks"] and s["stuck"][0] and s["stuck"][1]:
+        w[0], w[1] = 0.0, 0.0  # the engine's rounding would creep
     for j in range(2):
         s["q"][j], s["w"][j] = q[j], w[j]
     measure_pose(s)
+    if s["springs"]:
+        path.feel_spring(s, table, after)
     if s["smooth"]:
         path.feel_place(s, table)
 
@@ -1077,7 +1399,8 @@ class Sampled(NamedTuple):
             row = i - s["first"]
             n = min(n, len(e.ahead) - row)
         ready_kicks(s, e.ahead, -1, True)
-        grows = s["physical"] > 0 and (s["smooth"] > 0 or rate[0] > 0.0 or rate[1] > 0.0)
+        changes = s["smooth"] > 0 or s["grooved"] == 2 or rate[0] > 0.0 or rate[1] > 0.0
+        grows = s["physical"] > 0 and changes
         varies = row >= 0 or grows
         lowx, lowy, highx, highy = s["low"][0], s["low"][1], s["high"][0], s["high"][1]
         for made in range(n):
@@ -1095,11 +1418,15 @@ class Sampled(NamedTuple):
             if not (lowx - TOUCH <= px <= highx + TOUCH and lowy - TOUCH <= py <= highy + TOUCH):
                 return made
             enter(s, e.rows, e.rendered, x, dt, True)
+            if s["sticks"]:
+                note_stops(s, e)
             if s["event"]:
                 take_event(s, e.chance, e.ring)
             command(s, e.ctrl, e.push, dt)
             e.step(e.model, e.data)
-            observe(s, e.q, e.w, e.table)
+            observe(s, e.q, e.w, e.table, dt)
+            if s["grooved"]:
+                path.cut_place(s, e)
             s["i"] = i + made + 1
             s["t"] = s["i"] * dt
             s["landings"] = 0
@@ -1144,6 +1471,9 @@ class Sampled(NamedTuple):
         ready_kick_now(s, e.muscle, s["late"], 0.0 if event else s["before"], after)
         work_out(s, s["late"], event)
 
+    def meet(self, s, e, after, lands):
+        return after
+
     def finite(self, s, e):
         return abs(s["end"][2]) + abs(s["end"][3]) < INF
 
@@ -1154,18 +1484,24 @@ class Sampled(NamedTuple):
         enter(s, e.rows, e.rendered, s["late"], after, shows)
         if shows and after == 0.0:
             i = s["filled"] - 1
+            fx, fy = s["felt"][4], s["felt"][5]
             e.rows[i, 4] = self.speed(s, e, 0)
             e.rows[i, 5] = self.speed(s, e, 1)
             enter_rates(s, e.rows, i)
+            if s["sticks"]:
+                s["felt"][4], s["felt"][5] = fx, fy
+                enter_force(s, e.rows, e.rendered, i, (0.0, 0.0), 0.0)
 
     def commit(self, s, e, after):
+        if s["sticks"]:
+            note_stops(s, e)
         if s["event"]:
             take_event(s, e.chance, e.ring)
         command(s, e.ctrl, e.push, after)
         e.timestep[0] = after
         e.step(e.model, e.data)
         e.timestep[0] = s["dt"]
-        observe(s, e.q, e.w, e.table)
+        observe(s, e.q, e.w, e.table, after)
 
     def speed(self, s, e, i):
         # half a kick has led to the border; in stiff clay that half holds too little of the clay,
@@ -1173,13 +1509,16 @@ class Sampled(NamedTuple):
         before = s["before"]
         if before == 0.0:
             return 0.0
-        x, at, end = s["whole"], s["sample"], s["end"]
+        x, end = s["whole"], s["end"]
         ready_kick_now(s, e.muscle, x, before, before)
         felt = x[10 + i] > 0.0
         if not felt:
             ready_kick_now(s, e.muscle, x, before, 0.0)
         work_out(s, x, False)
-        return loop.velocity_at_sample(x, i, at[2 + i], end[i], at[8 + i]) if felt else end[i]
+        if felt:
+            vx, vy = sample_velocity(s, x)
+            return vy if i else vx
+        return end[i]
 
 
 class SampledRun(Run):
@@ -1193,6 +1532,10 @@ class SampledRun(Run):
         now["ratio"] = round((s.Ts or s.dt) / s.dt)
         now["Ts"] = now["ratio"] * float(s.dt)
         now["physical"] = int(s.render == "implicit")
+        now["sticks"] = int(now["physical"] and now["yields"])
+        if now["sticks"]:  # more kicks than rows: at samples, and at changes of the torques
+            self.stop_rows = np.zeros((16 * CHUNK, 3))
+            self._arrays(stops=self.stop_rows)
         self.law: LawCaller | None = None
         parts = list(zip(s.servo, s.compensators, s.gain, strict=True))
         x = loop.initial_state(s.start, s.velocity, s.servo)
@@ -1211,9 +1554,6 @@ class SampledRun(Run):
         measure_pose(now)
         now["due"] = now["due_next"] = math.inf
         self.ring = np.zeros((0, 1 + HOLD))
-        self.rendered = np.zeros((0, 2))
-        self.rendered_kept: list[np.ndarray] = []
-        self.last_rendered: Any = None
         if s.interface:
             self._wire(s.interface)
         look_ahead(now, self.e.chance)
@@ -1271,8 +1611,7 @@ class SampledRun(Run):
         self.ring[: parts.window, :3] = past
         self._arrays(ring=self.ring)
         if s.render == "held":
-            self.rendered = np.zeros((CHUNK - 1, 2))
-            self._arrays(rendered=self.rendered)
+            self.render()
         if now["random"]:
             self.noise = hardware.SampleNoise(parts)
             self._arrays(chance=self.noise.table(0, 2))
@@ -1314,50 +1653,6 @@ class SampledRun(Run):
         self.ring[:] = saved[1]
         if self.law:
             self.desk[:] = saved[2]
-
-    def flush(self) -> None:
-        n = self.filled
-        if n and len(self.rendered):
-            self.last_rendered = self.rendered[n - 1].tolist()
-        super().flush()
-
-    def judge(self, rows: np.ndarray) -> int:
-        """As Run.judge, with the force that the motors render.
-
-        Args:
-            rows: as in Run.judge.
-        """
-        before = self.looked
-        good = super().judge(rows)
-        if good and len(self.rendered):
-            self.rendered_kept.append(self.rendered[self.kept[-1][0] - before])
-        return good
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """As Run.arrays; where an interface renders the clay, fe is what the motors hold."""
-        arrays = super().arrays()
-        if self.rendered_kept:
-            arrays["fe"] = np.concatenate(self.rendered_kept)
-        return arrays
-
-    def columns(self, rows: np.ndarray, first: int) -> dict[str, np.ndarray]:
-        """As Run.columns; fe as in `arrays`.
-
-        Args:
-            rows: as in Run.columns.
-            first: as in Run.columns.
-        """
-        out = super().columns(rows, first)
-        if len(self.rendered):
-            out["fe"] = self.rendered[first : first + len(rows)].copy()
-        return out
-
-    def brief(self) -> tuple[Any, ...]:
-        """As Run.brief."""
-        *found, last, balance = super().brief()
-        if self.without_samples and self.last_rendered:
-            last[3] = tuple(self.last_rendered)
-        return *found, last, balance
 
     def balance(self) -> dict[str, float]:
         """As Run.balance, with what the hardware takes."""

@@ -8,7 +8,6 @@ headless run computes it from the record.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,32 +15,15 @@ import numpy as np
 from ..errors import ParameterError, number
 from ..model.clay import Clay, extent
 from ..model.scenario import Scenario
+from ..model.tool import Tool
 from ..simulation.record import Record
 
 CELL_SIZE = 2e-3  # [m] largest cell of a picture's map
 PICTURE_CELLS, VOLUME_CELLS = 10, 32  # least number of cells in the tool's width
 PATH_TOLERANCE = 5e-4  # of the width: largest distance of the path from its straight pieces
 MAP_MARGIN = 0.02  # [m] of a block without borders, before the start and beyond the end of the path
+HIGHEST = 0.8  # of a block's thickness in a picture, above the floor of its grooves
 HALF_BREADTH = 0.08  # [m] of a block without borders, across the path
-
-
-@dataclass(frozen=True)
-class Tool:
-    """The cutter at the handle.
-
-    Attributes:
-        width: of its round footprint [m].
-        depth: of the cut [m].
-    """
-
-    width: float = 0.02
-    depth: float = 0.01
-
-    def __post_init__(self):
-        for field, low, high in (("width", 2.0 * CELL_SIZE, 0.1), ("depth", 1e-4, 0.025)):
-            value = number(f"tool.{field}", getattr(self, field), low, high, unit="m")
-            object.__setattr__(self, field, value)
-
 
 TOOL = Tool()
 
@@ -67,6 +49,9 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
         if across:
             low[1] = start[1] - MAP_MARGIN
             high[1] = start[1] + 2.1 * (length - start[0]) + MAP_MARGIN
+    if scenario.clay and scenario.clay.groove:
+        (x0, x1), (y0, y1) = scenario.clay.groove.x, scenario.clay.groove.y
+        return np.array((x0, y0)), np.array((x1, y1))
     for i in (0, 1):
         spans = extent(scenario.clay, i)
         if scenario.clay and spans and all(f != math.inf for span in spans for f in map(abs, span)):
@@ -87,9 +72,11 @@ class Removal:
         wide: sizes of the cells along x [m], shape (nx,).
         high: sizes of the cells along y [m], shape (ny,).
         cell: the largest size [m].
-        clay: share of each cell that is clay, 0 to 1, shape (ny, nx).
+        clay: share of each cell that is clay, 0 to 1, shape (ny, nx); of a groove, height above
+            its floor over the depth of the tool.
         cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
         volume: removed so far [m^3].
+        groove: the clay that stays cut; None for other clay.
     """
 
     def __init__(
@@ -130,8 +117,19 @@ class Removal:
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
         self.wide, self.high = (np.diff(at) for at in lines)
         self.clay = _clay_share(scenario.clay, spans, lines)
-        self.cut = np.zeros(self.clay.shape)
-        self.volume = 0.0
+        self._before = np.zeros(self.clay.shape)
+        self.groove = scenario.clay.groove if scenario.clay else None
+        if self.groove:
+            edges, places = self.groove.edges, (self.x, self.y)
+            at = [np.searchsorted(e, c, "right") for e, c in zip(edges, places, strict=True)]
+            cells = np.ix_(*at)
+            self.clay = np.pad(self.groove.relief, 1)[cells].T / tool.depth  # none beyond
+            self._before = 1.0 - np.pad(self.groove.shares, 1)[cells].T
+        self.restore()
+
+    def restore(self) -> None:
+        """Put back what was cut."""
+        self.cut, self.volume = self._before.copy(), 0.0
 
     def sweep(self, begin: Any, end: Any) -> float:
         """Move the tool in a straight line.
@@ -172,9 +170,15 @@ class Removal:
     def heights(self, thickness: float) -> np.ndarray:
         """Height of the clay over the ground at the cells [m], shape (ny, nx).
 
+        Of a groove whose clay is higher than fits, reduced in proportion.
+
         Args:
             thickness: of the block [m].
         """
+        if self.groove:
+            scale = min(1.0, HIGHEST * thickness / (self.groove.highest or thickness))
+            above = self.clay * self.tool.depth
+            return thickness + scale * (above * (1.0 - self.cut) - self.groove.highest)
         return np.where(self.clay > 0.5, thickness - self.tool.depth * self.cut, 0.0)
 
 
@@ -183,10 +187,12 @@ def removed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
 
+    In clay that stays cut (`Clay.groove`) it is what the run itself removed, by its own tool.
+
     Args:
         record: of the run.
-        width: of the tool [m].
-        depth: of the cut [m].
+        width: of the tool [m]; not used in clay that stays cut.
+        depth: of the cut [m]; not used in clay that stays cut.
         cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
 
     Returns:
@@ -200,6 +206,10 @@ def removed(
     volume, rate = np.zeros(len(p)), np.zeros(len(p))
     if record.scenario.clay is None or not len(p):
         return volume, rate
+    own = record.extra.get("removed")
+    if record.ground is not None and own is not None and len(own) == len(p) > 1:
+        step = np.gradient(record.t)
+        return own, np.divide(np.gradient(own), step, out=rate, where=step > 0.0)
     grid = Removal(record.scenario, tool, cell, p)
     way = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(p, axis=0).T))))
     moving = np.concatenate(((True,), np.diff(way) > 0.0))

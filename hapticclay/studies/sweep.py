@@ -70,7 +70,9 @@ def result_row(
             f"speed_{axis}": nan if speed is None else speed,
         }
         margin = nan
-        if r and r.scenario.gain[i] > 0.0:
+        clay = r and r.scenario.clay
+        linear = not (clay and (clay.yields or clay.springs))  # the loop has b alone
+        if r and linear and r.scenario.gain[i] > 0.0:
             limit = gain_limit.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
             margin = limit / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin

@@ -30,6 +30,7 @@ Answer = TypeVar("Answer")
 NO_TIMING = "must be {} here: the analysis is one of continuous time without delay"
 MOST_DAMPINGS = 64  # of the clay of a scenario, of which the worst is sought
 TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
+FASTEST = 1e9  # [m/s] of a steady velocity
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,9 @@ class Loop:
         """The loop of one axis of a scenario, at the nominal pose of its arm.
 
         Muscle force, pose, friction and what else the interface has besides its delay are not part
-        of it.
+        of it. Of clay that yields or springs back it has b alone: Fy, K and springs are left out,
+        so that in clay of b = 0 a gain limit may be inf however large Fy is. For clay that yields
+        see `push_outcomes` and `limit_cycles`.
 
         Args:
             scenario: the run.
@@ -269,6 +272,58 @@ def steady_speed(
         return speed if isinstance(b, np.ndarray) else float(speed)
     c = num[0] * (servo.G.gain / servo.G.stiffness)
     return K * c * f / (den[1] + K * c * b)
+
+
+def steady_damper(K: float, compensator: Compensator = PRINTED, servo: Servo = SERVO[0]) -> float:
+    """Damper that the handle is in steady motion, 10/K with the printed parts [N.s/m].
+
+    Args:
+        K: compensator gain.
+        compensator: shape of C.
+        servo: of the axis.
+
+    Returns:
+        1/(K c), c as in `steady_speed`; inf without an integrator, 0 with two.
+    """
+    num, den = (p.coef for p in reduced(compensator).fraction)
+    if den[0] != 0.0 or K == 0.0:
+        return math.inf
+    return float(den[1] / (K * num[0] * (servo.G.gain / servo.G.stiffness)))
+
+
+def steady_velocity(f: Any, damper: Any, Fy: float, K: float, n: float) -> np.ndarray:
+    """Velocity in clay that yields under a constant force: f = damper v + (Fy + K |v|^n) v/|v|.
+
+    Args:
+        f: force along the axes that the clay resists as one [N], shape (n,).
+        damper: of `steady_damper` and the clay together, along each [N.s/m], shape (n,).
+        Fy: yield force [N].
+        K: consistency [N/(m/s)^n].
+        n: flow index.
+
+    Returns:
+        [m/s], shape (n,): 0 where the yield force holds, inf where nothing else resists.
+    """
+    f, damper = np.asarray(f, dtype=float), np.asarray(damper, dtype=float)
+    size = math.hypot(*f)
+    if size <= Fy:
+        return np.zeros(f.shape)
+
+    def resistance(m: float) -> np.ndarray:
+        return damper * m + Fy + K * m**n
+
+    # |v| = m where the length of f/resistance(m), which falls with m, is 1
+    low, high = 0.0, 1.0
+    while math.hypot(*(f / resistance(high))) > 1.0:
+        low, high = high, 2.0 * high
+        if high > FASTEST:
+            return np.where(f != 0.0, np.copysign(math.inf, f), 0.0)
+    while low < (m := 0.5 * (low + high)) < high:
+        if math.hypot(*(f / resistance(m))) > 1.0:
+            low = m
+        else:
+            high = m
+    return high * f / resistance(high)
 
 
 def reduced(compensator: Compensator) -> Compensator:

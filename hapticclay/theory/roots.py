@@ -101,8 +101,8 @@ def squared_magnitude(p: Polynomial) -> Polynomial:
     return real_part(p, p)
 
 
-def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
-    """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
+def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
+    """Every K > 0 at which a root of A + K B lies on the imaginary axis, and its frequency.
 
     Exact: on the imaginary axis A + K B vanishes, so Im(A B*) = 0, a polynomial in omega, whose
     positive roots give the K at which a pair of roots can cross; one root can do so at 0 and at
@@ -113,8 +113,7 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
         B: polynomial, of no higher degree.
 
     Returns:
-        (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
-        small K.
+        (K, omega [rad/s]), K ascending.
     """
     AB = cross_spectrum(A, B)
     omega = positive_roots(Polynomial(AB.coef.imag))
@@ -124,12 +123,26 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
         ends = [-A.coef[n] / B.coef[n] if n == multiplicity_of_zero(B) else math.nan]
         ends += [-A.coef[-1] / B.coef[-1] if A.degree() == B.degree() else math.nan]
     K, omega = np.concatenate((K, ends)), np.concatenate((omega, [0.0, math.inf]))
-    found = [i for i in np.argsort(K) if 0.0 < K[i] < math.inf]
-    if not hurwitz(A + (0.5 * K[found[0]] if found else 1.0) * B):
+    return [(float(K[i]), float(omega[i])) for i in np.argsort(K) if 0.0 < K[i] < math.inf]
+
+
+def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
+    """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
+
+    Args:
+        A: polynomial.
+        B: polynomial, of no higher degree.
+
+    Returns:
+        (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
+        small K.
+    """
+    found = crossings(A, B)
+    if not hurwitz(A + (0.5 * found[0][0] if found else 1.0) * B):
         return 0.0, math.nan
-    for i in found:
-        if not hurwitz(A + (1.0 + 1e-6) * K[i] * B):
-            return float(K[i]), float(omega[i])
+    for K, omega in found:
+        if not hurwitz(A + (1.0 + 1e-6) * K * B):
+            return K, omega
     return math.inf, math.nan
 
 
@@ -201,14 +214,18 @@ def bisect(
 
 
 def first_failure(
-    holds: Callable[[float], bool], grid: Iterable[float], below: float | None = None
+    holds: Callable[[float], bool],
+    grid: Iterable[float],
+    below: float | None = None,
+    rtol: float = 1e-12,
 ) -> tuple[float, float]:
-    """Bracket the first change from true to false along a grid, to 1e-12 of its place.
+    """Bracket the first change from true to false along a grid.
 
     Args:
         holds: the property. A failure narrower than the grid may be missed.
         grid: ascending positive values at which to look.
         below: value below the grid at which the property is known to hold; None if there is none.
+        rtol: width of the result, relative to its upper end.
 
     Returns:
         (low, high), the property true at low and false at high: (0, first of grid) if it fails
@@ -217,7 +234,7 @@ def first_failure(
     low = below
     for x in grid:
         if not holds(x):
-            return (0.0, x) if low is None else bisect(holds, low, x)
+            return (0.0, x) if low is None else bisect(holds, low, x, rtol)
         low = x
     assert low is not None
     return low, math.inf

@@ -21,7 +21,7 @@ from ..files import atomic
 from ..simulation.record import Record
 from ..stepping.engine import mujoco
 from ..studies.removal import TOOL, Tool
-from .stage import CAMERAS, Stage
+from .stage import CAMERAS, Stage, held_words
 
 FRAME_RATES = {".mp4": 30, ".webp": 20, ".gif": 20}  # [1/s], by kind of file
 LEAST_ASPECT = 1.2  # width over height that the cameras of room.xml are made for
@@ -108,6 +108,7 @@ class Lens:
             mujoco.mjr_uploadHField(stage.model, self._context, stage.field)
         view = self._option, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(stage.model, stage.data, *view, self._scene)
+        stage.draw_arrow(self._scene)
         mujoco.mjr_render(self._rect, self._scene, self._context)
         if title:
             font = mujoco.mjtFont.mjFONT_NORMAL.value
@@ -227,15 +228,21 @@ def frames(
     camera = choice("camera", options.camera, CAMERAS)
     lens = Lens(stage, width - beside, height, camera, options.smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
+    held = record.held().tolist()
+    own = None if record.ground is None else record.extra.get("removed")
     gap = "   " if width - beside >= ONE_LINE_WIDTH else "\n"
     try:
         done = 0
         for n in samples_shown(record, options.speed, rate):
             stage.carve(_thinned(record.p[done:n]))
             stage.pose(record.q[n - 1])
+            stage.push(record.fe[n - 1], all(held[n - 1]))
             title = f"t = {record.t[n - 1]:.2f} s"
             if stage.field >= 0:
-                title += f"{gap}removed {1e6 * stage.removal.volume:.1f} cm3"
+                volume = stage.removal.volume if own is None else float(own[n - 1])
+                title += f"{gap}removed {1e6 * volume:.1f} cm3"
+            if still := held_words(held[n - 1]):
+                title += gap + still
             image[:, : width - beside] = lens.photograph(title)
             if running:
                 image[:, width - beside :] = running.draw(n)
@@ -296,13 +303,20 @@ def film(
         images = progress(images, len(samples_shown(record, options.speed, rate)))
     with tempfile.TemporaryDirectory() as folder, contextlib.closing(images):
         temporary = Path(folder) / f"film{kind}"
-        _write(temporary, images, rate)
+        write_images(temporary, images, rate)
         with atomic(out) as f, open(temporary, "rb") as made:
             shutil.copyfileobj(made, f)
     return out
 
 
-def _write(path: Path, images: Iterator[np.ndarray], rate: int) -> None:
+def write_images(path: Path, images: Iterator[np.ndarray], rate: int) -> None:
+    """Writes a film of images.
+
+    Args:
+        path: the file: .mp4, .webp or .gif.
+        images: shape (height, width, 3) of bytes each; each may overwrite the last.
+        rate: frames a second.
+    """
     import imageio.v2 as imageio
 
     if path.suffix != ".mp4":

@@ -21,13 +21,24 @@ import numpy as np
 
 from ..errors import ParameterError, integer
 from ..model.constants import AXES
-from .session import Player, Session
-from .stage import GROUND, THICKNESS, Stage, hardest, plotted_axes, room_scale
-from .style import CLAY_DEEP, FORCE_COLORS, GRID, MATERIALS, SKY, TABLE, rgb_bytes, verdict_color
+from .session import Frame, Player, Session, flow_text
+from .stage import (
+    ARROW_WIDTH,
+    GROUND,
+    THICKNESS,
+    Stage,
+    breaking_force,
+    hardest,
+    held_words,
+    plotted_axes,
+    room_scale,
+)
+from .style import CLAY_DEEP, FORCE_COLORS, GRID, PART_COLORS, SKY, TABLE, rgb_bytes, verdict_color
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
 CLAY_TIME, PLOT_TIME = 0.2, 0.5  # [s] between two updates of the clay, and of the plots
 PLOT_POINTS = 400
+MOST_FORCE = 5.0  # [N] of the slider, or twice what breaks clay that yields
 TAB_TITLE = "hapticclay"
 CENTRE = (0.22, 0.12)  # of the table [m]
 BANNER_STYLE = (
@@ -117,7 +128,7 @@ class Page:
         add, tool, arm = self.server.scene, self.session.tool, self.session.scenario.arm
         size = room_scale(arm)
         dark, steel, blue, orange = (
-            rgb_bytes(MATERIALS[name]) for name in ("dark", "steel", "blue", "orange")
+            rgb_bytes(PART_COLORS[name]) for name in ("dark", "steel", "blue", "orange")
         )
         camera = self.server.initial_camera
         camera.position = (0.21 * size, -0.66 * size, 0.64 * size)
@@ -159,6 +170,11 @@ class Page:
             look: Any = dict(color=rgb_bytes(CLAY_DEEP), flat_shading=True, side="front")
             look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
             self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
+        self._arrow: Any = None
+        if self.session.scenario.clay and self.session.scenario.clay.yields:
+            look = dict(shaft_radius=0.5 * ARROW_WIDTH, head_radius=1.2 * ARROW_WIDTH)
+            look.update(head_length=3.0 * ARROW_WIDTH, visible=False)
+            self._arrow = add.add_arrows("/force", np.zeros((1, 2, 3)), (0, 0, 0), **look)
         in_plane: Any = dict(active_axes=(True, True, False), disable_rotations=True)
         self.target = add.add_transform_controls("/hand", scale=0.12, **in_plane)
         self.target.on_update(self._dragged)
@@ -178,11 +194,15 @@ class Page:
         self.keep = gui.add_checkbox("Record", True)
         hint = "The hand pulls towards the arrows; drag them."
         self.hold = gui.add_checkbox("Hand holds", False, hint=hint)
-        top, gain = hardest(session.given), session.gain[0]
+        top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N.s/m]", 1.0
+        clay, most = session.given.clay, MOST_FORCE
+        if clay and clay.yields:
+            top, name, step = 1.0, "Clay Fy, K, b [times]", 0.05
+            most = max(most, float(math.ceil(min(2.0 * breaking_force(clay), 1e3))))
         limit = max(3.0 * top, 1.0)
-        self.b = gui.add_slider("Clay b [N.s/m]", 0.0, limit, 1.0, top, disabled=not top)
+        self.b = gui.add_slider(name, 0.0, limit, step, top, disabled=not top)
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(gain, 0.1), 5.0))
-        self.force = gui.add_slider("Force [N]", 0.0, 5.0, 0.1, 0.0)
+        self.force = gui.add_slider("Force [N]", 0.0, most, 0.1, 0.0)
         self._plots(uplot)
         self.run.on_click(self._toggle)
         reset.on_click(self._reset)
@@ -281,6 +301,8 @@ class Page:
             self._link1.wxyz, self._link2.wxyz = _about_z(q[0]), _about_z(q[0] + q[1])
             l1 = session.scenario.arm.l1
             self._link2.position = (l1 * math.cos(q[0]), l1 * math.sin(q[0]), 0.0)
+            if self._arrow:
+                self._point_arrow(frame, q)
             if point is None:
                 x, y = np.add(frame.p, session.scenario.origin).tolist()
                 self.target.position = (x, y, 0.052)
@@ -290,21 +312,36 @@ class Page:
                 self._clay.vertices = self._vertices()
         if plots_due:
             self._plot_time = now
-            t, p, v, fe, fh = (np.array(x) for x in zip(*some, strict=True))
+            t, p, v, fe, fh, _ = (np.array(x) for x in zip(*some, strict=True))
             for i, plot in self._velocities.items():
                 plot.data = _by_position(100.0 * p[:, i], 100.0 * v[:, i])
             self._forces.data = (t, *(f[:, i] for i in self._velocities for f in (fh, fe)))
             removed = f"removed {1e6 * self.stage.removal.volume:.2f} cm\u00b3"
             self.status.content, self.verdict.content = f"{status}  \n{removed}", banner
 
+    def _point_arrow(self, frame: Frame, q: Any) -> None:
+        """Shows the force of clay that yields."""
+        stage = self.stage
+        stage.pose(q)
+        stage.push(frame.fe, all(frame.held))
+        if stage.arrow is not None:
+            points = np.stack((stage.arrow.begin, stage.arrow.end))[None]
+            self._arrow.points = points.astype(np.float32)
+            self._arrow.colors = np.array(rgb_bytes(stage.arrow.color), dtype=np.uint8)
+        self._arrow.visible = stage.arrow is not None
+
     def _status(self) -> str:
         session, frame = self.session, self.session.frames[-1]
         state = "ended" if session.ended else "paused" if session.paused else "playing"
         slow = ", this machine is too slow" if session.clock.slow else ""
+        if still := held_words(frame.held):
+            state += f", {still},"
         b = session.b
+        clay = f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here"
+        clay = flow_text(session.scenario, frame.p, b) or clay
         return (
-            f"**{state}** {frame.t:.1f} s, {session.clock.factor:.2f} x real time{slow}  \n"
-            f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here, hand {math.hypot(*frame.fh):.2f} N"
+            f"**{state}** {frame.t:.1f} s, {session.clock.factor:.2f} x real "
+            f"time{slow}  \n{clay}, hand {math.hypot(*frame.fh):.2f} N"
         )
 
     def _banner(self) -> str:

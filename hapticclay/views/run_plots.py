@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..model.clay import Clay, Profile, Smooth
 from ..model.compensator import PRINTED
 from ..model.constants import AXES
 from ..model.controller import SERVO
+from ..model.flow import Flow
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
@@ -26,14 +27,23 @@ from .style import (
     BLACK,
     BLUE,
     CLAY_ALPHA,
+    CLAY_DEEP,
+    CLAY_PALE,
     GREEN,
     GREY,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
     VERMILION,
+    WHITE,
     add_legend,
+    along_motion,
     clay_color,
+    clay_share,
     figure_style,
     set_title,
     shade_clay,
+    shade_held,
 )
 
 BEYOND = 1e4  # [cm], past every path
@@ -41,6 +51,9 @@ MOST_BORDERS = 20  # of clay that is drawn region by region
 PICTURE_SIZE = 400  # pixels of a picture of other clay, along x and along y
 SHADES = 100  # of smooth clay along a path
 MOST_TITLED = 8  # that a title lists
+MOST_DOTS = 20_000  # of a kind in a plot
+HELD_LOOK: Any = dict(color=ORANGE, ls="", marker="_", ms=9, mew=0.8)
+FLOW_COLORS = (BLUE, GREEN, PURPLE, SKY_BLUE)  # of the regions of clay that yields
 FILM_DPI = 100
 LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
 ROOMY_PANEL = (180, 110)  # ... and the names of its axes
@@ -61,7 +74,10 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
             v = record.v[:, i]
             ax.plot(100.0 * record.p[:, i], v, color=BLUE, label="measured")
             built_in = s.controller is None
-            if built_in and s.operators[i] is None and s.muscle is None and not s.turned:
+            if s.clay and (s.clay.yields or s.clay.springs):
+                _expected_speeds(ax, record, name)
+                _mark_held(ax, record, i, v)
+            elif built_in and s.operators[i] is None and s.muscle is None and not s.turned:
                 c, servo = s.compensators[i], s.servo[i]
                 law = functools.partial(
                     linear_loop.steady_speed, s.gain[i], s.force[i], compensator=c, servo=servo
@@ -148,37 +164,59 @@ def path_plot(record: Record) -> Figure:
 
 
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades each region of the clay and names its damping along x and y on entry [N.s/m]."""
+    """Shades each region of the clay and names its damping on entry [N.s/m], or its flow."""
+    if clay.groove:
+        (x0, x1), (y0, y1) = clay.groove.x, clay.groove.y
+        size = 100.0 * (x1 - x0), 100.0 * (y1 - y0)
+        look: Any = dict(color=clay_color(1.0), alpha=CLAY_ALPHA, lw=0)
+        ax.add_patch(Rectangle((100.0 * x0, 100.0 * y0), *size, **look))
     edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
     if clay.smooth or max(map(len, edges)) > MOST_BORDERS:
         _clay_image(ax, clay, low, high)
         return
     for x0, x1 in zip(edges[0], edges[0][1:], strict=False):
         for y0, y1 in zip(edges[1], edges[1][1:], strict=False):
-            b = clay.at(0.005 * (x0 + x1), 0.005 * (y0 + y1)).tolist()
-            if not max(b):
+            middle = 0.005 * (x0 + x1), 0.005 * (y0 + y1)
+            share = float(clay_share(clay, *middle))
+            if not share:
                 continue
-            shade: Any = dict(color=clay_color(max(b) / clay.largest), alpha=CLAY_ALPHA, lw=0)
+            shade: Any = dict(color=clay_color(share), alpha=CLAY_ALPHA, lw=0)
             ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **shade))
             right, bottom = min(x1, high[0]), max(y0, low[1])
             shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
             if shown[0] > 0.12 and shown[1] > 0.08:
                 place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
                 text: Any = dict(ha="right", va="bottom", fontsize=8, color=GREY)
-                ax.text(place[0], place[1], f"b = ({b[0]:g}, {b[1]:g})", **text)
+                ax.text(place[0], place[1], _clay_text(clay, middle), **text)
+
+
+def _clay_text(clay: Clay, place: tuple[float, float]) -> str:
+    """Damping along x and y at a place [m], and what else resists there."""
+    b = clay.at(*place).tolist()
+    x, y = (tuple(map(float, law.flows_at(*place))) for law in clay.laws)
+    lines = []
+    for i, (letter, plain) in enumerate((("F$_y$", 0.0), ("K$_c$", 0.0), ("n", 1.0))):
+        if x[i] != plain or y[i] != plain:
+            both = f"{x[i]:.4g}" if x[i] == y[i] else f"({x[i]:.4g}, {y[i]:.4g})"
+            lines.append(f"{letter} = {both}")
+    if max(b) or not lines:
+        lines.append(f"b = ({b[0]:g}, {b[1]:g})")
+    return "\n".join(lines)
 
 
 def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
     """Shades clay of many cells by a picture of it [cm]."""
     x, y = (np.linspace(low[i], high[i], PICTURE_SIZE + 1) for i in (0, 1))
     middle = 0.005 * (x[1:] + x[:-1]), 0.005 * (y[1:] + y[:-1])
-    share = clay.at(middle[0], middle[1][:, None]).max(axis=0) / (clay.largest or 1.0)
+    share = clay_share(clay, middle[0], middle[1][:, None])
     colors = np.concatenate((clay_color(share), CLAY_ALPHA * (share > 0.0)[..., None]), axis=2)
     ax.imshow(colors, extent=(x[0], x[-1], y[0], y[-1]), origin="lower", zorder=0)
 
 
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
     """Plots the operator's force during a maneuver, a panel for each run (Fig. 11).
+
+    In clay that yields also the force of the clay, and the time for which it held the handle.
 
     Args:
         records: the runs.
@@ -191,7 +229,15 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
         panels = figure.subplots(len(records), 1, sharex=over == "time", squeeze=False)[:, 0]
         for ax, r in zip(panels, records, strict=True):
             where = r.t if over == "time" else 100.0 * r.p[:, i]
-            ax.plot(where, r.fh[:, i], color=BLUE, lw=0.9, label="operator, f$_h$")
+            hand = BLUE
+            if _yields(r.scenario):
+                hand = GREEN
+                ax.plot(where, r.fe[:, i], color=BLUE, lw=0.9, label="clay, f$_e$")
+                if over == "time":
+                    shade_held(ax, _held_spans(r, axis))
+                else:
+                    _mark_held(ax, r, i, r.fe[:, i])
+            ax.plot(where, r.fh[:, i], color=hand, lw=0.9, label="operator, f$_h$")
             if r.scenario.muscle is not None:
                 muscle = r.scenario.muscle
                 pieces = np.array_split(r.t, len(r.t) // 4096 + 1)  # it takes (n, lines) of memory
@@ -224,6 +270,195 @@ def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:
     return figure
 
 
+def ground_plot(record: Record) -> Figure:
+    """Plots what a run has left of clay that stays cut, and the path of the tool.
+
+    Args:
+        record: the run, in a groove.
+    """
+    from matplotlib.colors import LinearSegmentedColormap
+
+    clay, ground, p = record.scenario.clay, record.ground, 100.0 * record.p
+    assert clay is not None and clay.groove is not None and ground is not None
+    x, y = (100.0 * e for e in clay.groove.edges)
+    corners = np.array(((x[0], y[0]), (x[-1], y[-1])))
+    low = np.minimum(corners[0], p.min(axis=0)) - 0.3
+    high = np.maximum(corners[1], p.max(axis=0)) + 0.3
+    depth, breadth = (high - low)[::-1].tolist()
+    colors = LinearSegmentedColormap.from_list("clay", [WHITE, CLAY_PALE, CLAY_DEEP])
+    with figure_style():
+        figure = Figure(figsize=(6.4, min(max(4.7 * depth / breadth, 1.2) + 1.3, 6.4)))
+        ax = figure.add_subplot()
+        top = 1e3 * clay.groove.highest or 1.0
+        look: Any = dict(cmap=colors, vmin=0.0, vmax=top, rasterized=True)
+        image = ax.pcolormesh(x, y, 1e3 * ground.T, **look)
+        ax.plot(p[:, 0], p[:, 1], color=BLUE, lw=1.0, label="path of the tool")
+        ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
+        ax.plot(*p[-1], "s", color=BLUE, ms=5, label="end")
+        edge: Any = dict(fill=False, color=GREY, lw=0.6)
+        ax.add_patch(Rectangle(tuple(corners[0]), *(corners[1] - corners[0]), **edge))
+        bar = ax.inset_axes((1.03, 0.0, 0.03, 1.0))
+        bar.grid(False)
+        figure.colorbar(image, cax=bar, label="clay left [mm]")
+        ax.set(xlabel="position x [cm]", ylabel="position y [cm]", aspect="equal")
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        ax.grid(False)
+        add_legend(figure, ax)
+        set_title(ax, *_scenario_parts(record.scenario))
+    return figure
+
+
+def force_velocity_plot(record: Record) -> Figure:
+    """Plots the force of clay that yields over the velocity, beside the law of each region.
+
+    Clay that resists along the motion has one panel: force and speed along the motion, negative
+    where the handle goes back. Otherwise each axis on which it yields has one, of the clay's own
+    axes where it is turned. b v is left out of forces and laws where b is not one number a region.
+
+    Args:
+        record: the run, in clay that yields somewhere.
+    """
+    clay, main = record.scenario.clay, AXES.index(_main_axis(record.scenario))
+    assert clay is not None
+    c, s = math.cos(clay.angle), math.sin(clay.angle)
+    own = np.array(((c, -s), (s, c)))  # columns: the clay's axes
+    v, fe, held = record.v @ own, record.fe @ own, record.held()
+    across = clay.isotropic and not np.array_equal(record.b[:, 0], record.b[:, 1])
+    whole = not (clay.grows or clay.smooth or across)
+    if not whole:
+        fe = fe - record.b * v
+    if clay.isotropic:
+        named = "velocity along the motion [m/s]"
+        panels: dict[str, Any] = {named: (main, *along_motion(v, fe, main), held.all(axis=1))}
+    else:
+        names = [f"velocity v$_{a}$ [m/s]" for a in AXES]
+        if clay.angle:
+            names = [f"velocity along its {a} axis [m/s]" for a in ("first", "second")]
+        panels = {names[i]: (i, v[:, i], fe[:, i], held[:, i]) for i in (main, 1 - main)}
+        some = {n: x for n, x in panels.items() if clay.laws[x[0]].yields and x[1].any()}
+        panels = some or dict([next(iter(panels.items()))])
+    met = {name: _flows_met(record, x[0], whole) for name, x in panels.items()}
+    shown = list(dict.fromkeys(flow for flows in met.values() for flow in flows))
+    colors = dict(zip(shown, FLOW_COLORS, strict=False))
+    with figure_style():
+        figure = Figure(figsize=(6.4 if len(panels) == 1 else 9.6, 4.4))
+        several = figure.subplots(1, len(panels), squeeze=False)[0]
+        for flow, color in colors.items():
+            label = f"measured, {', '.join(_flow_parts([flow]))}"
+            several[0].plot([], [], ".", color=color, ms=9, label=label)
+        if any(held[:, x[0]].any() for x in panels.values()):
+            several[0].plot([], [], **HELD_LOOK, label="held still")
+        for ax, (name, (_, *measured)) in zip(several, panels.items(), strict=True):
+            flows = {flow: where for flow, where in met[name].items() if flow in colors}
+            _forces_over_velocity(ax, flows, colors, *measured)
+            ax.set_xlabel(name)
+            ax.set_ylabel("force of the clay [N]" if whole else "force of the clay less b v [N]")
+        add_legend(figure, several[0], ncols=2)
+        set_title(several[0], *_scenario_parts(record.scenario))
+    return figure
+
+
+def _flows_met(record: Record, i: int, whole: bool = True) -> dict[Flow, np.ndarray]:
+    """Samples in each flow of an axis that yields, those with the most samples first."""
+    clay = record.scenario.clay
+    assert clay is not None
+    b = record.b[:, i] if whole else np.zeros(len(record.t))
+    rows = np.stack((*clay.laws[i].flows_at(*record.p.T), b), axis=-1)
+    some = np.flatnonzero((rows[:, 0] > 0.0) | (rows[:, 1] > 0.0))
+    kinds, which = np.unique(rows[some], axis=0, return_inverse=True)
+    met = {Flow(*x): some[which.ravel() == k] for k, x in enumerate(kinds.tolist())}
+    return dict(sorted(met.items(), key=lambda x: -len(x[1])))
+
+
+def _forces_over_velocity(
+    ax: Axes,
+    met: dict[Flow, np.ndarray],
+    colors: Mapping[Flow, str],
+    v: np.ndarray,
+    force: np.ndarray,
+    held: np.ndarray,
+) -> None:
+    """Draws measured forces, those of a handle that is held, and the laws."""
+    for flow, where in met.items():
+        some = _spread(where[~held[where]], MOST_DOTS)
+        ax.plot(v[some], force[some], ".", color=colors[flow], ms=6, mew=0)
+    some = _spread(np.flatnonzero(held), MOST_DOTS)
+    ax.plot(v[some], force[some], **HELD_LOOK)
+    label = "law of the clay"
+    for flow, where in met.items():
+        back = force[where].min() < -0.01 * flow.Fy
+        x, y = _law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
+        ax.plot(x, y, color=VERMILION, ls="--", lw=1.3, label=label)
+        label = "_"
+
+
+def _law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and forces of a law, and at rest the forces that it can hold."""
+    share = np.linspace(0.0, 1.0, 200)[1:] ** 3  # close together where |v|^n bends
+    up = share * high if high > 0.0 else np.zeros(0)
+    down = share[::-1] * low if low < 0.0 else np.zeros(0)
+    least = -flow.Fy if back or low < 0.0 else 0.0
+    x = np.concatenate((down, (0.0, 0.0), up))
+    return x, np.concatenate((flow.force(down), (least, flow.Fy), flow.force(up)))
+
+
+def _spread(where: np.ndarray, most: int) -> np.ndarray:
+    """At most so many of some indices, evenly."""
+    return where[:: -(-len(where) // most) or 1]
+
+
+def _flow_parts(flows: Sequence[Flow]) -> list[str]:
+    """Phrases that name yield force, consistency, flow index and damping; K is the gain's."""
+    out = []
+    for letter, unit, values in (
+        ("F$_y$", " N", [x.Fy for x in flows]),
+        ("K$_c$", " N/(m/s)$^n$", [x.K for x in flows]),
+        ("n", "", [x.n for x in flows if x.K]),
+        ("b", " N$\\cdot$s/m", [x.b for x in flows]),
+    ):
+        told = _values_text([v for v in values if v])
+        out += [f"{letter} = {told}{unit}"] * bool(told)
+    return out
+
+
+def _values_text(values: list[float]) -> str:
+    """Different values, or their range where there are many."""
+    values = list(dict.fromkeys(values))
+    if len(values) > MOST_TITLED:
+        return f"{min(values):.4g} to {max(values):.4g}"
+    return ", ".join(f"{v:.4g}" for v in values)
+
+
+def _expected_speeds(ax: Axes, record: Record, axis: str) -> None:
+    """Draws the expected steady speed over each stretch of the path in clay that yields."""
+    i, label = AXES.index(axis), "expected, steady"
+    pieces = record.stretches(axis)
+    for piece in pieces if len(pieces) <= MOST_BORDERS else pieces[:3]:
+        speed, x = record.expected_speed(axis, piece), 100.0 * record.p[piece, i]
+        if speed is not None and math.isfinite(speed):
+            ax.plot([x.min(), x.max()], [speed] * 2, color=VERMILION, ls="--", lw=1.4, label=label)
+            label = "_"
+
+
+def _mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
+    """Marks where clay that yields held the handle, on a curve over the position."""
+    some = _spread(np.flatnonzero(record.held()[:, i]), MOST_DOTS)
+    if len(some):
+        look: Any = dict(color=ORANGE, ms=5, mew=0, zorder=4, label="held still")
+        ax.plot(100.0 * record.p[some, i], y[some], "o", **look)
+
+
+def _held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
+    """Times at which clay that yields held an axis, (begin, end) [s]."""
+    end = float(record.t[-1])
+    stops = [x for x in record.stops if axis in x.axis]
+    return [(x.start, end if x.end is None else x.end) for x in stops]
+
+
+def _yields(s: Scenario) -> bool:
+    return s.clay is not None and s.clay.yields
+
+
 def _clay_along_both_axes(s: Scenario) -> bool:
     return s.clay is not None and s.clay.along == AXES[0] + AXES[1]
 
@@ -247,7 +482,7 @@ def _velocity(record: Record) -> Figure | None:
 
 def _force(record: Record) -> Figure | None:
     s = record.scenario
-    if s.muscle is not None:
+    if s.muscle is not None or _yields(s):
         return maneuver_plot([record], _main_axis(s))
     return None if _clay_along_both_axes(s) else force_ratio_plot(record, _main_axis(s))
 
@@ -259,7 +494,18 @@ def _path(record: Record) -> Figure | None:
 
 def _force_position(record: Record) -> Figure | None:
     s = record.scenario
-    return maneuver_plot([record], _main_axis(s), "position") if s.muscle is not None else None
+    some = s.muscle is not None or record.ground is not None
+    return maneuver_plot([record], _main_axis(s), "position") if some else None
+
+
+def _force_velocity(record: Record) -> Figure | None:
+    clay = record.scenario.clay
+    told = clay is not None and clay.yields and not clay.groove and not clay.springs
+    return force_velocity_plot(record) if told and len(record.t) else None
+
+
+def _ground(record: Record) -> Figure | None:
+    return ground_plot(record) if record.ground is not None and len(record.t) else None
 
 
 FIGURES: dict[str, Callable[[Record], Figure | None]] = {
@@ -267,6 +513,8 @@ FIGURES: dict[str, Callable[[Record], Figure | None]] = {
     "force": _force,
     "path": _path,
     "force_position": _force_position,
+    "force_velocity": _force_velocity,
+    "ground": _ground,
 }
 """File name of each figure of a run, and the function that draws it or returns None where the
 figure does not apply. To add a plot to `hapticclay run`, add an entry."""
@@ -301,7 +549,10 @@ def _position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
 def _profile(record: Record, axis: str) -> Profile | None:
     """The clay of an axis; of a grid or smooth clay, what the path met along that axis."""
     clay, i = record.scenario.clay, AXES.index(axis)
-    law = getattr(clay, axis) if clay else None
+    law: Any = getattr(clay, axis) if clay else None
+    if clay and clay.groove and not law.some.any():
+        span: Any = getattr(clay.groove, axis), axis
+        return Profile(span[0], (0.0, 1.0, 0.0), span[1])  # where there is any
     if law is None or isinstance(law, Profile):
         return law
     x, first = np.unique(record.p[:, i], return_index=True)
@@ -309,10 +560,12 @@ def _profile(record: Record, axis: str) -> Profile | None:
         near = np.searchsorted(x, np.linspace(x[0], x[-1], SHADES))
         x, first = x[near], first[near]
     b = record.b[first, i]
-    change = np.flatnonzero(np.diff(b))
+    rows = np.column_stack((b, *law.flows_at(*record.p[first].T))) if law.yields else b[:, None]
+    change = np.flatnonzero(np.diff(rows, axis=0).any(axis=1))
     edges = 0.5 * (x[change] + x[change + 1])
+    values, *flow = rows[[*change, -1]].T.tolist()
     along = "x" if i == 0 else "y"
-    return Profile(tuple(edges.tolist()), (*b[change].tolist(), float(b[-1])), along)
+    return Profile(tuple(edges.tolist()), tuple(values), along, (), *map(tuple, flow))
 
 
 def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
@@ -338,13 +591,18 @@ def _scenario_parts(s: Scenario) -> list[str]:
     out = [f"{s.name}: {how}"]
     if s.muscle is None:
         out.append(f"u$_h$ = {pair(s.force)} N")
+    if s.clay and s.clay.groove:
+        out.append(f"clay that stays cut, up to {s.clay.groove.hardest:.4g} N")
     if s.clay:
         values = [v for f in s.clay.laws for v in dict.fromkeys(f.damping.ravel().tolist()) if v]
+        if s.clay.yields:
+            cells = [np.stack(f.flows, axis=-1).reshape(-1, 3) for f in s.clay.laws]
+            out += _flow_parts([Flow(*x) for x in np.unique(np.concatenate(cells), axis=0)])
         values = list(dict.fromkeys(values))
         told = ", ".join(f"{v:g}" for v in values) or "0"
         if len(values) > MOST_TITLED:
             told = f"{min(values):g} to {max(values):g}"
-        out.append(f"b = {told} N$\\cdot$s/m")
+        out += [f"b = {told} N$\\cdot$s/m"] * bool(values or not s.clay.yields)
         rates = [g for f in s.clay.laws for g in f.rates.ravel().tolist() if g]
         out += [f"growing {g:g} a second" for g in rates][:1]
         out += [f"turned by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
@@ -363,7 +621,7 @@ class Panel(NamedTuple):
     """A running plot.
 
     Attributes:
-        x: of its curves, shape (n,).
+        x: of its curves, shape (n,); NaN where they break.
         y_range: values that the y axis must hold.
         labels: of x and y, drawn where there is room.
         title: where there is room for labels.
@@ -408,7 +666,7 @@ class RunningPlots:
         self._axes = self._canvas.copy_from_bbox(figure.bbox)
         self._curves = []
         for ax, x, y, color in curves:
-            known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+            known = np.flatnonzero(np.isfinite(y))
             (line,) = ax.plot([], [], color=color, lw=1.4)
             self._curves.append((line, known, x[known], y[known]))
 
@@ -455,10 +713,16 @@ def running_figure(
             ax.set_ylabel(plan.labels[1] if roomy else "", labelpad=2)
             title = plan.title if roomy else plan.short
             ax.set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
-        for ax in panels[:2]:
+        yields = _yields(record.scenario)
+        for ax in panels[: 1 if yields else 2]:
             shade_clay(ax, _profile(record, AXES[i]), AXES[i])
+        if yields:
+            for ax in panels[1:2]:
+                _running_laws(ax, record, i)
+            for ax in panels[2:]:
+                shade_held(ax, _held_spans(record, AXES[i]))
         b = np.unique(record.b[:, i])
-        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 else ():
+        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 and not yields else ():
             panels[1].axhline(value, color=VERMILION, ls="--", lw=0.9)
             at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
             panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
@@ -478,18 +742,57 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
     where, when = (f"position {axis} [cm]", "time [s]") if roomy else (f"{axis} [cm]", "t [s]")
     speed, share = f"v$_{axis}$ [m/s]", "f$_e$/v [N$\\cdot$s/m]"
     force_curves = ((fh, GREEN), (fe, BLUE))
+    second = Panel(x, np.array((0.0, 1.25 * top)), (where, share), "", share, ((ratio, BLUE),))
+    told = "clay f$_e$ [N]"
+    if r.ground is not None:
+        second = Panel(x, np.append(fe, 0.0), (where, told), "", told, ((fe, BLUE),))
+    elif _yields(r.scenario):
+        u, along = _over_velocity(r, i)
+        over = speed
+        if r.scenario.clay is not None and r.scenario.clay.isotropic:
+            over = "v along the motion [m/s]" if roomy else "v [m/s]"
+        second = Panel(u, np.append(along, 0.0), (over, told), "", told, ((along, BLUE),))
     return (
         Panel(x, v, (where, f"velocity {speed}"), r.scenario.name, speed, ((v, BLUE),)),
-        Panel(x, np.array((0.0, 1.25 * top)), (where, share), "", share, ((ratio, BLUE),)),
+        second,
         Panel(
             r.t,
             np.append(1.15 * usual, 0.0),
             (when, "force [N]"),
-            "operator f$_h$, clay f$_e$",
+            f"operator f$_h$, clay f$_e${'; shaded: held still' if r.stops else ''}",
             "f$_h$, f$_e$ [N]",
             force_curves,
         ),
     )
+
+
+def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and force of the clay, along the motion if it resists so; NaN in free air."""
+    clay = r.scenario.clay
+    assert clay is not None
+    v, fe = along_motion(r.v, r.fe, i) if clay.isotropic else (r.v[:, i], r.fe[:, i])
+    Fy, K, _ = clay.laws[i].flows_at(*r.p.T)
+    return np.where((Fy > 0.0) | (K > 0.0) | (r.b[:, i] > 0.0), v, np.nan), fe
+
+
+def _running_laws(ax: Axes, r: Record, i: int) -> None:
+    """Draws the laws of clay that yields over the velocity, where they hold for an axis alone."""
+    clay = r.scenario.clay
+    if (
+        clay is None
+        or clay.grows
+        or clay.smooth
+        or clay.angle
+        or clay.groove
+        or (clay.isotropic and not np.array_equal(r.b[:, 0], r.b[:, 1]))
+        or len(_flows_met(r, i)) > 4
+    ):
+        return
+    v, fe = _over_velocity(r, i)
+    for flow, where in _flows_met(r, i).items():
+        back = fe[where].min() < -0.01 * flow.Fy
+        x, y = _law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
+        ax.plot(x, y, color=VERMILION, ls="--", lw=0.9)
 
 
 def _limits(values: np.ndarray) -> tuple[float, float]:

@@ -26,6 +26,8 @@ from ..errors import ParameterError, integer, number
 from ..model import regions
 from ..model.clay import Clay
 from ..model.constants import AXES, B_MAX
+from ..model.flow import CONSISTENCY_MAX, FY_MAX
+from ..model.groove import Groove
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
@@ -42,6 +44,7 @@ LONGEST_SESSION = 3600.0  # [s]
 PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
 RECENT_FRAMES = 60  # over which the real-time factor is averaged
+LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
 CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
 
 
@@ -164,6 +167,17 @@ class LiveRun(LeapfrogRun):
             self.table = table
             self._arrays(table=table)
             path.settle(self.s, self.e.table)
+            if block := scenario.clay.groove:
+                self._put(block=block.numbers, cut_at=(math.nan, math.nan))
+                self._put(bare=(*self.s["base"], *self.s["base"]))
+                self.s["drag"] = block.damping
+                path.cut_place(self.s, self.e)
+
+    @property
+    def held(self) -> tuple[bool, bool]:
+        """Whether clay that yields holds the handle still, along x and along y."""
+        x, y = self.s["stuck"]
+        return bool(x), bool(y)
 
     def judge(self, rows: np.ndarray) -> int:
         """As Run.judge; forgets the samples while they are not to be kept.
@@ -246,6 +260,7 @@ class Frame(NamedTuple):
         v: velocity of the handle [m/s], (2,).
         fe: force of the clay [N], (2,).
         fh: force of the hand [N], (2,).
+        held: whether clay that yields holds the handle still, along x and along y.
     """
 
     t: float
@@ -253,6 +268,7 @@ class Frame(NamedTuple):
     v: tuple[float, float]
     fe: tuple[float, float]
     fh: tuple[float, float]
+    held: tuple[bool, bool] = (False, False)
 
 
 class Session:
@@ -348,9 +364,8 @@ class Session:
     def verdict(self) -> LiveVerdict:
         """Says whether the loop is stable, by the monitor of the run and its gain limit."""
         s, onset = self.scenario, self.run.watch.onset
-        return live_verdict(
-            self.gain, live_gain_limits(s, self.b), onset, self.t - self._swung < CALM_TIME
-        )
+        limit = None if yields_at(s, self.frames[-1].p) else live_gain_limits(s, self.b)
+        return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
         """Makes the hand pull to a point, as far as the arm reaches.
@@ -373,7 +388,8 @@ class Session:
 
         Args:
             gain: K [1/kg]; None keeps it.
-            b: damping of all clay as a multiple of the given scenario's; None keeps it.
+            b: damping, yield force and consistency of all clay as a multiple of the given
+                scenario's; None keeps them.
         """
         scenario = self.scenario
         if gain is not None:
@@ -386,7 +402,7 @@ class Session:
 
     @property
     def damping(self) -> float:
-        """Damping of all clay as a multiple of the given scenario's."""
+        """Damping, yield force and consistency of all clay as a multiple of the given ones."""
         return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
@@ -482,7 +498,9 @@ class Session:
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
         hand = self.run.muscle.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
-        self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist())))
+        if self.run.last_rendered:  # of clay that yields, at the last sample
+            fe = tuple(self.run.last_rendered)
+        self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist()), self.run.held))
 
     def _within_reach(self, point: tuple[float, float]) -> tuple[float, float]:
         x, y = (a + o for a, o in zip(point, self.scenario.origin, strict=True))
@@ -520,23 +538,75 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
 
 
 def scaled(clay: Clay | None, factor: float) -> Clay | None:
-    """Returns the same clay with a multiple of its damping, B_MAX at most.
+    """Returns the same clay with a multiple of its damping, yield force, consistency and pressure.
+
+    Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
 
     Args:
         clay: the clay; None for none.
-        factor: on the damping.
+        factor: on all of them, within their bounds.
     """
 
-    def times(values: Any) -> Any:  # numbers, or rows of them
+    def times(values: Any, least: float = 0.0, most: float = B_MAX) -> Any:  # numbers, or rows
         if isinstance(values, tuple):
-            return tuple(map(times, values))
-        return min(values * factor, B_MAX)
+            return tuple(times(x, least, most) for x in values)
+        return min(max(values * factor, least), most) if values else values
 
     def law(f: Any) -> Any:
-        growing = {"growth": times(f.growth)} if f.growth else {}
-        return replace(f, values=times(f.values), **growing)
+        more = {"growth": times(f.growth)} if f.growth else {}
+        more |= {"Fy": times(f.Fy, LEAST_YIELD, FY_MAX)} if f.Fy else {}
+        more |= {"K": times(f.K, LEAST_YIELD, CONSISTENCY_MAX)} if f.K else {}
+        return replace(f, values=times(f.values), **more)
 
-    return None if clay is None else replace(clay, x=law(clay.x), y=law(clay.y))
+    def block(groove: Groove | None) -> Groove | None:
+        if groove is None:
+            return None
+        most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
+        k = min(max(factor, LEAST_YIELD), most)  # a block resists, however little
+        names = "pressure", "gradient", "damping"
+        return replace(groove, **{name: k * getattr(groove, name) for name in names})
+
+    if clay is None:
+        return None
+    return replace(clay, x=law(clay.x), y=law(clay.y), groove=block(clay.groove))
+
+
+def yields_at(scenario: Scenario, p: tuple[float, float]) -> bool:
+    """Whether the clay at a place yields: the linear loop then has no limit of K to tell.
+
+    Args:
+        scenario: of the run.
+        p: the place [m].
+    """
+    clay = scenario.clay
+    if clay is not None and clay.groove:
+        return all(a <= x <= b for x, (a, b) in zip(p, (clay.groove.x, clay.groove.y), strict=True))
+    return clay is not None and any(float(x) > 0.0 for f in clay.laws for x in f.flows_at(*p)[:2])
+
+
+def flow_text(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
+    """Names the law of clay that yields at a place, in a window; empty where no clay yields.
+
+    Args:
+        scenario: of the run.
+        p: the place [m].
+        b: damping there [N.s/m].
+    """
+    clay = scenario.clay
+    if clay is None or not clay.yields:
+        return ""
+    if clay.groove:
+        return f"holds with up to {clay.groove.hardest:.4g} N"
+    rows = zip(*(map(float, f.flows_at(*p)) for f in clay.laws), strict=True)
+    (Fy, K, n), parts = rows, []
+    for name, values, unit in (("Fy", Fy, " N"), ("K", K, ""), ("b", b, " N.s/m")):
+        if any(values):
+            alike = values[0] == values[1]
+            both = f"{values[0]:.4g}" if alike else f"{values[0]:.4g}, {values[1]:.4g}"
+            parts.append(f"{name} {both}{unit}")
+        if name == "K" and any(K):
+            parts[-1] += f", n {n[0]:.3g}" if n[0] == n[1] else f", n {n[0]:.3g}, {n[1]:.3g}"
+    return f"{'; '.join(parts) or 'none'} here"
 
 
 class Replay:
@@ -561,6 +631,7 @@ class Replay:
             tool: at the handle, if the record names none.
         """
         self.source, self.scenario = record, record.scenario
+        self._held = record.held()
         self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
         self.restart()
 
@@ -613,12 +684,14 @@ class Replay:
         """As of a session; the monitor's finding is the outcome of the record."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
-        limit = live_gain_limits(s, self.b) if s.control == "continuous" else None
+        known = s.control == "continuous" and not yields_at(s, self.frames[-1].p)
+        limit = live_gain_limits(s, self.b) if known else None
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
     def _frame(self, n: int) -> Frame:
         r = self.source
-        return Frame(float(r.t[n]), *(tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh)))
+        p, v, fe, fh, held = (tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh, self._held))
+        return Frame(float(r.t[n]), p, v, fe, fh, held)
 
 
 @contextlib.contextmanager

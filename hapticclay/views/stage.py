@@ -6,17 +6,19 @@ The model is for drawing only: `Stage.pose` copies the joint angles of the run i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..model.arm import PAPER, Arm
+from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
-from .style import MATERIALS, clay_color, rgb
+from .style import BLUE, PART_COLORS, SHADED_SPEED, SKY_BLUE, clay_color, clay_share, rgb
 
 CAMERAS = ("room", "top", "close")
 HIDDEN = (0.0, 0.0, -5.0)  # place of the hand's target while nobody pulls [m]
@@ -25,6 +27,8 @@ THICKNESS = 0.03  # of a block of clay [m]
 GRAIN = 0.03  # rms of the brightness of clay, as a share
 KNOB = (0.0, 0.0, 0.052)  # of the handle, from the tip of link 2 [m]
 TARGET_ALPHA = 0.45
+ARROW_LENGTH, ARROW_MOST = 0.08, 0.16  # [m] of the force that breaks the hardest clay; at most
+ARROW_WIDTH = 0.006  # [m]
 
 
 def plotted_axes(scenario: Scenario) -> tuple[int, ...]:
@@ -45,6 +49,46 @@ def hardest(scenario: Scenario) -> float:
     return scenario.clay.largest if scenario.clay else 0.0
 
 
+def breaking_force(clay: Clay) -> float:
+    """Force at which a tool moves slowly through the hardest clay that yields [N].
+
+    Args:
+        clay: of the scene.
+    """
+    flows = [law.flows for law in clay.laws]
+    most = float(max((Fy + K * SHADED_SPEED**n).max() for Fy, K, n in flows))
+    return max(most, clay.groove.hardest) if clay.groove else most
+
+
+def held_words(held: Sequence[bool]) -> str:
+    """Says that clay that yields holds the handle: "held", "held along x", or nothing.
+
+    Args:
+        held: whether it does, along x and along y.
+    """
+    names = [f" along {a}" for a, still in zip(AXES, held, strict=True) if still]
+    return f"held{names[0] if len(names) == 1 else ''}" if names else ""
+
+
+class Arrow(NamedTuple):
+    """The force of clay that yields on the handle.
+
+    Attributes:
+        begin: at the knob [m], (3,).
+        end: tip [m], (3,).
+        held: whether the clay holds the handle still.
+    """
+
+    begin: np.ndarray
+    end: np.ndarray
+    held: bool
+
+    @property
+    def color(self) -> str:
+        """Blue, as the clay's force in plots; light while it holds the handle."""
+        return SKY_BLUE if self.held else BLUE
+
+
 class Stage:
     """The scene of one scenario.
 
@@ -57,6 +101,7 @@ class Stage:
         field: id of the heightfield; -1 without clay.
         place: where the tool last cut [m], None before its first cut.
         stale: whether the heightfield lags behind the map.
+        arrow: force of the clay, where clay yields; None for none.
     """
 
     def __init__(self, scenario: Scenario, tool: Tool = TOOL):
@@ -64,8 +109,10 @@ class Stage:
 
         Args:
             scenario: what to show.
-            tool: at the handle.
+            tool: at the handle; clay that stays cut has its own.
         """
+        if scenario.clay and scenario.clay.groove:
+            tool = scenario.clay.groove.tool
         self.scenario, self.tool = scenario, tool
         self.removal = Removal(scenario, tool)
         grid, origin = self.removal, np.array(scenario.origin)
@@ -80,6 +127,9 @@ class Stage:
         self.field = 0 if block else -1
         self.place: tuple[float, float] | None = None
         self.stale = True
+        clay = scenario.clay
+        self._breaking = breaking_force(clay) if clay and clay.yields else 0.0
+        self.arrow: Arrow | None = None
         self._target = self.model.body("target").mocapid[0]
 
     def pose(self, q: Any, target: tuple[float, float] | None = None) -> None:
@@ -94,6 +144,36 @@ class Stage:
         self.data.mocap_pos[self._target] = at
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
+
+    def push(self, fe: Any, held: bool) -> None:
+        """Points the arrow along the force of clay that yields; to be called after `pose`.
+
+        Args:
+            fe: resisting force of the clay [N], (2,).
+            held: whether it holds the handle still.
+        """
+        self.arrow = None
+        size = float(np.hypot(*fe))
+        if not self._breaking or not size > 1e-3 * self._breaking:
+            return
+        length = min(ARROW_LENGTH * size / self._breaking, ARROW_MOST)
+        begin = self.data.body("tool").xpos + KNOB
+        self.arrow = Arrow(begin, begin - length / size * np.append(fe, 0.0), held)
+
+    def draw_arrow(self, scene: mujoco.MjvScene) -> None:
+        """Adds the arrow, if there is one, to what a renderer draws.
+
+        Args:
+            scene: of the renderer.
+        """
+        if self.arrow is None or scene.ngeom >= scene.maxgeom:
+            return
+        begin, end, _ = self.arrow
+        shape, geom = mujoco.mjtGeom.mjGEOM_ARROW.value, scene.geoms[scene.ngeom]
+        color = np.array((*rgb(self.arrow.color), 1.0), dtype=np.float32)
+        mujoco.mjv_initGeom(geom, shape, np.zeros(3), np.zeros(3), np.eye(3).ravel(), color)
+        mujoco.mjv_connector(geom, shape, ARROW_WIDTH, begin, end)
+        scene.ngeom += 1
 
     def carve(self, points: Any) -> float:
         """Moves the tool through points, from where it is.
@@ -115,8 +195,7 @@ class Stage:
 
     def restore(self) -> None:
         """Makes the clay whole again."""
-        self.removal.cut[:] = 0.0
-        self.removal.volume = 0.0
+        self.removal.restore()
         self.place, self.stale = None, True
 
     def relief(self) -> bool:
@@ -128,13 +207,13 @@ class Stage:
         return True
 
     def _colors(self) -> np.ndarray:
-        """The clay from above, darker where it damps more, shape (ny, nx, 3) of bytes."""
+        """The clay from above, darker where it is harder to cut, shape (ny, nx, 3) of bytes."""
         clay, grid = self.scenario.clay, self.removal
         assert clay is not None
-        b = np.broadcast_to(clay.at(grid.x, grid.y[:, None]).max(axis=0), grid.cut.shape)
+        share = np.broadcast_to(clay_share(clay, grid.x, grid.y[:, None]), grid.cut.shape)
         rng = np.random.default_rng(0)
-        grain = 1.0 + GRAIN * rng.standard_normal(b.shape)[..., None]
-        colors = 255.0 * clay_color(b / (hardest(self.scenario) or 1.0)) * grain
+        grain = 1.0 + GRAIN * rng.standard_normal(share.shape)[..., None]
+        colors = 255.0 * clay_color(share) * grain
         return np.clip(colors, 0, 255)[::-1]  # images start at the top
 
 
@@ -171,25 +250,39 @@ def picture(arm: Arm, clay: Block | None, tool: tuple[float, float]) -> mujoco.M
         tool: width of the tool, and depth of its tip under the surface [m].
     """
     with warnings_caught() as caught:
-        spec = compose_spec(["arm.xml", "room.xml"], arm)
-        _enlarge_room(spec, room_scale(arm))
-        for name, color in MATERIALS.items():
-            spec.material(name).rgba = (*rgb(color), 1.0)
-        for body, *skin in arm_skin(arm):
-            _skin(spec.body(body) if body else spec.worldbody, *skin)
-        tip = (0.0, 0.0, GROUND + (clay.thickness if clay else THICKNESS) - tool[1])
-        centre = (0.0, 0.0, 0.0)
-        body = spec.body("link2").add_body(name="tool", pos=(arm.l2, 0.0, 0.0))
-        _skin(body, "cylinder", tip, centre, 0.5 * tool[0], "steel")
-        _skin(body, "cylinder", centre, (0.0, 0.0, 0.045), 0.008, "dark")
-        _skin(body, "sphere", KNOB, KNOB, 0.016, "orange")
-        target = spec.worldbody.add_body(name="target", mocap=True)
-        _skin(target, "sphere", KNOB, KNOB, 0.012, "")
-        target.geoms[0].rgba = (*rgb(MATERIALS["orange"]), TARGET_ALPHA)
-        if clay:
-            _block(spec, clay)
-        model = spec.compile()
+        model = picture_spec(arm, clay, tool).compile()
     return checked_model(model, caught)
+
+
+def picture_spec(
+    arm: Arm, clay: Block | None, tool: tuple[float, float], more: tuple[str, ...] = ()
+) -> mujoco.MjSpec:
+    """The specification of a `picture`.
+
+    Args:
+        arm: as for `picture`.
+        clay: as for `picture`.
+        tool: as for `picture`.
+        more: further files of mjcf/.
+    """
+    spec = compose_spec(["arm.xml", "room.xml", *more], arm)
+    _enlarge_room(spec, room_scale(arm))
+    for name, color in PART_COLORS.items():
+        spec.material(name).rgba = (*rgb(color), 1.0)
+    for body, *skin in arm_skin(arm):
+        _skin(spec.body(body) if body else spec.worldbody, *skin)
+    tip = (0.0, 0.0, GROUND + (clay.thickness if clay else THICKNESS) - tool[1])
+    centre = (0.0, 0.0, 0.0)
+    body = spec.body("link2").add_body(name="tool", pos=(arm.l2, 0.0, 0.0))
+    _skin(body, "cylinder", tip, centre, 0.5 * tool[0], "steel")
+    _skin(body, "cylinder", centre, (0.0, 0.0, 0.045), 0.008, "dark")
+    _skin(body, "sphere", KNOB, KNOB, 0.016, "orange")
+    target = spec.worldbody.add_body(name="target", mocap=True)
+    _skin(target, "sphere", KNOB, KNOB, 0.012, "")
+    target.geoms[0].rgba = (*rgb(PART_COLORS["orange"]), TARGET_ALPHA)
+    if clay:
+        _block(spec, clay)
+    return spec
 
 
 def room_scale(arm: Arm) -> float:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Patch, PathPatch
 from matplotlib.path import Path
@@ -29,6 +29,7 @@ from ..studies.identification import (
 )
 from ..studies.stability_map import StabilityMap
 from ..studies.workspace import DRIFT_BLOCKS, Drift
+from ..studies.yield_map import YieldMap
 from .style import (
     BLACK,
     BLUE,
@@ -158,6 +159,84 @@ def _map_parts(chart: StabilityMap) -> list[str]:
     if chart.kind != "gain-pose":
         parts.append("shaping" if s.shaping else "no shaping")
     return [*parts[:-1], parts[-1] + "; stable below the lines"]
+
+
+# The map of yield force and gain
+
+PUSH_MARKS: Any = {
+    "sticks": dict(marker="_", color=BLACK, mew=2.0),
+    "limit cycle": dict(marker="o", mec=WHITE, mew=1.2),
+    "grows": dict(marker="^", color=BLACK),
+}
+PUSH_NAMES = {"sticks": "sticks", "limit cycle": "buzzes (colour: its speed)", "grows": "grows"}
+
+
+def yield_map_plot(chart: YieldMap) -> Figure:
+    """Plots what a push ends in, over yield force and gain.
+
+    Colours are the speed of the limit cycle by theory, and, in the dots, in runs.
+
+    Args:
+        chart: from `yield_map`.
+    """
+    push, low, high = chart.loop.push, *(f(c.Fy for c in chart.cells) for f in (min, max))
+    bottom, top = 0.9 * min(c.K for c in chart.cells), chart.K[-1]
+    Fy, K = np.geomspace(low / 1.3, 1.3 * high, 240), np.geomspace(bottom, top, 240)
+    speed = np.array(chart.speed)
+    some = np.isfinite(speed)
+    critical = np.exp(np.interp(K, chart.K, np.log(np.maximum(chart.critical, 1e-12))))
+    each = np.where(
+        (K >= chart.least) & (K < chart.limit) & np.any(some),
+        np.exp(np.interp(K, np.array(chart.K)[some], np.log(speed[some]))) if some.any() else 1.0,
+        np.nan,
+    )
+    goes = push >= np.outer(np.where(K < chart.least, np.inf, critical), Fy)
+    cycle = 1e3 * np.where(goes, np.outer(each, Fy), np.nan)
+    grows = goes & (K >= chart.limit)[:, None]
+    with figure_style():
+        figure = Figure(figsize=(7.4, 5.6))
+        ax = figure.add_subplot()
+        ax.set(xscale="log", yscale="log", xlim=(Fy[0], Fy[-1]), ylim=(bottom, top))
+        known = cycle[np.isfinite(cycle)]
+        colors = LogNorm(known.min(), min(known.max(), 1e4)) if len(known) else LogNorm(1.0, 10.0)
+        shaded = ax.pcolormesh(Fy, K, cycle, norm=colors, cmap="cividis", rasterized=True)
+        ax.contourf(Fy, K, grows, levels=(0.5, 1.5), colors="none", hatches=["///"])
+        edge = np.where(K < chart.least, np.nan, push / critical)
+        ax.plot(edge, K, color=BLACK, label=unit_text("theory: edge of sticking"))
+        for level, style, name in (
+            (chart.least, "--", "no limit cycle below"),
+            (chart.limit, "-.", "unstable in flowing clay above"),
+        ):
+            if level < top:
+                ax.axhline(level, color=VERMILION, ls=style, label=f"theory: {name}")
+        for name, look in PUSH_MARKS.items():
+            mine = [c for c in chart.cells if c.simulated == name]
+            for i, c in enumerate(mine):
+                own = dict(look)
+                if name == "limit cycle":
+                    own["mfc"] = shaded.cmap(colors(1e3 * c.speed))
+                label = f"a run: {PUSH_NAMES[name]}" if i == 0 else None
+                ax.plot(c.Fy, c.K, ls="none", ms=8, label=label, **own)
+        if wrong := [c for c in chart.cells if c.simulated != c.expected]:
+            look: Any = dict(marker="o", mfc="none", color=VERMILION, ms=14, mew=1.5, ls="none")
+            ax.plot([c.Fy for c in wrong], [c.K for c in wrong], label="unlike theory", **look)
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
+        for side in (ax.xaxis, ax.yaxis):
+            side.set_major_formatter(FormatStrFormatter("%g"))
+            side.set_minor_formatter(NullFormatter())
+        bar = figure.colorbar(shaded, ax=ax, format="%g")
+        bar.set_label(unit_text("largest speed of the limit cycle [mm/s]"))
+        ax.set(xlabel=unit_text("yield force Fy [N]"), ylabel=unit_text("gain K [1/kg]"))
+        add_legend(figure, ax, 2, fontsize=9)
+        s = chart.loop
+        parts = [f"{s.axis} axis, push of {1e3 * push:g} mm/s", unit_text(f"b = {s.b:g} N.s/m")]
+        parts += [
+            hand_name(s.operator),
+            "continuous time",
+            "shaping" if s.shaping else "no shaping",
+        ]
+        set_title(ax, *parts[:-1], parts[-1] + "; hatched: grows; white: sticks")
+    return figure
 
 
 # Identification

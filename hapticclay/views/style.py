@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.clay import Profile
+from ..model.clay import Clay, Grid, Profile, Smooth
 from ..model.operator import Operator
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ FORCE_COLORS = {  # whose force, along which axis; the window's titles name the 
 }
 COLOR_NAMES = {GREEN: "green", BLUE: "blue", ORANGE: "orange", VERMILION: "red"}
 VERDICT_COLORS = {"unstable": "#C92A2A", "stable": "#0D6B52", "other": "#B86B00"}  # under white
-MATERIALS = {"dark": "#38404A", "steel": "#B2BAC4", "blue": BLUE, "orange": VERMILION}
+PART_COLORS = {"dark": "#38404A", "steel": "#B2BAC4", "blue": BLUE, "orange": VERMILION}
 TABLE, GRID, SKY = "#CDD3D8", "#B4BCC4", ("#ECF0F5", "#D6DCE4")  # of the page, as in room.xml
 CLAY_PALE, CLAY_DEEP = "#DEA884", "#BA643E"  # clay of the least and of the largest damping
 STYLE: Any = {
@@ -56,6 +56,9 @@ STYLE: Any = {
 TITLE_SIZE = 9.0  # [points]
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
 CLAY_ALPHA = 0.35  # of clay behind curves
+HELD_COLOR, HELD_ALPHA = SKY_BLUE, 0.35  # time for which clay that yields holds the handle
+SHADED_SPEED = 0.01  # [m/s] at which clays that yield are compared, about that of the paper's cut
+SHADED_DENT = 1e-3  # [m] at which clays that spring back are
 
 
 def rgb(color: str) -> tuple[float, float, float]:
@@ -79,16 +82,85 @@ def rgb_bytes(color: str) -> tuple[int, int, int]:
 
 
 def clay_color(share: Any) -> np.ndarray:
-    """Shades clay by its damping.
+    """Shades clay by how hard it is to cut.
 
     Args:
-        share: damping over the largest damping of the scene, 0 to 1, any shape.
+        share: damping over the largest damping of the scene, or as `clay_share` in clay that
+            yields, 0 to 1, any shape.
 
     Returns:
         Red, green and blue from 0 to 1, shape (..., 3).
     """
     pale, deep = np.array(rgb(CLAY_PALE)), np.array(rgb(CLAY_DEEP))
     return pale + np.asarray(share)[..., None] ** 2 * (deep - pale)
+
+
+def along_motion(v: np.ndarray, fe: np.ndarray, main: int) -> tuple[np.ndarray, np.ndarray]:
+    """Speed and force along the motion; at rest, 0 and all of the force.
+
+    Both are negative where the motion, or at rest the force, is against the main axis.
+
+    Args:
+        v: velocity of the handle [m/s], shape (n, 2).
+        fe: force of the clay [N], shape (n, 2).
+        main: axis that tells forth from back, 0 or 1.
+
+    Returns:
+        Speed [m/s] and force [N], shape (n,) each.
+    """
+    speed, size = np.hypot(*v.T), np.hypot(*fe.T)
+    still = speed == 0.0
+    along = np.where(still, size, (fe * v).sum(axis=1) / np.where(still, 1.0, speed))
+    back = np.where(np.where(still, fe[:, main], v[:, main]) < 0.0, -1.0, 1.0)
+    return back * speed, back * along
+
+
+def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
+    """How hard clay is to cut at some places, over the hardest of the scene, growth aside.
+
+    Along the harder axis: the damping, or in a scene with clay that yields or springs back the
+    force at SHADED_SPEED and SHADED_DENT.
+
+    Args:
+        clay: of the scene.
+        x: coordinates [m].
+        y: the same along y.
+
+    Returns:
+        0 to 1, of the shape of x and y together.
+    """
+    if not (clay.yields or clay.springs):
+        return clay.at(x, y).max(axis=0) / (clay.largest or 1.0)
+    here, most = [], 0.0
+    for law in clay.laws:
+        if isinstance(law, Smooth):
+            most = max(most, SHADED_SPEED * float(law.damping.max()))
+            here.append(SHADED_SPEED * law.at(x, y))
+        else:
+            force = law_force(law)
+            most = max(most, float(force.max()))
+            here.append(force[law.index(x, y)])
+    if clay.groove:
+        (x0, x1), (y0, y1) = clay.groove.x, clay.groove.y
+        inside = (np.asarray(x) >= x0) & (x <= x1) & (np.asarray(y) >= y0) & (y <= y1)
+        force = clay.groove.hardest + SHADED_SPEED * clay.groove.thickest
+        most = max(most, force)
+        here.append(force * inside)
+    return np.maximum.reduce(np.broadcast_arrays(*here)) / (most or 1.0)
+
+
+def law_force(law: Profile | Grid) -> np.ndarray:
+    """Force of each cell of a law at SHADED_SPEED and SHADED_DENT, growth aside [N].
+
+    Args:
+        law: of one axis.
+
+    Returns:
+        As `Grid.damping`.
+    """
+    (Fy, K, n), (k, limit, k1) = law.flows, np.moveaxis(law.elastic, -1, 0)[:3]
+    springs = np.minimum(k * SHADED_DENT, limit) + k1 * SHADED_DENT
+    return Fy + K * SHADED_SPEED**n + law.damping * SHADED_SPEED + springs
 
 
 def verdict_color(text: str, unstable: bool) -> str:
@@ -171,7 +243,7 @@ def unit_text(text: str) -> str:
 
 
 def shade_clay(ax: Axes, profile: Profile | None, axis: str) -> None:
-    """Shades the intervals of the x axis that hold clay, darker where it damps more.
+    """Shades the intervals of the x axis that hold clay, darker where it is harder to cut.
 
     Args:
         ax: axes over the position along `axis` [cm].
@@ -180,9 +252,26 @@ def shade_clay(ax: Axes, profile: Profile | None, axis: str) -> None:
     """
     if profile is None or profile.along != axis:
         return
+    hard = profile.values
+    if profile.yields or profile.springs:
+        hard = tuple(law_force(profile).ravel().tolist())
     label, edges = "clay", (-1.0, *profile.edges, 1.0)
-    for low, high, b in zip(edges, edges[1:], profile.values, strict=False):
-        if b > 0.0:
-            color = clay_color(b / max(profile.values))
+    for low, high, force in zip(edges, edges[1:], hard, strict=False):
+        if force > 0.0:
+            color = clay_color(force / max(hard))
             ax.axvspan(100.0 * low, 100.0 * high, color=color, alpha=CLAY_ALPHA, lw=0, label=label)
             label = "_"
+
+
+def shade_held(ax: Axes, spans: Any) -> None:
+    """Shades the times at which clay that yields held the handle.
+
+    Args:
+        ax: axes over the time [s].
+        spans: (begin, end) of each [s].
+    """
+    bars = [(begin, end - begin) for begin, end in spans]
+    if bars:
+        across: Any = ax.get_xaxis_transform()
+        look: Any = dict(color=HELD_COLOR, alpha=HELD_ALPHA, lw=0, label="held still", zorder=0.5)
+        ax.broken_barh(bars, (0.0, 1.0), transform=across, **look)

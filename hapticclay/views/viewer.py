@@ -27,7 +27,16 @@ from ..stepping.engine import mujoco
 from ..studies.removal import Tool
 from .session import FRAME_TIME, Frame
 from .stage import Stage, plotted_axes
-from .style import BLACK, COLOR_NAMES, FORCE_COLORS, PALE_GREY, WHITE, rgb, verdict_color
+from .style import (
+    BLACK,
+    COLOR_NAMES,
+    FORCE_COLORS,
+    PALE_GREY,
+    WHITE,
+    along_motion,
+    rgb,
+    verdict_color,
+)
 
 Rows = tuple[tuple[str, str], ...]
 PLOTS_WIDTH = 0.32  # of the window's
@@ -91,7 +100,9 @@ class Pane:
             tool: at the handle.
         """
         self.stage = Stage(scenario, tool)
-        self.plots = _plots(plotted_axes(scenario))
+        yields = scenario.clay is not None and scenario.clay.yields
+        isotropic = scenario.clay is not None and scenario.clay.isotropic
+        self.plots = _plots(plotted_axes(scenario), yields, isotropic)
         self.frames: list[Frame] = []
         self.banner = _banner()
         self.rows: Rows = ()
@@ -112,6 +123,8 @@ class Pane:
         self.stage.carve([f.p for f in new])
         self.frames += new
         self.stage.pose(sight.angles, sight.target)
+        if self.frames:
+            self.stage.push(self.frames[-1].fe, all(self.frames[-1].held))
         if words := sight.writing:
             self.rows = (*words.rows, ("removed", f"{1e6 * self.stage.removal.volume:.2f} cm3"))
             self.keys = words.keys
@@ -151,6 +164,9 @@ class Pane:
                 viewer.update_hfield(self.stage.field)
             if sight.writing:
                 self._write(viewer)
+            with viewer.lock():
+                viewer.user_scn.ngeom = 0
+                self.stage.draw_arrow(viewer.user_scn)
             viewer.sync()
             time.sleep(max(0.001, FRAME_TIME - (time.perf_counter() - begin)))
 
@@ -273,26 +289,46 @@ def _ratio(force: float, v: float) -> float:
     return force / v if abs(v) > 1e-4 else math.nan
 
 
-def _plots(axes: tuple[int, ...]) -> tuple[LivePlot, ...]:
-    """Velocity and fe/v over position, and forces over time, along these axes."""
+def _law_point(f: Frame, i: int, isotropic: bool) -> tuple[float, float]:
+    """Velocity [cm/s] and force of the clay, along the motion where it resists so; NaN in air."""
+    v, fe = f.v[i], f.fe[i]
+    if isotropic:
+        (speed,), (force,) = along_motion(np.array([f.v]), np.array([f.fe]), i)
+        v, fe = float(speed), float(force)
+    return (100.0 * v, fe) if any(f.fe) else (math.nan, math.nan)
+
+
+def _plots(
+    axes: tuple[int, ...], yields: bool = False, isotropic: bool = False
+) -> tuple[LivePlot, ...]:
+    """Velocity and fe/v over position, and forces over time, along these axes.
+
+    Of clay that yields, fe over velocity in place of fe/v; of isotropic clay along the motion.
+    """
     hand, clay = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
     place, named = f"{AXES[axes[0]]} [cm]", ""
     if len(axes) > 1:
         place = "position [cm]"
         named = ": " + ", ".join(f"{AXES[i]} {COLOR_NAMES[clay[i]]}" for i in axes)
-    velocities, dampings, forces = [], [], []
+    velocities, dampings, laws, forces = [], [], [], []
     for i in axes:
         velocities.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], 100 * f.v[i])))
         dampings.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], _ratio(f.fe[i], f.v[i]))))
+        if not (isotropic and laws):
+            laws.append(LiveCurve(clay[i], lambda f, i=i: _law_point(f, i, isotropic)))
         forces.append(LiveCurve(hand[i], lambda f, i=i: (f.t, f.fh[i])))
         forces.append(LiveCurve(clay[i], lambda f, i=i: (f.t, f.fe[i])))
     both = (
         f"{who} {', '.join(COLOR_NAMES[color] for color in colors.values())}"
         for who, colors in (("hand", hand), ("clay", clay))
     )
+    second = LivePlot(f"clay, fe/v [N.s/m]{named}", place, tuple(dampings), 10.0)
+    if yields:
+        told = " along the motion" if isotropic else named
+        second = LivePlot(f"clay, fe [N]{told}", "velocity [cm/s]", tuple(laws), 0.1)
     return (
         LivePlot(f"velocity [cm/s]{named}", place, tuple(velocities), 0.1),
-        LivePlot(f"clay, fe/v [N.s/m]{named}", place, tuple(dampings), 10.0),
+        second,
         LivePlot(f"force [N]: {'; '.join(both)}", "time [s]", tuple(forces), 0.1),
     )
 

@@ -83,7 +83,7 @@ def test_a_value_on_a_bound_is_taken_and_the_next_one_is_not(prefix, part, name,
 @given(st.sampled_from(BOUNDED), st.sampled_from([math.nan, "1", True, 1j, b"", [], object()]))
 def test_no_number_field_takes_anything_else(case, value):
     prefix, part, name, _ = case
-    if value == [] and name in ("edges", "values", "growth"):
+    if value == [] and name in ("edges", "values", "growth", "Fy", "K", "n"):
         return
     with pytest.raises(ParameterError) as e:
         dataclasses.replace(part, **{name: value})

@@ -30,6 +30,19 @@ def memory(K, Ts):
 
 def paper(t, q, qd, fh, state, params):
     """One sample; params: begin and end of the clay [m], b [N.s/m], then `memory`."""
+    return in_clay(q, qd, fh, state, params, 0.0, 0.0, 1.0, 3)
+
+
+def paper_that_yields(t, q, qd, fh, state, params):
+    """As `paper`, of clay that yields on each axis; params: begin, end, b, Fy, K, n, `memory`."""
+    return in_clay(q, qd, fh, state, params, params[3], params[4], params[5], 6)
+
+
+def resists(v, b, Fy, K, n):
+    return b * v + (Fy + K * abs(v) ** n) * ((v > 0.0) - (v < 0.0))
+
+
+def in_clay(q, qd, fh, state, params, Fy, K, n, at):  # noqa: PLR0913  # a case, spelt out
     a = q[0] + q[1]
     u1x, u1y, u2x, u2y = -L1 * sin(q[0]), L1 * cos(q[0]), -L2 * sin(a), L2 * cos(a)
     px, py = u1y + u2y - OX, -OY - u1x - u2x
@@ -38,6 +51,8 @@ def paper(t, q, qd, fh, state, params):
     cx, cy = u1y * (r1 * r1) + u2y * (r2 * r2), -u1x * (r1 * r1) - u2x * (r2 * r2)
     b = params[2] if params[0] <= px < params[1] else 0.0
     fex, fey = b * vx, b * vy
+    if b:
+        fex, fey = resists(vx, b, Fy, K, n), resists(vy, b, Fy, K, n)
     fx, fy = fh[0] - fex, fh[1] - fey
     ax = servo(state[0], state[2], state[3], px, vx, cx, G[0][0], G[0][1], S[0][1], S[0][2])
     ay = servo(state[4], state[6], state[7], py, vy, cy, G[1][0], G[1][1], S[1][1], S[1][2])
@@ -49,8 +64,8 @@ def paper(t, q, qd, fh, state, params):
     t1 = I1 * ((ux * u2y - uy * u2x) / det) - u1x * fx - u1y * fy + t2
     p2 = u2x * fex + u2y * fey
     p1 = u1x * fex + u1y * fey + p2
-    x = after(state[0], state[1], state[2], state[3], fx, params, 3)
-    y = after(state[4], state[5], state[6], state[7], fy, params, 23)
+    x = after(state[0], state[1], state[2], state[3], fx, params, at)
+    y = after(state[4], state[5], state[6], state[7], fy, params, at + 20)
     return (t1 - p1, t2 - p2), x + y
 
 

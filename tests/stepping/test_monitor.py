@@ -213,6 +213,22 @@ def test_how_a_stable_run_ends(kw, code, word):
     check_finite(r)
 
 
+@pytest.mark.parametrize("clay,advice", [
+    (hc.slab(hc.material("stiff clay"), 0.05, 0.15), "above the yield force, 24.75 N, or lower Fy"),
+    (
+        hc.Clay.of_groove(hc.Groove((0.02, 0.08), (-0.02, 0.02), pressure=40e3)),
+        "above the yield force, 2 N, or lower the pressure",  # of 10 x 5 mm
+    ),
+    (hc.slab(hc.Flow(Fy=0.5, b=1e9), 0.05, 0.15), "lower b"),
+])  # fmt: skip
+def test_advice_to_a_run_held_in_clay_that_yields(clay, advice):
+    s = hc.constant_cut(t_max=3.0)
+    if clay.groove:  # unshaped, the tool does not come to rest in 3 s
+        s = dataclasses.replace(s, gain=(1.0, 0.0), shaping=True)
+    r = hc.simulate(dataclasses.replace(s, clay=clay))
+    assert r.outcome.code == "stalled" and advice in r.outcome.advice, r.status
+
+
 def at_nominal(**kw):
     s = hc.constant_cut(b=100.0, shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=6.0)
     clay = hc.Clay(hc.Profile((), (100.0,)), hc.Profile((), (100.0,)))

@@ -2,12 +2,14 @@
 
 import inspect
 import json
+import math
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -212,6 +214,14 @@ def test_rows_say_what_the_runs_said(tmp_path):
         and rows[1]["gain_margin_y"] < 1.0
     )
     assert rows[1]["axis"] == "y" and rows[0]["energy_residual"] < 1e-12
+
+
+@pytest.mark.parametrize("margin", [True, False])
+def test_clay_that_yields_has_no_linear_gain_margin(margin):
+    clay = hc.slab(90.0 if margin else hc.Flow(Fy=0.1, b=90.0))
+    r = hc.simulate(replace(hc.constant_cut(), clay=clay, t_max=0.05))
+    row = sweep.result_row(0, [], np.empty(0), r)
+    assert [math.isfinite(row[f"gain_margin_{axis}"]) for axis in "xy"] == [margin, margin]
 
 
 def test_a_refused_run_is_a_row(tmp_path):

@@ -49,6 +49,20 @@ def test_signals_page_runs(tmp_path):
     assert "at " in out.stdout
 
 
+@pytest.mark.parametrize("page", ["materials.md", "fit.md"])
+def test_page_says_what_its_snippet_prints(page):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
+
+
+def test_groove_of_the_clay_page_says_what_it_prints():
+    page = (ROOT / "docs" / "clay.md").read_text().partition("## Groove")[2]
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+
+
 PARTS = (ROOT / "docs" / "parts.md").read_text()
 BLOCKS = re.findall(r"## ([^\n]*)\n\n```python\n(.*?)```", PARTS, re.S)
 

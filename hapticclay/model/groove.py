@@ -1,0 +1,340 @@
+"""Clay that stays cut: what is left of a block of it, on a grid, and what holds a tool in it."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from ..errors import Bound, ParameterError, check_fields
+from .constants import AXES, B_MAX
+from .flow import FY_MAX
+from .materials import SMALL_TOOL, material
+from .tool import Tool
+
+CELLS = 20  # in the width of the tool, where none are asked for
+COARSEST = 8  # cells in it, at least
+MOST_CELLS = 4_000_000
+TOUCHING = 1e-6  # share of a cell: a gap as small lets go of the clay
+SOFT = 2.0  # cells to either side of the tool's edge of which it takes a share
+STRIDE = 0.5  # cells, at most, that the tool moves between two cuts
+# the front of the tool in sectors: by the share of |y| in |x| + |y| of their normals, in each
+# quadrant; half of the angle of each [rad]
+SECTORS = 16
+HALF = tuple(
+    0.5 * (math.atan2(k + 1.0, SECTORS - k - 1.0) - math.atan2(k, SECTORS - k))
+    for k in range(SECTORS)
+)
+RIM = 4 * 4 * SECTORS  # numbers of the rim: four a sector, see `cut`
+BLOCK_NUMBERS = 10  # numbers of Groove.numbers
+
+
+def outside(u):
+    """Share of a cell that the tool leaves standing: 0 within it, 1 outside.
+
+    Its slope is the cubic B-spline over the cells, whose sum over a row of them is always 1.
+
+    Args:
+        u: distance of the cell's centre from the edge of the tool, in cells, positive outside.
+
+    Returns:
+        The share, and its slope.
+    """
+    t = abs(u)
+    if t >= SOFT:
+        share, slope = 0.5, 0.0
+    elif t > 1.0:
+        t = 2.0 - t
+        slope = t * t * t / 6.0
+        share = 0.5 - 0.25 * t * slope
+    else:
+        slope = 2.0 / 3.0 - t * t * (1.0 - 0.5 * t)
+        share = t * (2.0 / 3.0 - t * t * (1.0 / 3.0 - 0.125 * t))
+    return 0.5 + (share if u > 0.0 else -share), slope
+
+
+def cut(grid, left, relief, x, y, whole, rim, removed):  # noqa: PLR0913  # plain numbers, for speed
+    """Cuts what lies under the tool, and takes down the clay that touches it.
+
+    Args:
+        grid: Groove.numbers.
+        left: share of each cell that is left, shape (n, m).
+        relief: height of each cell before the first cut [m], shape (n, m).
+        x: place of the tool, x [m].
+        y: the same, y [m].
+        whole: 1 to cut the whole disc; 0 for its edge, where it has moved by a part of a cell.
+        rim: gets the clay that touches it, four numbers a sector: sum of area x normal, x and y;
+            area [m^2]; area x pressure [N].
+        removed: volume removed so far, and what rounding left of it [m^3].
+    """
+    x0, y0, wx, wy, nx, ny, r, cell, pressure, gradient = grid
+    for j in range(RIM):
+        rim[j] = 0.0
+    outer, inner = r + SOFT * cell, r - SOFT * cell
+    i0, i1 = int(max((x - outer - x0) / wx, 0.0)), int(min((x + outer - x0) / wx, nx - 1.0))
+    for i in range(i0, i1 + 1):
+        dx = x0 + (i + 0.5) * wx - x
+        far = outer * outer - dx * dx
+        if far <= 0.0:
+            continue
+        far, near = math.sqrt(far), inner * inner - dx * dx
+        near = 0.0 if whole or near <= 0.0 else math.sqrt(near)
+        seen = -1
+        for side in range(1 if near == 0.0 else 2):
+            low, high = y - y0 + (near if side else -far), y - y0 + (far if side else -near)
+            if near == 0.0:
+                high = y - y0 + far
+            j0, j1 = max(int(max(low / wy - 0.5, 0.0)), seen + 1), int(min(high / wy, ny - 1.0))
+            seen = j1
+            for j in range(j0, j1 + 1):
+                share = left[i, j]
+                if share <= 0.0:
+                    continue
+                dy = y0 + (j + 0.5) * wy - y
+                d = math.sqrt(dx * dx + dy * dy)
+                stays, slope = outside((d - r) / cell)
+                if stays >= 1.0:
+                    continue
+                height = relief[i, j]
+                if stays < share:
+                    left[i, j] = stays
+                    add(removed, height * wx * wy * (share - stays))
+                    share = stays
+                engaged = slope * (1.0 - (stays - share) / TOUCHING)
+                if engaged > 0.0 and height > 0.0:
+                    area = engaged * height * wx * wy / cell
+                    k = 4 * sector(dx, dy)
+                    rim[k] += area * dx / d
+                    rim[k + 1] += area * dy / d
+                    rim[k + 2] += area
+                    rim[k + 3] += area * (pressure + 0.5 * gradient * height)
+
+
+def add(removed, volume):
+    """Adds to a sum, with what rounding leaves of it (Neumaier).
+
+    Args:
+        removed: the sum, and that.
+        volume: what to add, >= 0.
+    """
+    total = removed[0] + volume
+    if removed[0] >= volume:
+        removed[1] += removed[0] - total + volume
+    else:
+        removed[1] += volume - total + removed[0]
+    removed[0] = total
+
+
+def sector(x, y):
+    """Number of the sector in which a direction lies.
+
+    Args:
+        x: its x, not 0 where y is.
+        y: its y.
+    """
+    ax, ay = abs(x), abs(y)
+    k = min(int(SECTORS * ay / (ax + ay)), SECTORS - 1)
+    return k + (2 * SECTORS if x < 0.0 else 0) + (SECTORS if y < 0.0 else 0)
+
+
+def resistance(rim, x, y):
+    """What a motion meets: the clay in front of the tool, by its projection on the direction.
+
+    Args:
+        rim: from `cut`.
+        x: direction of the motion, x, of any length.
+        y: the same, y.
+
+    Returns:
+        Force [N], engaged cross-section [m^2]; zeros for no direction.
+    """
+    length = math.sqrt(x * x + y * y)
+    force, area = 0.0, 0.0
+    if length > 0.0:
+        x, y = x / length, y / length
+        for k in range(4 * SECTORS):
+            whole = rim[4 * k + 2]
+            if whole > 0.0:
+                part = rim[4 * k] * x + rim[4 * k + 1] * y
+                some = HALF[k % SECTORS] * whole
+                if part < some:  # a part of the sector faces away
+                    part = (part + some) * (part + some) / (4.0 * some) if part > -some else 0.0
+                area += part
+                force += part * rim[4 * k + 3] / whole
+    return force, area
+
+
+@dataclass(frozen=True)
+class Groove:
+    """A block of clay that stays cut: a tool at the handle removes what stands in its way.
+
+    The tool is a disc that cuts down to a floor. The block is a grid of cells; the share of each
+    under the tool is removed, and the edge of the tool is spread over two cells to either side. The
+    clay in front of the tool resists with its pressure times its cross-section, along the motion,
+    and holds a tool at rest: in fresh clay with (pressure + gradient depth/2) width depth.
+
+    Attributes:
+        x: where the block begins and ends along x [m], ascending.
+        y: the same along y.
+        pressure: force per cross-section of the cut, at the surface [Pa], 0 to 1e8.
+        gradient: by which it grows with the depth below the surface [Pa/m], 0 to 1e10.
+        damping: force per cross-section and speed, that is per volume rate [N.s/m^3], 0 to 1e12.
+        tool: width of the disc, and depth of the cut; 10 mm and 5 mm by default.
+        cells: how many there are along x and along y, 8 or more in the width of the tool; None for
+            20 in it.
+        heights: of the clay above the floor of the cut [m], a line along y for each cell along x,
+            0 to 0.1; empty where it is flat, tool.depth everywhere.
+        left: share of each cell that is left, as heights, 0 to 1; empty for all of it.
+    """
+
+    x: Annotated[tuple[float, float], Bound(unit="m")]
+    y: Annotated[tuple[float, float], Bound(unit="m")]
+    pressure: Annotated[float, Bound(0.0, 1e8, "Pa")] = 0.0
+    gradient: Annotated[float, Bound(0.0, 1e10, "Pa/m")] = 0.0
+    damping: Annotated[float, Bound(0.0, 1e12, "N.s/m^3")] = 0.0
+    tool: Tool = SMALL_TOOL
+    cells: Annotated[tuple[float, float] | None, Bound(1.0, 1e5)] = None
+    heights: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 0.1, "m")] = ()
+    left: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)] = ()
+
+    def __post_init__(self):
+        check_fields(self, "groove.")
+        for axis, (low, high) in zip(AXES, (self.x, self.y), strict=True):
+            if high <= low:
+                raise ParameterError(f"groove.{axis}", (low, high), "must be strictly ascending")
+        for axis, n in zip(AXES, self.cells or (), strict=False):
+            if n != int(n):
+                raise ParameterError(f"groove.cells[{axis}]", n, "must be a whole number")
+        (wx, wy), (n, m), most = self.sizes, self.shape, self.tool.width / COARSEST
+        if max(wx, wy) > most * (1.0 + 1e-9):
+            need = [math.ceil((b - a) / most - 1e-9) for a, b in (self.x, self.y)]
+            bound = f"must be {need[0]} by {need[1]} or more, {COARSEST} in the tool's width"
+            raise ParameterError("groove.cells", (n, m), bound)
+        if n * m > MOST_CELLS:
+            raise ParameterError("groove.cells", (n, m), f"must be at most {MOST_CELLS} in all")
+        for name in ("heights", "left"):
+            table = getattr(self, name)
+            got = len(table), len(table[0]) if table else 0
+            if table and got != (n, m):
+                bound = f"must have shape {(n, m)}, a number a cell, has {got}"
+                raise ParameterError(f"groove.{name}", table, bound)
+        if not (self.pressure or self.gradient or self.damping):
+            bound = "must be above 0 without gradient and damping: the block would not resist"
+            raise ParameterError("groove.pressure", self.pressure, bound)
+        if self.hardest > FY_MAX:
+            bound = f"must press with {FY_MAX:g} N at most, presses with {self.hardest:.3g} N"
+            raise ParameterError("groove.pressure", self.pressure, bound)
+        if self.thickest > B_MAX:
+            bound = f"must damp with {B_MAX:g} N.s/m at most, damps with {self.thickest:.3g} N.s/m"
+            raise ParameterError("groove.damping", self.damping, bound)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of cells along x and along y."""
+        if self.cells:
+            return int(self.cells[0]), int(self.cells[1])
+        w = self.tool.width / CELLS
+        n, m = (math.ceil((b - a) / w - 1e-9) for a, b in (self.x, self.y))
+        return n, m
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Of a cell, along x and along y [m]."""
+        x, y = ((b - a) / n for (a, b), n in zip((self.x, self.y), self.shape, strict=True))
+        return x, y
+
+    @property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Borders between the cells, and those of the block, along x and along y [m]."""
+        x, y = (
+            np.linspace(a, b, n + 1) for (a, b), n in zip((self.x, self.y), self.shape, strict=True)
+        )
+        return x, y
+
+    @functools.cached_property
+    def relief(self) -> np.ndarray:
+        """Height of each cell above the floor of the cut, before any cut [m], shape (n, m)."""
+        return np.array(self.heights) if self.heights else np.full(self.shape, self.tool.depth)
+
+    @functools.cached_property
+    def shares(self) -> np.ndarray:
+        """Share of each cell that is left, shape (n, m)."""
+        return np.array(self.left) if self.left else np.ones(self.shape)
+
+    @property
+    def highest(self) -> float:
+        """Largest height above the floor of the cut [m]."""
+        return float(self.relief.max()) if self.heights else self.tool.depth
+
+    @property
+    def hardest(self) -> float:
+        """Force on the tool where its whole width is engaged in the highest clay [N]."""
+        mean = self.pressure + 0.5 * self.gradient * self.highest
+        return mean * self.tool.width * self.highest
+
+    @property
+    def thickest(self) -> float:
+        """Damping there [N.s/m]."""
+        return self.damping * self.tool.width * self.highest
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What `cut` takes: begin of the block (x, y) [m], sizes of a cell [m], numbers of cells,
+        radius of the tool and the larger size of a cell [m], pressure [Pa], gradient [Pa/m].
+        """
+        (wx, wy), (n, m) = self.sizes, self.shape
+        r, cell = 0.5 * self.tool.width, max(wx, wy)
+        return (
+            self.x[0], self.y[0], wx, wy, float(n), float(m), r, cell, self.pressure, self.gradient
+        )  # fmt: skip
+
+    @classmethod
+    def of_material(
+        cls, name: str, x: tuple[float, float], y: tuple[float, float], tool: Tool = SMALL_TOOL
+    ) -> Groove:
+        """A block of a material, of even pressure: that on the tool's whole face, Fy/(w d).
+
+        Args:
+            name: as for `material`.
+            x: where the block begins and ends along x [m].
+            y: the same along y.
+            tool: the tool.
+
+        Raises:
+            ParameterError: there is no such material, or its force is no pressure, as it depends on
+                a power of the speed.
+        """
+        flow, face = material(name, tool), tool.width * tool.depth
+        if flow.K:
+            raise ParameterError("material", name, "must be without K |v|^n in clay that stays cut")
+        return cls(x, y, pressure=flow.Fy / face, damping=flow.b / face, tool=tool)
+
+    def volume(self, ground: Any = None) -> float:
+        """Volume of the block, to rounding [m^3].
+
+        Args:
+            ground: height of what is left of each cell, as Record.ground [m], shape (n, m); None
+                for the block as given.
+        """
+        heights = self.relief * self.shares if ground is None else np.asarray(ground, float)
+        wx, wy = self.sizes
+        return math.fsum((heights * (wx * wy)).ravel().tolist())
+
+    def after(self, ground: Any) -> Groove:
+        """The block as a run has left it.
+
+        Args:
+            ground: height of what is left of each cell, as Record.ground [m], shape (n, m).
+
+        Raises:
+            ParameterError: it has another shape, or is higher than the block.
+        """
+        relief, ground = self.relief, np.asarray(ground, dtype=float)
+        if ground.shape != relief.shape:
+            bound = f"must have shape {relief.shape}, has {ground.shape}"
+            raise ParameterError("ground", ground, bound)
+        shares = np.divide(ground, relief, out=np.ones(self.shape), where=relief > 0.0)
+        return replace(self, left=shares)  # pyright: ignore[reportArgumentType]

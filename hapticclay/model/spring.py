@@ -1,0 +1,104 @@
+"""Clay that springs back: Te = b s + k (Eqs. 3, 4), a spring that yields, one that relaxes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from ..errors import Bound, ParameterError, check_fields
+
+STIFFNESS_MAX = 1e9  # [N/m]
+RESOLVED = 0.2  # longest step over the time in which a spring moves the handle by one radian
+
+
+@dataclass(frozen=True)
+class Spring:
+    """How clay springs back along one axis, beside its damping.
+
+    Its rest is where the handle comes into the region, on the border or at the start. The second
+    spring is Zener's: it takes the load of a fast motion and gives it up with time.
+
+    Attributes:
+        k: stiffness [N/m], 0 to 1e9.
+        limit: force beyond which it gives way for good [N], > 0, at most 1e6; None for never.
+        k1: stiffness of a second spring beside it, which relaxes [N/m], 0 to 1e9.
+        tau: relaxation time of the second spring [s], > 0, at most 1e5; 1 without k1.
+        surface: whether the clay is a wall behind the border, which pushes and never pulls; what
+            gave way is a dent that stays. Else the tool sticks in it and is pulled back as well.
+    """
+
+    k: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    limit: Annotated[float | None, Bound(0.0, 1e6, "N", above=True)] = None
+    k1: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    tau: Annotated[float, Bound(0.0, 1e5, "s", above=True)] = 1.0
+    surface: bool = False
+
+    def __post_init__(self):
+        check_fields(self, "spring.")
+        if self.limit is not None and not self.k:
+            raise ParameterError("spring.limit", self.limit, "must be None without stiffness k")
+        if self.tau != type(self).tau and not self.k1:
+            raise ParameterError("spring.tau", self.tau, f"must be {type(self).tau} without k1")
+        if self.surface and not (self.k or self.k1):
+            raise ParameterError("spring.surface", True, "must be False without k and k1")
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float]:
+        """k [N/m], limit [N] (inf for none), k1 [N/m], tau [s], 1.0 for a surface."""
+        limit = math.inf if self.limit is None else self.limit
+        return self.k, limit, self.k1, self.tau, float(self.surface)
+
+
+def spring_step(k, limit, way, rest, p):
+    """A spring that gives way, after the handle has moved.
+
+    Args:
+        k: stiffness [N/m].
+        limit: force at which it gives way [N].
+        way: direction in which it is pushed, 1.0 or -1.0, where it is a surface; 0.0 elsewhere.
+        rest: place without force before [m].
+        p: place of the handle [m].
+
+    Returns:
+        (rest [m], force [N], energy stored, energy lost since [J]).
+    """
+    if k <= 0.0:
+        return rest, 0.0, 0.0, 0.0
+    e, most, lost = p - rest, limit / k, 0.0
+    if e > most and way >= 0.0:
+        lost = limit * (e - most)
+        rest, e = p - most, most
+    elif e < -most and way <= 0.0:
+        lost = limit * (-most - e)
+        rest, e = p + most, -most
+    if way * e < 0.0:
+        e = 0.0
+    return rest, k * e, 0.5 * k * e * e, lost
+
+
+def relaxing_step(k, tau, way, z, dp, h):
+    """A spring in line with a damper, Maxwell's, after an even motion: exact.
+
+    Args:
+        k: stiffness [N/m].
+        tau: relaxation time [s].
+        way: as in `spring_step`.
+        z: elongation before [m].
+        dp: motion of the handle [m].
+        h: its time [s].
+
+    Returns:
+        (elongation [m], force [N], energy stored, energy lost since [J]).
+    """
+    if k <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    lost, new = 0.0, z
+    if h > 0.0:
+        x = h / tau
+        new = z * math.exp(-x) - dp * math.expm1(-x) / x
+        # work less what is stored: the time integral of z is tau (dp - change of z)
+        lost = k * (dp / x * (dp - (new - z)) - 0.5 * (new * new - z * z))
+        if way * new < 0.0:  # the handle has left it
+            lost, new = 0.5 * k * abs(z) * max(0.0, abs(z) - abs(dp)), 0.0
+    return new, k * new, 0.5 * k * new * new, max(lost, 0.0)

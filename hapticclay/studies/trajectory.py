@@ -1,0 +1,413 @@
+"""Smooth motions under noisy positions, and a law of force fitted together with the motion.
+
+A velocity differentiated from noisy positions is itself noisy, and a law fitted to it comes out
+biased. Here position and force are explained at once: a spline a stretch follows the positions, and
+its derivative, put into the law, the forces (total least squares along a spline). The spline's
+coefficients are eliminated from the normal equations, which are banded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..model.flow import N_MAX, N_MIN
+
+DEGREE = 4  # of the spline; its velocity is a cubic, its acceleration continuous
+LEAST_PER_KNOT = 8  # samples between knots: coarse enough for the rests to tell the noise
+FIT_RANGES = {  # of the parameters, the logarithm of K, while a law is fitted
+    "Fy": (-1e9, 1e9),
+    "b": (-1e12, 1e12),
+    "K": (math.log(1e-12), math.log(1e12)),
+    "n": (N_MIN, N_MAX),
+}
+WINDOW = 5.0  # correlation times over which autocorrelations are summed (Sokal 1997)
+
+
+class Stretch(NamedTuple):
+    """Samples that one spline follows.
+
+    Attributes:
+        t: times [s], (n,), ascending.
+        bends: times at which the acceleration may jump [s], ascending.
+    """
+
+    t: np.ndarray
+    bends: Sequence[float] = ()
+
+
+class Motion:
+    """Quartic splines over time, one for each stretch, and their velocities.
+
+    Args:
+        stretches: one or more; samples are those of one after those of the other.
+        spacing: of the knots, about [s].
+        sliding: samples of which the velocity matters, indices; None for all.
+        sign: direction of each of these, 1.0 or -1.0; None for 1.0.
+
+    Attributes:
+        size: number of coefficients.
+    """
+
+    def __init__(
+        self,
+        stretches: Sequence[Stretch],
+        spacing: float,
+        sliding: np.ndarray | None = None,
+        sign: np.ndarray | None = None,
+    ):
+        places, velocities, first = [], [], []
+        self.size = 0
+        for stretch in stretches:
+            P, V, at = _basis(stretch, spacing)
+            places.append(P)
+            velocities.append(V)
+            first.append(at + self.size)
+            self.size += int(at[-1]) + DEGREE + 1
+        self._first, self._place = np.concatenate(first), np.concatenate(places)
+        velocity = np.concatenate(velocities)
+        chosen = np.arange(len(velocity)) if sliding is None else sliding
+        self._velocity, self._near = velocity[chosen], self._first[chosen]
+        if sign is not None:
+            self._velocity = self._velocity * sign[:, None]
+        self._gram = self._products(self._place, self._first)
+
+    def place(self, c: np.ndarray) -> np.ndarray:
+        """Positions at the samples [m].
+
+        Args:
+            c: coefficients [m], (size,).
+        """
+        return np.einsum("ij,ij->i", self._place, c[_nearby(self._first)])
+
+    def velocity(self, c: np.ndarray) -> np.ndarray:
+        """Velocities of the samples that slide, forward [m/s].
+
+        Args:
+            c: coefficients [m], (size,).
+        """
+        return np.einsum("ij,ij->i", self._velocity, c[_nearby(self._near)])
+
+    def follow(self, p: np.ndarray) -> np.ndarray:
+        """Coefficients that follow some samples best.
+
+        Args:
+            p: positions [m], (n,).
+        """
+        return _solved(self._gram, self._gathered(self._place, self._first, p))
+
+    def deviation(self, some: np.ndarray) -> np.ndarray:
+        """Standard deviation of velocities per standard deviation of the positions [1/s].
+
+        Args:
+            some: indices of samples that slide, (m,).
+        """
+        rows = np.zeros((self.size, len(some)))
+        for k, i in enumerate(some.tolist()):
+            rows[_nearby(self._near[i : i + 1])[0], k] = self._velocity[i]
+        return np.sqrt(np.sum(rows * _solved(self._gram, rows), axis=0))
+
+    def eliminated(
+        self, ratio: float, slope: np.ndarray, columns: np.ndarray, rest: np.ndarray, p: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The coefficients' part in a step of Gauss and Newton, normal equations A c + G theta = g.
+
+        Args:
+            ratio: weight of a squared position beside a squared force [N^2/m^2].
+            slope: change of each force by its velocity [N.s/m], (n,).
+            columns: change of each force by the law's parameters, (n, k).
+            rest: forces less those of the law [N], (n,).
+            p: positions less those of the spline [m], (m,).
+
+        Returns:
+            (A^-1 g, (size,); A^-1 G, (size, k); G, (size, k)).
+        """
+        A = ratio * self._gram + self._products(self._velocity, self._near, slope * slope)
+        g = ratio * self._gathered(self._place, self._first, p)
+        g += self._gathered(self._velocity, self._near, slope * rest)
+        G = [self._gathered(self._velocity, self._near, slope * x) for x in columns.T]
+        right = np.array([g, *G]).T
+        found = _solved(A, right)
+        return found[:, 0], found[:, 1:], right[:, 1:]
+
+    def _products(
+        self, X: np.ndarray, first: np.ndarray, weights: np.ndarray | None = None
+    ) -> np.ndarray:
+        """X' diag(weights) X in lower banded form."""
+        out = np.zeros((DEGREE + 1, self.size))
+        Y = X if weights is None else X * weights[:, None]
+        for d in range(DEGREE + 1):
+            for r in range(DEGREE + 1 - d):
+                out[d] += np.bincount(first + r, Y[:, r] * X[:, r + d], self.size)
+        return out
+
+    def _gathered(self, X: np.ndarray, first: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """X' y."""
+        return np.bincount(_nearby(first).ravel(), (X * y[:, None]).ravel(), self.size)
+
+
+def _nearby(first: np.ndarray) -> np.ndarray:
+    return first[:, None] + np.arange(DEGREE + 1)
+
+
+def _solved(banded: np.ndarray, right: np.ndarray) -> np.ndarray:
+    from scipy.linalg import solveh_banded
+
+    return solveh_banded(banded, right, lower=True, check_finite=False)
+
+
+def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows of positions and of velocities, (n, DEGREE + 1), and the first coefficient of each."""
+    from scipy.interpolate import BSpline
+
+    k, t = DEGREE, stretch.t
+    ends = [float(t[0]), *stretch.bends, float(t[-1])]
+    knots = [np.full(k + 1, t[0])]
+    for i, (a, b) in enumerate(zip(ends, ends[1:], strict=False)):
+        most = max(1, int(np.searchsorted(t, b) - np.searchsorted(t, a)) // LEAST_PER_KNOT)
+        inner = np.linspace(a, b, int(np.clip(round((b - a) / spacing), 1, most)) + 1)
+        knots += [inner[1:-1], np.full(k + 1 if i == len(ends) - 2 else k - 1, b)]
+    knots = np.concatenate(knots)
+    count = len(knots) - k - 1
+    first = np.clip(np.searchsorted(knots, t, "right") - 1, k, count - 1) - k
+    P = BSpline.design_matrix(t, knots, k).data.reshape(-1, k + 1)
+    D = BSpline.design_matrix(t, knots[1:-1], k - 1).data.reshape(-1, k)
+    scale = k / (knots[k + 1 : -1] - knots[1 : -k - 1])  # of each difference of coefficients
+    V = np.zeros_like(P)
+    for r in range(k):
+        part = D[:, r] * scale[first + r]
+        V[:, r + 1] += part
+        V[:, r] -= part
+    return P, V, first
+
+
+class Series(NamedTuple):
+    """Values to follow.
+
+    Attributes:
+        stretches: their samples.
+        y: the values, (n,), those of one stretch after those of the other.
+    """
+
+    stretches: Sequence[Stretch]
+    y: np.ndarray
+
+
+def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
+    """Spacing of the knots with which splines tell most of some series, by Akaike's criterion.
+
+    Args:
+        series: one or more.
+
+    Returns:
+        (spacing [s], variance of what is left of each series).
+    """
+    times = [x.t for x in series[0].stretches]
+    finest = LEAST_PER_KNOT * float(np.median(np.diff(times[0])))
+    longest = max(2.0 * finest, *(float(t[-1] - t[0]) for t in times))
+    count = max(2, math.ceil(2.0 * math.log2(longest / finest)))
+    best: Any = None
+    for spacing in np.geomspace(finest, longest, count).tolist():
+        score, variances = 0.0, []
+        for x in series:
+            motion, n = Motion(x.stretches, spacing), len(x.y)
+            left = float(np.sum((x.y - motion.place(motion.follow(x.y))) ** 2))
+            # corrected for few samples (Hurvich, Tsai 1989)
+            m = motion.size
+            score += n * math.log(max(left, 1e-24 * float(x.y @ x.y) + 1e-300))
+            score += n * (n + m) / max(n - m - 2, 1)
+            variances.append(left / max(n - m, 1))
+        if best is None or score < best[0]:
+            best = score, spacing, variances
+    return best[1:]
+
+
+class Flowing(NamedTuple):
+    """A law of force as a function of the speed.
+
+    Attributes:
+        names: of its parameters, some of Fy, K, n, b.
+    """
+
+    names: tuple[str, ...]
+
+    def force(self, theta: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Forces at some speeds [N].
+
+        Args:
+            theta: parameters, the logarithm of K in its place.
+            v: speeds [m/s], above 0.
+        """
+        return self.slopes(theta, v)[0]
+
+    def slopes(self, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces, and how they change with speed and parameters.
+
+        Args:
+            theta: parameters, the logarithm of K in its place.
+            v: speeds [m/s], above 0, (n,).
+
+        Returns:
+            (force [N], (n,); by speed [N.s/m], (n,); by parameters, (n, k)).
+        """
+        a = dict(zip(self.names, theta.tolist(), strict=True))
+        force = np.full(len(v), a.get("Fy", 0.0))
+        slope = np.full(len(v), a.get("b", 0.0))
+        force += slope * v
+        columns = {"Fy": np.ones(len(v)), "b": v}
+        if "K" in a:
+            power = np.exp(np.clip(a["K"] + a["n"] * np.log(v), -700.0, 300.0))
+            force += power
+            slope += a["n"] * power / v
+            columns |= {"K": power, "n": power * np.log(v)}
+        return force, slope, np.stack([columns[x] for x in self.names], axis=1)
+
+
+class Minimum(NamedTuple):
+    """Where position and force together are explained best.
+
+    Attributes:
+        theta: parameters of the law, the logarithm of K in its place.
+        c: coefficients of the motion [m]; empty where the speed is known.
+        sum: sum of squares of the force, the part of the noise of the velocity taken out [N^2].
+        spread: inverse of the normal matrix of the parameters, (k, k); times the variance of a
+            force their covariance.
+        v: speeds [m/s], (n,).
+        rest: forces less those of the law [N], (n,).
+    """
+
+    theta: np.ndarray
+    c: np.ndarray
+    sum: float
+    spread: np.ndarray
+    v: np.ndarray
+    rest: np.ndarray
+
+
+class Joint(NamedTuple):
+    """Forces beside positions, or beside known speeds.
+
+    Attributes:
+        f: resisting forces [N], (n,), positive against the motion.
+        p: positions in the direction of motion [m], (n,); empty where the speed is known.
+        motion: splines; None where the speed is known.
+        start: coefficients that follow the positions alone, or the known speeds [m/s].
+        ratio: variance of a force over that of a position [N^2/m^2].
+        slowest: speed below which laws are continued by their tangents [m/s].
+    """
+
+    f: np.ndarray
+    p: np.ndarray
+    motion: Motion | None
+    start: np.ndarray
+    ratio: float
+    slowest: float
+
+    def least(
+        self,
+        law: Flowing,
+        theta: np.ndarray,
+        held: Sequence[bool] = (),
+        near: np.ndarray | None = None,
+    ) -> Minimum:
+        """Least sum of squares over parameters and motion, by Gauss and Newton's method.
+
+        Args:
+            law: the law.
+            theta: where to start.
+            held: which parameters stay as they are; empty for none.
+            near: coefficients to start from [m]; None for `start`.
+        """
+        k = len(law.names)
+        free = ~np.array(held, dtype=bool) if len(held) else np.ones(k, dtype=bool)
+        low, high = np.array([FIT_RANGES[x] for x in law.names]).T
+        theta = np.clip(theta, low, high)
+        c = self.start if near is None else near
+        alone = self._position_sum(self.start)
+        now = self._look(law, theta, c)
+        spread = np.zeros((k, k))
+        for _ in range(60):
+            step, turn, spread = self._step(law, theta, c, free)
+            out = free & (((theta <= low) & (step < 0.0)) | ((theta >= high) & (step > 0.0)))
+            if out.any():
+                step, turn, spread = self._step(law, theta, c, free & ~out)
+            scale = 1.0
+            for _ in range(12):
+                new = np.clip(theta + scale * step, low, high)
+                moved = c + scale * turn if self.motion else c
+                then = self._look(law, new, moved)
+                if math.isfinite(then[0]) and then[0] <= now[0]:
+                    break
+                scale *= 0.5
+            else:
+                break
+            gain = now[0] - then[0]
+            theta, c, now = new, moved, then
+            if gain <= 1e-9 * max(now[0] - alone, 0.0):
+                break
+        _, v, rest = now
+        return Minimum(theta, c, max(now[0] - alone, 0.0), spread, v, rest)
+
+    def _position_sum(self, c: np.ndarray) -> float:
+        if self.motion is None:
+            return 0.0
+        return self.ratio * float(np.sum((self.p - self.motion.place(c)) ** 2))
+
+    def _look(
+        self, law: Flowing, theta: np.ndarray, c: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        v = c if self.motion is None else self.motion.velocity(c)
+        with np.errstate(over="ignore", invalid="ignore"):
+            rest = self.f - self._continued(law, theta, v)[0]
+            return float(rest @ rest) + self._position_sum(c), v, rest
+
+    def _continued(self, law: Flowing, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Of a law, below the slowest speed along its tangent."""
+        force, slope, columns = law.slopes(theta, np.maximum(v, self.slowest))
+        return force + slope * np.minimum(v - self.slowest, 0.0), slope, columns
+
+    def _step(
+        self, law: Flowing, theta: np.ndarray, c: np.ndarray, free: np.ndarray
+    ) -> tuple[np.ndarray, Any, np.ndarray]:
+        """Step of the free parameters and of the motion; spread of the parameters."""
+        v = c if self.motion is None else self.motion.velocity(c)
+        force, slope, columns = self._continued(law, theta, v)
+        rest, J = self.f - force, columns[:, free]
+        H, g = J.T @ J, J.T @ rest
+        turn, back = 0.0, np.zeros(J.shape[1])
+        if self.motion is not None:
+            off = self.p - self.motion.place(c)
+            turn, back, G = self.motion.eliminated(self.ratio, slope, J, rest, off)
+            H, g = H - G.T @ back, g - G.T @ turn
+        size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        inverse = np.linalg.pinv(H / np.outer(size, size), hermitian=True) / np.outer(size, size)
+        step, spread = np.zeros(len(free)), np.zeros((len(free), len(free)))
+        step[free], spread[np.ix_(free, free)] = inverse @ g, inverse
+        return step, turn - back @ step[free], spread
+
+
+def correlation_time(x: np.ndarray) -> float:
+    """Samples of noise that count as one: 1 + 2 sum of the autocorrelations; 1 for white noise.
+
+    Summed over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). What
+    differs from 1 by less than twice its own deviation counts as 1.
+
+    Args:
+        x: samples, (n,).
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n = len(x)
+    x = x - x.mean()
+    power = np.abs(np.asarray(rfft(x, next_fast_len(2 * n, real=True)))) ** 2
+    rho = np.asarray(irfft(power))[: n // 4]
+    if not rho[0] > 0.0:
+        return 1.0
+    tau = 2.0 * np.cumsum(rho / rho[0]) - 1.0
+    ends = np.arange(len(tau)) >= WINDOW * np.maximum(tau, 1.0)
+    at = int(np.argmax(ends)) if ends.any() else len(tau) - 1
+    noise = math.sqrt((4.0 * at + 2.0) / n)
+    return float(tau[at]) if tau[at] > 1.0 + 2.0 * noise else 1.0

@@ -1,0 +1,221 @@
+"""What a push ends in, over the yield force of the clay and the gain: theory beside runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..errors import ParameterError, choice
+from ..model.clay import slab
+from ..model.constants import AXES
+from ..model.flow import Flow
+from ..model.scenario import Scenario
+from ..simulation.record import Record
+from ..simulation.simulate import simulate
+from ..theory.describing import limit_cycles, push_outcomes
+from ..theory.gain_limit import gain_limit
+from ..theory.linear_loop import TIMING, Loop
+from ..theory.relay_cycle import critical_push, exact_cycles
+from ..theory.roots import first_failure
+from .boundary import LARGE_PUSH, PushedLoop
+
+YIELD_FORCES = (0.1, 100.0)  # [N] of the map
+GAINS = (0.1, 100.0)  # among which the least is sought that has a limit cycle
+NO_LIMITS = (1e6, 1e6)  # [N.m] motors for which the loop is linear
+RUN_SPANS = (6.0, 24.0, 96.0)  # [s] of a run, longer where it has not settled
+SETTLED = 0.01  # share by which the speed of a cycle may still change from quarter to quarter
+
+PushClass = Literal["sticks", "limit cycle", "grows"]
+
+
+@dataclass(frozen=True)
+class MeasuredCycle:
+    """The oscillation in the last half of a run.
+
+    Attributes:
+        speed: largest velocity [m/s].
+        fundamental: amplitude of the velocity at omega [m/s].
+        amplitude: half of the way between its ends [m].
+        omega: frequency [rad/s].
+        change: share by which its speed grew from the third to the last quarter of the run.
+    """
+
+    speed: float
+    fundamental: float
+    amplitude: float
+    omega: float
+    change: float
+
+
+@dataclass(frozen=True)
+class YieldCell:
+    """One point of the map.
+
+    Attributes:
+        Fy: yield force [N].
+        K: gain of the compensator.
+        expected: what theory says of the push.
+        predicted: V of the limit cycle by the describing function [m/s]; NaN without one.
+        exact: its exact largest velocity [m/s]; NaN without one.
+        simulated: what a run did.
+        speed: largest velocity of the cycle in the run [m/s]; NaN without one.
+    """
+
+    Fy: float
+    K: float
+    expected: PushClass
+    predicted: float
+    exact: float
+    simulated: PushClass
+    speed: float
+
+
+@dataclass(frozen=True)
+class YieldMap:
+    """What a push ends in, over yield force and gain.
+
+    In proportion to Fy the loop does the same, so each gain has two numbers: the push that just
+    does not stick, and the speed of the limit cycle, both for a yield force of 1 N.
+
+    Attributes:
+        loop: what is kept fixed; its push is the push, its b the damping of the clay.
+        least: gain below which every push ends stuck, as there is no limit cycle.
+        limit: gain from which on a push that does not stick grows.
+        K: gains of the lines, ascending, from least on.
+        critical: velocity of the push from which on it does not stick [m/s per N].
+        speed: largest velocity of the limit cycle [m/s per N]; NaN from limit on.
+        cells: points at which theory and a run are compared.
+    """
+
+    loop: PushedLoop
+    least: float
+    limit: float
+    K: tuple[float, ...]
+    critical: tuple[float, ...]
+    speed: tuple[float, ...]
+    cells: tuple[YieldCell, ...]
+
+
+def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
+    """The run of a pushed loop in clay that yields, its motors without limits.
+
+    Args:
+        loop: the loop; its own b does not matter.
+        flow: the law of the clay.
+        t_max: length of the run [s].
+    """
+    scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop=False)
+    return replace(scenario, clay=slab(flow))
+
+
+def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
+    """The oscillation in the last half of a run; None where it rests or never swings through.
+
+    Args:
+        record: of the motion.
+        axis: "x" or "y".
+    """
+    i = AXES.index(choice("axis", axis, AXES))
+    last = record.t >= 0.5 * record.t[-1]
+    t, v, p = record.t[last], record.v[last, i], record.p[last, i]
+    up = np.flatnonzero((v[:-1] < 0.0) & (v[1:] >= 0.0))
+    if len(up) < 4:
+        return None
+    passed = t[up] - v[up] * (t[up + 1] - t[up]) / (v[up + 1] - v[up])
+    omega = 2.0 * math.pi * (len(passed) - 1) / (passed[-1] - passed[0])
+    whole = slice(up[0] + 1, up[-1] + 1)
+    wave = v[whole] * np.exp(-1j * omega * t[whole])
+    middle = up[len(up) // 2]
+    early, late = np.max(np.abs(v[:middle])), np.max(np.abs(v[middle:]))
+    return MeasuredCycle(
+        speed=float(np.max(np.abs(v[whole]))),
+        fundamental=float(2.0 * abs(np.mean(wave))),
+        amplitude=float(0.5 * np.ptp(p[whole])),
+        omega=float(omega),
+        change=float(late / early - 1.0),
+    )
+
+
+def classify_push(loop: PushedLoop, flow: Flow) -> tuple[PushClass, float]:
+    """What a run of a push does, and the largest velocity of its limit cycle [m/s], NaN for none.
+
+    Args:
+        loop: the loop; its own b does not matter.
+        flow: the law of the clay.
+    """
+    cycle = None
+    for t_max in RUN_SPANS:
+        record = simulate(yielding_run(loop, flow, t_max))
+        if record.t[-1] < t_max - 2.0 * record.scenario.dt:  # the arm is folded, or worse
+            return "grows", math.nan
+        cycle = measured_cycle(record, loop.axis)
+        if cycle is None:
+            return "sticks", math.nan
+        if abs(cycle.change) < SETTLED:
+            return "limit cycle", cycle.speed
+    assert cycle is not None
+    return ("grows" if cycle.change > 0.0 else "limit cycle"), cycle.speed
+
+
+def yield_map(
+    loop: PushedLoop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter
+) -> YieldMap:
+    """Make the map of yield force and gain, for Bingham clay of the loop's b.
+
+    Theory and runs are in continuous time, without delay and with motors that have no limits.
+
+    Args:
+        loop: what is kept fixed; its own K does not matter, its push is LARGE_PUSH.
+        quick: four gains of four yield forces, and seven on the lines, instead of six of seven, and
+            nineteen.
+        progress: wraps the iterable of the gains.
+
+    Raises:
+        ParameterError: the loop has no limit cycle at any gain.
+    """
+    loop = replace(loop, **TIMING, push=LARGE_PUSH)
+    linear, unit = loop.linear, Flow(Fy=1.0, b=loop.b)
+    lines, rows, columns = (6, 4, 4) if quick else (12, 6, 7)
+    limit = gain_limit(linear)  # inf in clay without damping, which does nothing once it flows
+
+    def rests(K: float) -> bool:
+        return math.isnan(_stable_speed(replace(linear, K=K), unit))
+
+    end = min(limit, GAINS[1])
+    some = np.geomspace(min(GAINS[0], 0.1 * end), 0.99 * end, 30).tolist() if end else []
+    _, least = first_failure(rests, some, rtol=0.01) if some else (0.0, 0.0)
+    if not 0.0 < least < end:
+        raise ParameterError("map", "gain-yield", "needs a loop that some gains let buzz")
+    top = 1.5 * limit if limit < math.inf else 6.0 * least
+    K = np.geomspace(least, min(0.995 * limit, top), lines).tolist()
+    K += np.linspace(1.005 * limit, top, lines // 3).tolist() if limit < top else []
+    tried = np.geomspace(0.8 * least, 0.95 * top, rows).tolist()
+    cells, critical, speed = [], [], []
+    for i, gain in enumerate(progress([*K, *tried])):
+        at = replace(linear, K=gain)
+        push, peak = critical_push(at, flow=unit), _stable_speed(at, unit)
+        if i < len(K):
+            critical.append(push)
+            speed.append(peak)
+            continue
+        for Fy in np.geomspace(*YIELD_FORCES, columns).tolist():
+            flow = replace(unit, Fy=Fy)
+            expected: PushClass = "sticks"
+            if loop.push >= Fy * push:
+                expected = "grows" if push_outcomes(at, flow=flow)[1] == "grows" else "limit cycle"
+            buzzes = expected == "limit cycle"
+            kept = [x.speed for x in limit_cycles(at, flow=flow) if x.kind == "limit cycle"]
+            predicted = kept[-1] if buzzes and kept else math.nan
+            exact = Fy * peak if buzzes else math.nan
+            found = classify_push(replace(loop, K=gain), flow)
+            cells.append(YieldCell(Fy, gain, expected, predicted, exact, *found))
+    return YieldMap(loop, least, limit, tuple(K), tuple(critical), tuple(speed), tuple(cells))
+
+
+def _stable_speed(loop: Loop, flow: Flow) -> float:
+    """Largest velocity of the exact limit cycle [m/s]; NaN for none."""
+    return max((x.speed for x in exact_cycles(loop, flow=flow) if x.stable), default=math.nan)

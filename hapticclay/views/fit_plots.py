@@ -1,0 +1,142 @@
+"""Figure of a fitted law of resistance: force against velocity, and what the law leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..studies.fitting import Fitted
+from .style import BLACK, BLUE, MID_GREY, VERMILION, figure_style, set_title
+
+DOTS_SHOWN = 6000  # of a panel
+BINS = 24  # of speeds, in which residuals are averaged
+LEAST_IN_BIN = 5
+LAGS = 60  # of the autocorrelation
+DOTS: Any = dict(ms=1.6, mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
+
+
+def fit_plot(fitted: Fitted) -> Figure:
+    """Plots force against velocity with the law, and residuals over velocity, time and lag.
+
+    Args:
+        fitted: from `fit_flow`.
+    """
+    shown = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
+    t, v, f, left = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
+    with figure_style():
+        figure = Figure(figsize=(9.6, 5.6))
+        axes = figure.subplot_mosaic("AB;AC;AD", width_ratios=(1.25, 1.0))
+        law, speed, time, lag = (axes[k] for k in "ABCD")
+        law.plot(v, f, "o", label="data", **DOTS)
+        _fitted_curve(law, fitted)
+        law.set(xlabel="velocity [m/s]", ylabel="resisting force [N]")
+        law.locator_params(axis="x", nbins=6)
+        law.legend(loc="lower right", markerscale=3.0)
+        words = [
+            f"{p.name} = {_interval(p.value, p.low, p.high)} {p.unit}" for p in fitted.parameters
+        ]
+        law.text(
+            0.03,
+            0.97,
+            "\n".join(_typeset(x) for x in words),
+            transform=law.transAxes,
+            va="top",
+            fontsize=9,
+            color=BLACK,
+        )
+        chosen = next(c for c in fitted.candidates if c.law == fitted.law)
+        told = f"{fitted.law} law" if not fitted.law.endswith("law") else fitted.law
+        set_title(law, told, f"Akaike weight {chosen.weight:.2f}")
+        _residual_panel(speed, v, left, "velocity [m/s]")
+        _binned(speed, fitted)
+        speed.legend(loc="upper right", fontsize=8)
+        _residual_panel(time, t, left, "time [s]")
+        _autocorrelation(lag, fitted)
+        figure.align_ylabels([speed, time, lag])
+    return figure
+
+
+def _fitted_curve(ax: Axes, fitted: Fitted) -> None:
+    """The law on both sides of rest as far as the data go, and its band."""
+    for way in (-1.0, 1.0):
+        speeds = np.abs(fitted.v[fitted.v * way > 0.0])
+        if not len(speeds):
+            continue
+        fine = way * np.geomspace(speeds.min(), speeds.max(), 300)
+        force, half = fitted.flow.force(fine), fitted.band(fine)
+        first = way == np.sign(fitted.v[0])
+        look: Any = dict(label="law" if first else "_")
+        ax.plot(fine, force, color=VERMILION, zorder=4, **look)
+        look["label"] = f"{100 * fitted.level:g} % band" if first else "_"
+        ax.fill_between(
+            fine, force - half, force + half, color=BLACK, alpha=0.3, lw=0, zorder=3, **look
+        )
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    """A value with its interval, to the digits that the interval allows."""
+    width = max(high - low, 1e-6 * abs(value), 1e-300)
+    digits = int(np.clip(1 - np.floor(np.log10(width)), 0, 9))
+    return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def _typeset(text: str) -> str:
+    for plain, nice in (
+        ("Fy =", "$F_y$ ="),
+        ("K =", "$K$ ="),
+        ("n =", "$n$ ="),
+        ("b =", "$b$ ="),
+        ("N/(m/s)^n", "N/(m/s)$^n$"),
+        ("N.s/m", "N$\\cdot$s/m"),
+    ):
+        text = text.replace(plain, nice)
+    return text
+
+
+def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str) -> None:
+    ax.plot(x, left, "o", **DOTS)
+    ax.axhline(0.0, color=BLACK, lw=0.8)
+    top = 1.05 * float(np.max(np.abs(left), initial=1e-12))
+    ax.set(xlabel=label, ylabel="residual [N]", ylim=(-top, 1.5 * top))  # room for the legend
+
+
+def _binned(ax: Axes, fitted: Fitted) -> None:
+    """Mean residual of samples of like velocity, with its 95 % bars."""
+    v, left = fitted.v, fitted.residuals
+    edges = np.quantile(v, np.linspace(0.0, 1.0, BINS + 1))
+    place = np.clip(np.searchsorted(edges, v, "right") - 1, 0, BINS - 1)
+    count = np.bincount(place, minlength=BINS)
+    good = count >= LEAST_IN_BIN
+    mean_v, mean = (np.bincount(place, x, BINS)[good] / count[good] for x in (v, left))
+    bar = 1.96 * fitted.force_noise * np.sqrt(fitted.correlation / count[good])
+    ax.errorbar(
+        mean_v,
+        mean,
+        bar,
+        fmt="s",
+        ms=3.0,
+        color=VERMILION,
+        elinewidth=1.0,
+        zorder=3,
+        label="means, 95 %",
+    )
+
+
+def _autocorrelation(ax: Axes, fitted: Fitted) -> None:
+    x = fitted.residuals - np.mean(fitted.residuals)
+    count = min(LAGS, len(x) // 4)
+    power = float(x @ x) or 1.0
+    rho = [float(x[k:] @ x[: len(x) - k]) / power for k in range(1, count + 1)]
+    ax.axhspan(-1.96 / np.sqrt(len(x)), 1.96 / np.sqrt(len(x)), color=MID_GREY, alpha=0.3, lw=0)
+    ax.axhline(0.0, color=BLACK, lw=0.8)
+    ax.vlines(np.arange(1, count + 1), 0.0, rho, color=BLUE, lw=1.4)
+    low, high = min(-0.1, *rho), max(0.1, *rho)
+    ax.set(
+        xlabel="lag [samples]; grey: white noise",
+        ylabel="autocorrelation",
+        xlim=(0, count + 1),
+        ylim=(1.15 * low, 1.15 * high),
+    )

@@ -1,0 +1,156 @@
+"""Clay that springs back, in runs: walls, dents, relaxation, energy, engines, files."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from tests.stepping.test_yield import V0, M, slider
+
+HIT = 0.01 / V0  # when the slider comes to the wall [s]
+
+
+def wall(spring, b=0.0, edges=(0.03,), **more):
+    """Clay along x behind the last border."""
+    n = len(edges)
+    law = hc.Profile(edges, (0.0,) * n + (b,), springs=(hc.Spring(),) * n + (spring,), **more)
+    return hc.Clay(law, hc.Profile((), (0.0,)))
+
+
+@pytest.mark.parametrize("k", [1e3, 1e5, 1e8])
+def test_a_wall_throws_the_slider_back(k):
+    omega = math.sqrt(k / M)
+    back = HIT + math.pi / omega
+    errors = []
+    for dt in (1e-3, 3.6e-4, 1e-4):
+        r = hc.simulate(slider(wall(hc.Spring(k=k)), dt, back + 0.01))
+        assert [c.border for c in r.crossings] == [0.03, 0.03]
+        # a step takes at most 0.2 of the time of a radian: 0.2^2/24 of the contact's length, and
+        # the servo's least stiffness
+        h = min(dt, 0.2 / math.sqrt(k * r.scenario.mobility))
+        errors.append(abs(r.crossings[1].time - back))
+        assert errors[-1] < math.pi / omega * (omega * h) ** 2 / 12.0 + 1e-7
+        assert r.v[-1, 0] == pytest.approx(-V0, rel=1e-3)
+        assert r.energy["springs_stored"] == 0.0 and r.energy["springs_lost"] < 1e-20
+        assert abs(r.energy["clay"]) < 1e-3 * M * V0**2
+        assert abs(r.energy["residual"]) < 1e-14
+    if k == 1e3:
+        assert np.log2(errors[0] / errors[2]) / np.log2(10.0) == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_dent_stays():
+    # the spring takes Fp^2/(2 k), what is left of the energy makes the dent
+    k, Fp = 2000.0, 3.0
+    dent = (0.5 * M * V0**2 - Fp**2 / (2.0 * k)) / Fp
+    s = slider(wall(hc.Spring(k=k, limit=Fp, surface=True)), 1e-4, 0.4)
+    r = hc.simulate(s)
+    assert r.p[:, 0].max() == pytest.approx(0.03 + dent + Fp / k, abs=1e-7)
+    assert r.v[-1, 0] == pytest.approx(-Fp / math.sqrt(k * M), rel=1e-5)
+    assert r.energy["springs_lost"] == pytest.approx(Fp * dent, rel=1e-4)
+    # the handle leaves the ground of the dent, not the border, and touches nothing on its way
+    out = (r.v[:, 0] < 0.0) & (r.p[:, 0] > 0.03) & (r.p[:, 0] < 0.03 + 0.9 * dent)
+    assert out.any() and not r.fe[out].any()
+
+
+def test_a_second_push_meets_the_wall_in_its_dent():
+    # a hand that pushes twice as hard as the wall bears, lets go, and comes back with less
+    k, Fp = 5000.0, 4.0
+    t = (0.0, 0.05, 0.06, 0.35, 0.36, 0.7, 0.71, 2.5)
+    push = hc.Samples(t, tuple((f, 0.0) for f in (0.0, 0.0, 6.0, 6.0, -3.0, -3.0, 1.0, 1.0)))
+    s = dataclasses.replace(
+        hc.free(), clay=wall(hc.Spring(k=k, limit=Fp, surface=True), edges=(0.01,)),
+        force=(0.0, 0.0), muscle=push, t_max=2.5, length=None, stop=False,
+    )  # fmt: skip
+    r = hc.simulate(s)
+    deepest = r.p[r.t < 1.0, 0].max()
+    rests = deepest - Fp / k
+    assert deepest > 0.02
+    touching = np.flatnonzero(r.fe[:, 0] > 0.0)
+    again = touching[r.t[touching] > 0.8]
+    assert again.size and r.p[again, 0].min() == pytest.approx(rests, abs=2e-4)
+
+
+def test_a_spring_that_sticks_to_the_tool_loses_a_loop_each_cycle():
+    # steady cycles of an embedded elastic-plastic spring under a slow, large displacement
+    k, Fp = 3000.0, 2.0
+    law = hc.Profile((), (0.0,), springs=(hc.Spring(k=k, limit=Fp),))
+    push = hc.Multisine((10.0, 0.0), 0.9, 1.1, 1.0, lines=1)
+    s = dataclasses.replace(
+        hc.free(), clay=hc.Clay(law, hc.Profile((), (0.0,))), force=(0.0, 0.0), gain=(0.3, 0.1),
+        muscle=push, t_max=8.0, length=None, stop=False, start=(0.1, 0.0), dt=1e-3,
+    )  # fmt: skip
+    r = hc.simulate(s)
+    last = r.t > 7.0
+    area = np.trapezoid(r.fe[last, 0], r.p[last, 0])
+    swing = 0.5 * np.ptp(r.p[last, 0])
+    assert area == pytest.approx(4.0 * Fp * (swing - Fp / k), rel=4e-3)  # corners between samples
+    assert r.energy["clay"] == pytest.approx(
+        r.energy["springs_lost"] + r.energy["springs_stored"], rel=1e-4
+    )
+
+
+def test_a_zener_wall_relaxes_to_its_lasting_spring():
+    # held against the wall by a steady push, the depth goes to F/k; at once it is F/(k + k1)
+    k, k1, tau, F = 1000.0, 4000.0, 0.2, 2.0
+    s = dataclasses.replace(
+        hc.free(), clay=wall(hc.Spring(k=k, k1=k1, tau=tau), b=200.0, edges=(0.005,)),
+        force=(F, 0.0), t_max=12.0, length=None, gain=(0.2, 0.2), stop=False,
+    )  # fmt: skip
+    r = hc.simulate(s)
+    # delta comes to rest where the clay bears all of the push
+    assert r.p[-1, 0] - 0.005 == pytest.approx(F / k, rel=1e-3)
+    assert r.fe[-1, 0] == pytest.approx(F, rel=1e-3)
+    assert r.energy["springs_lost"] > 0.0
+
+
+@pytest.mark.plain
+def test_python_compiled_batch_steps_and_files_agree(tmp_path):
+    spring = hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, surface=True)
+    s = dataclasses.replace(
+        hc.free(), clay=wall(spring, b=20.0, edges=(0.01, 0.012), Fy=(0.0, 0.5, 0.2)),
+        force=(4.0, 1.0), t_max=0.25, length=None, stop=False, operator=hc.Operator(),
+    )  # fmt: skip
+    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
+    (c,) = hc.simulate_batch([s])
+    with hc.Simulation(s) as sim:
+        while sim.outcome is None:
+            sim.step()
+    for r in (b, c, sim.record(), hc.Record.load(a.save(tmp_path))):
+        for name in ("t", "p", "v", "fh", "fe", "q", "qd", "tau", "delta"):
+            assert np.array_equal(getattr(a, name), getattr(r, name)), name
+        assert r.energy == a.energy
+    assert hc.Scenario.load(tmp_path / "scenario.toml") == s
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("render", ["implicit", "held"])
+def test_sampled_control_meets_the_same_springs(render):
+    clay = wall(
+        hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1), b=20.0, edges=(0.01,), Fy=(0.0, 0.3)
+    )
+    s = dataclasses.replace(
+        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.3, length=None, stop=False, dt=2e-5,
+    )  # fmt: skip
+    exact = hc.simulate(s)
+    gaps = []
+    for Ts in (4e-4, 2e-4):
+        late = dataclasses.replace(s, control="sampled", render=render, Ts=Ts)
+        r = hc.simulate(late)
+        gaps.append(np.abs(r.p[-1] - exact.p[-1]).max())
+        assert r.energy["springs_lost"] == pytest.approx(exact.energy["springs_lost"], rel=0.02)
+    # what a hold of half a sample does falls with the sample
+    assert gaps[1] < 0.7 * gaps[0] < 1e-4
+    short = dataclasses.replace(late, t_max=0.05, start=(0.009, 0.0))
+    a, b = (hc.simulate(short, engine=e) for e in ("python", "native"))
+    for name in ("t", "p", "v", "fh", "fe", "tau"):
+        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+
+
+def test_springs_are_refused_where_no_law_of_them_is_known():
+    s = dataclasses.replace(hc.free(), clay=wall(hc.Spring(k=10.0)))
+    with pytest.raises(hc.ParameterError, match="integrator"):
+        dataclasses.replace(s, integrator="accurate")
+    with pytest.raises(hc.ParameterError, match="angle"):
+        dataclasses.replace(s, clay=dataclasses.replace(s.clay, angle=0.1))

@@ -1,0 +1,57 @@
+"""The block of finite elements: it keeps its dent, and nothing but its script knows of it."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hapticclay as hc
+from benchmarks import flex_block
+from hapticclay.stepping import engine
+from hapticclay.views.stage import Stage
+
+ROOT = Path(flex_block.__file__).parents[1]
+
+
+def test_no_module_and_no_model_names_the_block():
+    for path in (ROOT / "hapticclay").rglob("*.py"):
+        words = ast.walk(ast.parse(path.read_text()))
+        texts = [x.value for x in words if isinstance(x, ast.Constant) and isinstance(x.value, str)]
+        assert not any("flex_block" in x for x in texts), path
+    for path in engine.mjcf_folder().glob("*.xml"):
+        assert path.name == flex_block.FILE or "flex" not in path.read_text(), path
+    for path in (ROOT / "benchmarks").rglob("*.py"):
+        assert path.stem == "flex_block" or "flex_block" not in path.read_text(), path
+
+
+def test_models_that_are_stepped_or_drawn_have_no_flex():
+    for scenario in (hc.constant_cut(), hc.free(), hc.constant_cut(clay=(0.01, 0.1))):
+        assert engine.build(scenario).nflex == Stage(scenario).model.nflex == 0
+
+
+def test_a_run_and_a_picture_open_no_file_of_it():
+    code = (
+        "import sys\nseen = []\n"
+        "sys.addaudithook(lambda e, a: seen.append(str(a[0])) if e == 'open' else None)\n"
+        "import hapticclay as hc\nfrom hapticclay.views.stage import Stage\n"
+        "hc.simulate(hc.constant_cut(t_max=0.01))\nStage(hc.constant_cut())\n"
+        "assert any('arm.xml' in x for x in seen)\n"
+        "print([x for x in seen if 'flex' in x], [m for m in sys.modules if 'flex' in m])\n"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout == "[] []\n"
+
+
+@pytest.mark.parametrize("yields", [True, False])
+def test_the_dent_stays_because_the_block_yields(yields):
+    """20 mm deep; without a yield strain the same block springs back."""
+    scene = flex_block.Scene(yields)
+    while scene.data.time < 1.1:
+        scene.step()
+    assert (0.012 if yields else 0.005) < scene.dent() < 0.021
+    while scene.data.time < flex_block.PATH[-1, 0]:
+        scene.step()
+    assert 0.008 < scene.dent() < 0.015 if yields else scene.dent() < 0.001
+    assert scene.model.nv == 2 + 3 * 7 * 7 * 2  # the lowest layer of nodes is pinned
