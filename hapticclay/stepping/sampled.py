@@ -1393,14 +1393,14 @@ class Sampled(NamedTuple):
     def glide(self, s, e, room):
         i, dt, rate = s["i"], s["dt"], s["rate"]
         n, row = min(s["last"] - i, room - s["filled"]), -1
-        if n < 1 or not path.may_glide(s):
+        # clay is cut step by step: a call of it in here would slow every other run
+        if n < 1 or s["grooved"] or not path.may_glide(s):
             return 0
         if s["first"] >= 0:
             row = i - s["first"]
             n = min(n, len(e.ahead) - row)
         ready_kicks(s, e.ahead, -1, True)
-        changes = s["smooth"] > 0 or s["grooved"] == 2 or rate[0] > 0.0 or rate[1] > 0.0
-        grows = s["physical"] > 0 and changes
+        grows = s["physical"] > 0 and (s["smooth"] > 0 or rate[0] > 0.0 or rate[1] > 0.0)
         varies = row >= 0 or grows
         lowx, lowy, highx, highy = s["low"][0], s["low"][1], s["high"][0], s["high"][1]
         for made in range(n):
@@ -1425,8 +1425,6 @@ class Sampled(NamedTuple):
             command(s, e.ctrl, e.push, dt)
             e.step(e.model, e.data)
             observe(s, e.q, e.w, e.table, dt)
-            if s["grooved"]:
-                path.cut_place(s, e)
             s["i"] = i + made + 1
             s["t"] = s["i"] * dt
             s["landings"] = 0
