@@ -68,6 +68,18 @@ class Flow:
         return np.sign(v) * (self.Fy + self.K * np.abs(v) ** self.n) + self.b * v
 
 
+def moving_force(Fy, K, n, speed):
+    """Force of clay that yields on a tool that moves, beside its damping, Fy + K v^n [N].
+
+    Args:
+        Fy: yield force [N].
+        K: consistency [N/(m/s)^n].
+        n: flow index.
+        speed: of the tool, >= 0 [m/s].
+    """
+    return Fy + K * speed**n if K > 0.0 else Fy
+
+
 def motion_force(law, along, vx, vy):
     """Force of clay that yields on a tool in motion; none at rest, where any up to Fy may act.
 
@@ -84,10 +96,10 @@ def motion_force(law, along, vx, vy):
     x, y = abs(vx), abs(vy)
     if along:
         x = math.sqrt(vx * vx + vy * vy)
-        f = (Fyx + Kx * x**nx if Kx > 0.0 else Fyx) / x if x > 0.0 else 0.0
+        f = moving_force(Fyx, Kx, nx, x) / x if x > 0.0 else 0.0
         return f * vx, f * vy
-    fx = (Fyx + Kx * x**nx if Kx > 0.0 else Fyx) if x > 0.0 else 0.0
-    fy = (Fyy + Ky * y**ny if Ky > 0.0 else Fyy) if y > 0.0 else 0.0
+    fx = moving_force(Fyx, Kx, nx, x) if x > 0.0 else 0.0
+    fy = moving_force(Fyy, Ky, ny, y) if y > 0.0 else 0.0
     return math.copysign(fx, vx), math.copysign(fy, vy)
 
 
@@ -118,18 +130,14 @@ def thinned(q, k, n):
     return m
 
 
-def implicit_share(slope, m, K, n):
-    """Share of the velocity at the end of a step in that at which K v^n is taken.
+def implicit_share(z):
+    """Share of the velocity at the end of a step in that at which a force is taken.
 
     One half, second order, unless the force would overshoot: as in `clay.split_damping`.
 
     Args:
-        slope: velocity lost by the end per unit of force [m/(N.s)].
-        m: velocity [m/s], > 0.
-        K: consistency [N/(m/s)^n].
-        n: flow index.
+        z: velocity that the force takes by the end, per unit of velocity.
     """
-    z = slope * K * n * m ** (n - 1.0)
     return 0.5 if z <= 2.0 else 1.0 - 1.0 / z
 
 
@@ -156,7 +164,7 @@ def sliding_force(a, end, slope, Fy, K, n):
     if end > 0.0:
         m = thinned(end, slope * K, n)
         if m > 0.0:
-            share = implicit_share(slope, m, K, n)
+            share = implicit_share(slope * K * n * m ** (n - 1.0))
             m = thinned((1.0 - share) * a + share * end, share * slope * K, n)
             stops = m <= (1.0 - share) * a
     if stops:
@@ -276,7 +284,7 @@ def resist_along(B, v, end, law, sample):
             sx, sy, hx, hy, first = vx + at * gx, vy + at * gy, fx, fy, False
             m = math.sqrt(sx * sx + sy * sy)
             if m > 0.0:
-                f = (Fy + K * m**n if K > 0.0 else Fy) / m
+                f = moving_force(Fy, K, n, m) / m
                 hx, hy = f * sx, f * sy
         rx += span * fx
         ry += span * fy
@@ -315,9 +323,9 @@ def force_along(B, v, d, hold, left, Fy, K, n):  # noqa: PLR0913  # plain number
     m = math.sqrt(mx * mx + my * my)
     stops = m == 0.0
     if m > 0.0:
-        f = Fy + K * m**n if K > 0.0 else Fy
+        f = moving_force(Fy, K, n, m)
         z = 0.5 * left * (B[0] + B[3]) * f * max(n if K > 0.0 else 1.0, 1.0) / m
-        share = 0.5 if z <= 2.0 else 1.0 - 1.0 / z
+        share = implicit_share(z)
         keep = 1.0 - share
         px, py = keep * v[0] + share * qx, keep * v[1] + share * qy
         mx, my = slowed(B, px, py, share * left, Fy, K, n)
@@ -326,7 +334,7 @@ def force_along(B, v, d, hold, left, Fy, K, n):  # noqa: PLR0913  # plain number
     if stops:
         # a force of this size, or less where it turns, takes the whole velocity within some time
         f = 0.5 * math.sqrt(v[0] * v[0] + v[1] * v[1])
-        f = Fy + K * f**n if K > 0.0 and f > 0.0 else Fy
+        f = moving_force(Fy, K, n, f)
         det = B[0] * B[3] - B[1] * B[2]
         px, py = (B[3] * v[0] - B[1] * v[1]) / det, (B[0] * v[1] - B[2] * v[0]) / det
         square, mixed = px * px + py * py, px * hold[0] + py * hold[1]
@@ -339,7 +347,7 @@ def force_along(B, v, d, hold, left, Fy, K, n):  # noqa: PLR0913  # plain number
         m = math.sqrt(mx * mx + my * my)
         if m == 0.0:  # at rest at the very end
             return hold[0] + px / left, hold[1] + py / left, left
-    f = (Fy + K * m**n if K > 0.0 else Fy) / m
+    f = moving_force(Fy, K, n, m) / m
     return f * mx, f * my, left
 
 
@@ -375,7 +383,7 @@ def slowed(B, qx, qy, k, Fy, K, n):
             s = 0.5 * most
     for _ in range(60):
         # u = m/|m| if s is the length of m
-        f = Fy + K * s**n if K > 0.0 else Fy
+        f = moving_force(Fy, K, n, s)
         a, b, c, e = s + f * xx, f * xy, f * yx, s + f * yy
         det = a * e - b * c
         x, y = (e * qx - b * qy) / det, (a * qy - c * qx) / det
@@ -396,7 +404,7 @@ def slowed(B, qx, qy, k, Fy, K, n):
             s = new
             break
         s = new
-    f = Fy + K * s**n if K > 0.0 and s > 0.0 else Fy
+    f = moving_force(Fy, K, n, s)
     a, b, c, e = s + f * xx, f * xy, f * yx, s + f * yy
     det = a * e - b * c
     x, y = (e * qx - b * qy) / det, (a * qy - c * qx) / det

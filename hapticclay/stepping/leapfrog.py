@@ -671,16 +671,8 @@ def write_felt(s, e, j, i, x):
             rest = raw[j, 18 + n] - felt[j, n] - felt[j, 12 + n]
             v = loop.velocity_at_sample(x, n, raw[j, 4 + n], raw[j, 6 + n], rest)
         rows[i, 4 + n] = v
-    # in stiff clay v is what its damping feels; where that is against the yield force, the clay
-    # holds the handle
     if s["yields"] and not s["turned_clay"]:  # which is never stiff, see Scenario
-        px, py = rows[i, 4] * felt[j, 4], rows[i, 5] * felt[j, 5]
-        if s["yields"] == 2:
-            px = py = px + py
-        if px < 0.0:
-            rows[i, 4] = 0.0
-        if py < 0.0:
-            rows[i, 5] = 0.0
+        rows[i, 4], rows[i, 5] = loop.not_against(s, rows[i, 4], rows[i, 5], felt[j, 4], felt[j, 5])
     fex, fey = path.viscous_parts(s, x[12], x[13], rows[i, 4], rows[i, 5])
     e.rendered[i, 0] = fex + felt[j, 4] + felt[j, 12]
     e.rendered[i, 1] = fey + felt[j, 5] + felt[j, 13]

@@ -205,6 +205,18 @@ def spring_force(s, L):
     )
 
 
+def is_one_flow(s):
+    """Whether clay yields alike before and after the sample.
+
+    Args:
+        s: state of the run.
+    """
+    for j in range(6):
+        if s["flow"][j] != s["flow_old"][j]:
+            return False
+    return True
+
+
 def law_in_kick(s, L, vx, vy):
     """Fy, K, n of x and y in a kick. Half a step of other clay before it counts as steady force.
 
@@ -218,17 +230,13 @@ def law_in_kick(s, L, vx, vy):
         6 numbers.
     """
     a, b = s["flow"], s["flow_old"]
-    same = True
-    for j in range(6):
-        same = same and a[j] == b[j]
-    if same:
+    if is_one_flow(s):
         return a[0], a[1], a[2], a[3], a[4], a[5]
     R = 1.0 - L
     x, y = abs(vx), abs(vy)
     if s["yields"] == 2:
         x = y = math.sqrt(vx * vx + vy * vy)
-    x = b[0] + b[1] * x ** b[2] if b[1] > 0.0 else b[0]
-    y = b[3] + b[4] * y ** b[5] if b[4] > 0.0 else b[3]
+    x, y = flow.moving_force(b[0], b[1], b[2], x), flow.moving_force(b[3], b[4], b[5], y)
     return L * x + R * a[0], R * a[1], a[2], L * y + R * a[3], R * a[4], a[5]
 
 
@@ -264,6 +272,27 @@ def groove_law(s, x, y):
     """
     Fy, _ = groove.resistance(s["rim"], x, y)
     return Fy, 0.0, 1.0, Fy, 0.0, 1.0
+
+
+def not_against(s, vx, vy, fx, fy):
+    """Velocity at a sample, 0.0 where it is against the yield force: the clay holds the handle.
+
+    In stiff clay the velocity is what its damping feels, and may be.
+
+    Args:
+        s: state of the run.
+        vx: velocity, x [m/s].
+        vy: the same, y [m/s].
+        fx: force of yielding, x [N].
+        fy: the same, y [N].
+
+    Returns:
+        (x, y) [m/s].
+    """
+    px, py = vx * fx, vy * fy
+    if s["yields"] == 2:
+        px = py = px + py
+    return 0.0 if px < 0.0 else vx, 0.0 if py < 0.0 else vy
 
 
 def creeping_force(s, L, g, b, v):

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..model import arm, clay, compensator, groove, pieces, regions
 from ..model import spring as springs
+from . import loop
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # how a run stands
@@ -549,6 +550,17 @@ def settle(s, table):
             s["base"][j] += s["dragging"]
 
 
+def handle_place(s):
+    """Place of the handle by the joint angles, (x, y) [m].
+
+    Args:
+        s: state of the run.
+    """
+    ox, oy = s["origin"]
+    u1x, u1y, u2x, u2y = arm.jacobian(s["q"][0], s["q"][1], arm_of(s))
+    return u1y + u2y - ox, -oy - u1x - u2x
+
+
 def enter_spring(s, table):
     """Takes the springs of the region in which the run continues; those left behind lose theirs.
 
@@ -557,11 +569,8 @@ def enter_spring(s, table):
         table: from regions.region_table.
     """
     spring, stretch, sprung, n = s["spring"], s["stretch"], s["sprung"], regions.SPRING
-    q1, q2 = s["q"]
-    ox, oy = s["origin"]
-    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
     at, stiffest = s["sprung_at"], 0.0
-    at[0], at[1] = u1y + u2y - ox, -oy - u1x - u2x
+    at[0], at[1] = handle_place(s)
     sprung[2], sprung[3] = sprung[0], sprung[1]
     s["sprung_energy"][0] += s["sprung_energy"][1]
     s["sprung_energy"][1] = 0.0
@@ -597,10 +606,7 @@ def feel_spring(s, table, h):
         h: time since the last place [s].
     """
     spring, stretch, at, n = s["spring"], s["stretch"], s["sprung_at"], regions.SPRING
-    q1, q2 = s["q"]
-    ox, oy = s["origin"]
-    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
-    px, py = u1y + u2y - ox, -oy - u1x - u2x
+    px, py = handle_place(s)
     stored = 0.0
     for i in range(2):
         p, way = (py if i else px), spring[n * i + 5]
@@ -636,18 +642,6 @@ def viscous_parts(s, bx, by, vx, vy):
     return clay.viscous_force(bx, by, vx, vy)
 
 
-def is_one_flow(s):
-    """Whether clay yields alike before and after the sample.
-
-    Args:
-        s: state of the run.
-    """
-    for j in range(6):
-        if s["flow"][j] != s["flow_old"][j]:
-            return False
-    return True
-
-
 def note_stop(s, e, t, stuckx, stucky):
     """Notes where clay that yields stops the handle or lets it go.
 
@@ -681,7 +675,7 @@ def may_glide(s):
     dt, base, rate, old = s["dt"], s["base"], s["rate"], s["old"]
     if s["before"] != dt or s["t"] != s["i"] * dt or s["closing"] != OPEN or s["struck"]:
         return False
-    if s["beyond"] and not (is_one_flow(s) and s["resolved"] == INF):
+    if s["beyond"] and not (loop.is_one_flow(s) and s["resolved"] == INF):
         return False
     return old[0] == base[0] and old[1] == base[1] and old[2] == rate[0] and old[3] == rate[1]
 
@@ -693,11 +687,8 @@ def feel_place(s, table):
         s: state of the run.
         table: from regions.region_table.
     """
-    q1, q2 = s["q"]
-    ox, oy = s["origin"]
     base, old, which = s["base"], s["old"], s["smooth"]
-    u1x, u1y, u2x, u2y = arm.jacobian(q1, q2, arm_of(s))
-    x, y = u1y + u2y - ox, -oy - u1x - u2x
+    x, y = handle_place(s)
     base[0], base[1] = regions.smooth_clay(table, which, x, y, base[0], base[1])
     for j in range(2):
         if which != 2 - j:

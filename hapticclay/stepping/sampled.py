@@ -453,12 +453,7 @@ def sample_velocity(s, x):
         vx = slowx
     if x[11] > 0.0 and vy != 0.0:
         vy = slowy
-    # in stiff clay v is what its damping feels; where that is against the yield force, the clay
-    # holds the handle
-    px, py = vx * felt[4], vy * felt[5]
-    if s["yields"] == 2:
-        px = py = px + py
-    return 0.0 if px < 0.0 else vx, 0.0 if py < 0.0 else vy
+    return loop.not_against(s, vx, vy, felt[4], felt[5])
 
 
 def add_works(s, x, hold, w1, w2, work):
