@@ -41,6 +41,8 @@ from .model.signals import Signal as Signal
 from .model.signals import Sum as Sum
 from .model.spring import Spring as Spring
 from .model.tool import Tool as Tool
+from .model.virtual_wall import Device as Device
+from .model.virtual_wall import VirtualWall as VirtualWall
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record
