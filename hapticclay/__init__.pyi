@@ -75,6 +75,7 @@ from .theory.design import compare as compare
 from .theory.design import design_gain as design_gain
 from .theory.design import transparency_error as transparency_error
 from .theory.gain_limit import gain_limit as gain_limit
+from .theory.gain_limit import stiffness_limit as stiffness_limit
 from .theory.linear_loop import Loop as Loop
 from .theory.linear_loop import closed_loop_poles as closed_loop_poles
 from .theory.margins import Box as Box

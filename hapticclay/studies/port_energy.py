@@ -228,6 +228,8 @@ def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
         bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
         raise ParameterError("wall.velocity", wall.velocity, bound)
     d = wall.device
+    if not (d.friction or d.damper):
+        return 0.0  # nothing takes energy
     if not (d.friction or d.quantum):
         paths = [(lambda w, x=x: polygon(w, x), max(8, 2 * steps // x[1])) for x in _turns_of(wall)]
         return _least_limit(wall, paths)

@@ -370,7 +370,11 @@ def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
 
     Returns:
         The middle; None if the force changes at the samples, so that there is none.
+
+    Raises:
+        ParameterError: the device has no damper, so that no hand is the worst.
     """
+    b = number("device.damper", wall.device.damper, 0.0, above=True, unit="N.s/m")
     whole, part = _split_delay(wall)
     if not part:
         return None
@@ -378,7 +382,7 @@ def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
     H = (wall.K + _object(wall, np.array([turn]))[0]) * back**whole
     straight = (1.0 - part) + part / back
     late = part * (1.0 - part) * wall.Ts * H * (1.0 - back)
-    return complex((straight + late / (2.0 * wall.device.damper))[0])
+    return complex((straight + late / (2.0 * b))[0])
 
 
 def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
@@ -403,7 +407,7 @@ def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray)
     i = int(np.argmin(y))
     around = float(x[max(i - 1, 0)]), float(x[min(i + 1, len(x) - 1)])
     found: Any = minimize_scalar(
-        lambda a: float(f(np.array([a]))[0]), bounds=around, method="bounded"
+        lambda a: min(float(f(np.array([a]))[0]), 1e300), bounds=around, method="bounded"
     )
     return min(float(y[i]), float(found.fun))
 
