@@ -1,4 +1,4 @@
-"""Loops in clay with a stiffness k: one with the hand's spring where it is physical, and by runs."""
+"""Loops in clay with a stiffness k: where it is physical, one with the hand's spring; by runs."""
 
 from dataclasses import replace
 
