@@ -33,11 +33,11 @@ TOP_SPEED = 9.0  # [m/s] along it
 SMALL = 0.01  # of the quantum: of a path that shows one edge of the encoder alone
 LEAST_SPEED = 1.5e-5  # [m/s] along it: a run slower than 1e-5 m/s counts as stalled
 LEAST_SHARE = 2e-3  # of the damper's loss in that of friction, along such a path
-TURNS = [(1, 1), (2, 3), (1, 2), (1, 4), (1, 12)]  # (p, q): paths tried at omega Ts = pi p/q
+TRIED_TURNS = [(1, 1), (2, 3), (1, 2), (1, 4), (1, 12)]  # (p, q): paths tried at omega Ts = pi p/q
 SLOW_TURN = 48  # q of the slowest path tried
-GROWTH = 1.3  # factor on K in the search for an active wall
-CLOSE = 2e-4  # limits are found to this share
-SETTLED = 12.0  # time constants of the filter before energy is counted
+K_FACTOR = 1.3  # factor on K in the search for an active wall
+K_SHARE = 2e-4  # limits are found to this share
+FILTER_TIMES = 12.0  # time constants of the filter before energy is counted
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
     n, h = len(path.places), Ts / steps
     memory = wall.window + math.ceil(wall.delay / Ts) + 2.0
     if wall.velocity_filter is not None:
-        memory += SETTLED / (2.0 * math.pi * wall.velocity_filter * Ts)
+        memory += FILTER_TIMES / (2.0 * math.pi * wall.velocity_filter * Ts)
     first = math.ceil(memory / n)
     samples, corner = n * (first + integer("periods", periods, 1, 10_000)) + 1, 0
     at, place = np.arange(samples + 1) * Ts, np.resize(path.places, samples + 1)
@@ -257,7 +257,7 @@ def _turns_of(wall: VirtualWall) -> list[tuple[int, int]]:
     index = wall_limits.passivity_index(
         replace(wall, K=limit), [math.pi * p / (q * wall.Ts) for p, q in tried]
     )
-    return [tried[int(np.argmin(index))], *TURNS]
+    return [tried[int(np.argmin(index))], *TRIED_TURNS]
 
 
 def _least_limit(wall: VirtualWall, paths: list[tuple[Callable, int]]) -> float:
@@ -277,9 +277,9 @@ def _least_limit(wall: VirtualWall, paths: list[tuple[Callable, int]]) -> float:
             return 0.0
         low, high = 0.0, min(0.1 * guess, least)
         while high < least and energy(high, *way) >= 0.0:
-            low, high = high, min(GROWTH * high, least)
+            low, high = high, min(K_FACTOR * high, least)
             if high > STIFFNESS_MAX:
                 return math.inf
-        found: Any = brentq(energy, low, high, way, xtol=0.5 * CLOSE * high, rtol=CLOSE)
+        found: Any = brentq(energy, low, high, way, xtol=0.5 * K_SHARE * high, rtol=K_SHARE)
         least = float(found)
     return least

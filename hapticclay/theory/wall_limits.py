@@ -23,8 +23,8 @@ from .margins import Box
 
 MOST_STATES = 600  # of a map whose eigenvalues are asked for
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
-TURNS = 4000  # values of omega Ts at which it is tried, twice
-HIGHEST = 1e7  # [rad/s]
+TRIED_ANGLES = 4000  # values of omega Ts at which it is tried, twice
+TOP_OMEGA = 1e7  # [rad/s]
 REFINED = 3  # rounds of the search within a box of hands
 
 
@@ -395,8 +395,8 @@ def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
 
 def _turns(wall: VirtualWall) -> np.ndarray:
     """omega Ts, dense enough for window and delay."""
-    n = TURNS + 40 * (wall.window + _split_delay(wall)[0])
-    slow = np.geomspace(SLOWEST_TURN, math.pi, TURNS)[:-1]
+    n = TRIED_ANGLES + 40 * (wall.window + _split_delay(wall)[0])
+    slow = np.geomspace(SLOWEST_TURN, math.pi, TRIED_ANGLES)[:-1]
     return np.union1d(slow, np.linspace(0.0, math.pi, n)[1:])
 
 
@@ -586,6 +586,6 @@ def wall_impedance(wall: VirtualWall, omega: Any) -> np.ndarray:
 
 def _frequencies(omega: Any) -> np.ndarray:
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
-    if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= HIGHEST)):
-        raise ParameterError("omega", omega, f"must be > 0 and <= {HIGHEST:g} rad/s, shape (n,)")
+    if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= TOP_OMEGA)):
+        raise ParameterError("omega", omega, f"must be > 0 and <= {TOP_OMEGA:g} rad/s, shape (n,)")
     return omega
