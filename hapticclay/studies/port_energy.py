@@ -280,6 +280,6 @@ def _least_limit(wall: VirtualWall, paths: list[tuple[Callable, int]]) -> float:
             low, high = high, min(K_FACTOR * high, least)
             if high > STIFFNESS_MAX:
                 return math.inf
-        found: Any = brentq(energy, low, high, way, xtol=0.5 * K_SHARE * high, rtol=K_SHARE)
+        found: Any = brentq(energy, low, high, way, xtol=0.5 * K_SHARE * high, rtol=K_SHARE)  # type: ignore[arg-type]
         least = float(found)
     return least
