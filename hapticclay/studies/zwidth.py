@@ -44,7 +44,7 @@ SWINGS = 4.0  # periods of device and wall in such a run, at least
 READ = 400  # samples of it that are read, about
 SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) are no oscillation
 FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
-STEPS = 8  # engine steps a sample, at least
+STEPS, REST_STEPS = 8, 4  # engine steps a sample, at least
 STEP_DECAY = 0.1  # largest share of its speed that the damper takes in a step
 DEEPEST = 5e-3  # [m] into the wall that the force presses, so that the arm moves straight
 REST_SAMPLES = 1000  # of the first run that is judged by its rest
@@ -53,6 +53,8 @@ REST_SPANS = (1.0, 4.0, 16.0, 64.0)  # longer while a swing decays, or the devic
 REST_MOST = 20_000  # samples of that first run, at most
 WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
 STEADY = 0.97  # a swing that keeps so much of itself from one to the other is sustained
+ROUGH_STEADY = 0.8  # the same of one within ROUGH quanta, whose size is not even
+ROUGH = 10.0
 SOFTEST = 1e-3  # K of the ladder's first rung over the largest of the linear loop
 RUNG = 3.0  # ratio of the K of one rung to that of the one below
 CLOSE = 5e-3  # a boundary between rest and swing is found to this share
@@ -572,7 +574,7 @@ def growth_rates(walls: Sequence[VirtualWall]) -> list[float]:
         walls: the walls.
     """
     jobs, read = [], []
-    steps = _steps(walls)
+    steps = _steps(walls, STEPS)
     for w in walls:
         omega = math.sqrt((w.K + w.hand.spring) / _mass(w))
         order = w.window + w.delay / w.Ts
@@ -609,21 +611,23 @@ def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[b
         press: the push, and what counts as rest.
     """
     rests: dict[int, bool] = {}
-    steps = _steps(walls)
+    steps = _steps(walls, REST_STEPS)
     for span in REST_SPANS:
         left = [i for i in range(len(walls)) if i not in rests]
         jobs = [_pressed(walls[i], press, span, steps) for i in left]
         for i, record in zip(left, simulate_batch(jobs, every=steps), strict=True):
             (early, _), (late, creep) = (_swing(record, *window) for window in WINDOWS)
-            rough, last = walls[i].device.quantum > 0.0, span == REST_SPANS[-1]
+            quantum, last = walls[i].device.quantum, span == REST_SPANS[-1]
+            chatters = late < ROUGH * quantum and span > 1.0
+            keeps = late >= (ROUGH_STEADY if chatters else STEADY) * early
             if record.outcome.code in ("diverged", "out of reach", "singular"):
                 rests[i] = False
             elif late <= press.still:
                 rests[i] = True
-            elif rough and (last or (late >= STEADY * early and creep < late)):
+            elif quantum and (last or (keeps and creep < late)):
                 rests[i] = False
-            elif not rough and (last or late >= early):
-                rests[i] = late < STEADY * early
+            elif not quantum and (last or late >= early):
+                rests[i] = not keeps
     return [rests[i] for i in range(len(walls))]
 
 
@@ -649,9 +653,9 @@ def _swing(record: Record, begin: float, end: float) -> tuple[float, float]:
     return float(min(back, forth)), float(abs(x[-1] - x[0]))
 
 
-def _steps(walls: Sequence[VirtualWall]) -> int:
-    """Engine steps a sample, such that the dampers take a small share of the speed in each."""
+def _steps(walls: Sequence[VirtualWall], least: int) -> int:
+    """Engine steps a sample, at least so many, such that the dampers take a small share of the speed in each."""
     w = walls[0]
     decay = (w.device.damper + w.hand.damper) / _mass(w) * w.Ts
     most = max(1, math.floor(w.Ts / 1e-6))  # dt is 1 us at least
-    return min(max(STEPS, math.ceil(decay / STEP_DECAY), math.ceil(w.Ts / 0.02)), most)
+    return min(max(least, math.ceil(decay / STEP_DECAY), math.ceil(w.Ts / 0.02)), most)
