@@ -5,6 +5,7 @@ Z-width: Colgate, Brown, Factors affecting the Z-width of a haptic display, ICRA
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 
 from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..model.constants import AXES, TS
 from ..model.fields import with_fields
 from ..model.operator import Operator
 from ..model.shapes import Constant
@@ -20,7 +22,7 @@ from ..model.spring import STIFFNESS_MAX
 from ..model.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
-from ..theory import wall_limits
+from ..theory import gain_limit, wall_limits
 from ..theory.margins import Box
 from ..theory.roots import bisect
 from . import boundary
@@ -35,7 +37,14 @@ VARIED = {  # what a family may vary: its field, unit, factor of the unit that a
     "filter": ("velocity_filter", "Hz", 1.0),
     "window": ("window", "samples", 1.0),
 }
-LETTERS = {"damper": "b", "friction": "fc", "mass": "m", "quantum": "Delta"}  # in labels
+VARIED_ARM = {"Ts": VARIED["Ts"], "delay": VARIED["delay"], "gain": ("K", "1/kg", 1.0)}
+LETTERS = {
+    "gain": "Kc",
+    "damper": "b",
+    "friction": "fc",
+    "mass": "m",
+    "quantum": "Delta",
+}  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
 LINE_POINTS = 41  # of a line of theory
 TOP_SHARES = (0.72, 0.88, 0.97)  # of the largest B: points where the boundary falls
@@ -55,7 +64,8 @@ WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
 STEADY = 0.97  # a swing that keeps so much of itself from one to the other is sustained
 ROUGH_STEADY = 0.8  # the same of one within ROUGH quanta, whose size is not even
 ROUGH = 10.0
-SOFTEST = 1e-3  # K of the ladder's first rung over the largest of the linear loop
+SOFTEST = 0.03  # K of the ladder's first rung over that of the linear loop at B = 0, and
+SOFT = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
 RUNG = 3.0  # ratio of the K of one rung to that of the one below
 CLOSE = 5e-3  # a boundary between rest and swing is found to this share
 RESOLVED = 0.01  # share of K to which the decay of a swing tells stable from unstable
@@ -64,6 +74,7 @@ LINEAR, RESTING = "growth rate", "rest after a push"
 PERIOD = 2.0 * math.pi
 
 Answer = TypeVar("Answer")
+Wall = VirtualWall | boundary.PushedLoop  # on a bare device, or clay of k and b on this arm
 Search = Generator[float, Any, float]
 Progress = Callable[[float], None]
 
@@ -122,7 +133,7 @@ class ZRegion:
 
     Attributes:
         name: of the region in its family, "" for one alone.
-        wall: the device, the hand and the timing; its own K and B do not matter.
+        wall: what renders them, whose own K and B (of an arm, k and b) do not matter.
         verdict: how a run was judged, "growth rate" (linear loops) or "rest after a push".
         B: virtual damping [N.s/m], ascending.
         K: largest stable stiffness found by runs, for each B [N/m]; 0 for none. All that is softer
@@ -138,7 +149,7 @@ class ZRegion:
     """
 
     name: str
-    wall: VirtualWall
+    wall: Wall
     verdict: str
     B: tuple[float, ...]
     K: tuple[float, ...]
@@ -223,7 +234,7 @@ class ZWidth:
         """What was unstable below a line that is sufficient, in words; empty as it should be."""
         return [x for r in self.regions for x in r.violations()]
 
-    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+    def tables(self) -> dict[str, dict[str, list]]:
         """What the figure shows: "runs", "lines", and "regions" with a row each."""
         runs: dict[str, list] = {"region": [], "B [N.s/m]": [], "K [N/m]": [], "exact K [N/m]": []}
         if boxed := any(r.box for r in self.regions):
@@ -257,7 +268,7 @@ class ZWidth:
 
 
 def zwidth(
-    wall: VirtualWall,
+    wall: Wall,
     vary: str = "",
     values: Iterable[Any] = (),
     *,
@@ -275,9 +286,10 @@ def zwidth(
     `docs/zwidth.md`.
 
     Args:
-        wall: device, hand and timing; its own K and B do not matter.
+        wall: device, hand and timing; its own K and B do not matter. Or the arm with its servo and
+            compensator: the plane is then that of the clay's b and k, under the gain of the loop.
         vary: what differs in a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
-            "filter" or "window"; "" for one region.
+            "filter" or "window", of an arm "Ts", "delay" or "gain"; "" for one region.
         values: of what differs [SI]; None among those of "filter" is no filter.
         B: virtual damping to try [N.s/m], ascending; None for 0 and others up to the largest that
             is stable.
@@ -287,10 +299,13 @@ def zwidth(
         progress: called with the share of the work that is done.
 
     Raises:
-        ParameterError: wall is none, an unknown name, a value out of its bounds, or no values.
+        ParameterError: wall is none, an unknown name, a value out of its bounds, no values, or an
+            arm in continuous time.
     """
-    if not isinstance(wall, VirtualWall):
-        raise ParameterError("wall", wall, "must be a VirtualWall")
+    if not isinstance(wall, VirtualWall | boundary.PushedLoop):
+        raise ParameterError("wall", wall, "must be a VirtualWall, or a PushedLoop of the arm")
+    if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
+        raise ParameterError("Ts", None, "must be given: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
     some = None if B is None else _dampings(B)
@@ -312,13 +327,14 @@ def _dampings(B: Iterable[float]) -> tuple[float, ...]:
     return out
 
 
-def _family(wall: VirtualWall, vary: str, values: tuple[Any, ...]) -> list[tuple[str, VirtualWall]]:
+def _family(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[str, Wall]]:
     """Names and walls of the regions."""
     if not vary:
         if values:
             raise ParameterError("values", values, "must be given with the name that they vary")
         return [("", wall)]
-    field, unit, factor = VARIED[choice("vary", vary, tuple(VARIED))]
+    varied = VARIED if isinstance(wall, VirtualWall) else VARIED_ARM
+    field, unit, factor = varied[choice("vary", vary, tuple(varied))]
     if not values:
         raise ParameterError("values", values, f"must hold a value of {vary} at least")
     return [(_value_name(vary, x, unit, factor), with_fields(wall, {field: x})) for x in values]
@@ -333,29 +349,28 @@ def _value_name(vary: str, value: Any, unit: str, factor: float) -> str:
 
 def _region(
     name: str,
-    wall: VirtualWall,
+    wall: Wall,
     B: tuple[float, ...] | None,
     box: Box | None,
     press: Press,
     quick: bool,
     show: Progress,
 ) -> ZRegion:
-    wall = replace(wall, K=0.0, B=0.0)
+    wall = _at(wall, 0.0, 0.0)
     linear = is_linear(wall)
     top = theoretical_damping(wall)
-    scale = max((_exact(replace(wall, B=share * top)) for share in (0.0, 0.5)), default=0.0)
-    soft = SOFTEST * (scale or _stiff(wall))
+    soft = _softest(wall, top)
     most_B = math.nan
     if B is None:
         most_B = _most_damping(wall, top, 0.0 if linear else soft, press)
         top = top if linear or math.isinf(most_B) else min(top, most_B)
     grid = _grid(wall, top, QUICK_POINTS if quick else POINTS) if B is None else B
-    walls = [replace(wall, B=x) for x in grid]
+    walls = [_at(wall, 0.0, x) for x in grid]
     exact = [_exact(w) for w in walls]
     limits = _limits(wall, max(grid[-1], top if B is None else 0.0), grid)
     half = 1.0 if box is None else 0.5
 
-    def find(walls: Sequence[VirtualWall], exact: Sequence[float], begin: float) -> list[float]:
+    def find(walls: Sequence[Wall], exact: Sequence[float], begin: float) -> list[float]:
         return _stiffest(walls, exact, soft, press, lambda s: show(begin + half * s))
 
     K = find(walls, exact, 0.0)
@@ -368,40 +383,42 @@ def _region(
         note = "worst hand of the box, linear loop"
         limits.append(Limit("any hand of the box", "exact", grid, tuple(box_exact), note))
     show(1.0)
-    return ZRegion(
-        name,
-        wall,
-        LINEAR if linear else RESTING,
-        grid,
-        tuple(K),
-        tuple(exact),
-        most_B,
-        tuple(limits),
-        box,
-        tuple(box_K),
-        tuple(box_exact),
-    )
+    verdict, given = LINEAR if linear else RESTING, (tuple(grid), tuple(K), tuple(exact))
+    boxed = (box, tuple(box_K), tuple(box_exact))
+    return ZRegion(name, wall, verdict, *given, most_B, tuple(limits), *boxed)
 
 
-def is_linear(wall: VirtualWall) -> bool:
+def _at(wall: Wall, K: float, B: float) -> Wall:
+    """The wall with another K and B."""
+    if isinstance(wall, VirtualWall):
+        return replace(wall, K=K, B=B)
+    return replace(wall, k=K, b=B)
+
+
+def is_linear(wall: Wall) -> bool:
     """Whether the loop of a wall is linear: no friction, no encoder, no surface.
 
     Args:
-        wall: the wall.
+        wall: the wall; the arm's loop is linear in a small motion.
     """
+    if isinstance(wall, boundary.PushedLoop):
+        return True
     return not (wall.surface or wall.device.friction or wall.device.quantum)
 
 
-def theoretical_damping(wall: VirtualWall) -> float:
+def theoretical_damping(wall: Wall) -> float:
     """Largest B of the linear loop that is stable at K = 0 [N.s/m]; 0 for none.
 
     Args:
         wall: all but K and B.
     """
-    unit = _mass(wall) / wall.Ts
+    unit = _mass(wall) / _sample(wall)
 
     def stable(B: float) -> bool:
-        return wall_limits.stable_wall(replace(wall, K=0.0, B=B))
+        tried = _at(wall, 0.0, B)
+        if isinstance(tried, VirtualWall):
+            return wall_limits.stable_wall(tried)
+        return gain_limit.is_stable(tried.linear)
 
     grid = np.geomspace(1e-5 * unit, 1e3 * unit, 120).tolist()
     low = next((i for i, B in enumerate(grid) if stable(B)), None)
@@ -411,7 +428,7 @@ def theoretical_damping(wall: VirtualWall) -> float:
     return grid[-1] if high is None else bisect(stable, grid[low], high, 1e-9)[0]
 
 
-def worst_hand(wall: VirtualWall, box: Box) -> Operator:
+def worst_hand(wall: Wall, box: Box) -> Operator:
     """The hand of a box with which the least K is stable, among those at its ends and middles.
 
     Args:
@@ -425,44 +442,62 @@ def worst_hand(wall: VirtualWall, box: Box) -> Operator:
     return min(hands, key=lambda hand: _exact(replace(wall, operator=hand)))
 
 
-def _exact(wall: VirtualWall) -> float:
-    return wall_limits.stiffness_band(wall)[1]
+@functools.lru_cache(maxsize=2048)  # asked for as a line, as a guess, and beside the runs
+def _exact(wall: Wall) -> float:
+    """Largest stable K of the linear loop."""
+    if isinstance(wall, VirtualWall):
+        return wall_limits.stiffness_band(wall)[1]
+    return gain_limit.stiffness_limit(wall.linear)
 
 
-def _mass(wall: VirtualWall) -> float:
-    return wall.device.mass + wall.hand.mass
+def _softest(wall: Wall, top: float) -> float:
+    """Least K at which a wall is tried."""
+    first, scale = (_exact(_at(wall, 0.0, share * top)) for share in (0.0, 0.5))
+    scale = max(first, scale) or wall.hand.spring + _mass(wall) / _sample(wall) ** 2
+    return min(max(SOFTEST * first, SOFT[0] * scale), SOFT[1] * scale)
 
 
-def _stiff(wall: VirtualWall) -> float:
-    """K [N/m] that turns the phase of the mass by one radian in a sample."""
-    return _mass(wall) / wall.Ts**2
+def _mass(wall: Wall) -> float:
+    """Mass of device and hand [kg]."""
+    if isinstance(wall, VirtualWall):
+        return wall.device.mass + wall.hand.mass
+    return 1.0 / wall.servo.S.gain + wall.hand.mass
 
 
-def _grid(wall: VirtualWall, top: float, points: int) -> tuple[float, ...]:
+def _sample(wall: Wall) -> float:
+    return wall.Ts or TS
+
+
+def _grid(wall: Wall, top: float, points: int) -> tuple[float, ...]:
     """0, then even on a logarithm up to half of the largest B, then where the boundary falls."""
     if top == 0.0:
         return (0.0,)
-    b = wall.device.damper + wall.hand.damper
+    b = wall.hand.damper + (wall.device.damper if isinstance(wall, VirtualWall) else 0.0)
     first = min(max(0.5 * b, 1e-3 * top), 0.1 * top)
     rising = np.geomspace(first, 0.5 * top, points - 1 - len(TOP_SHARES)).tolist()
     return (0.0, *rising, *(share * top for share in TOP_SHARES))
 
 
-def _limits(wall: VirtualWall, top: float, grid: Sequence[float]) -> list[Limit]:
+def _limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     """Lines of theory, from the least B up to top."""
     first = next((B for B in grid if B > 0.0), 1.0)
     fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
     if top > first:
         fine += [*np.geomspace(first, top, LINE_POINTS), *np.linspace(0.7 * top, top, 9)]
+    if isinstance(wall, boundary.PushedLoop):  # whose limit is a scan
+        fine = []
     B = np.unique([*fine, *grid]).tolist()
-    walls = [replace(wall, B=x) for x in B]
+    walls = [_at(wall, 0.0, x) for x in B]
     parts: list[Limit] = []
 
-    def line(name: str, kind: str, law: Callable[[VirtualWall], float], note: str) -> None:
+    def line(name: str, kind: str, law: Callable[[Any], float], note: str) -> None:
         K = [law(w) for w in walls]
         if any(x > 0.0 for x in K):
             parts.append(Limit(name, kind, tuple(B), tuple(K), note))
 
+    if isinstance(wall, boundary.PushedLoop):
+        line("exact, linear loop", "exact", _exact, "sampled loop at the nominal pose")
+        return parts
     left_out = [n for n in ("friction", "quantum") if getattr(wall.device, n)]
     left_out += ["surface"] if wall.surface else []
     note = f"of the linear loop: {' and '.join(left_out)} left out" if left_out else "eigenvalues"
@@ -489,7 +524,7 @@ def _limits(wall: VirtualWall, top: float, grid: Sequence[float]) -> list[Limit]
 
 
 def _stiffest(
-    walls: Sequence[VirtualWall],
+    walls: Sequence[Wall],
     exact: Sequence[float],
     softest: float,
     press: Press,
@@ -501,23 +536,29 @@ def _stiffest(
             boundary.crossing_search(K if 0.0 < K < math.inf else softest, 0.1 * STIFFNESS_MAX)
             for K in exact
         ]
-        return _side_by_side(searches, lambda i, K: replace(walls[i], K=K), growth_rates, show)
+        return _side_by_side(
+            searches, lambda i, K: _at(walls[i], K, _damping(walls[i])), growth_rates, show
+        )
     top = 0.3 * STIFFNESS_MAX
     return _side_by_side(
         [_rung_search(softest, top) for _ in walls],
-        lambda i, K: replace(walls[i], K=K),
+        lambda i, K: _at(walls[i], K, _damping(walls[i])),
         lambda tried: come_to_rest(tried, press),
         show,
     )
 
 
-def _most_damping(wall: VirtualWall, top: float, K: float, press: Press) -> float:
+def _damping(wall: Wall) -> float:
+    return wall.B if isinstance(wall, VirtualWall) else wall.b
+
+
+def _most_damping(wall: Wall, top: float, K: float, press: Press) -> float:
     """Largest stable B at a K, by runs."""
     if top == 0.0:
         return 0.0
 
-    def tried(i: int, B: float) -> VirtualWall:
-        return replace(wall, K=K, B=B)
+    def tried(i: int, B: float) -> Wall:
+        return _at(wall, K, B)
 
     if K == 0.0:
         search = boundary.crossing_search(top, 100.0 * top)
@@ -528,8 +569,8 @@ def _most_damping(wall: VirtualWall, top: float, K: float, press: Press) -> floa
 
 def _side_by_side(
     searches: Sequence[Search],
-    wall: Callable[[int, float], VirtualWall],
-    judge: Callable[[Sequence[VirtualWall]], Sequence[Answer]],
+    wall: Callable[[int, float], Any],
+    judge: Callable[[Sequence[Any]], Sequence[Answer]],
     show: Progress = lambda share: None,
 ) -> list[float]:
     """Results of searches that each ask for one run at a time; a batch has one of each."""
@@ -567,15 +608,21 @@ def _rung_search(start: float, most: float) -> Search:
     return low
 
 
-def growth_rates(walls: Sequence[VirtualWall]) -> list[float]:
+def growth_rates(walls: Sequence[Wall]) -> list[float]:
     """Rate at which the oscillation of each wall's linear loop grows, from a run of each [1/s].
 
     Args:
         walls: the walls.
     """
+    arms = [w for w in walls if isinstance(w, boundary.PushedLoop)]
+    if arms:
+        records = simulate_batch(w.scenario() for w in arms)
+        how = boundary.GROWTH_SAMPLE, boundary.SLOWEST_MODE
+        return [_growth(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
+    bare = [w for w in walls if isinstance(w, VirtualWall)]
     jobs, read = [], []
-    steps = _steps(walls, STEPS)
-    for w in walls:
+    steps = _steps(bare, STEPS)
+    for w in bare:
         omega = math.sqrt((w.K + w.hand.spring) / _mass(w))
         order = w.window + w.delay / w.Ts
         n = max(FEWEST + 12.0 * order, SWINGS * PERIOD / max(omega * w.Ts, 1e-9) if omega else 0.0)
@@ -587,15 +634,15 @@ def growth_rates(walls: Sequence[VirtualWall]) -> list[float]:
     return [_growth(r, *how) for r, how in zip(records, read, strict=True)]
 
 
-def _growth(record: Record, sample: float, slowest: float) -> float:
+def _growth(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
     """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean."""
-    speed = np.abs(record.v[:, 0])
+    speed = np.abs(record.v[:, AXES.index(axis)])
     n = len(speed)
     share = math.ceil(0.1 * n)
     change = (speed[-share:].max() + 1e-300) / (speed[:share].max() + 1e-300)
     if n > 2 * share and not FADED < change < 1.0 / FADED:
         return math.log(change) / record.t[-1]
-    return boundary.growth_rate(record, "x", sample, slowest)
+    return boundary.growth_rate(record, axis, sample, slowest)
 
 
 def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[bool]:
@@ -654,7 +701,7 @@ def _swing(record: Record, begin: float, end: float) -> tuple[float, float]:
 
 
 def _steps(walls: Sequence[VirtualWall], least: int) -> int:
-    """Engine steps a sample, at least so many, such that the dampers take a small share of the speed in each."""
+    """Engine steps a sample, at least so many, and such that dampers take little in each."""
     w = walls[0]
     decay = (w.device.damper + w.hand.damper) / _mass(w) * w.Ts
     most = max(1, math.floor(w.Ts / 1e-6))  # dt is 1 us at least
