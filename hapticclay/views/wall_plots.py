@@ -136,11 +136,12 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
         ax.annotate(
             r.name,
             place,
-            xytext=(points(5.0), points(5.0)),
+            xytext=(points(6.0), points(-5.0 if side == "left" else 5.0)),
             textcoords="offset points",
             color=CURVE_STYLES[i % len(CURVE_STYLES)][0],
             fontsize=points(9.0),
             ha="left" if side == "left" else "center",
+            va="top" if side == "left" else "bottom",
             zorder=7,
         )
 
