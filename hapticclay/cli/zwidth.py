@@ -122,7 +122,7 @@ class ZWidthCommand:
             figure = Figure(lambda: zwidth_plot(found), found.tables)
             console.save_figures({"zwidth": figure}, self.out, self.figures)
         finally:  # a full disk must not hide the result
-            print(region_table(found))
+            print(zwidth_table(found))
         print(f"written to {self.out}")
         return 0
 
@@ -186,7 +186,7 @@ class ZWidthCommand:
         return Box((m, M), (d, D), (k, K))
 
 
-def region_table(found: ZWidth) -> str:
+def zwidth_table(found: ZWidth) -> str:
     """The regions and what was found beside theory, for a terminal.
 
     Args:

@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from ..theory.margins import Box
 from ..theory.roots import bisect
 from . import boundary
 
-VARIED = {  # what a family may vary: its field, unit, factor of the unit that a label shows
+VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit that a label shows
     "Ts": ("Ts", "ms", 1e3),
     "delay": ("delay", "ms", 1e3),
     "quantum": ("device.quantum", "um", 1e6),
@@ -37,7 +37,11 @@ VARIED = {  # what a family may vary: its field, unit, factor of the unit that a
     "filter": ("velocity_filter", "Hz", 1.0),
     "window": ("window", "samples", 1.0),
 }
-VARIED_ARM = {"Ts": VARIED["Ts"], "delay": VARIED["delay"], "gain": ("K", "1/kg", 1.0)}
+VARIED_ARM = {
+    "Ts": VARIED_DEVICE["Ts"],
+    "delay": VARIED_DEVICE["delay"],
+    "gain": ("K", "1/kg", 1.0),
+}
 LETTERS = {
     "gain": "Kc",
     "damper": "b",
@@ -46,14 +50,14 @@ LETTERS = {
     "quantum": "Delta",
 }  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
-LINE_POINTS = 61  # of a line of theory
+LIMIT_POINTS = 61  # of a line of theory
 TOP_SHARES = (0.72, 0.88, 0.97)  # of the largest B: points where the boundary falls
-FEWEST, MOST = 300, 6000  # samples of a run whose growth is read
-SWINGS = 4.0  # periods of device and wall in such a run, at least
+FEWEST_SAMPLES, MOST_SAMPLES = 300, 6000  # samples of a run whose growth is read
+READ_SWINGS = 4.0  # periods of device and wall in such a run, at least
 READ = 400  # samples of it that are read, about
 SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) are no oscillation
 FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
-STEPS, REST_STEPS = 8, 4  # engine steps a sample, at least
+GROWTH_STEPS, REST_STEPS = 8, 4  # engine steps a sample, at least
 STEP_DECAY = 0.1  # largest share of its speed that the damper takes in a step
 DEEPEST = 5e-3  # [m] into the wall that the force presses, so that the arm moves straight
 REST_SAMPLES = 1000  # of the first run that is judged by its rest
@@ -61,22 +65,20 @@ REST_SWINGS = 10.0  # its periods, at least
 REST_SPANS = (1.0, 4.0, 16.0, 64.0)  # longer while a swing decays, or the device creeps
 REST_MOST = 20_000  # samples of that first run, at most
 WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
-STEADY = 0.97  # a swing that keeps so much of itself from one to the other is sustained
-ROUGH_STEADY = 0.8  # the same of one within ROUGH quanta, whose size is not even
+KEPT = 0.97  # a swing that keeps so much of itself from one to the other is sustained
+ROUGH_KEPT = 0.8  # the same of one within ROUGH quanta, whose size is not even
 ROUGH = 10.0
 SOFTEST = 0.03  # K of the ladder's first rung over that of the linear loop at B = 0, and
-SOFT = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
+SOFT_BOUNDS = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
 RUNG = 3.0  # ratio of the K of one rung to that of the one below
-CLOSE = 5e-3  # a boundary between rest and swing is found to this share
-RESOLVED = 0.01  # share of K to which the decay of a swing tells stable from unstable
+EDGE_CLOSE = 5e-3  # a boundary between rest and swing is found to this share
+REST_RESOLVED = 0.01  # share of K to which the decay of a swing tells stable from unstable
 FALLEN = 0.01  # share of the largest K below which a boundary has fallen to nothing
-LINEAR, RESTING = "growth rate", "rest after a push"
-PERIOD = 2.0 * math.pi
+BY_GROWTH, BY_REST = "growth rate", "rest after a push"
 
-Answer = TypeVar("Answer")
 Wall = VirtualWall | boundary.PushedLoop  # on a bare device, or clay of k and b on this arm
 Search = Generator[float, Any, float]
-Progress = Callable[[float], None]
+Share = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ class ZRegion:
     @property
     def linear(self) -> bool:
         """Whether the loop is linear, so that its eigenvalues tell what the runs must find."""
-        return self.verdict == LINEAR
+        return self.verdict == BY_GROWTH
 
     @property
     def largest_K(self) -> float:
@@ -202,7 +204,7 @@ class ZRegion:
     def violations(self) -> list[str]:
         """Points at which a run was unstable below a line that is sufficient, in words."""
         out = []
-        close = boundary.BRACKET if self.linear else RESOLVED
+        close = boundary.BRACKET if self.linear else REST_RESOLVED
         for limit in self.limits:
             for B, K in zip(self.B, self.K, strict=True):
                 asked = limit.at(B)
@@ -276,7 +278,7 @@ def zwidth(
     box: Box | None = None,
     press: Press = Press(),
     quick: bool = False,
-    progress: Progress = lambda share: None,
+    progress: Share = lambda share: None,
 ) -> ZWidth:
     """Find the walls that a device renders stably, by runs, beside what theory says.
 
@@ -309,7 +311,7 @@ def zwidth(
     if box is not None and not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
     some = None if B is None else _dampings(B)
-    family = _family(wall, vary, tuple(values))
+    family = _family_walls(wall, vary, tuple(values))
     regions = []
     for i, (name, each) in enumerate(family):
 
@@ -327,13 +329,13 @@ def _dampings(B: Iterable[float]) -> tuple[float, ...]:
     return out
 
 
-def _family(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[str, Wall]]:
+def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[str, Wall]]:
     """Names and walls of the regions."""
     if not vary:
         if values:
             raise ParameterError("values", values, "must be given with the name that they vary")
         return [("", wall)]
-    varied = VARIED if isinstance(wall, VirtualWall) else VARIED_ARM
+    varied = VARIED_DEVICE if isinstance(wall, VirtualWall) else VARIED_ARM
     field, unit, factor = varied[choice("vary", vary, tuple(varied))]
     if not values:
         raise ParameterError("values", values, f"must hold a value of {vary} at least")
@@ -354,7 +356,7 @@ def _region(
     box: Box | None,
     press: Press,
     quick: bool,
-    show: Progress,
+    show: Share,
 ) -> ZRegion:
     wall = _at(wall, 0.0, 0.0)
     linear = is_linear(wall)
@@ -367,7 +369,7 @@ def _region(
     grid = _grid(wall, top, QUICK_POINTS if quick else POINTS) if B is None else B
     walls = [_at(wall, 0.0, x) for x in grid]
     exact = [_exact(w) for w in walls]
-    limits = _limits(wall, max(grid[-1], top if B is None else 0.0), grid)
+    limits = _theory_limits(wall, max(grid[-1], top if B is None else 0.0), grid)
     half = 1.0 if box is None else 0.5
 
     def find(walls: Sequence[Wall], exact: Sequence[float], begin: float) -> list[float]:
@@ -383,7 +385,7 @@ def _region(
         note = "worst hand of the box, linear loop"
         limits.append(Limit("any hand of the box", "exact", grid, tuple(box_exact), note))
     show(1.0)
-    verdict, given = LINEAR if linear else RESTING, (tuple(grid), tuple(K), tuple(exact))
+    verdict, given = BY_GROWTH if linear else BY_REST, (tuple(grid), tuple(K), tuple(exact))
     boxed = (box, tuple(box_K), tuple(box_exact))
     return ZRegion(name, wall, verdict, *given, most_B, tuple(limits), *boxed)
 
@@ -454,7 +456,7 @@ def _softest(wall: Wall, top: float) -> float:
     """Least K at which a wall is tried."""
     first, scale = (_exact(_at(wall, 0.0, share * top)) for share in (0.0, 0.5))
     scale = max(first, scale) or wall.hand.spring + _mass(wall) / _sample(wall) ** 2
-    return min(max(SOFTEST * first, SOFT[0] * scale), SOFT[1] * scale)
+    return min(max(SOFTEST * first, SOFT_BOUNDS[0] * scale), SOFT_BOUNDS[1] * scale)
 
 
 def _mass(wall: Wall) -> float:
@@ -478,12 +480,12 @@ def _grid(wall: Wall, top: float, points: int) -> tuple[float, ...]:
     return (0.0, *rising, *(share * top for share in TOP_SHARES))
 
 
-def _limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
+def _theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     """Lines of theory, from the least B up to top."""
     first = next((B for B in grid if B > 0.0), 1.0)
     fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
     if top > first:
-        fine += [*np.geomspace(first, top, LINE_POINTS), *np.linspace(0.5 * top, top, 17)]
+        fine += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, 17)]
     if isinstance(wall, boundary.PushedLoop):  # whose limit is a scan
         fine = []
     B = np.unique([*fine, *grid]).tolist()
@@ -528,7 +530,7 @@ def _stiffest(
     exact: Sequence[float],
     softest: float,
     press: Press,
-    show: Progress,
+    show: Share,
 ) -> list[float]:
     """Largest stable K of each wall, by runs."""
     if is_linear(walls[0]):
@@ -570,8 +572,8 @@ def _most_damping(wall: Wall, top: float, K: float, press: Press) -> float:
 def _side_by_side(
     searches: Sequence[Search],
     wall: Callable[[int, float], Any],
-    judge: Callable[[Sequence[Any]], Sequence[Answer]],
-    show: Progress = lambda share: None,
+    judge: Callable[[Sequence[Any]], Sequence[Any]],
+    show: Share = lambda share: None,
 ) -> list[float]:
     """Results of searches that each ask for one run at a time; a batch has one of each."""
     results = [math.nan] * len(searches)
@@ -599,7 +601,7 @@ def _rung_search(start: float, most: float) -> Search:
         low, high = high, RUNG * high
         if low > most:
             return math.inf
-    while low and high / low > 1.0 + CLOSE:
+    while low and high / low > 1.0 + EDGE_CLOSE:
         middle = math.sqrt(low * high)
         if (yield middle):
             low = middle
@@ -621,12 +623,15 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
         return [_growth(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
     bare = [w for w in walls if isinstance(w, VirtualWall)]
     jobs, read = [], []
-    steps = _steps(bare, STEPS)
+    steps = _engine_steps(bare, GROWTH_STEPS)
     for w in bare:
         omega = math.sqrt((w.K + w.hand.spring) / _mass(w))
         order = w.window + w.delay / w.Ts
-        n = max(FEWEST + 12.0 * order, SWINGS * PERIOD / max(omega * w.Ts, 1e-9) if omega else 0.0)
-        n = math.ceil(min(n, MOST + 12.0 * order))
+        n = max(
+            FEWEST_SAMPLES + 12.0 * order,
+            READ_SWINGS * math.tau / max(omega * w.Ts, 1e-9) if omega else 0.0,
+        )
+        n = math.ceil(min(n, MOST_SAMPLES + 12.0 * order))
         kept = max(READ, 6.0 * order)
         read.append((w.Ts * max(1.0, n / kept), SLOWEST * omega))
         jobs.append(w.scenario(n * w.Ts, push=boundary.SMALL_PUSH, steps=steps))
@@ -658,7 +663,7 @@ def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[b
         press: the push, and what counts as rest.
     """
     rests: dict[int, bool] = {}
-    steps = _steps(walls, REST_STEPS)
+    steps = _engine_steps(walls, REST_STEPS)
     for span in REST_SPANS:
         left = [i for i in range(len(walls)) if i not in rests]
         jobs = [_pressed(walls[i], press, span, steps) for i in left]
@@ -666,7 +671,7 @@ def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[b
             (early, _), (late, creep) = (_swing(record, *window) for window in WINDOWS)
             quantum, last = walls[i].device.quantum, span == REST_SPANS[-1]
             chatters = late < ROUGH * quantum and span > 1.0
-            keeps = late >= (ROUGH_STEADY if chatters else STEADY) * early
+            keeps = late >= (ROUGH_KEPT if chatters else KEPT) * early
             if record.outcome.code in ("diverged", "out of reach", "singular"):
                 rests[i] = False
             elif late <= press.still:
@@ -685,7 +690,7 @@ def _pressed(wall: VirtualWall, press: Press, span: float, steps: int) -> Any:
     if quantum and wall.K:
         force = (max(0, round(force / (wall.K * quantum) - 0.5)) + 0.5) * wall.K * quantum
     omega = math.sqrt(stiffness / _mass(wall))
-    n = max(REST_SAMPLES, REST_SWINGS * PERIOD / (omega * wall.Ts)) if omega else REST_SAMPLES
+    n = max(REST_SAMPLES, REST_SWINGS * math.tau / (omega * wall.Ts)) if omega else REST_SAMPLES
     n = math.ceil(span * min(n + wall.delay / wall.Ts, REST_MOST))
     muscle = Constant((force, 0.0)) if force else None
     return wall.scenario(n * wall.Ts, push=press.speed, muscle=muscle, steps=steps)
@@ -700,7 +705,7 @@ def _swing(record: Record, begin: float, end: float) -> tuple[float, float]:
     return float(min(back, forth)), float(abs(x[-1] - x[0]))
 
 
-def _steps(walls: Sequence[VirtualWall], least: int) -> int:
+def _engine_steps(walls: Sequence[VirtualWall], least: int) -> int:
     """Engine steps a sample, at least so many, and such that dampers take little in each."""
     w = walls[0]
     decay = (w.device.damper + w.hand.damper) / _mass(w) * w.Ts

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from ..model.virtual_wall import VirtualWall
-from ..studies.zwidth import LINEAR, ZRegion, ZWidth
+from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
 from .style import (
     BLACK,
     BLUE,
@@ -45,7 +45,7 @@ KIND_WORDS = {"exact": "", "sufficient": " (sufficient)", "rule": " (rule)"}
 REGION_ALPHA = 0.22
 LABEL_ROOM = 0.05  # share of the height that the name of a region takes
 SPREAD = 20.0  # ratio of B from which an axis is logarithmic
-LEAST_SHARE = 1e-4  # of the largest K, down to which a logarithmic axis goes
+SHOWN_SHARE = 1e-4  # of the largest K, down to which a logarithmic axis goes
 
 
 def zwidth_plot(chart: ZWidth) -> Figure:
@@ -77,7 +77,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
 def _draw_region(ax: Axes, r: ZRegion) -> None:
     """The region of one device with all its lines."""
     bottom = ax.get_ylim()[0]
-    ax.fill_between(*_outline(r), bottom, color=SKY_BLUE, alpha=REGION_ALPHA, lw=0, zorder=0.5)
+    ax.fill_between(*_region_edge(r), bottom, color=SKY_BLUE, alpha=REGION_ALPHA, lw=0, zorder=0.5)
     for limit in r.limits:
         look = dict(LIMIT_LOOKS[limit.name.split(" ")[0]])
         if limit.name.startswith("exact"):
@@ -86,13 +86,13 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
             label = limit.name + KIND_WORDS[limit.kind]
         if look.get("marker"):
             look |= dict(ms=stroke(8), mfc=WHITE, mew=stroke(1.8), zorder=6, clip_on=False)
-        ax.plot(limit.B, _shown(limit.K, bottom), label=label, **look)
+        ax.plot(limit.B, _where_stable(limit.K, bottom), label=label, **look)
     runs: Any = dict(ls="none", color=BLACK, ms=stroke(6), zorder=5, clip_on=False)
-    how = "stability" if r.verdict == LINEAR else "rest"
-    ax.plot(r.B, _shown(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
+    how = "stability" if r.verdict == BY_GROWTH else "rest"
+    ax.plot(r.B, _where_stable(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
     if r.box:
         label = "runs with the worst hand"
-        ax.plot(r.B, _shown(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
+        ax.plot(r.B, _where_stable(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
 
 
 def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
@@ -101,16 +101,16 @@ def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
     for i, r in enumerate(regions):
         color, style = CURVE_STYLES[i % len(CURVE_STYLES)]
         marker = FAMILY_MARKS[i % len(FAMILY_MARKS)]
-        ax.fill_between(*_outline(r), bottom, color=color, alpha=0.05, lw=0, zorder=0.5)
+        ax.fill_between(*_region_edge(r), bottom, color=color, alpha=0.05, lw=0, zorder=0.5)
         if r.linear:
             limit = r.limits[0]
-            ax.plot(limit.B, _shown(limit.K, bottom), color=color, ls=style)
+            ax.plot(limit.B, _where_stable(limit.K, bottom), color=color, ls=style)
         else:
-            ax.plot(*_outline(r), color=color, ls=style, lw=stroke(1.0))
+            ax.plot(*_region_edge(r), color=color, ls=style, lw=stroke(1.0))
         look: Any = dict(color=color, marker=marker, ls="none", ms=stroke(5), clip_on=False)
         if i % 2:
             look["mfc"] = WHITE
-        ax.plot(r.B, _shown(r.K, bottom), label=r.name, zorder=5, **look)
+        ax.plot(r.B, _where_stable(r.K, bottom), label=r.name, zorder=5, **look)
     _name_regions(ax, regions)
 
 
@@ -146,7 +146,7 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
         )
 
 
-def _outline(r: ZRegion) -> tuple[list[float], list[float]]:
+def _region_edge(r: ZRegion) -> tuple[list[float], list[float]]:
     """The edge of a region: the exact line where the loop is linear, else from run to run."""
     if r.linear and r.limits:
         return list(r.limits[0].B), list(r.limits[0].K)
@@ -154,7 +154,7 @@ def _outline(r: ZRegion) -> tuple[list[float], list[float]]:
     return (B, K) if math.isnan(r.most_B) else ([*B, r.most_B], [*K, 0.0])
 
 
-def _shown(K: Sequence[float], bottom: float) -> np.ndarray:
+def _where_stable(K: Sequence[float], bottom: float) -> np.ndarray:
     """K, with a gap where there is none."""
     a = np.array(K, dtype=float)
     return np.where(np.isfinite(a) & (a > 0.0), a, np.nan)
@@ -169,7 +169,8 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion]) -> None:
     top = max([*B, *(r.largest_B for r in regions)], default=1.0)
     most = max(K, default=1.0)
     if not B or B[-1] < SPREAD * B[0] or min(x for r in regions for x in r.B) < 0.0:
-        ax.set(xlim=(min(0.0, *(r.B[0] for r in regions)), 1.05 * top), ylim=(0.0, 1.1 * most))
+        left = min(0.0, *(r.B[0] for r in regions))
+        ax.set(xlim=(left, 1.05 * top if top > left else 1.0), ylim=(0.0, 1.1 * most))
         return
     first = B[0]
     ax.set_xscale("symlog", linthresh=first, linscale=0.45)
@@ -178,7 +179,7 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion]) -> None:
     ax.set_xticks([0.0, *powers])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yscale("log")
-    ax.set_ylim(max(0.4 * min([*least, most]), LEAST_SHARE * most), 2.0 * most)
+    ax.set_ylim(max(0.4 * min([*least, most]), SHOWN_SHARE * most), 2.0 * most)
     for side in (ax.xaxis, ax.yaxis):
         side.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         side.set_minor_formatter(NullFormatter())
@@ -213,6 +214,6 @@ def _device_parts(chart: ZWidth) -> list[str]:
         told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told
     parts = [unit_text(text) for name, text in told.items() if name != chart.vary]
     parts.append(hand_name(w.operator))
-    if any(r.verdict != LINEAR for r in chart.regions):
+    if any(r.verdict != BY_GROWTH for r in chart.regions):
         parts.append(f"rest within {1e6 * chart.press.still:g} um")
     return parts
