@@ -343,7 +343,7 @@ def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[
 
 
 def _value_name(vary: str, value: Any, unit: str, factor: float) -> str:
-    if value is None:
+    if value is None or value == "none":
         return f"no {vary}"
     x = value * factor if isinstance(value, int | float) else value
     return f"{LETTERS.get(vary, vary)} = {x:g} {unit}" if x is not value else f"{vary} = {x}"

@@ -86,13 +86,13 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
             label = limit.name + KIND_WORDS[limit.kind]
         if look.get("marker"):
             look |= dict(ms=stroke(8), mfc=WHITE, mew=stroke(1.8), zorder=6, clip_on=False)
-        ax.plot(limit.B, _where_stable(limit.K, bottom), label=label, **look)
+        ax.plot(limit.B, _where_stable(limit.K), label=label, **look)
     runs: Any = dict(ls="none", color=BLACK, ms=stroke(6), zorder=5, clip_on=False)
     how = "stability" if r.verdict == BY_GROWTH else "rest"
-    ax.plot(r.B, _where_stable(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
+    ax.plot(r.B, _marked(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
     if r.box:
         label = "runs with the worst hand"
-        ax.plot(r.B, _where_stable(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
+        ax.plot(r.B, _marked(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
 
 
 def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
@@ -104,13 +104,13 @@ def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
         ax.fill_between(*_region_edge(r), bottom, color=color, alpha=0.05, lw=0, zorder=0.5)
         if r.linear:
             limit = r.limits[0]
-            ax.plot(limit.B, _where_stable(limit.K, bottom), color=color, ls=style)
+            ax.plot(limit.B, _where_stable(limit.K), color=color, ls=style)
         else:
             ax.plot(*_region_edge(r), color=color, ls=style, lw=stroke(1.0))
         look: Any = dict(color=color, marker=marker, ls="none", ms=stroke(5), clip_on=False)
         if i % 2:
             look["mfc"] = WHITE
-        ax.plot(r.B, _where_stable(r.K, bottom), label=r.name, zorder=5, **look)
+        ax.plot(r.B, _marked(r.K, bottom), label=unit_text(r.name), zorder=5, **look)
     _name_regions(ax, regions)
 
 
@@ -133,15 +133,16 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
     if room(side) < LABEL_ROOM:
         return  # the legend names them
     for i, (r, place) in enumerate(zip(regions, places[side], strict=True)):
+        left = side == "left"
         ax.annotate(
-            r.name,
+            unit_text(r.name),
             place,
-            xytext=(points(6.0), points(-5.0 if side == "left" else 5.0)),
+            xytext=(stroke(7.0) if left else 0.0, stroke(-5.0 if left else 6.0)),
             textcoords="offset points",
             color=CURVE_STYLES[i % len(CURVE_STYLES)][0],
             fontsize=points(9.0),
-            ha="left" if side == "left" else "center",
-            va="top" if side == "left" else "bottom",
+            ha="left" if left else "center",
+            va="top" if left else "bottom",
             zorder=7,
         )
 
@@ -154,10 +155,16 @@ def _region_edge(r: ZRegion) -> tuple[list[float], list[float]]:
     return (B, K) if math.isnan(r.most_B) else ([*B, r.most_B], [*K, 0.0])
 
 
-def _where_stable(K: Sequence[float], bottom: float) -> np.ndarray:
+def _where_stable(K: Sequence[float]) -> np.ndarray:
     """K, with a gap where there is none."""
     a = np.array(K, dtype=float)
     return np.where(np.isfinite(a) & (a > 0.0), a, np.nan)
+
+
+def _marked(K: Sequence[float], bottom: float) -> np.ndarray:
+    """K of markers, which must not lie under the axes."""
+    a = _where_stable(K)
+    return np.where(a >= bottom, a, np.nan)
 
 
 def _set_axes(ax: Axes, regions: Sequence[ZRegion]) -> None:
