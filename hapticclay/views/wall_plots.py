@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from ..model.virtual_wall import VirtualWall
@@ -144,6 +145,7 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
             ha="left" if left else "center",
             va="top" if left else "bottom",
             zorder=7,
+            path_effects=[withStroke(linewidth=stroke(3.0), foreground=WHITE)],
         )
 
 
