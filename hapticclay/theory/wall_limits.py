@@ -25,6 +25,7 @@ MOST_STATES = 600  # of a map whose eigenvalues are asked for
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
 TRIED_ANGLES = 4000  # values of omega Ts at which it is tried, twice
 TOP_OMEGA = 1e7  # [rad/s]
+HUGE = 1e30  # [N/m] in place of infinity, which a search cannot subtract
 REFINED = 3  # rounds of the search within a box of hands
 
 
@@ -405,9 +406,11 @@ def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray)
     from scipy.optimize import minimize_scalar
 
     i = int(np.argmin(y))
+    if math.isinf(y[i]):
+        return float(y[i])
     around = float(x[max(i - 1, 0)]), float(x[min(i + 1, len(x) - 1)])
     found: Any = minimize_scalar(
-        lambda a: min(float(f(np.array([a]))[0]), 1e300), bounds=around, method="bounded"
+        lambda a: min(float(f(np.array([a]))[0]), HUGE), bounds=around, method="bounded"
     )
     return min(float(y[i]), float(found.fun))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
 from ..theory import linear_loop
+from . import figure as shown
 from .style import (
     BLACK,
     BLUE,
@@ -518,6 +520,71 @@ FIGURES: dict[str, Callable[[Record], Figure | None]] = {
 }
 """File name of each figure of a run, and the function that draws it or returns None where the
 figure does not apply. To add a plot to `hapticclay run`, add an entry."""
+
+
+FIGURE_COLUMNS = {  # of a record, of which each figure shows some; other figures: all
+    "velocity": ("p", "v"),
+    "force": ("p", "v", "fh", "fe", "b"),
+    "path": ("p",),
+    "force_position": ("p", "fh", "fe"),
+    "force_velocity": ("v", "fe"),
+    "ground": ("p",),
+}
+COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
+
+
+def record_figures(record: Record) -> dict[str, shown.Figure]:
+    """Returns every figure of FIGURES, to be drawn in any style; some may not apply to the run.
+
+    Args:
+        record: the run.
+    """
+    return {
+        name: shown.Figure(
+            functools.partial(draw, record), functools.partial(run_tables, record, name)
+        )
+        for name, draw in FIGURES.items()
+    }
+
+
+def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
+    """Returns the numbers that a figure of FIGURES shows.
+
+    Args:
+        record: the run.
+        name: of the figure.
+    """
+    samples: dict[str, Any] = {"time [s]": record.t}
+    for part in FIGURE_COLUMNS.get(name, tuple(COLUMN_UNITS)):
+        for i, axis in enumerate(AXES):
+            word = axis if part == "p" else f"{part}_{axis}"
+            samples[f"{word} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
+    out = {"samples": samples}
+    if name == "velocity":
+        rows = [(axis, r[axis]) for axis in AXES for r in record.regions(axis)]
+        out["stretches"] = {
+            "axis": [axis for axis, _ in rows],
+            "from [m]": [r["from_m"] for _, r in rows],
+            "to [m]": [r["to_m"] for _, r in rows],
+            "steady speed [m/s]": [r["steady_speed"] for _, r in rows],
+            "expected speed [m/s]": [r["expected_speed"] for _, r in rows],
+        }
+    clay = record.scenario.clay
+    if name == "ground" and record.ground is not None and clay and clay.groove:
+        x, y = (0.5 * (e[1:] + e[:-1]) for e in clay.groove.edges)
+        i, j = (a.ravel() for a in np.indices(record.ground.shape))
+        out["cells"] = {"x [m]": x[i], "y [m]": y[j], "left [m]": record.ground.ravel()}
+    return out
+
+
+def figure_files(folder: Path) -> set[Path]:
+    """Lists the files that figures of FIGURES, in any format, and their numbers have in a folder.
+
+    Args:
+        folder: of a record.
+    """
+    ends = [f".{kind}" for kind in (*shown.FORMATS, "csv")] + ["-stretches.csv", "-cells.csv"]
+    return {path for name in FIGURES for end in ends if (path := folder / f"{name}{end}").exists()}
 
 
 def figures(record: Record) -> dict[str, Figure]:

@@ -529,6 +529,24 @@ def sweep_plot(
     return figure
 
 
+def sweep_tables(
+    table: Any, value: str = "status", x: str | None = None, y: str | None = None
+) -> dict[str, dict[str, list]]:
+    """Returns what a map of a sweep shows: its runs with both parameters and the column.
+
+    Args:
+        table: from `read_sweep`.
+        value: column shown.
+        x: as in `sweep_plot`.
+        y: as in `sweep_plot`.
+    """
+    names = swept_parameters(table)
+    x = x or names[0]
+    y = y or next(n for n in names if n != x)
+    columns = {_column_label(name): table[name].to_pylist() for name in (x, y, value)}
+    return {"runs": columns | {"why none": missing_reasons(table, value)}}
+
+
 class Mapped(NamedTuple):
     """Runs of a sweep to be mapped, an entry a run.
 
