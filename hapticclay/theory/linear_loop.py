@@ -529,7 +529,7 @@ def sampled_differences(
         change, drive = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, n))
         # In the directions in which hand and handle have one mass the axes are decoupled.
         for size, direction in zip(masses.tolist(), directions.T, strict=True):
-            own, held = _moved(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
+            own, held = held_motion(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
             share = np.outer(direction, direction)
             change += np.kron(own, share)
             drive += np.kron(held[:, None], share)
@@ -618,7 +618,7 @@ def _over_states(
 
 
 def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """As `_moved`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
+    """As `held_motion`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
     n = len(w)
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
@@ -627,7 +627,7 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
     return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
 
 
-def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
+def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Change of (p, v) over t [s] under p'' = own @ (p, v) + w u.
 
     The response to a pulse, and its integral, are divided differences of exp(s t) at the roots 0,
