@@ -24,6 +24,7 @@ from ..simulation.simulate import simulate
 from ..theory import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.linear_loop import Loop
+from ..theory.wall_limits import stable_wall, stiffness_band
 from .boundary import PushedLoop
 from .identification import _multisine, estimate_response
 
@@ -210,7 +211,7 @@ def measure_impedance(
             raise ParameterError("amplitude", amplitude, LIMITS + record.status)
         part = slice(settling * n, (settling + 2) * n)
         measured, deviation = _measured(subject, record, part, n, steps, i, wave)
-        if deviation.max() <= SETTLED:
+        if deviation.max() <= SETTLED or _rough(subject):
             break
     else:
         bound = (
@@ -228,6 +229,13 @@ def _check_subject(subject: Subject) -> None:
         if subject.surface:
             bound = "must be False: a wall that acts on one side alone is not linear"
             raise ParameterError("wall.surface", True, bound)
+        if not _rough(subject) and not stable_wall(subject):
+            bound = (
+                f"must leave the wall stable with this hand: between {{:.4g}} and {{:.4g}} N/m "
+                f"at B = {subject.B:g} N.s/m, M = {subject.M:g} kg"
+            )
+            bound = bound.format(*stiffness_band(subject))
+            raise ParameterError("wall.K", subject.K, bound)
         return
     if not isinstance(subject, PushedLoop):
         raise ParameterError("subject", subject, "must be a PushedLoop or a VirtualWall")
@@ -235,6 +243,12 @@ def _check_subject(subject: Subject) -> None:
         limit = gain_limit.gain_limit(subject.linear)
         bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
         raise ParameterError("K", subject.K, bound)
+
+
+def _rough(subject: Subject) -> bool:
+    """Whether friction or encoder are in the run, which theory leaves out."""
+    device = subject.device if isinstance(subject, VirtualWall) else None
+    return device is not None and bool(device.friction or device.quantum)
 
 
 def _grid(subject: Subject, length: float) -> tuple[float | None, int, int]:
@@ -291,7 +305,7 @@ def _measured(  # noqa: PLR0913  # one record, and where it is read
 
 def _notes(subject: Subject, dt: float) -> tuple[str, ...]:
     notes = []
-    if isinstance(subject, VirtualWall) and (subject.device.friction or subject.device.quantum):
+    if _rough(subject):
         notes.append(
             "friction and encoder make the response depend on the amplitude: measured is the best "
             "linear one at this amplitude, computed leaves them out"

@@ -109,15 +109,15 @@ def held_arm(  # noqa: PLR0913  # the numbers of one mass
     whole = math.floor(delay / Ts + 1e-9)
     part = delay / Ts - whole
     part = part if part > 1e-9 else 0.0
-    A = np.array([[0.0, 1.0, 0.0], [-spring / mass, -damper / mass, 1.0 / mass], [0.0, 0.0, 0.0]])
+    own, s = np.array([-spring, -damper]) / mass, 1j * omega
     # under the force of one sample for a share `part`, then under the next
-    head, rest = (controller.matrix_exponential(x * Ts * A) for x in (part, 1.0 - part))
-    step, s = rest[:2, :2] @ head[:2, :2], 1j * omega
-    z = np.exp(s * Ts)
-    before = z ** -(1.0 + whole)
-    drive = np.multiply.outer(before, rest[:2, :2] @ head[:2, 2])
-    drive += np.multiply.outer(z**-whole, rest[:2, 2])
-    ahead = np.expm1(s * Ts)[:, None, None] * np.eye(2) - (step - np.eye(2))
+    head, old = linear_loop.held_motion(own, 1.0 / mass, part * Ts)
+    rest, new = linear_loop.held_motion(own, 1.0 / mass, (1.0 - part) * Ts)
+    change, z1 = rest + head + rest @ head, np.expm1(s * Ts)
+    before = np.exp(-s * Ts * (1 + whole))
+    drive = np.multiply.outer(before, old + rest @ old)
+    drive += np.multiply.outer(np.exp(-s * Ts * whole), new)
+    ahead = z1[:, None, None] * np.eye(2) - change
     held = np.linalg.solve(ahead, drive[:, :, None])[:, :, 0]
     place = 1.0 / (mass * s * s + damper * s + spring)
     hold = -np.expm1(-s * Ts) / (s * Ts) * np.exp(-s * delay)
