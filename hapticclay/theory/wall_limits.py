@@ -24,7 +24,7 @@ from .margins import Box
 MOST_STATES = 600  # of a map whose eigenvalues are asked for
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
 TURNS = 4000  # values of omega Ts at which it is tried, twice
-FASTEST = 1e7  # [rad/s]
+HIGHEST = 1e7  # [rad/s]
 REFINED = 3  # rounds of the search within a box of hands
 
 
@@ -66,13 +66,15 @@ def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
     Raises:
         ParameterError: window and delay are of more than 600 samples together.
     """
-    family = _family(wall)
+    family, typical = _every_stiffness(wall), (wall.device.mass + wall.hand.mass) / wall.Ts**2
     edges = [0.0, *sorted(K for K, _ in gain_limit.gain_crossings(family)), math.inf]
     low = None
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         if b <= (1.0 + 1e-9) * a:
             continue
-        inside = (0.5 * b if b < math.inf else 1.0) if not a else math.sqrt(a * min(b, 16.0 * a))
+        inside = 0.5 * min(b, typical) if not a else math.sqrt(a * b)
+        if b == math.inf and a:
+            inside = 4.0 * max(a, typical)
         if family.stable(inside):
             low = a if low is None else low
         elif low is not None:
@@ -176,7 +178,7 @@ def _within(less: np.ndarray) -> bool:
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
 
 
-def _response(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _at_samples(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Place and velocity at the samples per force of the wall, late and held; turn is omega Ts."""
     change, soon, late, whole, _ = _motion(wall)
     z1 = np.expm1(1j * turn)
@@ -199,7 +201,7 @@ def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return law * smooth * rate, 0.0 * back
 
 
-def _family(wall: VirtualWall) -> gain_limit.LoopFamily:
+def _every_stiffness(wall: VirtualWall) -> gain_limit.LoopFamily:
     """The wall for every K."""
     wall = replace(wall, K=0.0)
     free = wall_differences(wall)
@@ -207,7 +209,7 @@ def _family(wall: VirtualWall) -> gain_limit.LoopFamily:
     n, Ts, top = len(free), wall.Ts, math.pi / wall.Ts
 
     def h(omega: np.ndarray) -> np.ndarray:
-        place, speed = _response(wall, omega * Ts)
+        place, speed = _at_samples(wall, omega * Ts)
         by_place, by_speed = _object(wall, omega * Ts)
         return -place / (1.0 + by_place * place + by_speed * speed)
 
@@ -502,7 +504,7 @@ def hulin_boundary(
 
     def crossing(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """B and K that put a pair of poles at z = exp(+-j turn): K + B (1 - 1/z)/Ts = -1/G."""
-        asked = -1.0 / _response(wall, turn)[0]
+        asked = -1.0 / _at_samples(wall, turn)[0]
         B = asked.imag * wall.Ts / np.sin(turn)
         return B, asked.real - 2.0 * B / wall.Ts * np.sin(0.5 * turn) ** 2
 
@@ -516,7 +518,7 @@ def hulin_boundary(
         i = int(gone[0])
         last = float(brentq(stiffness, turn[i - 1], turn[i])) if i else last  # type: ignore[arg-type]
     B, K = crossing(np.linspace(0.0, last, n)[1:])
-    if (opposite := _response(wall, np.array([math.pi]))[0].real[0]) < 0.0:
+    if (opposite := _at_samples(wall, np.array([math.pi]))[0].real[0]) < 0.0:
         K = np.minimum(K, -1.0 / opposite - 2.0 * B / wall.Ts)
     kept = K >= -1e-9 * K.max()
     return np.append(-damper, B[kept]), np.append(0.0, np.maximum(K[kept], 0.0))
@@ -546,7 +548,7 @@ def wall_impedance(wall: VirtualWall, omega: Any) -> np.ndarray:
     Ts, s = wall.Ts, 1j * omega
     bare = replace(wall, operator=None)
     turn = omega * Ts
-    place, speed = _response(bare, turn)
+    place, speed = _at_samples(bare, turn)
     by_place, by_speed = _object(bare, turn)
     by_place = by_place + wall.K
     back = 1.0 + by_place * place + by_speed * speed
@@ -557,6 +559,6 @@ def wall_impedance(wall: VirtualWall, omega: Any) -> np.ndarray:
 
 def _frequencies(omega: Any) -> np.ndarray:
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
-    if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= FASTEST)):
-        raise ParameterError("omega", omega, f"must be > 0 and <= {FASTEST:g} rad/s, shape (n,)")
+    if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= HIGHEST)):
+        raise ParameterError("omega", omega, f"must be > 0 and <= {HIGHEST:g} rad/s, shape (n,)")
     return omega
