@@ -102,6 +102,7 @@ from .theory.wall_limits import passivity_index as passivity_index
 from .theory.wall_limits import stable_wall as stable_wall
 from .theory.wall_limits import stiffness_band as stiffness_band
 from .theory.wall_limits import wall_impedance as wall_impedance
+from .views.figure import Figure as Figure
 from .views.images import gray_image as gray_image
 
 __version__: str
