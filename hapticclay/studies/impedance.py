@@ -159,6 +159,7 @@ def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> P
         shaping=scenario.shaping,
         torque_limit=scenario.torque_limit,
         arm=scenario.arm,
+        k=loop.k,
     )
 
 

@@ -142,12 +142,13 @@ def loop_response(loop: Loop, omega: np.ndarray) -> Impedance:
     """
     omega = frequencies(omega)
     s = 1j * omega
+    rendered = loop.b + loop.k / s
     if loop.Ts is None:
         Z, sent = late_impedance(loop, omega), np.exp(-s * loop.delay)
-        force = loop.b * (sent if loop.render == "held" else 1.0)
-        return Impedance(omega, Z, force / Z, loop.b + 0.0 * s)
+        force = rendered * (sent if loop.render == "held" else 1.0)
+        return Impedance(omega, Z, force / Z, rendered)
     v, fh, fe = _sampled_response(loop, omega)
-    return Impedance(omega, fh / v, fe / fh, loop.b + 0.0 * s)
+    return Impedance(omega, fh / v, fe / fh, rendered)
 
 
 @of_loop("K", "b", "omega", timing=True)
@@ -192,7 +193,7 @@ def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
     late = np.exp(-s * loop.delay)
     now, then = _now_and_late(replace(loop, operator=None))
     # N, which clay does not change, is what a hand of Th = 1 N/m adds
-    bare = replace(loop, b=0.0, operator=None)
+    bare = replace(loop, b=0.0, k=0.0, operator=None)
     touched = zip(
         _now_and_late(replace(bare, operator=UNIT_SPRING)), _now_and_late(bare), strict=True
     )
@@ -211,14 +212,14 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
 
     The law of the motors is that of `linear_loop.sampled_differences`, at z = exp(j omega Ts).
     """
-    Ts, th, b, n = loop.Ts, loop.hand, loop.b, loop.compensator.order
+    Ts, th, b, k, n = loop.Ts, loop.hand, loop.b, loop.k, loop.compensator.order
     assert Ts is not None
-    s, implicit = 1j * omega, loop.render == "implicit"
+    s, physical = 1j * omega, float(loop.render == "implicit")
     W = loop.servo.S.gain if loop.mobility is None else loop.mobility
     shaped = loop.servo.S.gain / W - 1.0  # share of the net force that shapes the inertia
     total = 1.0 / W + th.mass
-    damper = th.damper + (b if implicit else 0.0)
-    arm = held_arm(total, damper, th.spring, Ts, loop.delay, omega)
+    damper, spring = th.damper + physical * b, th.spring + physical * k
+    arm = held_arm(total, damper, spring, Ts, loop.delay, omega)
     # compensator and reference model, to the net force
     A, B = controller.held_compensator(loop.servo, loop.compensator, loop.gain, Ts)
     ahead = np.expm1(s * Ts)[:, None, None] * np.eye(n + 2) - (A - np.eye(n + 2))
@@ -226,19 +227,21 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     through = controller.controller_matrices(loop.servo, loop.compensator, loop.gain)[1][-1]
     law, delta = controller.feedback_vector(loop.servo), loop.compensator.state_space()[2]
     per_force = (states @ np.array([*(law[2] * delta), *law[4:]]) + through) / W + shaped
-    # f = uh - Th p - b v with the acceleration under the force that acted until the sample
+    # f = uh - Th p - b v - k p with the acceleration under the force that acted until the sample
     share = th.mass / total
-    f_place, f_own = th.spring * (share - 1.0), 1.0 - share
+    f_place, f_own = share * spring - th.spring - k, 1.0 - share
     f_speed = share * damper - th.damper - b
-    u_place = per_force * f_place + law[0] / W
-    u_speed = per_force * f_speed + law[1] / W - (0.0 if implicit else b)
+    u_place = per_force * f_place + law[0] / W - (1.0 - physical) * k
+    u_speed = per_force * f_speed + law[1] / W - (1.0 - physical) * b
     loop_gain = u_place * arm.held_place + u_speed * arm.held_speed
     loop_gain = loop_gain - per_force * share * arm.before
     asked = (u_place * arm.place + u_speed * arm.speed + per_force * f_own) / (1.0 - loop_gain)
     v = arm.speed * (1.0 + arm.hold * asked)
     fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
-    seen = arm.speed + arm.held_speed * asked  # velocity at the samples
-    return v, fh, b * (v if implicit else arm.hold * seen)
+    if physical:
+        return v, fh, (b + k / s) * v
+    seen = b * (arm.speed + arm.held_speed * asked) + k * (arm.place + arm.held_place * asked)
+    return v, fh, arm.hold * seen
 
 
 def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
