@@ -33,6 +33,8 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
     "fit": "hapticclay.cli.fit:FitCommand",
+    "impedance": "hapticclay.cli.impedance:ImpedanceCommand",
+    "mbk": "hapticclay.cli.mbk:MBKCommand",
     "bench": "hapticclay.cli.bench:BenchCommand",
     "fields": "hapticclay.cli.fields:FieldsCommand",
     "materials": "hapticclay.cli.materials:MaterialsCommand",

@@ -33,7 +33,7 @@ GROWTH_STEPS = 2  # of the engine a sample: under a held force each is exact but
 FADED_SHARE = 1e-6  # of the push: what is left may be rounding
 MOST_SOUGHT = 100.0  # times the exact border: end of a search
 HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
-DECAYS = (1.0, 300.0)  # [1/s] B/M of admittances
+DECAYS = (1.0, 1000.0)  # [1/s] B/M of admittances
 RANGE_BAND = (0.5, 30.0)  # [Hz]
 
 

@@ -152,7 +152,8 @@ def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Re
             span = float(tried[i + step]) - end
             end += span * bisect(lambda x, a=end, s=span: stable(a + s * x), 0.0, 1.0, 0.01)[0]
         ends.append(end)
-    x = np.linspace(*ends, n)
+    # dense towards the ends, where the borders meet
+    x = ends[0] + (ends[1] - ends[0]) * 0.5 * (1.0 - np.cos(np.linspace(0.0, math.pi, n)))
     bands = np.array([stable_band(replace(wall, **{across: v}), up) for v in x.tolist()])
     return Region(plane, wall, x, bands[:, 0], bands[:, 1])
 

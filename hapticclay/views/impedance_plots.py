@@ -64,7 +64,7 @@ def impedance_plot(found: MeasuredImpedance) -> Figure:
                 ax.axhline(value, **look)
             ax.plot(fine, curve, color=BLUE, label="computed")
             ax.plot(m.frequency, dots, label="measured", **_dots())
-            _scale(ax, np.concatenate((curve, dots)), value)
+            _scale(ax, np.concatenate((curve, dots)), value, log=False)
             ax.set(xscale="log", ylabel=unit_text(label))
         _frequency_axis(axes[-1], fine)
         figure.align_ylabels(list(axes))
@@ -124,18 +124,18 @@ def mbk_plot(found: DeviceMBK) -> Figure:
         for ax, (plane, region) in zip(axes, found.regions.items(), strict=True):
             across, up = PLANES[plane]
             high = np.where(np.isfinite(region.high), region.high, np.nan)
-            low = region.low
-            scale = "log" if up == "K" else "linear"
-            if scale == "log":  # from one thousandth of the top
-                low = np.maximum(low, 1e-3 * np.nanmax(high))
-                high = np.maximum(high, low)
+            log = plane == "mass-stiffness"
+            low = np.maximum(region.low, 1e-9) if log else region.low
             ax.fill_between(region.x, low, high, color=BLUE, alpha=0.15, lw=0.0, label="stable")
             ax.plot(region.x, high, color=BLUE, label="exact border")
-            if scale == "linear":
+            if up == "B":
                 ax.plot(region.x, low, color=BLUE)
             _border_dots(ax, found.found[plane])
             ax.set(xlabel=unit_text(PART_LABELS[across]), ylabel=unit_text(PART_LABELS[up]))
-            ax.set(yscale=scale)
+            if log:
+                ax.set(yscale="log", ylim=(2e-4 * np.nanmax(high), 2.0 * np.nanmax(high)))
+            elif up == "K":
+                ax.set_ylim(0.0, None)
             if across == "M":
                 ax.axvline(0.0, color=BLACK, lw=stroke(0.8))
             third = ({"K", "B", "M"} - {across, up}).pop()
@@ -159,7 +159,7 @@ def dynamic_range_plot(found: DeviceMBK) -> Figure:
         ax = figure.add_subplot()
         ax.fill_between(f, r.free, r.most, color=PALE_GREY, lw=0.0)
         w = r.stiffest
-        text = f"stiffest wall, K = {w.K:.3g} N/m, B = {w.B:.3g} N.s/m"
+        text = f"stiffest wall, K = {1e-3 * w.K:.3g} kN/m, B = {w.B:.3g} N.s/m"
         ax.plot(f, r.most, color=VERMILION, ls="--", label=unit_text(text))
         ax.plot(f, r.free, color=BLUE, label="free device")
         ax.plot(f, r.least, color=GREEN, ls="-.", label="least stable virtual mass")
@@ -168,7 +168,7 @@ def dynamic_range_plot(found: DeviceMBK) -> Figure:
         i = len(f) // 2
         middle = math.sqrt(r.free[i] * r.most[i])
         look: Any = dict(ha="center", va="center", fontsize=points(9.0), color=BLACK)
-        ax.text(f[i], middle, f"{r.decibels[i]:.0f} dB, mean {r.mean:.0f} dB", **look)
+        ax.text(f[i], middle, f"range {r.mean:.0f} dB in the mean", **look)
         add_legend(figure, ax, 1)
     return figure
 
@@ -195,7 +195,8 @@ def least_mass_plot(found: ArmMBK) -> Figure:
             ax.plot(x, y, label="border by runs", **_dots(BLUE))
         ax.set(xscale="log", yscale="log")
         ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
-        ax.text(0.03, 0.97, "stable above", transform=ax.transAxes, va="top", fontsize=points(9.0))
+        look: Any = dict(transform=ax.transAxes, ha="right", va="top", fontsize=points(9.0))
+        ax.text(0.98, 0.98, "stable: above and to the right", **look)
         add_legend(figure, ax, 3 if not narrow() else 1)
         how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
         set_title(ax, f"arm, {loop.axis} axis", how)
@@ -240,16 +241,15 @@ def _dots(color: str = BLUE, mark: str = "o") -> Any:
 
 def _border_dots(ax: Axes, borders: tuple[Border, ...]) -> None:
     if borders:
-        low = ax.get_ylim()[0]
-        x, y = np.array([(b.x, b.y) for b in borders if b.y > low]).T
+        x, y = [b.x for b in borders], [b.y for b in borders]
         ax.plot(x, y, label="border by runs", **_dots(VERMILION))
 
 
-def _scale(ax: Axes, y: np.ndarray, also: float | None) -> None:
-    """A logarithmic scale for positive values that span much, else one that shows zero."""
+def _scale(ax: Axes, y: np.ndarray, also: float | None, log: bool = True) -> None:
+    """A scale that shows zero, or where log is True and positive values span much, that of logs."""
     some = y[np.isfinite(y)]
     some = np.append(some, also) if also is not None else some
-    if some.min() > 0.0 and some.max() / some.min() > LOG_SPAN:
+    if log and some.min() > 0.0 and some.max() / some.min() > LOG_SPAN:
         ax.set_yscale("log")
     elif some.min() >= 0.0:
         ax.set_ylim(0.0, 1.1 * some.max())
