@@ -7,7 +7,7 @@ response is taken at its lines over whole periods, as in `identification`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -296,7 +296,9 @@ def _measured(  # noqa: PLR0913  # one record, and where it is read
     bins = np.round(wave.omega / (2.0 * math.pi) * wave.period).astype(int)
     reference = wave(record.t[part])[:, i]
     Z = estimate_response(np.array([[reference, v, fh]]), n, bins)
-    felt = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
+    felt = np.zeros_like(Z.response)
+    if np.any(fe):
+        felt = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
     if held:
         turn = 1j * wave.omega * wave.period / n
         felt = felt * -np.expm1(-turn) / turn
@@ -315,24 +317,3 @@ def _notes(subject: Subject, dt: float) -> tuple[str, ...]:
     if abs(late - round(late)) > 1e-6:
         notes.append("the delay is no multiple of a step: measured fe/fh is late by up to a step")
     return tuple(notes)
-
-
-def impedance_rows(found: MeasuredImpedance) -> list[Mapping[str, float]]:
-    """Measured and computed values at each line, a dictionary a line.
-
-    Args:
-        found: from `measure_impedance`.
-    """
-    m, c = found.measured, found.computed
-    return [
-        {
-            "f": float(m.frequency[j]),
-            "stiffness": float(m.stiffness[j]),
-            "damping": float(m.damping[j]),
-            "mass": float(m.mass[j]),
-            "difference": float(abs(m.Z[j] / c.Z[j] - 1.0)),
-            "felt": float(abs(m.felt[j])),
-            "felt_difference": float(abs(m.felt[j] / c.felt[j] - 1.0)) if c.felt[j] else math.nan,
-        }
-        for j in range(len(m.omega))
-    ]
