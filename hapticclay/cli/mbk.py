@@ -88,8 +88,8 @@ class MBKCommand:
         assert self.arm is not None
         box = HANDS
         if self.box:
-            low, high = self.box[::2], self.box[1::2]
-            box = Box(*zip(low, high, strict=True))
+            m0, m1, d0, d1, k0, k1 = self.box
+            box = Box((m0, m1), (d0, d1), (k0, k1))
         operator = Operator(*self.hand) if self.hand else Operator()
         loop = PushedLoop(self.arm, b=0.0, operator=operator, Ts=self.Ts)
         points = 7 if self.quick else 17

@@ -36,8 +36,8 @@ MOTION = 1e-5  # [m] rms: the pose changes the mobility by 4e-5 of it
 LONGEST_STEP = 1e-4  # [s] of the engine: its error is (omega dt)^2/6, 6e-5 at 30 Hz
 STEPS_TRIED = 24  # more of them a sample, until the delay falls on a step
 SETTLING_PERIODS = (2, 6, 22)  # let go by before the response is taken, until it has settled
-SETTLED = 1e-4  # relative deviation of the impedance from period to period
-LIMITS = "must leave the motion linear: "
+STEADY_RESPONSE = 1e-4  # relative deviation of the impedance from period to period
+LINEAR_MOTION = "must leave the motion linear: "
 
 Subject = PushedLoop | VirtualWall
 
@@ -205,23 +205,23 @@ def measure_impedance(
     place = 1.0 / (s * computed.Z + th.mass * s * s + th.damper * s + th.spring)
     rms = amplitude / math.sqrt(np.mean(np.abs(place) ** 2))
     wave = replace(wave, rms=(rms * along[0], rms * along[1]))
+    deviation, settling = np.array([math.inf]), 0
     for settling in SETTLING_PERIODS:
-        scenario = _scenario(subject, wave, (settling + 2) * wave.period, dt)
+        scenario = _driven_scenario(subject, wave, (settling + 2) * wave.period, dt)
         record = simulate(scenario)
         if record.outcome.code != "time limit" or record.outcome.cause:
-            raise ParameterError("amplitude", amplitude, LIMITS + record.status)
+            raise ParameterError("amplitude", amplitude, LINEAR_MOTION + record.status)
         part = slice(settling * n, (settling + 2) * n)
         measured, deviation = _measured(subject, record, part, n, steps, i, wave)
-        if deviation.max() <= SETTLED or _rough(subject):
-            break
-    else:
-        bound = (
-            f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
-            f"after {settling} periods of {wave.period:.3g} s; give a longer period"
-        )
-        raise ParameterError("period", period, bound)
-    felt = replace(measured, rendered=computed.rendered)
-    return MeasuredImpedance(subject, felt, computed, deviation, scenario, _notes(subject, dt))
+        if deviation.max() <= STEADY_RESPONSE or _rough(subject):
+            felt = replace(measured, rendered=computed.rendered)
+            notes = _notes(subject, dt)
+            return MeasuredImpedance(subject, felt, computed, deviation, scenario, notes)
+    bound = (
+        f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
+        f"after {settling} periods of {wave.period:.3g} s; give a longer period"
+    )
+    raise ParameterError("period", period, bound)
 
 
 def _check_subject(subject: Subject) -> None:
@@ -267,7 +267,7 @@ def _grid(subject: Subject, length: float) -> tuple[float | None, int, int]:
     return subject.Ts, samples * steps, steps
 
 
-def _scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
+def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
     if isinstance(subject, VirtualWall):
         return subject.scenario(t_max, muscle=wave, steps=round(subject.Ts / dt))
     still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop=True)

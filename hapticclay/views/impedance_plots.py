@@ -180,23 +180,25 @@ def least_mass_plot(found: ArmMBK) -> Figure:
         found: from `arm_mbk`.
     """
     loop = found.loop
+    timed = loop.Ts is not None or loop.delay > 0.0
+    every = "worst hand tried of the box" if timed else "every hand of the box, exact"
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.0))
         ax = figure.add_subplot()
         for (M, B), color, style, name in (
-            (found.worst, VERMILION, "--", "every hand of the box"),
-            (found.nominal, BLUE, "-", hand_name(loop.operator)),
+            (found.worst, VERMILION, "--", every),
+            (found.nominal, BLUE, "-", f"{hand_name(loop.operator)}, exact"),
         ):
             there = np.isfinite(M) & (M > 0.0)
             if np.any(there):
-                ax.plot(B[there], M[there], color=color, ls=style, label=f"{name}, exact")
+                ax.plot(B[there], M[there], color=color, ls=style, label=name)
         if found.found:
             x, y = [r.x for r in found.found], [r.y for r in found.found]
             ax.plot(x, y, label="border by runs", **_dots(BLUE))
         ax.set(xscale="log", yscale="log")
         ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
-        look: Any = dict(transform=ax.transAxes, ha="right", va="top", fontsize=points(9.0))
-        ax.text(0.98, 0.98, "stable: above and to the right", **look)
+        look: Any = dict(transform=ax.transAxes, ha="left", va="bottom", fontsize=points(9.0))
+        ax.text(0.03, 0.04, "stable above and to the right", **look)
         add_legend(figure, ax, 3 if not narrow() else 1)
         how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
         set_title(ax, f"arm, {loop.axis} axis", how)

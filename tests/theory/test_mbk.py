@@ -18,7 +18,7 @@ WALL = hc.VirtualWall(device=hc.Device(0.1, 0.5))
 @given(B=st.floats(0.0, 150.0), M=st.floats(-0.05, 0.1), delay=st.floats(0.0, 2e-3))
 @settings(max_examples=20, deadline=None)
 def test_the_band_of_springs_is_that_of_the_exact_crossings(B, M, delay):
-    """`stiffness_band` has the crossings of the unit circle, `stable_band` a grid of eigenvalues."""
+    """`stiffness_band` has the crossings of the unit circle, `stable_band` eigenvalues."""
     wall = replace(WALL, B=B, M=M, delay=delay)
     low, high = hc.stiffness_band(wall)
     found = mbk.stable_band(wall, "K")
