@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import hapticclay as hc
@@ -206,3 +207,11 @@ def test_text_can_be_read_in_print(name, style, monkeypatch):
     for title, box in titles:
         assert not any(box.overlaps(key) for key in keys), title
         assert not any(box.overlaps(b) for t, b in titles if t is not title), title
+
+
+def test_the_check_sees_what_is_clipped(monkeypatch):
+    figure = Figure(figsize=(2.0, 2.0))
+    figure.text(0.9, 0.5, "clipped at the right")
+    FigureCanvasAgg(figure)
+    ((_, box),) = texts(figure, monkeypatch)
+    assert box.x1 > figure.bbox.x1
