@@ -19,7 +19,7 @@ from .spring import STIFFNESS_MAX
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
 STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
 UPRIGHT = 0.5 * math.pi  # [rad] joint 1 where x = 0
-STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
+SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
 MASS_MAX = 1e6  # [kg]
 
 
@@ -97,7 +97,7 @@ class VirtualWall:
         push: float = 0.0,
         start: float = 0.0,
         muscle: Signal | None = None,
-        steps: int = STEPS,
+        steps: int = SAMPLE_STEPS,
     ) -> Scenario:
         """Build a run of it: link 1 of an arm is the device, the wall a sampled controller.
 

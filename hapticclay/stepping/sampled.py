@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm, clay, compensator, controller, flow, hardware, operator
+from ..model import arm, clay, compensator, controller, flow, hardware, operator, regions
+from ..model import spring as springs
 from ..model.compensator import Compensator
 from ..model.controller import Servo
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
@@ -763,7 +764,9 @@ def sample(s, e, w1, w2, fx, fy):
         elif s["yields"]:
             rx, ry = force_in_motion(s, vx, vy)
             fex, fey = fex + rx, fey + ry
-        if s["springs"]:
+        if s["springs"] == 2 and s["encoder"]:
+            fex, fey = fex + measured_pull(s, 0, px), fey + measured_pull(s, 1, py)
+        elif s["springs"]:
             fex, fey = fex + s["sprung"][0], fey + s["sprung"][1]
         put10(hold, 0, 0.0, 0.0, fex, fey, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if s["coupled"] or s["guarded"]:
@@ -800,6 +803,28 @@ def sample(s, e, w1, w2, fx, fy):
         next_form(s, 1, fy)
     else:
         next_memory(s, fx, fy)
+
+
+def measured_pull(s, i, p):
+    """Force of the springs that the motors render, at a place as an encoder reads it.
+
+    What gave way and what relaxed since goes by the true place.
+
+    Args:
+        s: state of the run.
+        i: axis.
+        p: the place [m].
+
+    Returns:
+        The force [N].
+    """
+    spring, stretch, n = s["spring"], s["stretch"], i * regions.SPRING
+    k, limit, k1, way = spring[n], spring[n + 1], spring[n + 2], spring[n + 5]
+    _, f, _, _ = springs.spring_step(k, limit, way, stretch[2 * i], p)
+    # the second spring is as long as when the handle was last seen, and what was misread
+    rest = s["sprung_at"][i] - stretch[2 * i + 1]
+    _, f1, _, _ = springs.spring_step(k1, INF, way, rest, p)
+    return f + f1
 
 
 def driven_torques(s, t1, t2):

@@ -18,6 +18,7 @@ from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
 from ..model.hardware import Interface
 from ..model.scenario import Position, Scenario, TorqueLimit
+from ..model.spring import Spring
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limit, linear_loop
@@ -45,6 +46,7 @@ class PushedLoop(Loop):
 
     Attributes:
         b: clay on both axes [N.s/m].
+        k: stiffness of it on both axes, with its rest where the handle starts [N/m].
         K: compensator gain, > 0, at most 1e6.
         shaping: as in Scenario; without it the arm's mobility takes the place of the gain of Sh.
         pose: place of the handle, from its nominal position [m].
@@ -73,7 +75,7 @@ class PushedLoop(Loop):
             t_max: length of the run [s].
             stop: as in Scenario.
         """
-        i, everywhere = AXES.index(self.axis), Profile((), (self.b,))
+        i, everywhere = AXES.index(self.axis), Profile((), (self.b,), springs=(Spring(self.k),))
         x, y = self._nominal
         moves = linear_loop.reduced(self.compensator).den[-1] == 0.0
         along = (lambda x: (x, 0.0)) if i == 0 else (lambda x: (0.0, x))
@@ -102,7 +104,7 @@ class PushedLoop(Loop):
     @property
     def linear(self) -> Loop:
         """The linear loop of it at the nominal pose."""
-        return Loop.of(self.scenario(), self.axis, self.b)
+        return replace(Loop.of(self.scenario(), self.axis, self.b), k=self.k)
 
     @property
     def _nominal(self) -> tuple[float, float]:
@@ -243,6 +245,18 @@ def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> floa
     return _simulated(loop, "b", guess, most)
 
 
+def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: float = 1e7) -> float:
+    """Clay's k [N/m] above which the oscillation of a run grows; the loop's own k does not matter.
+
+    Args:
+        loop: all but k.
+        guess: start of the search [N/m]; None for the limit of the linear loop.
+        most: end of the search [N/m].
+    """
+    guess = gain_limit.stiffness_limit(loop.linear) if guess is None else guess
+    return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
+
+
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
     def rate(value: float) -> float:
         return growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
@@ -281,6 +295,7 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
         Ts=loop.Ts,
         delay=loop.delay,
         render=loop.render,
+        k=loop.k,
     )
     loops = (loop, other) if i == 0 else (other, loop)
     x, y = loop._nominal

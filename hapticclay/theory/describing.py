@@ -243,6 +243,7 @@ def limit_cycles(loop: Loop, *, flow: Flow) -> tuple[LimitCycle, ...]:
         ParameterError: a value is out of its bounds.
     """
     is_flow(flow)
+    without_spring(loop)
     A, B = _over_damping(loop)
     found = sorted(
         (V, crossing)
@@ -294,6 +295,19 @@ def is_flow(flow: Flow) -> None:
     """
     if not isinstance(flow, Flow):
         raise ParameterError("flow", flow, "must be a Flow")
+
+
+def without_spring(loop: Loop) -> None:
+    """Refuses a loop in clay that springs back, where clay that yields would rest elsewhere.
+
+    Args:
+        loop: the loop.
+
+    Raises:
+        ParameterError: its k is not 0.
+    """
+    if loop.k:
+        raise ParameterError("k", loop.k, "must be 0 here: the analysis is of clay that yields")
 
 
 def _counts(loop: Loop, flow: Flow, speeds: list[float]) -> list[int]:

@@ -22,6 +22,7 @@ from numpy.polynomial import Polynomial
 from ..errors import number
 from ..model.compensator import Compensator
 from ..model.scenario import Scenario
+from ..model.spring import STIFFNESS_MAX
 from . import linear_loop, roots
 from .linear_loop import Loop, of_loop
 
@@ -49,6 +50,30 @@ def gain_limit(loop: Loop) -> float:
         ParameterError: a value is out of its bounds.
     """
     return critical_gain(loop)[0]
+
+
+@of_loop("K", "b", "operator", timing=True)
+def stiffness_limit(loop: Loop) -> float:
+    """Largest stiffness k of the clay up to which the loop of one axis is stable [N/m].
+
+    In continuous time without delay it is the first crossing of the closed-loop polynomial, which
+    is linear in k: exact. Otherwise k rises over 20 values a decade, from 1e-3 N/m, until the loop
+    is unstable, and the limit is bisected: a window of k narrower than that may be missed.
+
+    Args:
+        loop: the loop with its K > 0, whose own k does not matter; or axis, K, b, operator, and
+            other parts by name.
+
+    Returns:
+        k; inf if there is no limit up to 1e9 N/m, 0 if the loop is unstable at any small k.
+    """
+    soft = replace(loop, k=0.0)
+    if loop.Ts is None and not loop.delay:
+        per_place = linear_loop.device_admittance(soft)[0]
+        return roots.first_crossing(linear_loop.characteristic(soft), per_place)[0]
+    grid = np.geomspace(1e-3, STIFFNESS_MAX, 241).tolist()
+    low, high = roots.first_failure(lambda k: is_stable(replace(loop, k=k)), grid, rtol=1e-10)
+    return high if low else 0.0
 
 
 def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
@@ -89,7 +114,9 @@ def is_stable(loop: Loop) -> bool:
         loop: the loop with its K > 0.
     """
     K = number("K", loop.gain, 0.0, above=True)
-    if loop.Ts is not None or loop.delay:
+    if loop.Ts is not None:
+        return _within_circle(*_acting_map(loop)[:3], K)
+    if loop.delay:
         return loop_family(loop).stable(K)
     return linear_loop.stable(loop)
 
@@ -206,7 +233,14 @@ def _zeros(
         )
         if bottom.fun < 0.0:  # type: ignore[union-attr]
             spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
-    return [math.exp(brentq(f, a, c, xtol=1e-15, rtol=1e-14)) for a, c in spans]  # type: ignore[arg-type]
+
+    def zero(a: float, c: float) -> float:
+        fa, fc = f(a), f(c)
+        if fa * fc > 0.0:  # one of them is a zero but for the rounding of an array beside a number
+            return a if abs(fa) < abs(fc) else c
+        return brentq(f, a, c, xtol=1e-15, rtol=1e-14)  # type: ignore[return-value]
+
+    return [math.exp(zero(a, c)) for a, c in spans]
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
@@ -324,19 +358,9 @@ def sampled_loop(loop: Loop) -> LoopFamily:
     Args:
         loop: the loop, sampled, whose own K does not matter.
     """
-    loop = replace(loop, compensator=linear_loop.reduced(loop.compensator))
-    less, beta, gamma = linear_loop.sampled_differences(loop)
-    less, beta, gamma = _from_rest(loop, less, beta[:, 0], gamma[0])
-    t, Ts = loop.environment, loop.Ts
+    less, beta, gamma, free, integrators, unseen = _acting_map(loop)
+    t, Ts, n = loop.environment, loop.Ts, len(less)
     assert Ts is not None
-    integrators = _integrators(loop.compensator)
-    # Nothing of the force tells of a state that only moves the place, or the speed, of the handle.
-    unseen = min(integrators, roots.multiplicity_of_zero(t)) if np.any(t.coef) else integrators
-    kept = np.delete(np.arange(len(less)), np.arange(2, 2 + unseen))
-    free = np.delete(np.arange(len(less)), np.arange(2, 2 + integrators))
-    free = less[np.ix_(free, free)]
-    less, beta, gamma = less[np.ix_(kept, kept)], beta[kept], gamma[kept]
-    n = len(less)
 
     def h(omega: np.ndarray) -> np.ndarray:
         out = np.empty(len(omega), dtype=complex)
@@ -348,8 +372,7 @@ def sampled_loop(loop: Loop) -> LoopFamily:
         return out
 
     def stable(K: float) -> bool:
-        z1 = eigenvalues(less + max(K, LEAST_GAIN) * np.outer(beta, gamma))
-        return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
+        return _within_circle(less, beta, gamma, K)
 
     z1 = eigenvalues(free).astype(complex)
     poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
@@ -362,6 +385,30 @@ def sampled_loop(loop: Loop) -> LoopFamily:
     outside = int(np.sum(2.0 * z1.real + np.abs(z1) ** 2 > 0.0))
     ends = (0.0, top) if still else (top,)
     return LoopFamily(h, grid, stable, ends, math.inf, integrators - unseen, lambda: outside)
+
+
+def _within_circle(less: np.ndarray, beta: np.ndarray, gamma: np.ndarray, K: float) -> bool:
+    """Whether every eigenvalue of the sampled loop lies within the unit circle."""
+    z1 = eigenvalues(less + max(K, LEAST_GAIN) * np.outer(beta, gamma))
+    return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
+
+
+def _acting_map(loop: Loop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int, int]:
+    """The sampled loop without the states that nothing of the force tells of.
+
+    Returns:
+        M - 1, beta and gamma; M - 1 without C's integrators; their number; that of those left out.
+    """
+    loop = replace(loop, compensator=linear_loop.reduced(loop.compensator))
+    less, beta, gamma = linear_loop.sampled_differences(loop)
+    less, beta, gamma = _from_rest(loop, less, beta[:, 0], gamma[0])
+    t, integrators = loop.environment, _integrators(loop.compensator)
+    # Nothing of the force tells of a state that only moves the place, or the speed, of the handle.
+    unseen = min(integrators, roots.multiplicity_of_zero(t)) if np.any(t.coef) else integrators
+    kept = np.delete(np.arange(len(less)), np.arange(2, 2 + unseen))
+    free = np.delete(np.arange(len(less)), np.arange(2, 2 + integrators))
+    free = less[np.ix_(free, free)]
+    return less[np.ix_(kept, kept)], beta[kept], gamma[kept], free, integrators, unseen
 
 
 def _integrators(compensator: Compensator) -> int:
@@ -380,13 +427,14 @@ def _from_rest(
     m, n = _integrators(loop.compensator), loop.compensator.order
     if not m:
         return less, beta, gamma
-    s, spring, g = loop.servo.S, loop.hand.spring, loop.servo.G
+    s, spring, g = loop.servo.S, loop.environment.coef[0], loop.servo.G
     chain = np.arange(2, 2 + m)
     others = np.delete(np.arange(len(less)), chain)
     rest = np.zeros((len(less), m))
     rest[2 + n, 0] = loop.compensator.state_space()[2][0] * (g.gain / g.stiffness)
     rest[0, 0] = s.stiffness / (s.stiffness + s.gain * spring) * rest[2 + n, 0]
-    rest[4 + n :, 0] = spring * rest[0, 0]
+    motors = spring - (loop.k if loop.render == "held" else 0.0)  # hold what is physical
+    rest[4 + n :, 0] = motors * rest[0, 0]
     own, theirs = np.triu(less[np.ix_(chain, chain)], 1), less[np.ix_(others, others)]
     for j in range(1, m):
         needed = rest[others, :j] @ own[:j, j] - less[others, chain[j]]

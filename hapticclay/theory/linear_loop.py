@@ -24,6 +24,7 @@ from ..model.constants import AXES, B_MAX
 from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Render, Scenario
+from ..model.spring import STIFFNESS_MAX
 from . import roots
 
 Answer = TypeVar("Answer")
@@ -56,6 +57,8 @@ class Loop:
         render: the clay is "held" (a force of the motors) or "implicit" (physical, never late).
         mobility: of the bare handle where the servo shapes its inertia [1/kg], which tells with
             sampling or delay; None for the gain of Sh.
+        k: stiffness of the clay, an elastic wall with its rest at p = 0, Te = b s + k [N/m], 0 to
+            1e9; held, implicit or late as b is.
     """
 
     axis: Literal["x", "y"] = "x"
@@ -68,6 +71,7 @@ class Loop:
     delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
     render: Render = "held"
     mobility: Annotated[float | None, Bound(0.0, 1e12, "1/kg", above=True)] = None
+    k: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
 
     def __post_init__(self):
         axis = AXES.index(choice("axis", self.axis, AXES))
@@ -149,7 +153,7 @@ class Loop:
     def environment(self) -> Polynomial:
         """Te + Th, clay and the operator's arm (Eqs. 4, 19), as a polynomial in s."""
         th = self.hand
-        return Polynomial([th.spring, th.damper + self.b, th.mass])
+        return Polynomial([th.spring + self.k, th.damper + self.b, th.mass])
 
 
 PARTS = tuple(f.name for f in fields(Loop))
@@ -365,7 +369,7 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
     without shaping) and T = Te + Th,
 
-        0 = s^2 + W (Th + [implicit] b s) + late (kd s + kp + [held] W b s + (Wn - W) T
+        0 = s^2 + W (Th + [implicit] Te) + late (kd s + kp + [held] W Te + (Wn - W) T
             + (s^2 + kd s + kp) G C T)
 
     times the denominator of G C.
@@ -377,10 +381,10 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
         (physical, motors, driven).
     """
     s, th, cg = loop.servo.S, loop.hand, _forward_denominator(loop)
-    damper, held = (th.damper + loop.b, 0.0) if loop.render == "implicit" else (th.damper, loop.b)
+    k, b = (loop.k, loop.b) if loop.render == "implicit" else (0.0, 0.0)  # physical
     W = s.gain if loop.mobility is None else loop.mobility
-    physical = cg * Polynomial([W * th.spring, W * damper, 1.0 + W * th.mass])
-    motors = cg * Polynomial([s.stiffness, s.damping + W * held])
+    physical = cg * Polynomial([W * (th.spring + k), W * (th.damper + b), 1.0 + W * th.mass])
+    motors = cg * Polynomial([s.stiffness + W * (loop.k - k), s.damping + W * (loop.b - b)])
     if loop.mobility is not None:
         motors = motors + (s.gain - W) * (cg * loop.environment)
     return physical, motors, loop_polynomials(loop)[2]
@@ -411,7 +415,7 @@ def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     Args:
         loop: the loop; hand and clay do not matter.
     """
-    unit_spring = replace(loop, b=0.0, operator=Operator(0.0, 0.0, 1.0))
+    unit_spring = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
     denominator, passive, driven = loop_polynomials(unit_spring)
     return passive + loop.gain * driven, denominator
 
@@ -517,8 +521,8 @@ def sampled_differences(
     newest = at[-1]
     m = newest + n * (1 + whole)
     inertia, mass = np.linalg.inv(W), np.diag([x.hand.mass for x in loops])
-    springs, resistance = _resistance(loops)
-    dampers = resistance if implicit else np.array([-x.hand.damper for x in loops])
+    places, rates = _resistance(loops)
+    springs, dampers = _resistance(loops if implicit else [replace(x, b=0.0, k=0.0) for x in loops])
     masses, directions = np.linalg.eigh(inertia + mass)
     w = (directions / masses) @ directions.T
 
@@ -529,7 +533,7 @@ def sampled_differences(
         change, drive = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, n))
         # In the directions in which hand and handle have one mass the axes are decoupled.
         for size, direction in zip(masses.tolist(), directions.T, strict=True):
-            own, held = _moved(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
+            own, held = held_motion(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
             share = np.outer(direction, direction)
             change += np.kron(own, share)
             drive += np.kron(held[:, None], share)
@@ -537,13 +541,14 @@ def sampled_differences(
 
     (rest, new), (head, old) = (moved(x * Ts) for x in (1.0 - part, part))
     queue = np.zeros((n, n * (1 + whole)))
-    force = np.hstack((_over_states(loops, springs, resistance), queue))
+    force = np.hstack((_over_states(loops, places, rates), queue))
     before = np.hstack((w @ _over_states(loops, springs, dampers), queue))
     before[:, -n:] += w
     gamma = force - mass @ before
     u = np.hstack((inertia @ _feedback(loops), queue))
     if not implicit:
-        u += np.hstack((_over_states(loops, np.zeros(n), [-x.b for x in loops]), queue))
+        held = _over_states(loops, [-x.k for x in loops], [-x.b for x in loops])
+        u += np.hstack((held, queue))
     if shaping:
         u += (inertia @ nominal - np.eye(n)) @ gamma
 
@@ -593,7 +598,7 @@ def _resistance(loops: Sequence[Loop]) -> tuple[np.ndarray, np.ndarray]:
     """Hand and clay without the hand's mass: force per place and per velocity of each axis."""
     hands = [x.hand for x in loops]
     dampers = np.array([-h.damper - x.b for h, x in zip(hands, loops, strict=True)])
-    return np.array([-h.spring for h in hands]), dampers
+    return np.array([-h.spring - x.k for h, x in zip(hands, loops, strict=True)]), dampers
 
 
 def _feedback(loops: Sequence[Loop]) -> np.ndarray:
@@ -618,7 +623,7 @@ def _over_states(
 
 
 def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """As `_moved`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
+    """As `held_motion`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
     n = len(w)
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
@@ -627,11 +632,16 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
     return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
 
 
-def _moved(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Change of (p, v) over t [s] under p'' = own @ (p, v) + w u.
+def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Change of place and velocity over a time under p'' = own @ (p, v) + w u.
 
     The response to a pulse, and its integral, are divided differences of exp(s t) at the roots 0,
     slow and fast, written so that nothing cancels however stiff the clay.
+
+    Args:
+        own: acceleration per place [1/s^2] and per velocity [1/s], shape (2,).
+        w: acceleration per force [1/kg].
+        t: the time [s].
 
     Returns:
         The change for p and v before, shape (2, 2), and for a held u, shape (2,).

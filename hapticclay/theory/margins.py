@@ -402,8 +402,10 @@ def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
     """
     z, e = linear_loop.device_impedance(loop)
     s = 1j * np.asarray(omega, dtype=float)
-    felt = loop.b * e(s)
-    return felt / (felt + z(s))
+    felt, device = loop.b * e(s), z(s)
+    if loop.k:
+        felt, device = (loop.b * s + loop.k) * e(s), s * device
+    return felt / (felt + device)
 
 
 # ---- the worst case over hands -------------------------------------------------------------------

@@ -21,7 +21,7 @@ from .margins import LINEAR, Verdict
 def passivity(loop: Loop) -> Verdict:
     """Whether the impedance shown to the hand is passive, in continuous time.
 
-    Z = fh/v = b + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable,
+    Z = fh/v = b + k/s + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable,
     Re Z(j omega) >= 0, and Z is a spring at rest and a mass at high frequency, not their negatives
     (Colgate, Hogan, Int. J. Control 48, 1988).
 
@@ -42,7 +42,9 @@ def passivity(loop: Loop) -> Verdict:
     how = "stable without a hand and Re Z >= 0 at the least of a ratio of polynomials: exact"
     measures = "least Re Z [N.s/m]" + ("" if alone else "; not stable without a hand")
     fails = roots.positive_bands(-R)
-    negative = z.coef[-1] * e.coef[-1] < 0.0 or (spring and z.coef[0] * e.coef[spring] < 0.0)
+    stiffness = z.coef[0] / e.coef[spring] if spring else 0.0
+    stiffness += loop.k if spring < 2 else 0.0
+    negative = z.coef[-1] * e.coef[-1] < 0.0 or stiffness < 0.0
     measures += "; a negative mass or spring" if negative else ""
     good = alone and worst >= 0.0 and not negative
     return Verdict(good, worst, omega, (LINEAR, "continuous time"), how, measures, fails)

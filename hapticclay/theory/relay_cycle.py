@@ -19,7 +19,7 @@ from ..model.compensator import moving_states
 from ..model.controller import matrix_exponential
 from ..model.flow import Flow
 from . import linear_loop, roots
-from .describing import is_flow, limit_cycles, push_outcomes
+from .describing import is_flow, limit_cycles, push_outcomes, without_spring
 from .linear_loop import Loop, of_loop
 from .roots import first_failure
 
@@ -252,6 +252,7 @@ def exact_cycles(loop: Loop, *, flow: Flow) -> tuple[ExactCycle, ...]:
 def _pieces(loop: Loop, flow: Flow) -> _Pieces:
     """The loop in clay of 1 N and the flow's dampers: all else is in proportion to Fy."""
     is_flow(flow)
+    without_spring(loop)
     if not flow.Fy or (flow.K and flow.n != 1.0):
         raise ParameterError(
             "flow", flow, "must be Coulomb or Bingham clay: Fy > 0, K = 0 or n = 1"

@@ -154,3 +154,40 @@ def test_springs_are_refused_where_no_law_of_them_is_known():
         dataclasses.replace(s, integrator="accurate")
     with pytest.raises(hc.ParameterError, match="angle"):
         dataclasses.replace(s, clay=dataclasses.replace(s.clay, angle=0.1))
+
+
+@pytest.mark.plain
+def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
+    # soft and lasting: nothing yields or relaxes, so the force tells the place
+    k, counts = 800.0, 4096
+    clay = wall(hc.Spring(k=k), edges=(0.0,))
+    s = dataclasses.replace(
+        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.06, length=None, stop=False, dt=1e-4,
+        Ts=5e-4, control="sampled", render="held", interface=hc.Interface(encoder=counts),
+    )  # fmt: skip
+    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
+    for name in ("t", "p", "v", "fh", "fe", "tau"):
+        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+    step = 2.0 * math.pi / counts
+    q = step * np.round(a.q[:-1:5] / step)
+    l1, l2 = s.arm.l1, s.arm.l2
+    read = l1 * np.cos(q[:, 0]) + l2 * np.cos(q.sum(axis=1)) - s.origin[0]
+    beyond = a.p[:-1:5, 0] > 1e-6  # behind the border, where the spring begins
+    assert beyond.sum() > 100 and np.abs(read - a.p[:-1:5, 0]).max() > 0.2 * step * l1
+    assert a.fe[:-1:5, 0][beyond] == pytest.approx(k * read[beyond], abs=1e-9)
+
+
+@pytest.mark.plain
+def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
+    # far finer than the motion: the same run as without one, to what a count does to the force
+    spring = hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1, surface=True)
+    s = dataclasses.replace(
+        hc.free(), clay=wall(spring, b=20.0, edges=(0.01,)), force=(4.0, 0.0), t_max=0.3,
+        length=None, stop=False, dt=1e-4, Ts=5e-4, control="sampled", render="held",
+    )  # fmt: skip
+    exact = hc.simulate(s)
+    fine = hc.simulate(dataclasses.replace(s, interface=hc.Interface(encoder=2**36)))
+    assert exact.energy["springs_lost"] > 0.0
+    # 2 pi/2^36 of 0.25 m is 2e-11 m, times 2.5 kN/m 6e-8 N
+    assert np.abs(fine.fe - exact.fe).max() < 1e-5
+    assert np.abs(fine.p - exact.p).max() < 1e-8

@@ -1,0 +1,564 @@
+"""Virtual walls on a bare device: the exact linear loop, and the limits that have been published.
+
+The device (mass, damper) and the hand at it are linear between samples, so the sampled loop is a
+matrix: exact. Friction, encoder and the surface of a wall are no part of it: what is said of a wall
+with a surface holds while it is pressed. `docs/equations.md`, section 7, has the derivations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..errors import ParameterError, integer, number
+from ..model.operator import Operator
+from ..model.virtual_wall import Device, VirtualWall
+from . import gain_limit, linear_loop, roots
+from .margins import Box
+
+MOST_STATES = 600  # of a map whose eigenvalues are asked for
+SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
+TURNS = 4000  # values of omega Ts at which it is tried, twice
+HIGHEST = 1e7  # [rad/s]
+REFINED = 3  # rounds of the search within a box of hands
+
+
+# ---- the sampled loop ----------------------------------------------------------------------------
+
+
+def stable_wall(wall: VirtualWall) -> bool:
+    """Whether the linear loop of wall, device and hand is stable.
+
+    Every eigenvalue of the sampled loop lies within the unit circle. Without springs (K = 0, none
+    in the hand) the one at z = 1 that moves the handle does not count.
+
+    Args:
+        wall: the wall with its K; friction, quantum and surface are left out.
+
+    Raises:
+        ParameterError: window and delay are of more than 600 samples together.
+    """
+    less = wall_differences(wall)
+    if not np.any(less[:, 0]):  # nothing depends on the place
+        less = less[1:, 1:]
+    return _within(less)
+
+
+def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
+    """Stiffness K between which the linear wall is stable at its own B and M [N/m].
+
+    K multiplies one signal of the loop, so a pole crosses the unit circle at the K = 1/h(omega)
+    where h is real and positive (see `gain_limit`): exact to rounding. Eigenvalues tell which of
+    the intervals between two such K are stable. Of several stable intervals, as large delays give
+    them, this is the lowest.
+
+    Args:
+        wall: all but K, which does not matter.
+
+    Returns:
+        (low, high), low mostly 0; high is 0 if no K is stable, inf if there is no limit.
+
+    Raises:
+        ParameterError: window and delay are of more than 600 samples together.
+    """
+    family, typical = _every_stiffness(wall), (wall.device.mass + wall.hand.mass) / wall.Ts**2
+    edges = [0.0, *sorted(K for K, _ in gain_limit.gain_crossings(family)), math.inf]
+    low = None
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        if b <= (1.0 + 1e-9) * a:
+            continue
+        inside = 0.5 * min(b, typical) if not a else math.sqrt(a * b)
+        if b == math.inf and a:
+            inside = 4.0 * max(a, typical)
+        if family.stable(inside):
+            low = a if low is None else low
+        elif low is not None:
+            return low, a
+    return (0.0, 0.0) if low is None else (low, math.inf)
+
+
+def wall_differences(wall: VirtualWall) -> np.ndarray:
+    """The sampled loop x(k+1) = (1 + D) x(k) of wall, device and hand, x at the sample.
+
+    x holds place and velocity, then, as far as the wall needs them: the displacements between the
+    last `window` samples, the filtered velocity and the measured one of the sample before, and the
+    forces on their way, newest first. A fraction of a sample in the delay splits the hold in two.
+
+    Args:
+        wall: the wall with its K.
+
+    Returns:
+        D, shape (n, n), without the loss of digits of a difference.
+
+    Raises:
+        ParameterError: window and delay are of more than 600 samples together.
+    """
+    change, soon, late, whole, part = _motion(wall)
+    Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
+    differs = moves and wall.velocity == "difference"
+    window = wall.window if differs else 0
+    filtered = int(differs and wall.velocity_filter is not None)
+    queue = whole + (part > 0.0)
+    at = np.cumsum([2, window, filtered, int(wall.M != 0.0), queue])
+    n = int(at[-1])
+    if n > MOST_STATES:
+        raise ParameterError("wall.window", wall.window, f"must lie below {MOST_STATES - whole}")
+    steps, smooth, last, first = (int(x) for x in at[:-1])  # where each kind of state begins
+    unit = np.eye(n)
+    speed = unit[1]
+    if differs:
+        speed = unit[steps:smooth].sum(axis=0) / (window * Ts)
+    if filtered:
+        keep = _kept(wall)
+        speed = keep * unit[smooth] + (1.0 - keep) * speed
+    force = wall.K * unit[0] + wall.B * speed
+    if wall.M:
+        force = force + wall.M / Ts * (speed - unit[last])
+    forces = [-force, *unit[first:]]  # on the handle: of this sample, of the one before, ...
+    less = np.zeros((n, n))
+    less[:2, :2] = change
+    less[:2] += np.outer(soon, forces[whole])
+    if part:
+        less[:2] += np.outer(late, forces[whole + 1])
+    if window:
+        less[steps] = less[0]
+        less[range(steps + 1, smooth), range(steps, smooth - 1)] = 1.0
+    if filtered:
+        less[smooth] = speed
+    if wall.M:
+        less[last] = speed
+    for j in range(queue):
+        less[first + j] = forces[j]
+    less[range(2, n), range(2, n)] -= 1.0
+    return less
+
+
+def _kept(wall: VirtualWall) -> float:
+    """Share of its state that the velocity's filter keeps over a sample."""
+    f = wall.velocity_filter
+    return 0.0 if f is None else math.exp(-2.0 * math.pi * f * wall.Ts)
+
+
+def _split_delay(wall: VirtualWall) -> tuple[int, float]:
+    """Whole samples of the delay, and the rest as a share of a sample."""
+    whole = math.floor(wall.delay / wall.Ts + 1e-9)
+    part = wall.delay / wall.Ts - whole
+    return whole, part if part > 1e-9 else 0.0
+
+
+def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, float]:
+    """How (place, velocity) of device and hand change over a sample.
+
+    Returns:
+        The change for those before, shape (2, 2); for a force that comes `part` of a sample after
+        it began, shape (2,); for the one that acts until then, shape (2,); whole samples of the
+        delay; part.
+    """
+    d, hand = wall.device, wall.hand
+    whole, part = _split_delay(wall)
+    mass = d.mass + hand.mass
+    own = np.array([-hand.spring, -d.damper - hand.damper]) / mass
+    rest, soon = linear_loop.held_motion(own, 1.0 / mass, (1.0 - part) * wall.Ts)
+    if not part:
+        return rest, soon, np.zeros(2), whole, part
+    head, old = linear_loop.held_motion(own, 1.0 / mass, part * wall.Ts)
+    return rest + head + rest @ head, soon, old + rest @ old, whole, part
+
+
+def _within(less: np.ndarray) -> bool:
+    """Whether every eigenvalue of 1 + less lies within the unit circle."""
+    if not np.all(np.any(less, axis=0)):  # a state that nothing depends on: one lies at z = 1
+        return False
+    z1 = gain_limit.eigenvalues(less)
+    return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
+
+
+def _at_samples(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place and velocity at the samples per force of the wall, late and held; turn is omega Ts."""
+    change, soon, late, whole, _ = _motion(wall)
+    z1 = np.expm1(1j * turn)
+    back = np.exp(-1j * turn)
+    drive = (soon[:, None] + late[:, None] * back) * np.exp(-1j * turn * whole)
+    (a, b), (c, d) = change
+    det = z1 * (z1 - a - d) + (a * d - b * c)
+    return ((z1 - d) * drive[0] + b * drive[1]) / det, ((z1 - a) * drive[1] + c * drive[0]) / det
+
+
+def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force of the wall per measured place, without K, and per exact velocity, without delay."""
+    back = -np.expm1(-1j * turn)  # 1 - 1/z
+    law = wall.B + wall.M / wall.Ts * back
+    if wall.velocity == "exact":
+        return 0.0 * back, law
+    keep = _kept(wall)
+    smooth = (1.0 - keep) / ((1.0 - keep) + keep * back)
+    rate = -np.expm1(-1j * turn * wall.window) / (wall.window * wall.Ts)
+    return law * smooth * rate, 0.0 * back
+
+
+def _every_stiffness(wall: VirtualWall) -> gain_limit.LoopFamily:
+    """The wall for every K."""
+    wall = replace(wall, K=0.0)
+    free = wall_differences(wall)
+    spring = wall_differences(replace(wall, K=1.0)) - free
+    n, Ts, top = len(free), wall.Ts, math.pi / wall.Ts
+
+    def h(omega: np.ndarray) -> np.ndarray:
+        place, speed = _at_samples(wall, omega * Ts)
+        by_place, by_speed = _object(wall, omega * Ts)
+        return -place / (1.0 + by_place * place + by_speed * speed)
+
+    z1 = np.linalg.eigvals(free).astype(complex)
+    poles = np.log1p(z1[(np.abs(1.0 + z1) > 1e-6) & (z1 != 0.0)]) / Ts
+    size = np.abs(poles[poles != 0.0])
+    low = max(1e-3 * min(size.min(initial=math.inf), 1e-3 * top), 1e-12 * top)
+    near = gain_limit.frequency_grid(low, top * (1.0 - 1e-9), poles.imag[poles.imag > 0.0])
+    grid = np.union1d(np.linspace(low, top, 40 * n)[:-1], near)
+    return gain_limit.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
+
+
+def hand_box_limit(wall: VirtualWall, box: Box) -> float:
+    """Least stable K over a box of hands at the wall [N/m].
+
+    Searched: the 27 hands at ends and middles of the box, then along each side through the worst of
+    them. No proof for the hands between.
+
+    Args:
+        wall: all but K and the hand, which do not matter.
+        box: the hands; a rigid arm stops every wall and does not count.
+
+    Returns:
+        The least `high` of `stiffness_band`; 0 if no K is stable for all of these hands.
+    """
+    from scipy.optimize import minimize_scalar
+
+    if not isinstance(box, Box):
+        raise ParameterError("box", box, "must be a Box")
+    sides = [box.mass, box.damper, box.spring]
+    known: dict[tuple[float, ...], tuple[float, float]] = {}
+
+    def band(hand: tuple[float, ...]) -> tuple[float, float]:
+        if hand not in known:
+            known[hand] = stiffness_band(replace(wall, operator=Operator(*hand)))
+        return known[hand]
+
+    ends = [sorted({low, 0.5 * (low + high), high}) for low, high in sides]
+    worst = min(
+        ((m, d, k) for m in ends[0] for d in ends[1] for k in ends[2]), key=lambda x: band(x)[1]
+    )
+    for _ in range(REFINED):
+        before = worst
+        for i, (low, high) in enumerate(sides):
+            if low == high:
+                continue
+
+            def along(x: float, i=i, hand=worst) -> float:
+                return band((*hand[:i], float(x), *hand[i + 1 :]))[1]
+
+            found: Any = minimize_scalar(along, bounds=(low, high), method="bounded")
+            worst = min(
+                worst, (*worst[:i], float(found.x), *worst[i + 1 :]), key=lambda x: band(x)[1]
+            )
+        if worst == before:
+            break
+    high = band(worst)[1]
+    return high if all(low < high for low, _ in known.values()) else 0.0
+
+
+# ---- passivity -----------------------------------------------------------------------------------
+
+
+def colgate_schenkel_limit(wall: VirtualWall) -> float:
+    """Largest K at which the wall is passive at its own B and M [N/m].
+
+    Colgate, Schenkel (J. Robotic Systems 14, 1997): necessary and sufficient for a sampled object
+    behind a mass and a damper b, whatever passive hand holds it. With window 1 and without filter,
+    delay and M it is 2 (b - |B|)/Ts. Otherwise it is found over the frequencies up to pi/Ts: with a
+    delay of whole samples by their condition, its H late; with a fraction of a sample, after which
+    the force changes between two samples, by the condition of `passivity_index`.
+
+    Args:
+        wall: all but K; hand, friction and quantum do not matter.
+
+    Returns:
+        K; 0 if no K > 0 is passive: without damper, and where B or M act on an exact velocity,
+        which a hand can give the handle at the samples alone, at no cost.
+    """
+    b, Ts = wall.device.damper, wall.Ts
+    if wall.velocity == "exact" and (wall.B or wall.M):
+        return 0.0
+    plain = not wall.delay and not wall.M and (wall.velocity == "exact" or wall.window == 1)
+    if plain and wall.velocity_filter is None:
+        return max(0.0, 2.0 * (b - abs(wall.B)) / Ts)
+    whole, part = _split_delay(wall)
+
+    def limits(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest passive K; none for nan."""
+        late = np.exp(-1j * turn * whole)
+        rest = _object(wall, turn)[0] * late
+        asked, more = _asked(wall, turn, rest), _asked(wall, turn, late)
+        q = 0.25 * part * (1.0 - part) * Ts * Ts
+        p = b * more + 2.0 * q * (late.conj() * rest).real
+        c = b * asked + q * np.abs(rest) ** 2 - b * b  # q K^2 + p K + c <= 0
+        with np.errstate(all="ignore"):
+            if not q:
+                edge = -c / p
+                least, most = np.where(p < 0.0, edge, -math.inf), np.where(p > 0.0, edge, math.inf)
+                flat = (p == 0.0) & (c > 0.0)
+                return np.where(flat, math.nan, least), np.where(flat, math.nan, most)
+            root = np.sqrt(p * p - 4.0 * q * c)
+            far = -0.5 * (p + np.copysign(root, p))
+            ends = np.sort([far / q, np.where(far != 0.0, c / far, 0.0)], axis=0)
+        return ends[0], ends[1]
+
+    turn = _turns(wall)
+    least, most = limits(turn)
+    if b == 0.0 or np.any(np.isnan(most)):
+        return 0.0
+    high = _lowest(lambda x: limits(x)[1], turn, most)
+    low = -_lowest(lambda x: -limits(x)[0], turn, -least)
+    return high if high > max(low, 0.0) else 0.0
+
+
+def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
+    """Physical damping to spare at each frequency: the wall is passive where it is never negative.
+
+    That is b less
+
+        Ts Re{(1 - 1/z) H(z)}/(2 (1 - cos omega Ts)),    z = exp(j omega Ts)
+
+    (Colgate, Schenkel 1997), with H late by the whole samples of the delay. If the delay has a
+    fraction T' of a sample beside them, it is b less (r + sqrt(r^2 + T' (Ts - T') |H|^2))/2 with
+    r = Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)), necessary and sufficient as well.
+
+    Args:
+        wall: the wall with its K; hand, friction and quantum do not matter.
+        omega: frequencies, > 0 and up to pi/Ts, beyond which the condition repeats itself [rad/s],
+            shape (n,).
+
+    Returns:
+        [N.s/m], shape (n,); -inf where B or M act on an exact velocity.
+    """
+    omega = _frequencies(omega)
+    turn = omega * wall.Ts
+    whole, part = _split_delay(wall)
+    by_place, by_speed = _object(wall, turn)
+    if np.any(by_speed):
+        return np.full(turn.shape, -math.inf)
+    H = (wall.K + by_place) * np.exp(-1j * turn * whole)
+    asked = _asked(wall, turn, H)
+    if part:
+        q = part * (1.0 - part) * wall.Ts**2
+        asked = 0.5 * (asked + np.sqrt(asked**2 + q * np.abs(H) ** 2))
+    return wall.device.damper - asked
+
+
+def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
+    """Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)) [N.s/m], T' the delay's fraction."""
+    part = _split_delay(wall)[1] * wall.Ts
+    shape = (wall.Ts - part) + part * np.exp(-1j * turn)
+    # (1 - 1/z)/(2 (1 - cos)) without the loss of digits of slow turns
+    return (0.5j * np.exp(-0.5j * turn) / np.sin(0.5 * turn) * shape * H).real
+
+
+def _turns(wall: VirtualWall) -> np.ndarray:
+    """omega Ts, dense enough for window and delay."""
+    n = TURNS + 40 * (wall.window + _split_delay(wall)[0])
+    slow = np.geomspace(SLOWEST_TURN, math.pi, TURNS)[:-1]
+    return np.union1d(slow, np.linspace(0.0, math.pi, n)[1:])
+
+
+def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray) -> float:
+    """Least f near the point of a grid x at which it is least; y is f(x)."""
+    from scipy.optimize import minimize_scalar
+
+    i = int(np.argmin(y))
+    around = float(x[max(i - 1, 0)]), float(x[min(i + 1, len(x) - 1)])
+    found: Any = minimize_scalar(
+        lambda a: float(f(np.array([a]))[0]), bounds=around, method="bounded"
+    )
+    return min(float(y[i]), float(found.fun))
+
+
+def abbott_okamura_limit(wall: VirtualWall) -> float:
+    """Largest K at which a wall behind damper, friction and encoder is passive [N/m].
+
+    min(2 b/Ts, 2 fc/Delta): necessary and sufficient for a wall of K alone (Abbott, Okamura, IEEE
+    Trans. Robotics 21, 2005). Without an encoder (Delta = 0) it is 2 b/Ts.
+
+    Args:
+        wall: all but K, with B = M = 0 and delay = 0; the hand does not matter.
+
+    Raises:
+        ParameterError: B, M or delay is not zero.
+    """
+    for field in ("B", "M", "delay"):
+        if getattr(wall, field):
+            bound = "must be 0: the condition is one of a spring alone, without delay"
+            raise ParameterError(f"wall.{field}", getattr(wall, field), bound)
+    d = wall.device
+    rough = 2.0 * d.friction / d.quantum if d.quantum else math.inf
+    return min(2.0 * d.damper / wall.Ts, rough)
+
+
+# ---- delay ---------------------------------------------------------------------------------------
+
+
+def hulin_limit(wall: VirtualWall) -> float:
+    """Largest stable K by the linear rule (b + B)/(Ts/2 + delay) [N/m].
+
+    Hulin, Preusche, Hirzinger (EuroHaptics, 2006); Gil, Sanchez, Hulin, Preusche, Hirzinger (J.
+    Computing and Information Science in Engineering 9, 2009). It holds for (b + B) Ts/mass and
+    K Ts^2/mass far below 1: see docs/equations.md, section 7, for the ranges of 1 % and 5 %.
+
+    Args:
+        wall: all but K; b is the damping of device and hand together; M, window, filter and the
+            hand's mass and spring do not matter.
+    """
+    b = wall.device.damper + wall.hand.damper
+    return max(0.0, (b + wall.B) / (0.5 * wall.Ts + wall.delay))
+
+
+def jury_limit(wall: VirtualWall) -> float:
+    """Largest stable K of the held wall with delay 0 or Ts, in closed form [N/m].
+
+    Jury's conditions on the characteristic polynomial, of order 3 or 4, are polynomials in K of
+    order 2 at most.
+
+    Args:
+        wall: all but K, with delay 0 or Ts, window 1, no filter, M = 0, a difference for velocity,
+            and no spring in the hand.
+
+    Returns:
+        K, the high end of `stiffness_band`.
+
+    Raises:
+        ParameterError: the wall has other parts.
+    """
+    whole, part = _split_delay(wall)
+    if part or whole > 1:
+        raise ParameterError("wall.delay", wall.delay, "must be 0 or Ts")
+    plain = VirtualWall()
+    for field in ("M", "velocity", "window", "velocity_filter"):
+        if getattr(wall, field) != getattr(plain, field):
+            bound = f"must be {getattr(plain, field)} here"
+            raise ParameterError(f"wall.{field}", getattr(wall, field), bound)
+    if wall.hand.spring:
+        raise ParameterError("wall.operator.spring", wall.hand.spring, "must be 0 here")
+    (_, travel), (_, slowing), soon = *_motion(wall)[0], _motion(wall)[1]
+    # place per force: (n1 z + n0)/((z - 1)(z - e))
+    e, beta = 1.0 + slowing, wall.B / wall.Ts
+    n1, n0 = float(soon[0]), float(travel * soon[1] - soon[0] * e)
+    g = Polynomial([beta, 1.0])  # K + B/Ts
+    one = Polynomial([1.0])
+    a = [-n0 * beta * one, n0 * g - n1 * beta, n1 * g - (1.0 + e)]
+    if whole:
+        a = [a[0], a[1], a[2] + (1.0 + 2.0 * e), -(1.0 + e) * one]
+    else:
+        a[1] = a[1] + e
+    a.append(one)
+    n = len(a) - 1
+    signs = [(-1.0) ** (n - i) for i in range(n + 1)]
+    conditions = [sum(a, 0.0 * one), sum((x * y for x, y in zip(signs, a, strict=True)), 0.0 * one)]
+    row = a
+    while len(row) > 2:  # |first| < last, then the next row of the table
+        conditions += [row[-1] - row[0], row[-1] + row[0]]
+        row = [row[-1] * y - row[0] * x for x, y in zip(row[::-1], row, strict=True)][1:]
+    conditions += [row[-1] - row[0], row[-1] + row[0]]
+    edges = np.unique(np.concatenate([roots.positive_roots(c) for c in conditions]))
+    for low, high in zip([0.0, *edges], [*edges, 2.0 * edges.max(initial=0.0)], strict=True):
+        if all(c(0.5 * (low + high)) > 0.0 for c in conditions):
+            return float(high)
+    return 0.0
+
+
+def hulin_boundary(
+    mass: float, damper: float, Ts: float, samples: float = 0.0, n: int = 401
+) -> tuple[np.ndarray, np.ndarray]:
+    """Boundary of stability of the held, late wall in the plane of B and K: exact.
+
+    A pair of poles lies at z = exp(+-j omega Ts) where real and imaginary part of the loop's
+    equation vanish, two lines in that plane; their crossing moves along the boundary with omega,
+    from K = 0 at B = -damper to K = 0 at the largest stable B. A pole at z = -1 cuts it by the line
+    K + 2 B/Ts = const.
+
+    Args:
+        mass: of device and hand [kg], 1e-4 to 1e4.
+        damper: of device and hand [N.s/m], 0 to 1e9.
+        Ts: control sample [s].
+        samples: delay in samples, 0 to 100, with a fraction.
+        n: number of points, 3 to 100001.
+
+    Returns:
+        (B [N.s/m], K [N/m]), shape (m,) each, m <= n; the loop is stable below, for K > 0.
+    """
+    from scipy.optimize import brentq
+
+    samples, n = number("samples", samples, 0.0, 100.0), integer("n", n, 3, 100_001)
+    wall = VirtualWall(device=Device(mass=mass, damper=damper), Ts=Ts, delay=samples * Ts)
+
+    def crossing(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """B and K that put a pair of poles at z = exp(+-j turn): K + B (1 - 1/z)/Ts = -1/G."""
+        asked = -1.0 / _at_samples(wall, turn)[0]
+        B = asked.imag * wall.Ts / np.sin(turn)
+        return B, asked.real - 2.0 * B / wall.Ts * np.sin(0.5 * turn) ** 2
+
+    def stiffness(turn: float) -> float:
+        return float(crossing(np.array([turn]))[1][0])
+
+    turn = np.linspace(0.0, math.pi, 2 + 100 * (1 + math.ceil(samples)))[1:-1]
+    gone = np.flatnonzero(crossing(turn)[1] <= 0.0)
+    last = float(turn[-1])
+    if len(gone):
+        i = int(gone[0])
+        last = float(brentq(stiffness, turn[i - 1], turn[i])) if i else last  # type: ignore[arg-type]
+    B, K = crossing(np.linspace(0.0, last, n)[1:])
+    if (opposite := _at_samples(wall, np.array([math.pi]))[0].real[0]) < 0.0:
+        K = np.minimum(K, -1.0 / opposite - 2.0 * B / wall.Ts)
+    kept = K >= -1e-9 * K.max()
+    return np.append(-damper, B[kept]), np.append(0.0, np.maximum(K[kept], 0.0))
+
+
+# ---- what the hand feels -------------------------------------------------------------------------
+
+
+def wall_impedance(wall: VirtualWall, omega: Any) -> np.ndarray:
+    """Force of the hand over velocity of the device with the wall, fh/v: exact.
+
+    Under fh = exp(j omega t) the sampled loop comes to a steady motion. With place and velocity at
+    the samples known, the held force is, and so is its component at omega; v is the component of
+    the velocity at omega. Components at omega + 2 pi n/Ts, which the hold adds, are part of the
+    motion and of its samples, not of v. At multiples of pi/Ts a real force meets its own mirror
+    image in the samples, and what it feels depends on its phase.
+
+    Args:
+        wall: the wall with its K; friction, quantum and surface are left out, and the hand is what
+            pushes. If it is unstable without a hand, the motion lasts as long as a hand keeps it.
+        omega: frequencies, > 0 and up to 1e7 [rad/s], shape (n,).
+
+    Returns:
+        [N.s/m], shape (n,), complex.
+    """
+    omega = _frequencies(omega)
+    Ts, s = wall.Ts, 1j * omega
+    bare = replace(wall, operator=None)
+    turn = omega * Ts
+    place, speed = _at_samples(bare, turn)
+    by_place, by_speed = _object(bare, turn)
+    by_place = by_place + wall.K
+    back = 1.0 + by_place * place + by_speed * speed
+    hold = -np.expm1(-1j * turn) / (1j * turn) * np.exp(-s * wall.delay)
+    own = wall.device.mass * s + wall.device.damper
+    return own * back / (back - hold * (by_place + s * by_speed) / (s * own))
+
+
+def _frequencies(omega: Any) -> np.ndarray:
+    omega = np.atleast_1d(np.asarray(omega, dtype=float))
+    if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= HIGHEST)):
+        raise ParameterError("omega", omega, f"must be > 0 and <= {HIGHEST:g} rad/s, shape (n,)")
+    return omega
