@@ -92,7 +92,6 @@ from .theory.passivity import clay_passivity as clay_passivity
 from .theory.passivity import passivity as passivity
 from .theory.relay_cycle import ExactCycle as ExactCycle
 from .theory.relay_cycle import exact_cycles as exact_cycles
-from .views.figure import Figure as Figure
 from .theory.wall_limits import abbott_okamura_limit as abbott_okamura_limit
 from .theory.wall_limits import colgate_schenkel_limit as colgate_schenkel_limit
 from .theory.wall_limits import hand_box_limit as hand_box_limit
@@ -103,6 +102,7 @@ from .theory.wall_limits import passivity_index as passivity_index
 from .theory.wall_limits import stable_wall as stable_wall
 from .theory.wall_limits import stiffness_band as stiffness_band
 from .theory.wall_limits import wall_impedance as wall_impedance
+from .views.figure import Figure as Figure
 from .views.images import gray_image as gray_image
 
 __version__: str
