@@ -69,6 +69,9 @@ from .studies.measurement import identify_data as identify_data
 from .studies.removal import removed as removed
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map
+from .studies.zwidth import Press as Press
+from .studies.zwidth import ZWidth as ZWidth
+from .studies.zwidth import zwidth as zwidth
 from .theory.describing import LimitCycle as LimitCycle
 from .theory.describing import describing_function as describing_function
 from .theory.describing import limit_cycles as limit_cycles

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
-from ..errors import Bound, ParameterError, check_fields, number
+from ..errors import Bound, ParameterError, check_fields, choice, number
 from .arm import Arm
 from .constants import B_MAX
 from .hardware import Interface
@@ -19,6 +22,7 @@ from .spring import STIFFNESS_MAX
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
 STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
 UPRIGHT = 0.5 * math.pi  # [rad] joint 1 where x = 0
+WALL_SCHEMA = "hapticclay-wall-1"
 SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
 MASS_MAX = 1e6  # [kg]
 
@@ -84,6 +88,56 @@ class VirtualWall:
         if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
             bound = "must be 'difference' for a window or a filter"
             raise ParameterError("wall.velocity", self.velocity, bound)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> VirtualWall:
+        """The wall of a file: fields by name, as in `device.mass = 0.1`, `Ts = "1 ms"`.
+
+        Args:
+            path: the file, .toml or .json.
+
+        Raises:
+            ParameterError: the file cannot be read, or a field was refused.
+        """
+        from .fields import with_fields
+        from .scenario_file import read_settings
+
+        try:
+            data = read_settings(path)
+            del data["name"]
+            choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA,))
+            return with_fields(cls(), data)
+        except ParameterError as error:
+            field = "wall" if error.field == "scenario" else error.field
+            told = "" if field == "wall" else f" (in {Path(path)})"
+            raise ParameterError(field, error.value, error.bound + told) from None
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the fields that differ from the defaults.
+
+        Args:
+            path: the file, .toml or .json.
+
+        Returns:
+            The file.
+
+        Raises:
+            ParameterError: it cannot be written.
+        """
+        from ..files import atomic
+        from .fields import plain_data
+        from .scenario_file import is_scenario_file, toml_text
+
+        file, units = Path(path), {}
+        if not is_scenario_file(file.name):
+            raise ParameterError("wall", str(file), "must be a .toml or a .json file")
+        data = {"schema": WALL_SCHEMA, **plain_data(self, False, units)}
+        toml = file.suffix.lower() == ".toml"
+        with atomic(file) as f:
+            f.write(
+                (toml_text(data, units) if toml else json.dumps(data, indent=2) + "\n").encode()
+            )
+        return file
 
     @property
     def hand(self) -> Operator:

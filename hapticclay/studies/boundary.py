@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Annotated
 
 import numpy as np
 
-from ..errors import Bound, choice, number
+from ..errors import Bound, ParameterError, choice, number
 from ..model import arm
 from ..model.arm import Arm
 from ..model.clay import Clay, Profile
@@ -19,9 +19,10 @@ from ..model.controller import SERVO
 from ..model.hardware import Interface
 from ..model.scenario import Position, Scenario, TorqueLimit
 from ..model.spring import Spring
+from ..model.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit, linear_loop
+from ..theory import gain_limit, linear_loop, wall_limits
 from ..theory.linear_loop import TIMING, Loop
 from ..theory.roots import first_failure
 
@@ -112,32 +113,37 @@ class PushedLoop(Loop):
         return self.arm.l2, self.arm.l1
 
 
-def growth_rate(record: Record, axis: str) -> float:
+def growth_rate(
+    record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
+) -> float:
     """Rate at which the oscillation of a free motion grows: that of its least damped mode.
 
     The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
-    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling. Modes slower than
-    SLOWEST_MODE do not count.
+    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
 
     Args:
         record: of the motion.
         axis: "x" or "y".
+        sample: about the time between the samples that are read [s].
+        slowest: modes slower than this do not count [rad/s, 1/s].
 
     Returns:
         [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
     """
     i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
+    if len(record.t) > 2:  # kept each so many steps
+        dt *= max(1, round((record.t[1] - record.t[0]) / dt))
     v = record.v[:-1, i]  # the last step may be short
     v = v[int((1.0 - FITTED_SHARE) * len(v)) :]
     # Odd, and two of them: half the sampling frequency must fold onto zero in neither.
-    skip = 2 * round(0.5 * GROWTH_SAMPLE / dt) + 1
-    found = [_least_damped(v[::n], n * dt) for n in (skip, skip + 2) if len(v) >= 32 * n]
+    skip = 2 * round(0.5 * sample / dt) + 1
+    found = [_least_damped(v[::n], n * dt, slowest) for n in (skip, skip + 2) if len(v) >= 32 * n]
     if not found:
         return math.inf if record.outcome.code != "time limit" else -math.inf
     return max(found)
 
 
-def _least_damped(v: np.ndarray, dt: float) -> float:
+def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
     rows = min(len(v) // 2, 700)  # of a long run: all its modes, at a fraction of the cost
     hankel = np.lib.stride_tricks.sliding_window_view(v, rows).T
     u, s, _ = np.linalg.svd(hankel, full_matrices=False)
@@ -149,7 +155,7 @@ def _least_damped(v: np.ndarray, dt: float) -> float:
     weight = amplitude * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
     rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
     strong = weight > MODE_SHARE * weight.max(initial=0.0)
-    counts = strong & ((omega > SLOWEST_MODE) | (rate > SLOWEST_MODE))
+    counts = strong & ((omega > slowest) | (rate > slowest))
     return float(rate[counts].max()) if counts.any() else -math.inf
 
 
@@ -179,9 +185,6 @@ def classify_run(loop: PushedLoop) -> str:
 def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> float:
     """Parameter at which a growth rate changes from negative to positive.
 
-    Each rate is a run, and may be infinite, so this is a secant on a ratio within a bracket, two
-    runs a step, and not `brentq`.
-
     Args:
         rate: function of a positive parameter.
         guess: start of the search.
@@ -190,21 +193,44 @@ def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> 
     Returns:
         The parameter, within BRACKET of it; inf if the rate stays negative, 0 if it stays positive.
     """
+    search = crossing_search(guess, most)
+    try:
+        x = next(search)
+        while True:
+            x = search.send(rate(x))
+    except StopIteration as end:
+        return end.value
+
+
+def crossing_search(guess: float, most: float) -> Generator[float, float, float]:
+    """The search of `find_crossing`, for several side by side: yields x, takes the rate at it.
+
+    Each rate is a run, and may be infinite, so this is a secant on a ratio within a bracket, two
+    runs a step, and not `brentq`.
+
+    Args:
+        guess: start of the search.
+        most: end of the search.
+
+    Returns:
+        As `find_crossing`.
+    """
     step = 1.05
     low, high = guess / step, guess * step
-    a, b = rate(low), rate(high)
+    a = yield low
+    b = yield high
     while a > 0.0:
         if low < 1e-3 * guess:
             return 0.0
         step = min(2.0, step * step)
         high, b, low = low, a, low / step
-        a = rate(low)
+        a = yield low
     while b <= 0.0:
         if high > most:
             return math.inf
         step = min(2.0, step * step)
         low, a, high = high, b, high * step
-        b = rate(high)
+        b = yield high
     while high / low > 1.0 + BRACKET:
         share = a / (a - b) if math.isfinite(a - b) else 0.5
         share = min(max(share, 0.02), 0.98) if high / low < 1.5 else 0.5
@@ -213,7 +239,7 @@ def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> 
         # straight.
         for x in (middle * (1.0 - 0.4 * BRACKET), middle * (1.0 + 0.4 * BRACKET)):
             if low < x < high:
-                y = rate(x)
+                y = yield x
                 if y > 0.0:
                     high, b = x, y
                     break
@@ -255,6 +281,33 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
     """
     guess = gain_limit.stiffness_limit(loop.linear) if guess is None else guess
     return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
+
+
+def simulated_wall(wall: VirtualWall, guess: float | None = None, most: float = 1e8) -> float:
+    """K [N/m] above which the oscillation of a run on a virtual wall grows.
+
+    Args:
+        wall: all but K; linear, so without friction, quantum and surface.
+        guess: start of the search [N/m]; None for the limit of the linear wall.
+        most: end of the search [N/m].
+
+    Raises:
+        ParameterError: the wall is not linear.
+    """
+    for field, value in (
+        ("wall.surface", wall.surface),
+        ("device.friction", wall.device.friction),
+        ("device.quantum", wall.device.quantum),
+    ):
+        if value:
+            raise ParameterError(field, value, "must be none of it: growth is that of linear walls")
+    guess = wall_limits.stiffness_band(wall)[1] if guess is None else guess
+
+    def rate(K: float) -> float:
+        run = replace(wall, K=K).scenario(GROWTH_SPAN, push=SMALL_PUSH)
+        return growth_rate(simulate(run), "x")
+
+    return find_crossing(rate, min(guess, most) if guess > 0.0 else 1.0, most)
 
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:

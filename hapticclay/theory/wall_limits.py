@@ -358,6 +358,29 @@ def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
     return wall.device.damper - asked
 
 
+def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
+    """Where the worst hand has the device when a late force changes between two samples.
+
+    For samples cos(k turn) it is there at Re{middle exp(j k turn)}, of all places the one that
+    leaves the wall the least to spare.
+
+    Args:
+        wall: the wall with its K, of a device with a damper.
+        turn: omega Ts, 0 to pi.
+
+    Returns:
+        The middle; None if the force changes at the samples, so that there is none.
+    """
+    whole, part = _split_delay(wall)
+    if not part:
+        return None
+    back = np.exp(-1j * np.array([turn]))
+    H = (wall.K + _object(wall, np.array([turn]))[0]) * back**whole
+    straight = (1.0 - part) + part / back
+    late = part * (1.0 - part) * wall.Ts * H * (1.0 - back)
+    return complex((straight + late / (2.0 * wall.device.damper))[0])
+
+
 def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
     """Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)) [N.s/m], T' the delay's fraction."""
     part = _split_delay(wall)[1] * wall.Ts

@@ -368,7 +368,7 @@ def workspace_plot(drift: Drift) -> Figure:
         drift: from `drift_map`; a row for each axis, without and with inertia shaping.
     """
     with figure_style(axes_grid=False):
-        figure = Figure(figsize=figure_size(2, 12.4 if narrow() else 5.6, 9.4))
+        figure = Figure(figsize=figure_size(2, 9.6 if narrow() else 5.6, 9.4))
         shape = (4, 1) if narrow() else (2, 2)
         axes: Any = figure.subplots(*shape, sharex=True, sharey=True).reshape(2, 2)
         for i, row in enumerate(axes):

@@ -1,23 +1,26 @@
 """Every figure of the package at the width of one printed column: nothing clipped, small or over
 another text; and what its files hold."""
 
+import dataclasses
 import functools
 import math
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import hapticclay as hc
 from benchmarks import fit_coverage
+from hapticclay.studies import passivity_runs
 from hapticclay.studies.accuracy import Ladder, Setting
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.stability_map import MapCell, StabilityMap
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
 from hapticclay.theory.linear_loop import Loop
-from hapticclay.views import fit_plots, run_plots, study_plots, theory_plots
+from hapticclay.views import fit_plots, passivity_plots, run_plots, study_plots, theory_plots
 from hapticclay.views.style import LEAST_TEXT
 
 HAND = hc.Operator()
@@ -120,6 +123,25 @@ def swept():
     )  # fmt: skip
 
 
+@functools.cache
+def passive(what):
+    """Of a damped, late wall; the numbers by runs are made up."""
+    wall = hc.VirtualWall(K=500.0, B=0.2, device=hc.Device(0.1, 1.0), delay=5e-4)
+    if what == "energy":
+        stiff = hc.constant_cut(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=0.012)
+        return passivity_runs.energy_over_time(dataclasses.replace(stiff, stop=False))
+    if what == "index":
+        omega = np.geomspace(3.0, 3000.0, 50)
+        index, some = hc.passivity_index(wall, omega), omega[::9]
+        return passivity_runs.IndexOverFrequency(
+            "wall of K = 500 N/m, B = 0.2 N.s/m", omega, index + 0.1, index, some,
+            index[::9] + 0.1, some, index[::9],
+        )  # fmt: skip
+    Ts, delays = np.geomspace(1e-4, 1e-2, 20), (0.0, 0.5, 1.0, 2.0)
+    limits = np.array([2.0 / (Ts * (1.0 + 2.0 * d)) for d in delays])
+    return passivity_runs.PassiveRegion(wall, delays, Ts, limits, Ts[::6], limits[:, ::6])
+
+
 def run_case(name, figure):
     return lambda: run_plots.FIGURES[figure](record(name))
 
@@ -159,6 +181,9 @@ CASES = {
     "bode unstable": lambda: theory_plots.bode_plot(Loop("y", b=90.0, K=10.0), at="force"),
     "nyquist": lambda: theory_plots.nyquist_plot(LOOP, (0.5, 1.0, 3.0, 10.0, 30.0)),
     "small gain": lambda: theory_plots.small_gain_plot(LOOP),
+    "passivity index": lambda: passivity_plots.index_plot(passive("index")),
+    "passivity energy": lambda: passivity_plots.energy_plot(passive("energy")),
+    "passivity region": lambda: passivity_plots.region_plot(passive("region")),
     "transparency": lambda: theory_plots.transparency_plot(
         LOOP, [("as printed", 1.0, hc.Compensator()), ("designed", 2.0, hc.Compensator())]
     ),
@@ -206,3 +231,11 @@ def test_text_can_be_read_in_print(name, style, monkeypatch):
     for title, box in titles:
         assert not any(box.overlaps(key) for key in keys), title
         assert not any(box.overlaps(b) for t, b in titles if t is not title), title
+
+
+def test_the_check_sees_what_is_clipped(monkeypatch):
+    figure = Figure(figsize=(2.0, 2.0))
+    figure.text(0.9, 0.5, "clipped at the right")
+    FigureCanvasAgg(figure)
+    ((_, box),) = texts(figure, monkeypatch)
+    assert box.x1 > figure.bbox.x1

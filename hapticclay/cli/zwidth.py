@@ -1,0 +1,214 @@
+"""`hapticclay zwidth`: the virtual walls that a device renders stably, by runs and by theory."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from ..errors import ParameterError
+from ..files import versions, writable
+from ..model.constants import GAIN, TS
+from . import console
+
+if TYPE_CHECKING:
+    from ..studies.zwidth import Wall, ZWidth
+    from ..theory.margins import Box
+
+ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
+Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
+DEVICE_OPTIONS = {  # dotted names of the options
+    "mass": "device.mass",
+    "damper": "device.damper",
+    "friction": "device.friction",
+    "quantum": "device.quantum",
+    "Ts": "Ts",
+    "delay": "delay",
+    "velocity": "velocity",
+    "window": "window",
+    "filter": "velocity_filter",
+}
+HAND = ("mass", "damper", "spring")
+
+
+@dataclass(frozen=True)
+class ZWidthCommand:
+    """Find the virtual walls (K, B) that a device renders stably, by runs and by theory.
+
+    Quantities are in SI units, or have one: --Ts 1ms. With friction, an encoder or a surface the
+    loop is not linear: a wall is then stable if it comes to rest after a push.
+
+    Attributes:
+        source: File of a wall, .toml or .json, which the options change; none for the defaults.
+        mass: Mass of the device [kg], by default 0.1.
+        damper: Its physical damping b [N.s/m], by default 0.
+        friction: Its Coulomb friction fc [N], by default 0.
+        quantum: Of the position that its encoder reads [m], by default 0.
+        Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
+        delay: From a sample to the force computed from it [s], by default 0.
+        velocity: How it is measured, by default the difference of positions.
+        window: Samples that the difference spans, by default 1.
+        filter: Low-pass behind the difference [Hz], or none.
+        hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
+        surface: The wall has a surface and never pulls.
+        B: Virtual dampings to try [N.s/m]; by default 0 and others up to the largest stable one.
+        vary: A family: Ts, delay, quantum, damper, friction, mass, filter or window, then its
+            values, as in --vary damper 0.2 0.5 1; on the arm Ts, delay or gain.
+        box: Hands for a second set of runs: least and largest mass, damper, spring, as in
+            --box 0 1 0 5 0 300.
+        force: Of the push that tries a loop which is not linear [N].
+        speed: Of that push [m/s].
+        still: Largest motion back and forth that counts as rest [m].
+        arm: Axis of the arm with servo and compensator, in the place of a bare device: the plane is
+            that of the clay's k and b.
+        gain: Of the compensator, with --arm; by default 1 on x and 0.5 on y.
+        out: Folder for zwidth.json and the figure.
+        quick: Try fewer dampings.
+        figures: Format and style of the figure.
+    """
+
+    source: Annotated[Path | None, tyro.conf.Positional] = None
+    mass: Quantity = None
+    damper: Quantity = None
+    friction: Quantity = None
+    quantum: Quantity = None
+    Ts: Quantity = None
+    delay: Quantity = None
+    velocity: Literal["difference", "exact"] | None = None
+    window: Quantity = None
+    filter: Quantity = None
+    hand: tuple[float, float, float] | None = None
+    surface: bool = False
+    B: tuple[float, ...] = ()
+    vary: tuple[str, ...] = ()
+    box: tuple[float, float, float, float, float, float] | None = None
+    force: Quantity = None
+    speed: Quantity = None
+    still: Quantity = None
+    arm: Literal["x", "y"] | None = None
+    gain: float | None = None
+    out: Path = Path("out/zwidth")
+    quick: bool = False
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        from ..model.fields import with_fields
+        from ..studies.zwidth import Press, zwidth
+        from ..views.figure import Figure
+        from ..views.wall_plots import zwidth_plot
+
+        writable(self.out)
+        press = with_fields(Press(), self._given({n: n for n in ("force", "speed", "still")}))
+        wall, box = self._wall(), self._box()
+        with console.fraction_bar("runs") as show:
+            found = zwidth(
+                wall,
+                self.vary[0] if self.vary else "",
+                self._values(wall),
+                B=self.B or None,
+                box=box,
+                press=press,
+                quick=self.quick,
+                progress=show,
+            )
+        data = {"schema": ZWIDTH_SCHEMA, "wall": asdict(wall), "vary": self.vary, "box": self.box,
+                "press": asdict(press), "tables": found.tables(), "gap": found.gap(),
+                "violations": found.violations(), "versions": versions()}  # fmt: skip
+        try:
+            console.save_json(data, self.out / "zwidth.json")
+            figure = Figure(lambda: zwidth_plot(found), found.tables)
+            console.save_figures({"zwidth": figure}, self.out, self.figures)
+        finally:  # a full disk must not hide the result
+            print(region_table(found))
+        print(f"written to {self.out}")
+        return 0
+
+    def _given(self, names: dict[str, str]) -> dict[str, Any]:
+        """The options that were given, by dotted name, their numbers and units read."""
+        from ..model.fields import named_values
+
+        out: dict[str, Any] = {}
+        for option, name in names.items():
+            if (text := getattr(self, option)) is not None:
+                out |= named_values(f"--{option}", [f"{name}={text}"])
+        return out
+
+    def _wall(self) -> Wall:
+        from ..model.fields import with_fields
+        from ..model.operator import Operator
+        from ..model.virtual_wall import VirtualWall
+
+        hand = None if self.hand is None else Operator(*self.hand)
+        if self.arm:
+            return self._arm(hand)
+        if self.gain is not None:
+            raise ParameterError("gain", self.gain, "is for the arm: give --arm x or y")
+        wall = VirtualWall.load(self.source) if self.source else VirtualWall()
+        wall = with_fields(wall, self._given(DEVICE_OPTIONS))
+        if hand:
+            wall = replace(wall, operator=hand)
+        return replace(wall, surface=True) if self.surface else wall
+
+    def _arm(self, hand: Any) -> Wall:
+        from ..model.fields import with_fields
+        from ..studies.boundary import PushedLoop
+
+        names = [n for n in DEVICE_OPTIONS if n not in ("Ts", "delay")]
+        for name in (*names, "surface", "source"):
+            if value := getattr(self, name):
+                bound = "is for a bare device: leave it out beside --arm"
+                raise ParameterError(name, str(value), bound)
+        axis = self.arm or "x"
+        gain = GAIN["xy".index(axis)] if self.gain is None else self.gain
+        loop = PushedLoop(axis, K=gain, Ts=TS, operator=hand)
+        return with_fields(loop, self._given({"Ts": "Ts", "delay": "delay"}))
+
+    def _values(self, wall: Wall) -> list[Any]:
+        """The values behind --vary."""
+        from ..model.fields import named_values
+
+        if not self.vary:
+            return []
+        if len(self.vary) == 1:
+            bound = "must be a name and its values, as in --vary damper 0.2 0.5"
+            raise ParameterError("vary", self.vary[0], bound)
+        return [named_values("--vary", [f"x={word}"])["x"] for word in self.vary[1:]]
+
+    def _box(self) -> Box | None:
+        from ..theory.margins import Box
+
+        if self.box is None:
+            return None
+        m, M, d, D, k, K = self.box
+        return Box((m, M), (d, D), (k, K))
+
+
+def region_table(found: ZWidth) -> str:
+    """The regions and what was found beside theory, for a terminal.
+
+    Args:
+        found: from `zwidth`.
+    """
+    number = console.significant
+    rows = []
+    for r in found.regions:
+        gap = "-" if math.isnan(r.gap()) else f"{100.0 * r.gap():.2g} %"
+        sizes = [r.K[0], r.largest_K, r.largest_B, r.area]
+        rows.append([r.name or "-", *map(number, sizes), r.verdict, gap])
+    head = ["region", "K at least B", "largest K", "largest B", "area", "verdict", "off exact"]
+    lines = [console.text_table(rows, head, "lrrrrll")]
+    lines.append("K [N/m], B [N.s/m], area [N^2.s/m^2]")
+    if not math.isnan(found.gap()):
+        lines.append(f"runs against the exact linear loop: within {100.0 * found.gap():.2g} %")
+    if rough := [r for r in found.regions if not r.linear]:
+        lines.append(
+            f"rest: back and forth by {1e6 * found.press.still:g} um at most, after a push of "
+            f"{found.press.force:g} N at {1e3 * found.press.speed:g} mm/s"
+            f" ({len(rough)} of {len(found.regions)} regions)"
+        )
+    below = found.violations()
+    lines += below or ["no run was unstable below a line that is sufficient"]
+    return "\n".join(lines)

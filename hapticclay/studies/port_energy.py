@@ -1,0 +1,283 @@
+"""Passivity of a virtual wall by runs: the energy that it gives to the worst passive hand.
+
+A hand moves the device along a path that repeats itself; where the device gives more energy than it
+takes over a period, a passive hand exists that this drives without end, and the wall is active
+(Colgate, Schenkel, J. Robotic Systems 14, 1997). Of all paths through the same places at the
+samples the damper takes least on the one of constant speed between them, so the worst path is a
+polygon, whatever the mass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from ..errors import Bound, ParameterError, check_fields, integer
+from ..model import hardware
+from ..model.samples import Samples
+from ..model.scenario import Scenario
+from ..model.spring import STIFFNESS_MAX
+from ..model.virtual_wall import UPRIGHT, VirtualWall, wall_law
+from ..simulation import record
+from ..simulation.simulate import simulate
+from ..theory import wall_limits
+
+PATH_STEPS = 32  # engine steps a sample: a corner takes one, which loses its share of the damping
+LEAST_STEP = 1e-6  # [s] of a scenario
+LARGE = 5e-3  # [m] of a path that hides friction and quantum
+TOP_SPEED = 9.0  # [m/s] along it
+SMALL = 0.01  # of the quantum: of a path that shows one edge of the encoder alone
+LEAST_SPEED = 1.5e-5  # [m/s] along it: a run slower than 1e-5 m/s counts as stalled
+LEAST_SHARE = 2e-3  # of the damper's loss in that of friction, along such a path
+TURNS = [(1, 1), (2, 3), (1, 2), (1, 4), (1, 12)]  # (p, q): paths tried at omega Ts = pi p/q
+SLOW_TURN = 48  # q of the slowest path tried
+GROWTH = 1.3  # factor on K in the search for an active wall
+CLOSE = 2e-4  # limits are found to this share
+SETTLED = 12.0  # time constants of the filter before energy is counted
+
+
+@dataclass(frozen=True)
+class Path:
+    """A path that a hand imposes on the device: an even polygon in the samples, which repeats.
+
+    Attributes:
+        places: of the device at the samples of a period [m], shape (n,).
+        middles: of the device where a late force changes between two samples [m], shape (n,);
+            empty where it does not.
+    """
+
+    places: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")]
+    middles: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")] = ()
+
+    def __post_init__(self):
+        check_fields(self, "path.")
+        if len(self.places) < 2:
+            raise ParameterError("path.places", self.places, "must be two places or more")
+        if self.middles and len(self.middles) != len(self.places):
+            bound = f"must be {len(self.places)} places, one a sample"
+            raise ParameterError("path.middles", self.middles, bound)
+
+
+def zigzag(amplitude: float, about: float = 0.0) -> Path:
+    """The path at half the sampling frequency, in step with the samples: a triangle.
+
+    Over a sample a wall K with damper B gives 2 A^2 (K + 2 B/Ts) along it, and a damper b takes
+    4 b A^2/Ts.
+
+    Args:
+        amplitude: A [m].
+        about: its middle [m].
+    """
+    return Path((about + amplitude, about - amplitude))
+
+
+def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -> Path:
+    """The path of least loss through a sine of the samples.
+
+    If a late force changes between two samples it has a corner there too, where the damper's loss
+    and the wall's work balance (docs/equations.md, section 7).
+
+    Args:
+        wall: the wall with its K, of a device with a damper.
+        turn: omega Ts as (p, q) of pi p/q, 1 <= p <= q.
+        amplitude: of the sine [m].
+    """
+    p, q = turn
+    angle = math.pi * p / q * np.arange(2 * q)
+    places = amplitude * np.cos(angle)
+    middle = wall_limits.worst_middle(wall, math.pi * p / q)
+    if middle is None:
+        return Path(tuple(places.tolist()))
+    return Path(
+        tuple(places.tolist()), tuple((amplitude * middle * np.exp(1j * angle)).real.tolist())
+    )
+
+
+def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> Scenario:
+    """Build the run in which a hand moves the device along a path.
+
+    The force of the hand is what mass, damper, friction and wall ask for along the path, kick by
+    kick; the wall's is its law applied to the path as encoder and difference show it.
+
+    Args:
+        wall: the wall, without a hand of its own.
+        path: the path.
+        periods: that energy is counted over, behind those in which window, delay and filter fill.
+        steps: engine steps a sample.
+    """
+    return _imposed(wall, path, periods, steps)[0]
+
+
+def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Scenario, int]:
+    """The run, and the step from which energy is counted."""
+    d, Ts = wall.device, wall.Ts
+    if wall.operator is not None:
+        raise ParameterError("wall.operator", wall.operator, "must be None: the path is the hand")
+    if wall.surface:
+        raise ParameterError("wall.surface", True, "must be False: the wall acts along the path")
+    steps = min(integer("steps", steps, 2, 10_000), max(2, int(Ts / LEAST_STEP)))
+    n, h = len(path.places), Ts / steps
+    memory = wall.window + math.ceil(wall.delay / Ts) + 2.0
+    if wall.velocity_filter is not None:
+        memory += SETTLED / (2.0 * math.pi * wall.velocity_filter * Ts)
+    first = math.ceil(memory / n)
+    samples, corner = n * (first + integer("periods", periods, 1, 10_000)) + 1, 0
+    at, place = np.arange(samples + 1) * Ts, np.resize(path.places, samples + 1)
+    if path.middles:
+        corner = h * min(max(round(math.fmod(wall.delay, Ts) / h), 1), steps - 1)
+        at = np.stack((at, at + corner), axis=1).ravel()[:-1]
+        place = np.stack((place, np.resize(path.middles, samples + 1)), axis=1).ravel()[:-1]
+    off = 2 if corner == h else 1  # energy is counted between corners
+    t = h * np.arange((samples - 1) * steps + off + 1)
+    x = np.interp(t, at, place)
+    v = np.diff(x) / h
+    before, after = np.append(v[0], v), np.append(v, v[-1])  # of each kick
+    mean = 0.5 * (before + after)
+    wanted = d.mass * (after - before) / h + d.damper * mean
+    wanted += d.friction * np.sign(after)  # where it turns round, friction helps to stop it
+    wanted += _wall_force(wall, x[::steps], t, h)
+    force = np.column_stack((wanted, np.zeros(len(wanted))))
+    edges = np.append(0.0, t[1:] - 0.5 * h)
+    muscle = Samples(tuple(edges.tolist()), tuple(map(tuple, force.tolist())), between="hold")
+    scenario = wall.scenario(
+        float(t[-1]), push=float(v[0]), start=float(x[0]), muscle=muscle, steps=steps
+    )
+    return scenario, n * first * steps + off
+
+
+def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
+    """Mean force of the wall over the kicks at t, for a device at these places at the samples."""
+    scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.window
+    counts = (scenario.interface.encoder if scenario.interface else None) or 0
+    assert scenario.controller is not None
+    params, state = scenario.controller.params, (0.0, 0.0)
+    lever = params[3]
+    rate = -(place[1] - place[0]) / Ts / lever  # at which the joint has turned so far, see Sampled
+    q = UPRIGHT - np.arcsin(place / lever)
+    q = np.concatenate((q[0] + Ts * rate * np.arange(-window, 0), q))
+    q = [hardware.encode(x, counts) for x in q.tolist()]
+    w, held = rate, []
+    for k in range(len(place)):
+        if wall.velocity == "difference":
+            mean = (q[window + k] - q[k]) / (window * Ts)
+            cutoff = wall.velocity_filter
+            w = mean if cutoff is None else hardware.low_pass(w, mean, cutoff, Ts)
+        else:
+            w = rate if not k else (q[window + k] - q[window + k - 1]) / Ts
+        (torque, _), state = wall_law(0.0, (q[window + k], 0.0), (w, 0.0), (), state, params)
+        held.append(torque / lever)
+    begins = wall.delay + Ts * np.arange(len(place) + 1)
+    work = np.append(0.0, np.cumsum(held)) * Ts
+    low, high = np.maximum(t - 0.5 * h, 0.0), np.minimum(t + 0.5 * h, t[-1])
+    return (np.interp(high, begins, work) - np.interp(low, begins, work)) / (high - low)
+
+
+def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
+    """Energy that the device takes from the hand over a period of a path, by a run [J].
+
+    The integral of fh v of the run, less what the mass stores meanwhile, which is next to nothing.
+
+    Args:
+        wall: the wall with its K, without a hand of its own; not "exact" in velocity with B or M.
+        path: what the hand imposes.
+        periods: that it is a mean of.
+        steps: engine steps a sample, at most as many as make steps of 1e-6 s; damping and friction
+            come out short by one part in so many along a zigzag.
+
+    Returns:
+        The energy; a negative one proves that the wall is active.
+    """
+    scenario, first = _imposed(wall, path, periods, steps)
+    found = simulate(scenario)
+    d, v = wall.device, found.v[first:, 0]
+    if found.outcome.code != "time limit":
+        raise ParameterError("path", path, f"cannot be imposed: {found.status}")
+    # the record counts the device's damper to the hand
+    force = found.fh.copy()
+    force[:, 0] += d.damper * found.v[:, 0]
+    given = record.port_energy(replace(found, fh=force))[:, 0]
+    stored = 0.5 * d.mass * (v[-1] ** 2 - v[0] ** 2)
+    return float(given[-1] - given[first] - stored) / periods
+
+
+def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
+    """Largest K at which no path of a hand takes energy from the wall, by runs [N/m].
+
+    Paths: polygons at several frequencies up to pi/Ts, and at the one that theory names; with
+    friction or an encoder a large and a small zigzag, which show the damper and an edge of the
+    encoder alone. K is found for each path by the sign of the energy. A path that was not tried may
+    take energy at a lower K: the answer is an upper bound of the true limit.
+
+    Args:
+        wall: all but K, without a hand of its own; not "exact" in velocity with B or M, nor with a
+            surface.
+        steps: engine steps a sample, see `taken_energy`.
+
+    Returns:
+        K; 0 if the wall is active at any K, inf if nothing shows it active up to 1e9 N/m.
+
+    Raises:
+        ParameterError: the wall has a hand, a surface, or B or M on an exact velocity, where the
+            energy of a path does not tell.
+    """
+    if wall.velocity == "exact" and (wall.B or wall.M):
+        bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
+        raise ParameterError("wall.velocity", wall.velocity, bound)
+    d = wall.device
+    if not (d.friction or d.quantum):
+        paths = [(lambda w, x=x: polygon(w, x), max(8, 2 * steps // x[1])) for x in _turns_of(wall)]
+        return _least_limit(wall, paths)
+    paths = [(lambda w: zigzag(_large(wall)), steps)]
+    if d.quantum:
+        small = min(SMALL * d.quantum, _large(wall))
+        if d.damper and d.friction:
+            small = min(small, LEAST_SHARE * 0.5 * d.friction * wall.Ts / d.damper)
+        small = max(small, 0.5 * LEAST_SPEED * wall.Ts)
+        paths.insert(0, (lambda w: zigzag(small, 0.5 * d.quantum), steps))
+    return _least_limit(wall, paths)
+
+
+def _large(wall: VirtualWall) -> float:
+    """A of a zigzag that shows the damper rather than friction and quantum [m]."""
+    quantum, large = wall.device.quantum, min(LARGE, 0.5 * TOP_SPEED * wall.Ts)
+    return round(large / quantum) * quantum if 0.0 < quantum < large else large
+
+
+def _turns_of(wall: VirtualWall) -> list[tuple[int, int]]:
+    """omega Ts over pi, as fractions, of the paths tried: the worst by theory, and some."""
+    limit = wall_limits.colgate_schenkel_limit(wall)
+    every = {(p, q) for q in range(1, 17) for p in range(1, q + 1) if math.gcd(p, q) == 1}
+    tried = [*sorted(every), (1, SLOW_TURN), (SLOW_TURN - 1, SLOW_TURN)]
+    index = wall_limits.passivity_index(
+        replace(wall, K=limit), [math.pi * p / (q * wall.Ts) for p, q in tried]
+    )
+    return [tried[int(np.argmin(index))], *TURNS]
+
+
+def _least_limit(wall: VirtualWall, paths: list[tuple[Callable, int]]) -> float:
+    """Least K at which the energy along a path of the wall changes its sign."""
+    from scipy.optimize import brentq
+
+    def energy(K: float, path: Callable, steps: int) -> float:
+        stiff = replace(wall, K=K)
+        return taken_energy(stiff, path(stiff), 1, steps)
+
+    least, d = math.inf, wall.device
+    guess = (d.damper + d.friction + abs(wall.B)) / (wall.Ts + wall.delay) or 1.0
+    for way in paths:
+        if least < math.inf and energy(least, *way) >= 0.0:
+            continue
+        if energy(0.0, *way) < 0.0:
+            return 0.0
+        low, high = 0.0, min(0.1 * guess, least)
+        while high < least and energy(high, *way) >= 0.0:
+            low, high = high, min(GROWTH * high, least)
+            if high > STIFFNESS_MAX:
+                return math.inf
+        found: Any = brentq(energy, low, high, way, xtol=0.5 * CLOSE * high, rtol=CLOSE)
+        least = float(found)
+    return least

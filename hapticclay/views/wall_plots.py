@@ -1,0 +1,217 @@
+"""Figures of virtual walls: the region of stable K and B, and families of regions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+
+from ..model.virtual_wall import VirtualWall
+from ..studies.zwidth import LINEAR, ZRegion, ZWidth
+from .style import (
+    BLACK,
+    BLUE,
+    CURVE_STYLES,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    VERMILION,
+    WHITE,
+    add_legend,
+    figure_size,
+    figure_style,
+    hand_name,
+    points,
+    set_title,
+    stroke,
+    unit_text,
+)
+
+LIMIT_LOOKS: dict[str, Any] = {  # by the first word of the name
+    "exact,": dict(color=BLUE, ls="-"),
+    "Colgate,": dict(color=GREEN, ls="--"),
+    "Hulin": dict(color=VERMILION, ls="-."),
+    "Abbott,": dict(color=PURPLE, marker="D", ls="none"),
+    "any": dict(color=ORANGE, ls=(0, (1, 1))),
+}
+FAMILY_MARKS = "osD^vPX"
+KIND_WORDS = {"exact": "", "sufficient": " (sufficient)", "rule": " (rule)"}
+REGION_ALPHA = 0.22
+LABEL_ROOM = 0.05  # share of the height that the name of a region takes
+SPREAD = 20.0  # ratio of B from which an axis is logarithmic
+LEAST_SHARE = 1e-4  # of the largest K, down to which a logarithmic axis goes
+
+
+def zwidth_plot(chart: ZWidth) -> Figure:
+    """Plots the region of stable walls, or a family of regions.
+
+    Runs are markers and theory is lines. Of a family each region has its runs, the exact line of
+    its linear loop, and its name beside it.
+
+    Args:
+        chart: from `zwidth`.
+    """
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 5.4))
+        ax = figure.add_subplot()
+        _set_axes(ax, chart.regions)
+        if len(chart.regions) == 1:
+            _draw_region(ax, chart.regions[0])
+        else:
+            _draw_family(ax, chart.regions)
+        ax.set(
+            xlabel=unit_text("virtual damping B [N.s/m]"),
+            ylabel=unit_text("virtual stiffness K [N/m]"),
+        )
+        add_legend(figure, ax, 2)
+        set_title(ax, *_device_parts(chart))
+    return figure
+
+
+def _draw_region(ax: Axes, r: ZRegion) -> None:
+    """The region of one device with all its lines."""
+    bottom = ax.get_ylim()[0]
+    ax.fill_between(*_outline(r), bottom, color=SKY_BLUE, alpha=REGION_ALPHA, lw=0, zorder=0.5)
+    for limit in r.limits:
+        look = dict(LIMIT_LOOKS[limit.name.split(" ")[0]])
+        if limit.name.startswith("exact"):
+            label = limit.name if r.linear else f"linear loop, {_left_out(r)} left out"
+        else:
+            label = limit.name + KIND_WORDS[limit.kind]
+        if look.get("marker"):
+            look |= dict(ms=stroke(8), mfc=WHITE, mew=stroke(1.8), zorder=6, clip_on=False)
+        ax.plot(limit.B, _shown(limit.K, bottom), label=label, **look)
+    runs: Any = dict(ls="none", color=BLACK, ms=stroke(6), zorder=5, clip_on=False)
+    how = "stability" if r.verdict == LINEAR else "rest"
+    ax.plot(r.B, _shown(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
+    if r.box:
+        label = "runs with the worst hand"
+        ax.plot(r.B, _shown(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
+
+
+def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
+    """Runs and exact line of each region, with its name at its largest K."""
+    bottom = ax.get_ylim()[0]
+    for i, r in enumerate(regions):
+        color, style = CURVE_STYLES[i % len(CURVE_STYLES)]
+        marker = FAMILY_MARKS[i % len(FAMILY_MARKS)]
+        ax.fill_between(*_outline(r), bottom, color=color, alpha=0.05, lw=0, zorder=0.5)
+        if r.linear:
+            limit = r.limits[0]
+            ax.plot(limit.B, _shown(limit.K, bottom), color=color, ls=style)
+        else:
+            ax.plot(*_outline(r), color=color, ls=style, lw=stroke(1.0))
+        look: Any = dict(color=color, marker=marker, ls="none", ms=stroke(5), clip_on=False)
+        if i % 2:
+            look["mfc"] = WHITE
+        ax.plot(r.B, _shown(r.K, bottom), label=r.name, zorder=5, **look)
+    _name_regions(ax, regions)
+
+
+def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
+    """Names each region beside its edge, at B = 0 or at its top, where the edges are apart."""
+    places = {
+        "left": [(r.B[0], r.K[0]) for r in regions],
+        "top": [max(zip(r.B, r.K, strict=True), key=lambda p: p[1]) for r in regions],
+    }
+
+    def room(side: str) -> float:
+        """Least distance of two edges there, as a share of the height."""
+        at = ax.transAxes.inverted().transform(ax.transData.transform(places[side]))
+        heights = sorted(y for _, y in at)
+        return min((b - a for a, b in zip(heights, heights[1:], strict=False)), default=1.0)
+
+    if not all(K > 0.0 for _, K in places["left"]):
+        places.pop("left")
+    side = max(places, key=room)
+    if room(side) < LABEL_ROOM:
+        return  # the legend names them
+    for i, (r, place) in enumerate(zip(regions, places[side], strict=True)):
+        ax.annotate(
+            r.name,
+            place,
+            xytext=(points(5.0), points(5.0)),
+            textcoords="offset points",
+            color=CURVE_STYLES[i % len(CURVE_STYLES)][0],
+            fontsize=points(9.0),
+            ha="left" if side == "left" else "center",
+            zorder=7,
+        )
+
+
+def _outline(r: ZRegion) -> tuple[list[float], list[float]]:
+    """The edge of a region: the exact line where the loop is linear, else from run to run."""
+    if r.linear and r.limits:
+        return list(r.limits[0].B), list(r.limits[0].K)
+    B, K = list(r.B), list(r.K)
+    return (B, K) if math.isnan(r.most_B) else ([*B, r.most_B], [*K, 0.0])
+
+
+def _shown(K: Sequence[float], bottom: float) -> np.ndarray:
+    """K, with a gap where there is none."""
+    a = np.array(K, dtype=float)
+    return np.where(np.isfinite(a) & (a > 0.0), a, np.nan)
+
+
+def _set_axes(ax: Axes, regions: Sequence[ZRegion]) -> None:
+    """Scales and limits that hold every run: logarithmic where they span much, with B = 0."""
+    B = sorted({x for r in regions for x in r.B if x > 0.0})
+    K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0]
+    least = [x for r in regions for x in r.K[:1] if x > 0.0]
+    least += [x for r in regions if len(regions) == 1 for limit in r.limits for x in limit.K[:1]]
+    top = max([*B, *(r.largest_B for r in regions)], default=1.0)
+    most = max(K, default=1.0)
+    if not B or B[-1] < SPREAD * B[0] or min(x for r in regions for x in r.B) < 0.0:
+        ax.set(xlim=(min(0.0, *(r.B[0] for r in regions)), 1.05 * top), ylim=(0.0, 1.1 * most))
+        return
+    first = B[0]
+    ax.set_xscale("symlog", linthresh=first, linscale=0.45)
+    ax.set_xlim(0.0, 1.35 * top)
+    powers = [10.0**n for n in range(math.ceil(math.log10(first)), math.floor(math.log10(top)) + 1)]
+    ax.set_xticks([0.0, *powers])
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_yscale("log")
+    ax.set_ylim(max(0.4 * min([*least, most]), LEAST_SHARE * most), 2.0 * most)
+    for side in (ax.xaxis, ax.yaxis):
+        side.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        side.set_minor_formatter(NullFormatter())
+
+
+def _left_out(r: ZRegion) -> str:
+    """What the linear loop leaves out."""
+    assert isinstance(r.wall, VirtualWall)
+    d = r.wall.device
+    parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
+    return " and ".join(parts + ["surface"] * r.wall.surface)
+
+
+def _device_parts(chart: ZWidth) -> list[str]:
+    """Phrases that describe the device in the title: what is the same in all regions."""
+    w = chart.regions[0].wall
+    told = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
+    if w.delay:
+        told["delay"] = f"delay {1e3 * w.delay:g} ms"
+    if isinstance(w, VirtualWall):
+        d = w.device
+        told = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"} | told
+        if d.friction:
+            told["friction"] = f"fc = {d.friction:g} N"
+        if d.quantum:
+            told["quantum"] = f"quantum {1e6 * d.quantum:g} um"
+        if w.window > 1:
+            told["window"] = f"window {w.window}"
+        if w.velocity_filter:
+            told["filter"] = f"filter {w.velocity_filter:g} Hz"
+    else:
+        told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told
+    parts = [unit_text(text) for name, text in told.items() if name != chart.vary]
+    parts.append(hand_name(w.operator))
+    if any(r.verdict != LINEAR for r in chart.regions):
+        parts.append(f"rest within {1e6 * chart.press.still:g} um")
+    return parts
