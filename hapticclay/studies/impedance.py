@@ -194,7 +194,7 @@ def measure_impedance(
     amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     length = number("period", period, 0.1, 1000.0, unit="s")
     seed = integer("seed", seed, 0, 2**32 - 1)
-    Ts, n, steps = _grid(subject, length)
+    Ts, n, steps = _steps_of(subject, length)
     dt = (Ts or LONGEST_STEP) / steps
     i = 0 if isinstance(subject, VirtualWall) else AXES.index(subject.axis)
     along = (1.0, 0.0) if i == 0 else (0.0, 1.0)
@@ -252,7 +252,7 @@ def _rough(subject: Subject) -> bool:
     return device is not None and bool(device.friction or device.quantum)
 
 
-def _grid(subject: Subject, length: float) -> tuple[float | None, int, int]:
+def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
     """Control sample; engine steps in a period, whole samples; and in a sample."""
     from scipy.fft import next_fast_len
 
