@@ -197,11 +197,9 @@ def least_mass_plot(found: ArmMBK) -> Figure:
             ax.plot(x, y, label="border by runs", **_dots(BLUE))
         ax.set(xscale="log", yscale="log")
         ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
-        look: Any = dict(transform=ax.transAxes, ha="left", va="bottom", fontsize=points(9.0))
-        ax.text(0.03, 0.04, "stable above and to the right", **look)
         add_legend(figure, ax, 3 if not narrow() else 1)
         how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
-        set_title(ax, f"arm, {loop.axis} axis", how)
+        set_title(ax, f"arm, {loop.axis} axis", how, "stable above and to the right")
     return figure
 
 
