@@ -60,6 +60,10 @@ from .studies.fitting import fit_flow as fit_flow
 from .studies.identification import Identified as Identified
 from .studies.identification import Noise as Noise
 from .studies.identification import identify as identify
+from .studies.impedance import MeasuredImpedance as MeasuredImpedance
+from .studies.impedance import measure_impedance as measure_impedance
+from .studies.mbk import arm_mbk as arm_mbk
+from .studies.mbk import device_mbk as device_mbk
 from .studies.measurement import Measurement as Measurement
 from .studies.measurement import identify_data as identify_data
 from .studies.removal import removed as removed
@@ -79,6 +83,10 @@ from .theory.design import design_gain as design_gain
 from .theory.design import transparency_error as transparency_error
 from .theory.gain_limit import gain_limit as gain_limit
 from .theory.gain_limit import stiffness_limit as stiffness_limit
+from .theory.impedance import Impedance as Impedance
+from .theory.impedance import loop_impedance as loop_impedance
+from .theory.impedance import loop_response as loop_response
+from .theory.impedance import wall_response as wall_response
 from .theory.linear_loop import Loop as Loop
 from .theory.linear_loop import closed_loop_poles as closed_loop_poles
 from .theory.margins import Box as Box
@@ -92,6 +100,10 @@ from .theory.margins import nyquist as nyquist
 from .theory.margins import small_gain as small_gain
 from .theory.margins import transparency as transparency
 from .theory.margins import worst_case as worst_case
+from .theory.mbk import dynamic_range as dynamic_range
+from .theory.mbk import least_mass as least_mass
+from .theory.mbk import renderable as renderable
+from .theory.mbk import stable_band as stable_band
 from .theory.passivity import clay_passivity as clay_passivity
 from .theory.passivity import passivity as passivity
 from .theory.relay_cycle import ExactCycle as ExactCycle

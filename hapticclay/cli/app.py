@@ -30,10 +30,13 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "stability": "hapticclay.cli.stability:StabilityCommand",
     "accuracy": "hapticclay.cli.accuracy:AccuracyCommand",
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
+    "passivity": "hapticclay.cli.passivity:PassivityCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "zwidth": "hapticclay.cli.zwidth:ZWidthCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
     "fit": "hapticclay.cli.fit:FitCommand",
+    "impedance": "hapticclay.cli.impedance:ImpedanceCommand",
+    "mbk": "hapticclay.cli.mbk:MBKCommand",
     "bench": "hapticclay.cli.bench:BenchCommand",
     "fields": "hapticclay.cli.fields:FieldsCommand",
     "materials": "hapticclay.cli.materials:MaterialsCommand",
@@ -236,7 +239,8 @@ def options(words: Sequence[str]) -> dict[str, Any]:
         hints = _hints(kind)
         for f in dataclasses.fields(kind):
             nested = dataclasses.is_dataclass(hints[f.name])
-            out |= _hints(hints[f.name]) if nested else {f.name: hints[f.name]}
+            name = "set" if f.name == "changes" else f.name
+            out |= _hints(hints[f.name]) if nested else {name: hints[f.name]}
     if "scenario" in out:
         from ..model.experiments import EXPERIMENTS, parameters
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..files import atomic, writable
-from .console import progress_bar
+from .console import FigureOptions, progress_bar, save_figures
 
 
 @dataclass(frozen=True)
@@ -19,18 +19,25 @@ class ReproduceCommand:
         out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
         quick: Leave out the map of Sh over the workspace.
         page: Also write the table of numbers alone, as Markdown, to this file.
+        figures: Formats and style of figures/; those of the report are for a screen.
     """
 
     out: Path = Path("out/paper")
     quick: bool = False
     page: Path | None = None
+    figures: FigureOptions = FigureOptions()
 
     def __call__(self) -> int:
         writable(self.out)
         from ..paper import report
 
         with progress_bar(total=0, bar_format="{elapsed} {desc}") as bar:
-            rows = report.reproduce(self.out, self.quick, bar.set_description_str)
+            rows = report.reproduce(
+                self.out,
+                self.quick,
+                bar.set_description_str,
+                lambda figures, folder: save_figures(figures, folder, self.figures),
+            )
         if self.page:
             with atomic(self.page) as f:
                 f.write(report.paper_page(rows).encode())

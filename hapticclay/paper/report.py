@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-import io
+import functools
 import json
 import math
 from collections.abc import Callable
@@ -16,6 +16,7 @@ from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
 from ..studies import workspace
+from ..views.figure import Figure
 from . import claims
 from .claims import STATUSES, Row, Runs
 
@@ -242,6 +243,7 @@ def reproduce(
     out: Path,
     quick: bool = False,
     progress: Callable[[str], None] | None = None,
+    save: Callable[[dict[str, Figure], Path], object] | None = None,
     runs: Runs | None = None,
 ) -> list[Row]:
     """Writes report.html (self-contained), report.md, ledger.json and figures/.
@@ -250,6 +252,7 @@ def reproduce(
         out: folder.
         quick: whether to leave out the map over the workspace.
         progress: called with the title of each step before it begins.
+        save: writes figures by name to a folder; None for PNG files as in the report.
         runs: runs to use again; None to make them.
 
     Returns:
@@ -263,11 +266,14 @@ def reproduce(
             continue
         if progress:
             progress(p.title)
-        data = io.BytesIO()
-        p.draw(runs).savefig(data, format="png")
-        with atomic(out / "figures" / f"{p.name}.png") as f:
-            f.write(data.getvalue())
-        code = base64.b64encode(data.getvalue()).decode()
+        figure = Figure(functools.partial(p.draw, runs))
+        png = figure.png()
+        if save is None:
+            with atomic(out / "figures" / f"{p.name}.png") as f:
+                f.write(png)
+        else:
+            save({p.name: figure}, out / "figures")
+        code = base64.b64encode(png).decode()
         pictures.append({"name": p.name, "title": p.title, "caption": p.caption, "data": code})
     found = {"rows": rows, "statuses": STATUSES, "pictures": pictures, "versions": versions()}
     env = _environment()

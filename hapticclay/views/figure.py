@@ -27,7 +27,7 @@ class Figure:
         draw: returns the figure of matplotlib in the style of now (`style.figure_style`), or None
             where it does not apply.
         tables: the numbers by name of table, and by name and unit of column; or a function that
-            returns them, called when they are asked for.
+            returns them, called when they are asked for; None for the curves as they are drawn.
     """
 
     def __init__(
@@ -55,7 +55,11 @@ class Figure:
 
     def tables(self) -> Mapping[str, Table]:
         """Returns the numbers that the figure shows, by table and column."""
-        return (self._tables() if callable(self._tables) else self._tables) or {}
+        if self._tables is not None:
+            return self._tables() if callable(self._tables) else self._tables
+        with styles.styled("screen"):
+            figure = self._draw()
+            return {} if figure is None else curves_drawn(figure)
 
     def save(
         self,
@@ -112,14 +116,25 @@ class Figure:
         return written
 
     def svg(self, style: str = "screen") -> str:
-        """Returns the figure as the text of an SVG file.
+        """Returns the figure as the text of an SVG file, empty where it does not apply.
 
         Args:
             style: as in `draw`.
         """
+        return self._bytes("svg", style).decode()
+
+    def png(self, style: str = "screen") -> bytes:
+        """Returns the figure as a PNG file, empty where it does not apply.
+
+        Args:
+            style: as in `draw`.
+        """
+        return self._bytes("png", style)
+
+    def _bytes(self, kind: str, style: str) -> bytes:
         with styles.styled(style) as look:
             figure = self._draw()
-            return "" if figure is None else _encoded(figure, "svg", look.dpi).decode()
+            return b"" if figure is None else _encoded(figure, kind, look.dpi)
 
     def _repr_svg_(self) -> str | None:
         return self.svg() or None
@@ -129,6 +144,35 @@ def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
     data = io.BytesIO()
     figure.savefig(data, format=kind, dpi=dpi, metadata=UNDATED[kind])
     return data.getvalue()
+
+
+def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
+    """Returns the curves of a figure, a table a panel: columns curve, and x and y as labelled.
+
+    Args:
+        figure: with its curves as lines; what else is drawn is left out.
+    """
+    out: dict[str, Table] = {}
+    axes: Any = figure.axes
+    for ax in axes:
+        lines = [x for x in ax.lines if x.get_transform().contains_branch(ax.transData)]
+        lines = [x for x in lines if all(map(len, x.get_data()))]
+        straight = [x.get_transform() != ax.transData for x in lines]  # axhline and its like
+        lines = [x for x, some in zip(lines, straight, strict=True) if not some]
+        if not lines:
+            continue
+        x_name, y_name = ax.get_xlabel() or "x", ax.get_ylabel() or "y"
+        names = [str(x.get_label()) for x in lines]
+        names = [f"curve {i}" if n.startswith("_") else n for i, n in enumerate(names, 1)]
+        both = list(zip(names, (x.get_xydata() for x in lines), strict=True))
+        out[f"panel{len(out) + 1}"] = {
+            "curve": [name for name, xy in both for _ in xy],
+            x_name: [float(p[0]) for _, xy in both for p in xy],
+            y_name if y_name != x_name else f"{y_name} (y)": [
+                float(p[1]) for _, xy in both for p in xy
+            ],
+        }
+    return out
 
 
 def csv_text(table: Table) -> str:

@@ -77,8 +77,7 @@ PRINT: Any = STYLE | {
     "legend.handlelength": 1.8,
     "legend.columnspacing": 1.2,
     "legend.labelspacing": 0.35,
-    "figure.constrained_layout.h_pad": 0.02,
-    "figure.constrained_layout.w_pad": 0.02,
+    "figure.constrained_layout.w_pad": 0.03,
 }
 SCREEN_WIDTHS = {1: 6.4, 2: 9.6}  # [inch] of figures of one and of two columns
 LEAST_TEXT = 6.0  # [points] that print can be read at
@@ -154,6 +153,28 @@ def figure_size(columns: int, height: float, width: float | None = None) -> tupl
     """
     now = look()
     return now.width or width or SCREEN_WIDTHS[columns], now.scale * height
+
+
+def map_size(across: float, least: float, ratio: float) -> tuple[float, float]:
+    """Returns the size of a figure of a map to scale, in the style of now [inch].
+
+    Args:
+        across: width of its axes on a screen [inch].
+        least: their least height on a screen [inch].
+        ratio: height over width of what is shown.
+    """
+    width, scale = figure_size(1, 1.0)
+    across *= width / SCREEN_WIDTHS[1]
+    return width, min(max(across * ratio, scale * least) + 1.3 * scale, width)
+
+
+def panel_grid(count: int) -> tuple[int, int]:
+    """Returns rows and columns of some panels: side by side, or in one printed column stacked.
+
+    Args:
+        count: of the panels.
+    """
+    return (count, 1) if narrow() else (1, count)
 
 
 def points(size: float) -> float:

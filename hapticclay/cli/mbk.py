@@ -1,0 +1,163 @@
+"""`hapticclay mbk`: the virtual masses, dampers and springs that a device or the arm renders."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ..errors import ParameterError
+from ..files import writable
+from ..model.constants import TS
+from . import console
+from .impedance import wall_of
+
+if TYPE_CHECKING:
+    from ..studies.mbk import ArmMBK, DeviceMBK
+
+ARM_ONLY = ("hand", "box", "Ts")
+
+
+@dataclass(frozen=True)
+class MBKCommand:
+    """Find the virtual masses, dampers and springs that are stable, by theory and by runs.
+
+    For a bare device: over three planes, and its dynamic range. With --arm: the least mass that the
+    arm renders as the admittance of its compensator.
+
+    Attributes:
+        wall: The device, and the K, B and M that the planes keep, as in --wall mass=0.1 damper=0.5
+            Ts=1ms K=1000 B=2 M=0, which are the defaults; operator.mass=0.25 adds a hand.
+        arm: Axis of the arm, in the place of a bare device.
+        hand: Mass, damper and spring of the hand at the arm [kg, N.s/m, N/m]; by default Th (19).
+        box: Hands: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
+        Ts: Control sample of the arm [s]; None for continuous time.
+        columns: Columns of a plane, or dampers of the arm, at which runs look for the border.
+        quick: Draw lines of fewer points, with two such columns.
+        out: Folder for mbk.json and the figures.
+        figures: Format and style of the figures.
+    """
+
+    wall: tuple[str, ...] = ()
+    arm: Literal["x", "y"] | None = None
+    hand: tuple[float, float, float] | None = None
+    box: tuple[float, float, float, float, float, float] | None = None
+    Ts: float | None = TS
+    columns: int = 5
+    quick: bool = False
+    out: Path = Path("out/mbk")
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        writable(self.out)
+        columns = min(self.columns, 2) if self.quick else self.columns
+        if self.arm:
+            return self._arm(columns)
+        for name in ARM_ONLY:
+            if getattr(self, name) != getattr(type(self), name):
+                raise ParameterError(name, getattr(self, name), "is for the arm: give --arm too")
+        return self._device(columns)
+
+    def _device(self, columns: int) -> int:
+        from ..studies.mbk import device_mbk
+        from ..views import impedance_plots
+        from ..views.figure import Figure
+
+        wall = wall_of(("device.damper=0.5", "K=1000", "B=2") if not self.wall else self.wall)
+        found = device_mbk(wall, columns=columns, points=21 if self.quick else 61, progress=_bar)
+        tables = found.tables()
+        span = {"range": tables.pop("range")}
+        figures = {
+            "mbk": Figure(lambda: impedance_plots.mbk_plot(found), tables),
+            "range": Figure(lambda: impedance_plots.dynamic_range_plot(found), span),
+        }
+        self._save(found.summary(), figures, device_table(found))
+        return 0
+
+    def _arm(self, columns: int) -> int:
+        from ..model.operator import Operator
+        from ..studies.boundary import PushedLoop
+        from ..studies.mbk import HANDS, arm_mbk
+        from ..theory.margins import Box
+        from ..views import impedance_plots
+        from ..views.figure import Figure
+
+        if self.wall:
+            raise ParameterError("wall", self.wall, "is for a bare device: leave it out with --arm")
+        assert self.arm is not None
+        box = HANDS
+        if self.box:
+            m0, m1, d0, d1, k0, k1 = self.box
+            box = Box((m0, m1), (d0, d1), (k0, k1))
+        operator = Operator(*self.hand) if self.hand else Operator()
+        loop = PushedLoop(self.arm, b=0.0, operator=operator, Ts=self.Ts)
+        points = 7 if self.quick else 17
+        found = arm_mbk(
+            loop, box, columns=columns, points=points, samples=0 if self.quick else 24,
+            progress=_bar,
+        )  # fmt: skip
+        figures = {"mass": Figure(lambda: impedance_plots.least_mass_plot(found), found.tables)}
+        self._save(found.summary(), figures, arm_table(found))
+        return 0
+
+    def _save(self, summary: dict[str, Any], figures: dict[str, Any], table: str) -> None:
+        try:
+            console.save_json(summary, self.out / "mbk.json")
+            console.save_figures(figures, self.out, self.figures)
+        finally:  # a full disk must not hide the result
+            print(table)
+        print(f"written to {self.out}")
+
+
+def _bar(items: Any) -> Any:
+    return console.progress_bar(items, desc="mbk")
+
+
+def device_table(found: DeviceMBK) -> str:
+    """Borders by runs beside the exact ones, and the dynamic range, for a terminal.
+
+    Args:
+        found: from `device_mbk`.
+    """
+    number = console.significant
+    rows = []
+    for plane, some in found.found.items():
+        for x in some:
+            off = f"{100.0 * (x.y / x.exact - 1.0):+.2g} %"
+            rows.append([plane, number(x.x), x.end, number(x.y), number(x.exact), off])
+    head = ["plane", "at", "border", "by runs", "exact", "off"]
+    r = found.range
+    low, high = (float(r.omega[i]) / (2.0 * math.pi) for i in (0, -1))
+    wall = f"K = {r.stiffest.K:.4g} N/m with B = {r.stiffest.B:.4g} N.s/m"
+    lines = [
+        console.text_table(rows, head, "lrlrrr"),
+        "mass-damper: kg, N.s/m; mass-stiffness: kg, N/m; damper-stiffness: N.s/m, N/m",
+        f"dynamic range from the free device to {wall}: {r.decibels[0]:.3g} dB at {low:.3g} Hz, "
+        f"{r.decibels[-1]:.3g} dB at {high:.3g} Hz, mean {r.mean:.3g} dB",
+    ]
+    return "\n".join(lines)
+
+
+def arm_table(found: ArmMBK) -> str:
+    """The least masses of the arm, for a terminal.
+
+    Args:
+        found: from `arm_mbk`.
+    """
+    number = console.significant
+    runs = {x.exact: x.y for x in found.found}
+    rows = []
+    for (m, b), (worst, worst_b) in zip(found.nominal.T, found.worst.T, strict=True):
+        run = runs.get(float(m))
+        rows.append(
+            [
+                number(float(b)),
+                number(float(m)),
+                "" if run is None else number(run),
+                number(float(worst_b)),
+                number(float(worst)),
+            ]
+        )
+    head = ["B [N.s/m]", "least M [kg]", "by runs", "B, hand box", "least M, hand box"]
+    return console.text_table(rows, head, "rrrrr")

@@ -1,0 +1,319 @@
+"""The impedance that a hand feels, measured on runs by a multisine, beside the computed one.
+
+The muscles push with a multisine so small that the arm stays linear; after the transient the
+response is taken at its lines over whole periods, as in `identification`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, choice, integer, number
+from ..files import versions
+from ..model.constants import AXES
+from ..model.scenario import Scenario
+from ..model.signals import Multisine
+from ..model.virtual_wall import VirtualWall
+from ..simulation.record import Record
+from ..simulation.simulate import simulate
+from ..theory import gain_limit
+from ..theory.impedance import Impedance, loop_response, wall_response
+from ..theory.linear_loop import Loop
+from ..theory.wall_limits import stable_wall, stiffness_band
+from .boundary import PushedLoop
+from .identification import _multisine, estimate_response
+
+IMPEDANCE_SCHEMA = "hapticclay-impedance-1"
+IMPEDANCE_BAND = (0.5, 30.0)  # [Hz]
+IMPEDANCE_PERIOD = 4.0  # [s]
+IMPEDANCE_LINES = 24
+MOTION = 1e-5  # [m] rms: the pose changes the mobility by 4e-5 of it
+LONGEST_STEP = 1e-4  # [s] of the engine: its error is (omega dt)^2/6, 6e-5 at 30 Hz
+STEPS_TRIED = 24  # more of them a sample, until the delay falls on a step
+SETTLING_PERIODS = (2, 6, 22)  # let go by before the response is taken, until it has settled
+STEADY_RESPONSE = 1e-4  # relative deviation of the impedance from period to period
+LINEAR_MOTION = "must leave the motion linear: "
+
+Subject = PushedLoop | VirtualWall
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredImpedance:
+    """An impedance measured on a run, beside the computed one at the same lines.
+
+    Attributes:
+        subject: what was run.
+        measured: by the run, at the lines.
+        computed: by theory, at the lines.
+        deviation: of the measured Z from period to period, relative, shape (n,): what is left of
+            the transient.
+        scenario: the run.
+        notes: what the run has and theory leaves out.
+    """
+
+    subject: Subject
+    measured: Impedance
+    computed: Impedance
+    deviation: np.ndarray
+    scenario: Scenario
+    notes: tuple[str, ...] = ()
+
+    @property
+    def gap(self) -> float:
+        """Largest relative difference of the measured Z from the computed one."""
+        return float(np.max(np.abs(self.measured.Z / self.computed.Z - 1.0)))
+
+    @property
+    def felt_gap(self) -> float:
+        """Largest relative difference of the measured fe/fh from the computed; NaN without any."""
+        there = self.computed.felt != 0.0
+        if not np.any(there):
+            return math.nan
+        ratio = self.measured.felt[there] / self.computed.felt[there]
+        return float(np.max(np.abs(ratio - 1.0)))
+
+    def over(self, frequency: np.ndarray) -> Impedance:
+        """The computed impedance at other frequencies, for lines between the markers.
+
+        Args:
+            frequency: [Hz], > 0, shape (n,).
+        """
+        return computed_impedance(self.subject, 2.0 * math.pi * np.asarray(frequency, dtype=float))
+
+    def tables(self) -> dict[str, dict[str, Sequence[float]]]:
+        """What the figures show, by table, columns headed with their units."""
+        out: dict[str, dict[str, Sequence[float]]] = {}
+        for name, x in (("measured", self.measured), ("computed", self.computed)):
+            out[name] = {
+                "f [Hz]": x.frequency.tolist(),
+                "Re Z [N.s/m]": x.Z.real.tolist(),
+                "Im Z [N.s/m]": x.Z.imag.tolist(),
+                "effective stiffness [N/m]": x.stiffness.tolist(),
+                "effective damping [N.s/m]": x.damping.tolist(),
+                "effective mass [kg]": x.mass.tolist(),
+                "|fe/fh|": np.abs(x.felt).tolist(),
+                "phase of fe/fh [deg]": np.degrees(np.angle(x.felt)).tolist(),
+                "|Z/Ze|": np.abs(x.ratio).tolist(),
+                "phase of Z/Ze [deg]": np.degrees(np.angle(x.ratio)).tolist(),
+            }
+        out["measured"]["deviation"] = self.deviation.tolist()
+        return out
+
+    def summary(self) -> dict[str, Any]:
+        """Return everything, ready for JSON."""
+        return {
+            "schema": IMPEDANCE_SCHEMA,
+            "kind": type(self.subject).__name__,
+            "subject": asdict(self.subject),
+            "gap": self.gap,
+            "felt_gap": self.felt_gap,
+            "tables": self.tables(),
+            "notes": list(self.notes),
+            "versions": versions(),
+        }
+
+
+def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
+    """What theory says of a loop or a wall, at the nominal pose.
+
+    Args:
+        subject: a `PushedLoop` or a `VirtualWall`.
+        omega: [rad/s], > 0, shape (n,).
+    """
+    if isinstance(subject, VirtualWall):
+        return wall_response(subject, omega)
+    return loop_response(subject.linear, omega)
+
+
+def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
+    """The loop of one axis of a scenario as one to be run, its clay all around the handle.
+
+    Args:
+        scenario: whose arm, servo, compensator, hand and control it has.
+        axis: "x" or "y".
+        b: clay [N.s/m]; None for that of the scenario with the least gain limit.
+
+    Raises:
+        ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
+    """
+    loop, i = Loop.of(scenario, axis, b), AXES.index(choice("axis", axis, AXES))
+    given = scenario.interface
+    if given and replace(given, delay=0.0, seed=0) != type(given)():
+        bound = "must have no hardware but a delay: the impedance is that of a linear loop"
+        raise ParameterError("interface", given, bound)
+    return PushedLoop(
+        loop.axis,
+        b=loop.b,
+        operator=loop.operator,
+        servo=scenario.servo[i],
+        compensator=loop.compensator,
+        K=loop.gain,
+        Ts=loop.Ts,
+        delay=loop.delay,
+        render=loop.render,
+        shaping=scenario.shaping,
+        torque_limit=scenario.torque_limit,
+        arm=scenario.arm,
+        k=loop.k,
+    )
+
+
+def measure_impedance(
+    subject: Subject,
+    *,
+    band: tuple[float, float] = IMPEDANCE_BAND,
+    lines: int = IMPEDANCE_LINES,
+    period: float = IMPEDANCE_PERIOD,
+    amplitude: float = MOTION,
+    seed: int = 0,
+) -> MeasuredImpedance:
+    """Measure the impedance of a loop or a wall by a run, beside the computed one.
+
+    The run begins at the nominal pose. Agreement is limited by the steps of the engine, (omega
+    dt)^2/6, by the amplitude over the length of a link, and by what is left of the transient.
+
+    Args:
+        subject: a `PushedLoop`, whose own push and pose do not matter, or a `VirtualWall` that acts
+            everywhere.
+        band: lowest and highest frequency [Hz].
+        lines: of the multisine, spread over the logarithm of frequency.
+        period: of the multisine [s], rounded up to whole samples that are quick to transform.
+        amplitude: rms of the motion to aim at [m].
+        seed: of the phases.
+
+    Raises:
+        ParameterError: a value is out of its bounds; the loop is unstable with this hand; or the
+            run ends early, meets the limits of the motors, or does not settle.
+    """
+    _check_subject(subject)
+    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
+    length = number("period", period, 0.1, 1000.0, unit="s")
+    seed = integer("seed", seed, 0, 2**32 - 1)
+    Ts, n, steps = _steps_of(subject, length)
+    dt = (Ts or LONGEST_STEP) / steps
+    i = 0 if isinstance(subject, VirtualWall) else AXES.index(subject.axis)
+    along = (1.0, 0.0) if i == 0 else (0.0, 1.0)
+    wave = replace(_multisine(along, band, n * dt, lines, 0.1 / dt), seed=seed)
+    omega = wave.omega
+    computed = computed_impedance(subject, omega)
+    th, s = subject.hand, 1j * omega
+    place = 1.0 / (s * computed.Z + th.mass * s * s + th.damper * s + th.spring)
+    rms = amplitude / math.sqrt(np.mean(np.abs(place) ** 2))
+    wave = replace(wave, rms=(rms * along[0], rms * along[1]))
+    deviation, settling = np.array([math.inf]), 0
+    for settling in SETTLING_PERIODS:
+        scenario = _driven_scenario(subject, wave, (settling + 2) * wave.period, dt)
+        record = simulate(scenario)
+        if record.outcome.code != "time limit" or record.outcome.cause:
+            raise ParameterError("amplitude", amplitude, LINEAR_MOTION + record.status)
+        part = slice(settling * n, (settling + 2) * n)
+        measured, deviation = _measured(subject, record, part, n, steps, i, wave)
+        if deviation.max() <= STEADY_RESPONSE or _rough(subject):
+            felt = replace(measured, rendered=computed.rendered)
+            notes = _notes(subject, dt)
+            return MeasuredImpedance(subject, felt, computed, deviation, scenario, notes)
+    bound = (
+        f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
+        f"after {settling} periods of {wave.period:.3g} s; give a longer period"
+    )
+    raise ParameterError("period", period, bound)
+
+
+def _check_subject(subject: Subject) -> None:
+    """Refuse what no steady response exists of."""
+    if isinstance(subject, VirtualWall):
+        if subject.surface:
+            bound = "must be False: a wall that acts on one side alone is not linear"
+            raise ParameterError("wall.surface", True, bound)
+        if not _rough(subject) and not stable_wall(subject):
+            bound = (
+                f"must leave the wall stable with this hand: between {{:.4g}} and {{:.4g}} N/m "
+                f"at B = {subject.B:g} N.s/m, M = {subject.M:g} kg"
+            )
+            bound = bound.format(*stiffness_band(subject))
+            raise ParameterError("wall.K", subject.K, bound)
+        return
+    if not isinstance(subject, PushedLoop):
+        raise ParameterError("subject", subject, "must be a PushedLoop or a VirtualWall")
+    if not gain_limit.is_stable(subject.linear):
+        limit = gain_limit.gain_limit(subject.linear)
+        bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
+        raise ParameterError("K", subject.K, bound)
+
+
+def _rough(subject: Subject) -> bool:
+    """Whether friction or encoder are in the run, which theory leaves out."""
+    device = subject.device if isinstance(subject, VirtualWall) else None
+    return device is not None and bool(device.friction or device.quantum)
+
+
+def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
+    """Control sample; engine steps in a period, whole samples; and in a sample."""
+    from scipy.fft import next_fast_len
+
+    if subject.Ts is None:
+        n = int(next_fast_len(math.ceil(length / LONGEST_STEP - 1e-9)))  # type: ignore[arg-type]
+        return None, n, 1
+    least = max(1, math.ceil(subject.Ts / LONGEST_STEP - 1e-9))
+    late = subject.delay / subject.Ts
+    tried = range(least, least + STEPS_TRIED)
+    steps = next((x for x in tried if abs(x * late - round(x * late)) < 1e-9), least)
+    samples = int(next_fast_len(math.ceil(length / subject.Ts - 1e-9)))  # type: ignore[arg-type]
+    return subject.Ts, samples * steps, steps
+
+
+def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
+    if isinstance(subject, VirtualWall):
+        return subject.scenario(t_max, muscle=wave, steps=round(subject.Ts / dt))
+    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop=True)
+    base = replace(subject, pose=(0.0, 0.0)).scenario(t_max)
+    return replace(base, name="impedance", muscle=wave, dt=dt, Ts=subject.Ts, **still)
+
+
+def _measured(  # noqa: PLR0913  # one record, and where it is read
+    subject: Subject, record: Record, part: slice, n: int, steps: int, i: int, wave: Multisine
+) -> tuple[Impedance, np.ndarray]:
+    """The impedance over two whole periods of a record, and its relative deviation.
+
+    A row of the record holds velocity and hand force at the sample itself, the force interpolated
+    between the kicks on both sides. The force of the motors is held: its rows are a staircase,
+    whose fundamental is that of the rows times that of a hold.
+    """
+    v, fh, fe = (x[part, i] for x in (record.v, record.fh, record.fe))
+    held = False
+    if isinstance(subject, VirtualWall):
+        fh = fh + subject.device.damper * v  # the run has it in the arm of the operator
+        fe, held = record.tau[part, 0] / record.scenario.arm.l1, True
+    elif subject.Ts and subject.render == "held":
+        held = True
+        if not subject.delay:  # the record then has b v between the samples, too
+            fe = np.repeat(fe[::steps], steps)
+    bins = np.round(wave.omega / (2.0 * math.pi) * wave.period).astype(int)
+    reference = wave(record.t[part])[:, i]
+    Z = estimate_response(np.array([[reference, v, fh]]), n, bins)
+    felt = np.zeros_like(Z.response)
+    if np.any(fe):
+        felt = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
+    if held:
+        turn = 1j * wave.omega * wave.period / n
+        felt = felt * -np.expm1(-turn) / turn
+    found = Impedance(wave.omega, Z.response, felt, np.zeros_like(felt))
+    return found, Z.deviation / np.abs(Z.response)
+
+
+def _notes(subject: Subject, dt: float) -> tuple[str, ...]:
+    notes = []
+    if _rough(subject):
+        notes.append(
+            "friction and encoder make the response depend on the amplitude: measured is the best "
+            "linear one at this amplitude, computed leaves them out"
+        )
+    late = subject.delay / dt
+    if abs(late - round(late)) > 1e-6:
+        notes.append("the delay is no multiple of a step: measured fe/fh is late by up to a step")
+    return tuple(notes)

@@ -1,0 +1,285 @@
+"""Renderable masses, dampers and springs: what theory says, and where runs stop being stable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, integer, numbers_of
+from ..files import versions
+from ..model.virtual_wall import VirtualWall
+from ..simulation.simulate import simulate
+from ..theory.margins import Box
+from ..theory.mbk import (
+    PLANES,
+    DynamicRange,
+    Region,
+    dynamic_range,
+    least_mass,
+    renderable,
+    stable_band,
+)
+from .boundary import PushedLoop, find_crossing, growth_rate, simulated_gain
+
+MBK_SCHEMA = "hapticclay-mbk-1"
+MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}
+WALL_PUSH = 1e-4  # [m/s] initial velocity of the device
+GROWTH_SAMPLES = 800  # of a run whose growth is read
+GROWTH_STEPS = 2  # of the engine a sample: under a held force each is exact but for the damping
+FADED_SHARE = 1e-6  # of the push: what is left may be rounding
+MOST_SOUGHT = 100.0  # times the exact border: end of a search
+HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
+DECAYS = (1.0, 1000.0)  # [1/s] B/M of admittances
+RANGE_BAND = (0.5, 30.0)  # [Hz]
+
+
+class Border(NamedTuple):
+    """A border of stability found by runs.
+
+    Attributes:
+        x: along the plane.
+        y: up it, as found.
+        exact: the same by theory.
+        end: "high" or "low".
+    """
+
+    x: float
+    y: float
+    exact: float
+    end: str
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceMBK:
+    """What a bare device renders: a region over each plane, and its dynamic range.
+
+    Attributes:
+        wall: device, hand and sampling; each plane keeps one of its K, B and M.
+        regions: by plane.
+        found: borders by runs, by plane.
+        range: from free motion to the stiffest stable wall.
+    """
+
+    wall: VirtualWall
+    regions: dict[str, Region]
+    found: dict[str, tuple[Border, ...]]
+    range: DynamicRange
+
+    @property
+    def gap(self) -> float:
+        """Largest relative difference of a border found by runs from the exact one; NaN if none."""
+        gaps = [abs(x.y / x.exact - 1.0) for some in self.found.values() for x in some]
+        return max(gaps, default=math.nan)
+
+    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+        """What the figures show, by table, columns headed with their units."""
+        out: dict[str, dict[str, Sequence[Any]]] = {}
+        for plane, region in self.regions.items():
+            a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
+            low, high = region.low.tolist(), region.high.tolist()
+            out[plane] = {a: region.x.tolist(), f"least {b}": low, f"largest {b}": high}
+            runs = self.found[plane]
+            out[f"{plane} by runs"] = {
+                a: [r.x for r in runs],
+                b: [r.y for r in runs],
+                f"exact {b}": [r.exact for r in runs],
+                "end": [r.end for r in runs],
+            }
+        r = self.range
+        out["range"] = {
+            "f [Hz]": (r.omega / (2.0 * math.pi)).tolist(),
+            "free |Z| [N.s/m]": r.free.tolist(),
+            "least |Z| [N.s/m]": r.least.tolist(),
+            "stiffest |Z| [N.s/m]": r.most.tolist(),
+            "range [dB]": r.decibels.tolist(),
+        }
+        return out
+
+    def summary(self) -> dict[str, Any]:
+        """Return everything, ready for JSON."""
+        r = self.range
+        return {
+            "schema": MBK_SCHEMA,
+            "kind": "device",
+            "wall": asdict(self.wall),
+            "gap": self.gap,
+            "range_mean_dB": r.mean,
+            "stiffest": asdict(r.stiffest),
+            "tables": self.tables(),
+            "versions": versions(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ArmMBK:
+    """The least masses that the arm renders as an admittance 1/(M s^2 + B s).
+
+    Every larger mass of the same B/M is stable as well.
+
+    Attributes:
+        loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
+        box: hands.
+        nominal: M [kg] and B [N.s/m] of the border with the loop's own hand, shape (2, n).
+        worst: the same over all hands of the box; its own hand in a sampled loop is one of them.
+        found: the border by runs with the loop's own hand.
+    """
+
+    loop: PushedLoop
+    box: Box
+    nominal: np.ndarray
+    worst: np.ndarray
+    found: tuple[Border, ...]
+
+    @property
+    def gap(self) -> float:
+        """Largest relative difference of a mass found by runs from the exact one; NaN if none."""
+        return max((abs(r.y / r.exact - 1.0) for r in self.found), default=math.nan)
+
+    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+        """What the figure shows, by table, columns headed with their units."""
+        M, B = "least M [kg]", "B [N.s/m]"
+        out: dict[str, dict[str, Sequence[Any]]] = {
+            name: {B: b.tolist(), M: m.tolist()}
+            for name, (m, b) in (("this hand", self.nominal), ("hand box", self.worst))
+        }
+        out["runs"] = {
+            B: [r.x for r in self.found],
+            M: [r.y for r in self.found],
+            "exact M [kg]": [r.exact for r in self.found],
+        }
+        return out
+
+    def summary(self) -> dict[str, Any]:
+        """Return everything, ready for JSON."""
+        return {
+            "schema": MBK_SCHEMA,
+            "kind": "arm",
+            "loop": asdict(self.loop),
+            "box": asdict(self.box),
+            "gap": self.gap,
+            "tables": self.tables(),
+            "versions": versions(),
+        }
+
+
+def device_mbk(
+    wall: VirtualWall,
+    *,
+    columns: int = 5,
+    points: int = 41,
+    band: tuple[float, float] = RANGE_BAND,
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> DeviceMBK:
+    """What a bare device renders, over three planes, beside runs at the borders.
+
+    Args:
+        wall: device, hand and sampling. The plane of M and B keeps its K, that of M and K its B,
+            and that of B and K its M; a surface and the device's friction and quantum are left out.
+        columns: of each plane at which runs look for the border, 0 to 100.
+        points: of each line, 3 to 1001.
+        band: lowest and highest frequency of the dynamic range [Hz].
+        progress: wraps the iterable of the columns.
+
+    Raises:
+        ParameterError: a value is out of its bounds, or nothing in a plane is stable.
+    """
+    if not isinstance(wall, VirtualWall):
+        raise ParameterError("wall", wall, "must be a VirtualWall")
+    columns = integer("columns", columns, 0, 100)
+    low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
+    linear = replace(wall.device, friction=0.0, quantum=0.0)
+    wall = replace(wall, device=linear, surface=False)
+    regions = {plane: renderable(wall, plane, points) for plane in PLANES}
+    # away from the ends of a plane, where the borders meet
+    shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
+    asked = [
+        (plane, float(region.x[0] + share * (region.x[-1] - region.x[0])))
+        for plane, region in regions.items()
+        for share in shares.tolist()
+    ]
+    found: dict[str, list[Border]] = {plane: [] for plane in PLANES}
+    for plane, x in progress(asked):
+        found[plane] += wall_borders(wall, plane, x)
+    spread = dynamic_range(wall, 2.0 * math.pi * np.geomspace(low, high, points))
+    return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)
+
+
+def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
+    """The borders of one column of a plane found by runs, the search begun at the exact ones.
+
+    A low border at or below 0 is not looked for.
+
+    Args:
+        wall: as in `renderable`.
+        plane: one of PLANES.
+        x: the part along the plane.
+    """
+    across, up = PLANES[plane]
+    wall = replace(wall, **{across: x})
+    low, high = stable_band(wall, up)
+    out = []
+    if math.isfinite(high) and high > 0.0:
+        y = find_crossing(lambda y: wall_growth(replace(wall, **{up: y})), high, MOST_SOUGHT * high)
+        out.append(Border(x, y, high, "high"))
+    if low > 0.0:
+        y = find_crossing(
+            lambda y: wall_growth(replace(wall, **{up: 1.0 / y})), 1.0 / low, MOST_SOUGHT / low
+        )
+        out.append(Border(x, 1.0 / y if y else math.inf, low, "low"))
+    return out
+
+
+def wall_growth(wall: VirtualWall) -> float:
+    """Rate at which the oscillation of a pushed device grows or dies, by a run [1/s].
+
+    Args:
+        wall: with its K, B and M.
+    """
+    t_max = GROWTH_SAMPLES * wall.Ts
+    record = simulate(wall.scenario(t_max, push=WALL_PUSH, steps=GROWTH_STEPS))
+    v = np.abs(record.v[:, 0])
+    end = float(v[int(0.9 * len(v)) :].max())
+    if end < FADED_SHARE * WALL_PUSH:
+        return math.log(max(end, 1e-300) / WALL_PUSH) / t_max
+    return growth_rate(record, "x")
+
+
+def arm_mbk(
+    loop: PushedLoop,
+    box: Box = HANDS,
+    *,
+    columns: int = 5,
+    points: int = 15,
+    samples: int = 24,
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> ArmMBK:
+    """The least masses that the arm renders over their damper, beside runs.
+
+    Args:
+        loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
+        box: hands.
+        columns: number of B/M at which runs look for the border, 0 to 100.
+        points: number of B/M of each line, 2 to 1001.
+        samples: random members of the box tried in a sampled or late loop.
+        progress: wraps the iterable of the points.
+
+    Raises:
+        ParameterError: a value is out of its bounds.
+    """
+    points, columns = integer("points", points, 2, 1001), integer("columns", columns, 0, 100)
+    decays, linear = np.geomspace(*DECAYS, points), loop.linear
+    nominal, worst, found = [], [], []
+    runs = set(np.linspace(0, points - 1, columns).round().astype(int).tolist())
+    for i, decay in enumerate(progress(decays.tolist())):
+        M, B = least_mass(linear, decay)
+        nominal.append((M, B))
+        worst.append(least_mass(linear, decay, box, samples))
+        if i in runs and 0.0 < M < math.inf:
+            shape = replace(linear.compensator, num=(1.0,), den=(1.0, decay, 0.0))
+            K = simulated_gain(replace(loop, compensator=shape), 1.0 / M, MOST_SOUGHT / M)
+            found.append(Border(B, 1.0 / K if K else math.inf, M, "low"))
+    return ArmMBK(loop, box, np.array(nominal).T, np.array(worst).T, tuple(found))

@@ -1,0 +1,311 @@
+"""Passivity by theory and by runs: over frequency, over time, and over K, Ts and delay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, number
+from ..model.hardware import Interface
+from ..model.scenario import Scenario
+from ..model.virtual_wall import VirtualWall
+from ..simulation.record import Record, port_energy
+from ..simulation.simulate import simulate
+from ..theory import wall_limits
+from ..theory.gain_limit import is_stable
+from .boundary import PushedLoop
+from .impedance import computed_impedance, measure_impedance
+from .port_energy import passivity_limit, polygon, taken_energy
+
+INDEX_TURNS = ((1, 8), (1, 4), (3, 8), (1, 2), (2, 3), (4, 5), (1, 1))  # omega Ts over pi
+INDEX_BAND = (0.02, 0.9)  # of pi/Ts, of the sines of the impedance
+INDEX_LINES = 8
+ARM_BAND = (0.5, 30.0)  # [Hz]
+INDEX_POINTS = 2000  # of a computed line
+REGION_SPAN = 10.0  # Ts is shown down to that of the wall over this, and up to so many times it
+REGION_POINTS = 61
+AMPLITUDE = 1e-4  # [m] of the worst paths
+
+Progress = Callable[[Iterable[Any]], Iterable[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class IndexOverFrequency:
+    """Damping that a wall, or an arm in clay, shows the hand at each frequency, with runs beside.
+
+    Attributes:
+        name: of what was run.
+        omega: of the lines [rad/s], (n,).
+        damping: Re Z of the impedance fh/v [N.s/m], (n,).
+        index: of Colgate and Schenkel, a sampled wall only [N.s/m], (n,); None for an arm.
+        measured_omega: of the runs by sines [rad/s], (m,).
+        measured: Re Z in those runs [N.s/m], (m,).
+        worst_omega: of the runs along the worst paths of a hand [rad/s], (k,).
+        worst: energy taken over the integral of v^2 in those runs [N.s/m], (k,).
+    """
+
+    name: str
+    omega: np.ndarray
+    damping: np.ndarray
+    index: np.ndarray | None
+    measured_omega: np.ndarray
+    measured: np.ndarray
+    worst_omega: np.ndarray
+    worst: np.ndarray
+
+    @property
+    def margin(self) -> float:
+        """Least damping of the strictest line [N.s/m]: it is passive if this is not negative."""
+        return float(np.min(self.damping if self.index is None else self.index))
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of it shows: the lines, and the points by runs."""
+        lines: dict[str, Any] = {"omega [rad/s]": self.omega, "Re Z [N.s/m]": self.damping}
+        if self.index is not None:
+            lines["index [N.s/m]"] = self.index
+        out = {
+            "lines": lines,
+            "sines": {"omega [rad/s]": self.measured_omega, "Re Z [N.s/m]": self.measured},
+        }
+        if len(self.worst):
+            out["paths"] = {"omega [rad/s]": self.worst_omega, "index [N.s/m]": self.worst}
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyOverTime:
+    """One run without and with the observer and controller of Hannaford and Ryu.
+
+    Attributes:
+        without: the run as it is.
+        controlled: the same with `Interface(passivity=True)`.
+    """
+
+    without: Record
+    controlled: Record
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Energy that the rendered clay has taken, without and with the controller [J], (n,).
+
+        The observer's own sum, of held force times the way since the sample before, over both axes.
+        """
+        return rendered_energy(self.without), rendered_energy(self.controlled)
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of it shows, a table a run."""
+        out = {}
+        for name, record, energy in zip(
+            ("without", "controlled"),
+            (self.without, self.controlled),
+            self.observed,
+            strict=True,
+        ):
+            out[name] = {
+                "time [s]": record.t,
+                "energy taken by the clay [J]": energy,
+                "energy put in by the hand [J]": port_energy(record).sum(axis=1),
+                "v_x [m/s]": record.v[:, 0],
+                "v_y [m/s]": record.v[:, 1],
+            }
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveRegion:
+    """Largest passive stiffness of a wall over the control sample, for several delays.
+
+    Attributes:
+        wall: what is kept: device, B, M, velocity, window and filter.
+        delays: delays over Ts.
+        Ts: of the lines [s], (n,).
+        limits: largest passive K by theory [N/m], a row a delay, (len(delays), n).
+        run_Ts: of the runs [s], (m,).
+        found: largest K that no path of a hand draws energy from, by runs [N/m], (len(delays), m).
+    """
+
+    wall: VirtualWall
+    delays: tuple[float, ...]
+    Ts: np.ndarray
+    limits: np.ndarray
+    run_Ts: np.ndarray
+    found: np.ndarray
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of it shows: the lines, and the limits found by runs."""
+        out = {}
+        for name, Ts, K in (("theory", self.Ts, self.limits), ("runs", self.run_Ts, self.found)):
+            out[name] = {
+                "delay [samples]": np.repeat(self.delays, len(Ts)),
+                "Ts [s]": np.tile(Ts, len(self.delays)),
+                "K [N/m]": K.ravel(),
+            }
+        return out
+
+
+def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequency:
+    """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
+
+    Args:
+        wall: the wall with its K; its hand is left out. Friction and encoder, which no line knows,
+            are left out as well.
+        progress: wraps the list of paths to run.
+
+    Raises:
+        ParameterError: a wall with a surface; B or M on an exact velocity, where the condition
+            holds for no K.
+    """
+    wall = replace(wall, operator=None, device=replace(wall.device, friction=0.0, quantum=0.0))
+    _check_linear(wall)
+    edge = math.pi / wall.Ts
+    omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), INDEX_POINTS)
+    worst = [_index_by_run(wall, turn) for turn in progress(INDEX_TURNS)]
+    measured_omega = measured = np.zeros(0)
+    if wall_limits.stable_wall(wall):
+        low, high = (x * edge / (2.0 * math.pi) for x in INDEX_BAND)
+        found = measure_impedance(wall, band=(low, high), lines=INDEX_LINES, period=4.0 / low)
+        measured_omega, measured = found.measured.omega, found.measured.damping
+    return IndexOverFrequency(
+        f"wall of K = {wall.K:g} N/m, B = {wall.B:g} N.s/m",
+        omega,
+        wall_limits.wall_impedance(wall, omega).real,
+        wall_limits.passivity_index(wall, omega),
+        measured_omega,
+        measured,
+        np.array([edge * p / q for p, q in INDEX_TURNS]),
+        np.array(worst),
+    )
+
+
+def arm_index(loop: PushedLoop) -> IndexOverFrequency:
+    """The passivity of the arm in clay over frequency: Re Z by theory and by a run of sines.
+
+    Args:
+        loop: one axis, its hand left out; in continuous time it is passive where Re Z >= 0 at all
+            frequencies. Re Z of a sampled loop is that at one frequency; a hand of others may find
+            less.
+    """
+    loop = replace(loop, operator=None)
+    omega = 2.0 * math.pi * np.geomspace(ARM_BAND[0] / 5.0, 5.0 * ARM_BAND[1], INDEX_POINTS)
+    measured_omega = measured = np.zeros(0)
+    if is_stable(loop.linear):
+        found = measure_impedance(loop, band=ARM_BAND, lines=2 * INDEX_LINES)
+        measured_omega, measured = found.measured.omega, found.measured.damping
+    return IndexOverFrequency(
+        f"{loop.axis} axis, K = {loop.K:g}, b = {loop.b:g} N.s/m",
+        omega,
+        computed_impedance(loop, omega).damping,
+        None,
+        measured_omega,
+        measured,
+        np.zeros(0),
+        np.zeros(0),
+    )
+
+
+def energy_over_time(scenario: Scenario) -> EnergyOverTime:
+    """Runs a scenario without and with the passivity controller.
+
+    Args:
+        scenario: a run under sampled control whose clay the motors hold.
+
+    Raises:
+        ParameterError: its clay is not held, or its hardware takes no passivity controller.
+    """
+    if scenario.control != "sampled" or scenario.render != "held" or scenario.clay is None:
+        bound = "must be 'held' under control = 'sampled', in clay: the controller acts on that"
+        raise ParameterError("render", scenario.render, bound)
+    parts = scenario.interface or Interface()
+    without, controlled = (
+        simulate(replace(scenario, interface=replace(parts, passivity=x))) for x in (False, True)
+    )
+    return EnergyOverTime(without, controlled)
+
+
+def passive_region(
+    wall: VirtualWall,
+    delays: Sequence[float] = (0.0, 0.5, 1.0, 2.0),
+    run_Ts: Sequence[float] | None = None,
+    progress: Progress = iter,
+) -> PassiveRegion:
+    """Largest passive K of a wall over Ts for some delays, by theory and by runs.
+
+    Args:
+        wall: all but K, Ts and delay.
+        delays: over Ts, each 0 to 100.
+        run_Ts: control samples of the runs [s]; None for three around that of the wall.
+        progress: wraps the list of limits to find by runs.
+
+    Raises:
+        ParameterError: as `wall_index`, or a delay out of its bounds.
+    """
+    wall = replace(wall, operator=None, device=replace(wall.device, friction=0.0, quantum=0.0))
+    _check_linear(wall)
+    for i, delay in enumerate(delays):
+        number(f"delays.{i}", delay, 0.0, 100.0)
+    Ts = wall.Ts * np.geomspace(1.0 / REGION_SPAN, REGION_SPAN, REGION_POINTS)
+    Ts = Ts[Ts <= 1.0]
+    some = wall.Ts * np.array((0.25, 1.0, 4.0)) if run_Ts is None else np.array(run_Ts)
+
+    def at(T: float, delay: float) -> VirtualWall:
+        return replace(wall, Ts=float(T), delay=delay * float(T))
+
+    limits = [[wall_limits.colgate_schenkel_limit(at(T, d)) for T in Ts] for d in delays]
+    jobs = [at(T, d) for d in delays for T in some]
+    found = [passivity_limit(x) for x in progress(jobs)]
+    shape = len(delays), len(some)
+    return PassiveRegion(
+        wall, tuple(delays), Ts, np.array(limits), some, np.array(found).reshape(shape)
+    )
+
+
+def rendered_energy(record: Record) -> np.ndarray:
+    """Energy that rendered clay has taken from the handle by each sample, over both axes.
+
+    Args:
+        record: of a run.
+
+    Returns:
+        [J], shape (n,).
+    """
+    taken = (record.fe[:-1] * np.diff(record.p, axis=0)).sum(axis=1)
+    return np.concatenate(((0.0,), np.cumsum(taken)))
+
+
+def _check_linear(wall: VirtualWall) -> None:
+    if wall.surface:
+        bound = "must be False: the index is that of a wall that acts everywhere"
+        raise ParameterError("wall.surface", True, bound)
+    if wall.velocity == "exact" and (wall.B or wall.M):
+        bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
+        raise ParameterError("wall.velocity", wall.velocity, bound)
+
+
+def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
+    """Damping to spare along the worst path at omega Ts = pi p/q.
+
+    Without a fraction of a sample in the delay that path is the same for every damper, and the
+    energy taken along it is the damping to spare times the integral of v^2. With one, the damper
+    itself is lowered until its worst path takes nothing.
+    """
+    path = polygon(wall, turn, AMPLITUDE)
+    if not path.middles:
+        ways = np.diff(path.places, append=path.places[0])
+        return taken_energy(wall, path) * wall.Ts / float((ways * ways).sum())
+    from scipy.optimize import brentq
+
+    b, omega = wall.device.damper, np.array([math.pi * turn[0] / (turn[1] * wall.Ts)])
+    asked = max(b - float(wall_limits.passivity_index(wall, omega * (1.0 - 1e-12))[0]), 1e-9)
+
+    def energy(damper: float) -> float:
+        other = replace(wall, device=replace(wall.device, damper=damper))
+        return taken_energy(other, polygon(other, turn, AMPLITUDE))
+
+    low, high = 0.5 * asked, 2.0 * asked
+    if energy(low) > 0.0 or energy(high) < 0.0:
+        return math.nan
+    return b - float(brentq(energy, low, high, rtol=1e-5))  # type: ignore[arg-type]

@@ -1,0 +1,276 @@
+"""The impedance that a hand feels, split into stiffness, damping and mass, and transparency.
+
+In a sampled loop a sinusoidal force of the muscles comes back with sidebands, at every multiple of
+the sampling frequency. The response is then that of the fundamental: exact, by the pulse transfer
+function of the held arm at the samples, and by the hold's own spectrum between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..errors import ParameterError
+from ..model import controller
+from ..model.operator import Operator
+from ..model.virtual_wall import VirtualWall
+from . import linear_loop
+from .linear_loop import Loop, of_loop
+
+UNIT_SPRING = Operator(0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Impedance:
+    """What a hand feels over frequency, computed or measured.
+
+    Stiffness, damping and mass are the effective ones of Colonnese, Sketch, Okamura, Closed-loop
+    stiffness and damping accuracy of impedance-type haptic displays, IEEE Haptics Symposium 2014:
+    the spring or mass, and the damper, that would be felt alike at this one frequency.
+
+    Attributes:
+        omega: [rad/s], shape (n,).
+        Z: fh/v, hand force over handle velocity [N.s/m], complex, shape (n,).
+        felt: transparency fe/fh, the share of the hand's force that is rendered, complex, (n,).
+        rendered: Ze, the impedance that is to be rendered [N.s/m], complex, shape (n,).
+    """
+
+    omega: np.ndarray
+    Z: np.ndarray
+    felt: np.ndarray
+    rendered: np.ndarray
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """[Hz], shape (n,)."""
+        return self.omega / (2.0 * math.pi)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Effective damping, Re Z [N.s/m], shape (n,)."""
+        return self.Z.real
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Effective stiffness, -omega Im Z [N/m], (n,); NaN where a mass is felt instead."""
+        return np.where(self.Z.imag < 0.0, -self.omega * self.Z.imag, np.nan)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Effective mass, Im Z/omega [kg], shape (n,); NaN where a spring is felt instead."""
+        return np.where(self.Z.imag > 0.0, self.Z.imag / self.omega, np.nan)
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Z/Ze, felt over rendered impedance, complex, shape (n,); NaN where Ze = 0."""
+        out = np.full(self.Z.shape, complex(np.nan, np.nan))
+        return np.divide(self.Z, self.rendered, out=out, where=self.rendered != 0.0)
+
+
+class HeldArm(NamedTuple):
+    """A mass, damper and spring under a sinusoidal and a held force, phasors of the fundamental.
+
+    Each field has shape (n,), over the frequencies asked for. z = exp(j omega Ts).
+
+    Attributes:
+        place: per unit of the sinusoidal force [m/N].
+        speed: the same [m/(N.s)].
+        held_place: at the samples, per unit of the force asked for at them [m/N].
+        held_speed: the same [m/(N.s)].
+        before: force that acts up to a sample per unit of that asked for: z^-1, or more of them.
+        hold: fundamental of the held and late force per unit of that asked for.
+    """
+
+    place: np.ndarray
+    speed: np.ndarray
+    held_place: np.ndarray
+    held_speed: np.ndarray
+    before: np.ndarray
+    hold: np.ndarray
+
+
+def held_arm(  # noqa: PLR0913  # the numbers of one mass
+    mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
+) -> HeldArm:
+    """Responses of a mass, damper and spring whose motor holds its force from sample to sample.
+
+    Args:
+        mass: that moves [kg], > 0.
+        damper: on it [N.s/m].
+        spring: on it [N/m].
+        Ts: control sample [s].
+        delay: from a sample to the force computed from it [s].
+        omega: [rad/s], > 0, shape (n,).
+    """
+    whole = math.floor(delay / Ts + 1e-9)
+    part = delay / Ts - whole
+    part = part if part > 1e-9 else 0.0
+    own, s = np.array([-spring, -damper]) / mass, 1j * omega
+    # under the force of one sample for a share `part`, then under the next
+    head, old = linear_loop.held_motion(own, 1.0 / mass, part * Ts)
+    rest, new = linear_loop.held_motion(own, 1.0 / mass, (1.0 - part) * Ts)
+    change, z1 = rest + head + rest @ head, np.expm1(s * Ts)
+    before = np.exp(-s * Ts * (1 + whole))
+    drive = np.multiply.outer(before, old + rest @ old)
+    drive += np.multiply.outer(np.exp(-s * Ts * whole), new)
+    ahead = z1[:, None, None] * np.eye(2) - change
+    held = np.linalg.solve(ahead, drive[:, :, None])[:, :, 0]
+    place = 1.0 / (mass * s * s + damper * s + spring)
+    hold = -np.expm1(-s * Ts) / (s * Ts) * np.exp(-s * delay)
+    return HeldArm(place, s * place, held[:, 0], held[:, 1], before, hold)
+
+
+@of_loop("K", "b", "omega", timing=True)
+def loop_response(loop: Loop, omega: np.ndarray) -> Impedance:
+    """What the hand at the handle of a loop feels, over frequency.
+
+    In continuous time, late or not, no hand changes it. In a sampled loop it is the ratio of
+    fundamentals under a sinusoidal muscle force: the arm of the operator sends sidebands back, so
+    another arm changes it a little. For a loop that is unstable with this hand the answer is only
+    formal: no steady state has it.
+
+    Args:
+        loop: the loop with its K; or axis, K, b, omega, and other parts by name.
+        omega: [rad/s], > 0, shape (n,).
+
+    Raises:
+        ParameterError: a frequency is not above 0.
+    """
+    omega = frequencies(omega)
+    s = 1j * omega
+    rendered = loop.b + loop.k / s
+    if loop.Ts is None:
+        Z, sent = late_impedance(loop, omega), np.exp(-s * loop.delay)
+        force = rendered * (sent if loop.render == "held" else 1.0)
+        return Impedance(omega, Z, force / Z, rendered)
+    v, fh, fe = _sampled_response(loop, omega)
+    return Impedance(omega, fh / v, fe / fh, rendered)
+
+
+@of_loop("K", "b", "omega", timing=True)
+def loop_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
+    """fh/v of a loop, the Z of `loop_response` [N.s/m], complex, shape (n,).
+
+    Args:
+        loop: the loop with its K; or axis, K, b, omega, and other parts by name.
+        omega: [rad/s], > 0, shape (n,).
+
+    Raises:
+        ParameterError: a frequency is not above 0.
+    """
+    return loop_response(loop, omega).Z
+
+
+def frequencies(omega: np.ndarray) -> np.ndarray:
+    """Frequencies as an array of floats.
+
+    Args:
+        omega: [rad/s], shape (n,).
+
+    Raises:
+        ParameterError: one is not above 0, or not finite.
+    """
+    out = np.atleast_1d(np.asarray(omega, dtype=float))
+    if out.ndim != 1 or not np.all(np.isfinite(out)) or np.any(out <= 0.0):
+        raise ParameterError("omega", omega, "must be numbers above 0 rad/s, shape (n,)")
+    return out
+
+
+def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
+    """fh/v of a loop in continuous time, its motors late by loop.delay [N.s/m], complex, (n,).
+
+    The closed-loop polynomial is P + Th N with any hand Th, so p = (N/P) fh without one.
+
+    Args:
+        loop: the loop with its K, in continuous time.
+        omega: [rad/s], > 0, shape (n,).
+    """
+    s = 1j * omega
+    late = np.exp(-s * loop.delay)
+    now, then = _now_and_late(replace(loop, operator=None))
+    # N, which clay does not change, is what a hand of Th = 1 N/m adds
+    bare = replace(loop, b=0.0, k=0.0, operator=None)
+    touched = zip(
+        _now_and_late(replace(bare, operator=UNIT_SPRING)), _now_and_late(bare), strict=True
+    )
+    N_now, N_then = (a - b for a, b in touched)
+    return (now(s) + late * then(s)) / (s * (N_now(s) + late * N_then(s)))
+
+
+def _now_and_late(loop: Loop) -> tuple[Polynomial, Polynomial]:
+    """The closed-loop polynomial as what acts at once, and what the motors do."""
+    physical, motors, driven = linear_loop.delayed_polynomials(loop)
+    return physical, motors + loop.gain * driven
+
+
+def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fundamentals of v, fh and fe per unit of a sinusoidal muscle force in the sampled loop.
+
+    The law of the motors is that of `linear_loop.sampled_differences`, at z = exp(j omega Ts).
+    """
+    Ts, th, b, k, n = loop.Ts, loop.hand, loop.b, loop.k, loop.compensator.order
+    assert Ts is not None
+    s, physical = 1j * omega, float(loop.render == "implicit")
+    W = loop.servo.S.gain if loop.mobility is None else loop.mobility
+    shaped = loop.servo.S.gain / W - 1.0  # share of the net force that shapes the inertia
+    total = 1.0 / W + th.mass
+    damper, spring = th.damper + physical * b, th.spring + physical * k
+    arm = held_arm(total, damper, spring, Ts, loop.delay, omega)
+    # compensator and reference model, to the net force
+    A, B = controller.held_compensator(loop.servo, loop.compensator, loop.gain, Ts)
+    ahead = np.expm1(s * Ts)[:, None, None] * np.eye(n + 2) - (A - np.eye(n + 2))
+    states = np.linalg.solve(ahead, np.broadcast_to(B[:, None], (len(s), n + 2, 1)))[:, :, 0]
+    through = controller.controller_matrices(loop.servo, loop.compensator, loop.gain)[1][-1]
+    law, delta = controller.feedback_vector(loop.servo), loop.compensator.state_space()[2]
+    per_force = (states @ np.array([*(law[2] * delta), *law[4:]]) + through) / W + shaped
+    # f = uh - Th p - b v - k p with the acceleration under the force that acted until the sample
+    share = th.mass / total
+    f_place, f_own = share * spring - th.spring - k, 1.0 - share
+    f_speed = share * damper - th.damper - b
+    u_place = per_force * f_place + law[0] / W - (1.0 - physical) * k
+    u_speed = per_force * f_speed + law[1] / W - (1.0 - physical) * b
+    loop_gain = u_place * arm.held_place + u_speed * arm.held_speed
+    loop_gain = loop_gain - per_force * share * arm.before
+    asked = (u_place * arm.place + u_speed * arm.speed + per_force * f_own) / (1.0 - loop_gain)
+    v = arm.speed * (1.0 + arm.hold * asked)
+    fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
+    if physical:
+        return v, fh, (b + k / s) * v
+    seen = b * (arm.speed + arm.held_speed * asked) + k * (arm.place + arm.held_place * asked)
+    return v, fh, arm.hold * seen
+
+
+def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
+    """What the hand at a virtual wall feels, over frequency: the fundamental, exact.
+
+    The wall acts everywhere (surface=False), without Coulomb friction and encoder steps. The arm of
+    the operator sends sidebands back, so another arm changes the answer a little.
+
+    Args:
+        wall: the wall; its device's friction and quantum do not matter.
+        omega: [rad/s], > 0, shape (n,).
+
+    Raises:
+        ParameterError: a frequency is not above 0.
+    """
+    omega = frequencies(omega)
+    s, Ts, d, th = 1j * omega, wall.Ts, wall.device, wall.hand
+    z1 = np.exp(-s * Ts)
+    arm = held_arm(d.mass + th.mass, d.damper + th.damper, th.spring, Ts, wall.delay, omega)
+    place, speed = wall.K + 0.0 * s, 0.0 * s  # force per unit of each, measured
+    rate = wall.B - wall.M * np.expm1(-s * Ts) / Ts
+    if wall.velocity == "exact":
+        speed = rate
+    else:
+        keep = math.exp(-2.0 * math.pi * wall.velocity_filter * Ts) if wall.velocity_filter else 0.0
+        slope = -np.expm1(-s * Ts * wall.window) / (wall.window * Ts)
+        place = place + rate * slope * (1.0 - keep) / (1.0 - keep * z1)
+    held = place * arm.held_place + speed * arm.held_speed
+    asked = -(place * arm.place + speed * arm.speed) / (1.0 + held)
+    v = arm.speed * (1.0 + arm.hold * asked)
+    fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
+    return Impedance(omega, fh / v, -arm.hold * asked / fh, wall.K / s + wall.B + wall.M * s)

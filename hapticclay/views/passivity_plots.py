@@ -1,0 +1,153 @@
+"""Figures of passivity: over frequency, over time, and over K, Ts and delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
+from .style import (
+    BLACK,
+    BLUE,
+    CURVE_STYLES,
+    GREY,
+    VERMILION,
+    WHITE,
+    add_legend,
+    figure_size,
+    figure_style,
+    set_title,
+    stroke,
+    unit_text,
+)
+
+HERTZ = 2.0 * np.pi
+ACTIVE_LABEL = "active"
+REGION_MARKS = ("o", "s", "^", "D", "v")
+
+
+def index_plot(found: IndexOverFrequency) -> Figure:
+    """Plots the damping to spare over frequency, theory as lines and runs as marks.
+
+    Args:
+        found: from `wall_index` or `arm_index`.
+    """
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 4.2))
+        ax = figure.add_subplot()
+        ax.set_xscale("log")
+        mark: Any = dict(ls="none", ms=stroke(6.0), mfc=WHITE, mew=stroke(1.2), zorder=4)
+        if found.index is not None:
+            label = "index (Colgate, Schenkel 1997)"
+            ax.plot(found.omega / HERTZ, found.index, color=BLUE, label=label)
+        if len(found.worst):
+            label = "runs: worst path of a hand"
+            ax.plot(found.worst_omega / HERTZ, found.worst, "o", mec=BLUE, label=label, **mark)
+        ax.plot(found.omega / HERTZ, found.damping, color=VERMILION, ls="--", label="Re Z")
+        if len(found.measured):
+            label = "runs: sines, mean power / mean v$^2$"
+            ax.plot(
+                found.measured_omega / HERTZ,
+                found.measured,
+                "s",
+                mec=VERMILION,
+                label=label,
+                **mark,
+            )
+        _shade_active(ax)
+        ax.set(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
+        ax.set_xlim(found.omega[0] / HERTZ, found.omega[-1] / HERTZ * 1.05)
+        _plain_ticks(ax.xaxis)
+        add_legend(figure, ax, 2)
+        verdict = "passive" if found.margin >= 0.0 else "not passive"
+        set_title(ax, unit_text(found.name), f"least {found.margin:.4g}: {verdict}")
+    return figure
+
+
+def _shade_active(ax: Axes) -> None:
+    """Shades the half plane in which a hand can draw energy."""
+    low, high = ax.get_ylim()
+    room = 0.12 * (high - low)
+    low, high = min(low, -room), max(high, room)
+    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
+    ax.axhspan(low, 0.0, color=GREY, alpha=0.15, lw=0, zorder=0)
+    at: Any = dict(transform=ax.get_yaxis_transform(), ha="left", va="center", color=GREY)
+    ax.text(0.02, low + min(0.5 * -low, 0.06 * (high - low)), ACTIVE_LABEL, **at)
+    ax.set_ylim(low, high)
+
+
+def _plain_ticks(axis: Any) -> None:
+    low, high = axis.get_view_interval()
+    some = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=some))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def energy_plot(found: EnergyOverTime) -> Figure:
+    """Plots the energy that rendered clay has taken, and the velocity, of both runs.
+
+    Args:
+        found: from `energy_over_time`.
+    """
+    looks = ((VERMILION, "-", "without controller"), (BLUE, "--", "with controller"))
+    records = (found.without, found.controlled)
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 5.0))
+        top, low = figure.subplots(2, 1, sharex=True)
+        size = max(float(np.abs(e).max(initial=0.0)) for e in found.observed)
+        factor, unit = (1e3, "mJ") if size < 1.0 else (1.0, "J")
+        for record, energy, (color, dash, name) in zip(records, found.observed, looks, strict=True):
+            i = int(np.argmax(np.abs(record.v).max(axis=0, initial=0.0)))
+            time = 1e3 * record.t
+            top.plot(time, factor * energy, color=color, ls=dash, label=name)
+            low.plot(time, 1e3 * record.v[:, i], color=color, ls=dash)
+        top.axhline(0.0, color=BLACK, lw=stroke(0.8))
+        top.set_ylabel(f"energy that the\nclay has taken [{unit}]")
+        low.set(xlabel="time [ms]", ylabel="velocity [mm/s]")
+        figure.align_ylabels([top, low])
+        add_legend(figure, top, 2)
+        s = found.without.scenario
+        least = factor * float(found.observed[0].min(initial=0.0))
+        taken = f"draws {-least:.3g} {unit} without" if least < 0.0 else "takes energy"
+        clay = f"b = {s.clay.largest:g} N$\\cdot$s/m" if s.clay else "no clay"
+        set_title(top, clay, f"Ts = {1e3 * (s.Ts or s.dt):g} ms", taken)
+    return figure
+
+
+def region_plot(found: PassiveRegion) -> Figure:
+    """Plots the largest passive stiffness over the control sample, a line a delay, with runs.
+
+    Args:
+        found: from `passive_region`.
+    """
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 4.2))
+        ax = figure.add_subplot()
+        ax.set(xscale="log", yscale="log")
+        for i, (delay, limits) in enumerate(zip(found.delays, found.limits, strict=True)):
+            color, dash = CURVE_STYLES[i % len(CURVE_STYLES)]
+            label = "no delay" if not delay else f"delay {delay:g} Ts"
+            ax.plot(1e3 * found.Ts, _known(limits), color=color, ls=dash, label=label)
+            mark: Any = dict(mec=color, mfc=WHITE, ls="none", ms=stroke(6.5), mew=stroke(1.3))
+            mark["marker"] = REGION_MARKS[i % len(REGION_MARKS)]
+            ax.plot(1e3 * found.run_Ts, _known(found.found[i]), zorder=4, **mark)
+        ax.set(xlabel="control sample Ts [ms]", ylabel="largest passive stiffness K [N/m]")
+        ax.set_xlim(1e3 * found.Ts[0], 1e3 * found.Ts[-1])
+        for axis in (ax.xaxis, ax.yaxis):
+            _plain_ticks(axis)
+        add_legend(figure, ax, 4)
+        w = found.wall
+        told = [unit_text(f"b = {w.device.damper:g} N.s/m"), unit_text(f"B = {w.B:g} N.s/m")]
+        set_title(ax, *told, "lines: Colgate, Schenkel 1997; marks: runs")
+    return figure
+
+
+def _known(K: Sequence[float] | np.ndarray) -> np.ndarray:
+    K = np.asarray(K, dtype=float)
+    return np.where(np.isfinite(K) & (K > 0.0), K, np.nan)
