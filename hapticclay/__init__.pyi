@@ -103,6 +103,7 @@ from .theory.passivity import clay_passivity as clay_passivity
 from .theory.passivity import passivity as passivity
 from .theory.relay_cycle import ExactCycle as ExactCycle
 from .theory.relay_cycle import exact_cycles as exact_cycles
+from .views.figure import Figure as Figure
 from .views.images import gray_image as gray_image
 
 __version__: str

@@ -28,6 +28,7 @@ class AccuracyCommand:
         scenario: The experiment, or a scenario file; its dt and integrator are replaced.
         out: Folder for accuracy.png, accuracy.md and accuracy.json.
         quick: Run fewer steps, once each.
+        figures: Format and style of the figure.
     """
 
     scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
@@ -35,6 +36,7 @@ class AccuracyCommand:
         Path | None, tyro.conf.arg(help_behavior_hint="(default: out/accuracy/EXPERIMENT)")
     ] = None
     quick: bool = False
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..studies.accuracy import accuracy_ladder
@@ -55,11 +57,13 @@ class AccuracyCommand:
 
     def _save(self, found: Ladder, out: Path) -> None:
         from ..views import study_plots
+        from ..views.figure import Figure
 
         console.save_json(found.summary(), out / "accuracy.json")
         with atomic(out / "accuracy.md") as f:
             f.write((accuracy_page(found) + "\n").encode())
-        console.save_figures({"accuracy": study_plots.accuracy_plot(found)}, out)
+        figure = Figure(lambda: study_plots.accuracy_plot(found), found.tables)
+        console.save_figures({"accuracy": figure}, out, self.figures)
 
 
 def cheapest_tables(found: Ladder, markdown: bool = False) -> str:

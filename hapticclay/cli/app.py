@@ -214,9 +214,10 @@ def _positional(
             return i
         name, given, _ = word.partition("=")
         i += 1
-        if _plain(name) in own and _plain(name) != "set":
-            i += 0 if given else _count(own[_plain(name)])
-        else:  # --set, or an option of the experiment, which comes later
+        kind = own.get(_plain(name))
+        if kind is not None and _plain(name) != "set" and not _any_number(kind):
+            i += 0 if given else _count(kind)
+        else:  # as many words as follow; or an option of the experiment, which comes later
             while i < len(words) and not _is_option(words[i]) and not is_scenario(words[i]):
                 i += 1
     return None
@@ -232,7 +233,9 @@ def options(words: Sequence[str]) -> dict[str, Any]:
     if words[:1] and words[0] in COMMANDS:
         kind = load_command(words[0])
         hints = _hints(kind)
-        out = {f.name: hints[f.name] for f in dataclasses.fields(kind)}
+        for f in dataclasses.fields(kind):
+            nested = dataclasses.is_dataclass(hints[f.name])
+            out |= _hints(hints[f.name]) if nested else {f.name: hints[f.name]}
     if "scenario" in out:
         from ..model.experiments import EXPERIMENTS, parameters
 
@@ -252,7 +255,7 @@ def _hints(kind: type) -> dict[str, Any]:
 
 
 def _option_names(known: dict[str, Any]) -> list[str]:
-    names = [n for n in known if n not in ("scenario", "spec", "data")]  # these are words
+    names = [n for n in known if n not in ("scenario", "spec", "source")]  # these are words
     return names + [f"no-{n}" for n in names if known[n] is bool]
 
 
@@ -282,16 +285,20 @@ def _refusal(words: Sequence[str], complaint: str) -> ParameterError:
         return ParameterError("arguments", "", f"give {what}: {names}")
     found = re.match(r"(?:Error parsing|invalid choice|Missing value).*?--([\w-]+)", text)
     if not found or _plain(found[1]) not in known:
-        return ParameterError("arguments", "", text)
+        return ParameterError("arguments", "", re.sub(r"^Error parsing \w+: ", "", text))
     kind = known[_plain(found[1])]
     at = max(i for i, w in enumerate(words) if _plain(w.partition("=")[0]) == _plain(found[1]))
     _, _, first = words[at].partition("=")
     given = [first] if first else []
-    for word in words[at + 1 :][: _count(kind) - len(given)]:
+    most = None if _any_number(kind) else _count(kind) - len(given)
+    for word in words[at + 1 :][:most]:
         if _is_option(word):
             break
         given.append(word)
     name, value = f"--{found[1]}", " ".join(given)
+    if _any_number(kind) and get_origin(get_args(kind)[0]) is Literal:
+        kind = get_args(kind)[0]
+        value = next((word for word in given if word not in get_args(kind)), "")
     if get_origin(kind) is Literal:
         try:
             choice(name, value, get_args(kind))
@@ -312,6 +319,11 @@ def _plain(option: str) -> str:
     return option.lstrip("-").replace("_", "-")
 
 
+def _any_number(kind: Any) -> bool:
+    """Whether an option of this type takes any number of words."""
+    return get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis
+
+
 def _count(kind: Any) -> int:
     """Number of words that an option of this type takes."""
     if kind is bool:
@@ -325,6 +337,8 @@ def _meaning(kind: Any) -> str:
         return " or ".join(_meaning(k) for k in get_args(kind))
     if get_origin(kind) is Literal:
         return f"one of {', '.join(get_args(kind))}"
+    if _any_number(kind):
+        return "one or more, each " + _meaning(get_args(kind)[0])
     if get_origin(kind) is tuple:
         return f"{len(get_args(kind))} {KINDS[get_args(kind)[0]]}s"
     if kind is type(None):

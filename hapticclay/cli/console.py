@@ -10,16 +10,19 @@ import re
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 import tyro
 
+from ..errors import number
 from ..files import atomic
 
 if TYPE_CHECKING:
     from ..model.experiments import Experiment
     from ..model.scenario import Scenario
+    from ..views.figure import Figure
 
 
 SET_HELP = (
@@ -211,19 +214,49 @@ def ctrl_c() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def save_figures(figures: Mapping[str, Any], folder: Path) -> None:
-    """Writes figures as folder/NAME.png, each whole or not at all.
+@dataclass(frozen=True)
+class FigureOptions:
+    """How a command writes its figures.
+
+    Attributes:
+        format: Formats of the figures: png, svg, pdf; several may be given.
+        dpi: Pixels an inch of PNG [1/inch]; by default 100, and 300 in print.
+        style: For a screen, or for print: one column of 8.5 cm, or two of 17.5 cm.
+        data: Also write the numbers that each figure shows, as CSV.
+    """
+
+    format: tuple[Literal["png", "svg", "pdf"], ...] = ("png",)
+    dpi: float | None = None
+    style: Literal["screen", "print", "print-wide"] = "screen"
+    data: bool = False
+
+    def __post_init__(self):
+        if self.dpi is not None:
+            number("dpi", self.dpi, 10.0, 2400.0)
+
+
+def save_figures(
+    figures: Mapping[str, Figure], folder: Path, options: FigureOptions | None = None
+) -> dict[str, list[Path]]:
+    """Writes figures as folder/NAME.png or in other formats, each whole or not at all.
 
     Args:
-        figures: matplotlib figures by name.
+        figures: by name.
         folder: where to.
+        options: formats, style, and whether to write the numbers too.
+
+    Returns:
+        The files of each figure that applies, by name.
 
     Raises:
         ParameterError: a file cannot be written.
     """
-    for name, figure in figures.items():
-        with atomic(folder / f"{name}.png") as f:
-            figure.savefig(f, format="png")
+    o = options or FigureOptions()
+    written = {
+        name: figure.save(folder / name, o.format, o.dpi, o.style, o.data)
+        for name, figure in figures.items()
+    }
+    return {name: files for name, files in written.items() if files}
 
 
 def save_json(data: Any, file: Path) -> None:

@@ -27,7 +27,7 @@ class FitCommand:
     """Fit the law by which clay resists, f = (Fy + K |v|^n) v/|v| + b v, and choose its terms.
 
     Attributes:
-        data: CSV file of time [s], position [m] and force of the clay on the tool, counted as
+        source: CSV file of time [s], position [m] and force of the clay on the tool, counted as
             resistance [N]; or the folder of a record, or its record.npz.
         out: Folder for fit.json and fit.png.
         axis: Axis, of a record only; "path" for along the motion, whatever its direction.
@@ -36,9 +36,10 @@ class FitCommand:
         level: Confidence level of the intervals.
         time: First and last time to take [s].
         place: Lowest and highest position to take [m].
+        figures: Format and style of the figure.
     """
 
-    data: Annotated[Path, tyro.conf.Positional]
+    source: Annotated[Path, tyro.conf.Positional]
     out: Path = Path("out/fit")
     axis: Literal["x", "y", "path"] | None = None
     columns: tuple[str, ...] = ()
@@ -46,22 +47,24 @@ class FitCommand:
     level: float = 0.95
     time: tuple[float, float] | None = None
     place: tuple[float, float] | None = None
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..studies.fitting import FLOW_LAWS, fit_flow
+        from ..views.figure import Figure
         from ..views.fit_plots import fit_plot
 
         writable(self.out)
-        recorded = self.data.is_dir() or self.data.suffix == ".npz"
-        if self.data.suffix == ".toml":
+        recorded = self.source.is_dir() or self.source.suffix == ".npz"
+        if self.source.suffix == ".toml":
             bound = "must be a CSV file or a record, not a scenario: run it first"
-            raise ParameterError("data", str(self.data), bound)
+            raise ParameterError("source", str(self.source), bound)
         if recorded and self.columns:
             raise ParameterError("columns", self.columns, "is for a CSV file: leave it out")
         if self.axis and not recorded:
             raise ParameterError("axis", self.axis, "is for a record: leave it out")
         fitted = fit_flow(
-            self.data if recorded else self._measured(),
+            self.source if recorded else self._measured(),
             self.axis,
             self.laws or tuple(FLOW_LAWS),
             self.level,
@@ -70,7 +73,8 @@ class FitCommand:
         )
         try:
             console.save_json(fitted.summary(), self.out / "fit.json")
-            console.save_figures({"fit": fit_plot(fitted)}, self.out)
+            figure = Figure(lambda: fit_plot(fitted), fitted.tables)
+            console.save_figures({"fit": figure}, self.out, self.figures)
         finally:  # a full disk must not hide the result
             print(law_table(fitted))
         print(f"written to {self.out}")
@@ -82,7 +86,7 @@ class FitCommand:
         given = column_names(self.columns, FIT_COLUMNS, COLUMNS_EXAMPLE)
         names = {x: x for x in FIT_COLUMNS} | given
         try:
-            return Measurement.load(self.data, {FIT_COLUMNS[k]: x for k, x in names.items()})
+            return Measurement.load(self.source, {FIT_COLUMNS[k]: x for k, x in names.items()})
         except ParameterError as error:  # in the words of this command
             field, bound = error.field, error.bound
             for name, theirs in FIT_COLUMNS.items():

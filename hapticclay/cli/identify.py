@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -49,6 +50,7 @@ class IdentifyCommand:
             drives the experiment, for a position or force that is noisy or part of a loop.
         band: Lowest and highest frequency to fit [Hz].
         held: Say that a computer holds the input of the file from sample to sample.
+        figures: Formats and style of the figures.
     """
 
     out: Path = Path("out/identify")
@@ -63,6 +65,7 @@ class IdentifyCommand:
     columns: tuple[str, ...] = ()
     band: tuple[float, float] | None = None
     held: bool = False
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         self._check_words()
@@ -132,8 +135,9 @@ class IdentifyCommand:
         )
 
     def _save(self, results: Sequence[Identified], found: Drift | None) -> None:
-        from ..studies.identification import IDENTIFICATION_SCHEMA
+        from ..studies.identification import IDENTIFICATION_SCHEMA, response_tables
         from ..views import study_plots
+        from ..views.figure import Figure
 
         data = {
             "schema": IDENTIFICATION_SCHEMA,
@@ -142,13 +146,15 @@ class IdentifyCommand:
         }
         console.save_json(data, self.out / "identify.json")
         figures = {
-            block.figure: study_plots.identification_plot(same)
+            block.figure: Figure(
+                partial(study_plots.identification_plot, same), partial(response_tables, same)
+            )
             for what, block in study_plots.BLOCKS.items()
             if (same := [r for r in results if r.what == what])
         }
         if found:
-            figures["map"] = study_plots.workspace_plot(found)
-        console.save_figures(figures, self.out)
+            figures["map"] = Figure(partial(study_plots.workspace_plot, found), found.tables)
+        console.save_figures(figures, self.out, self.figures)
 
 
 def column_names(

@@ -35,6 +35,7 @@ class RunCommand:
             crossed) or 1e-7m (of positions): dt and integrator are then chosen, and verified by
             runs at other steps.
         plots: Draw the plots.
+        figures: Their formats and style.
     """
 
     scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
@@ -44,13 +45,14 @@ class RunCommand:
     every: int = 1
     error: str | None = None
     plots: bool = True
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         out = self.out or console.default_folder("run", self.scenario)
         writable(out)
         with console.ctrl_c() as asked:
             record = simulate_with_progress(self.scenario, self.every, asked, self.error)
-        deliver(record, out, self.plots)
+        deliver(record, out, self.figures if self.plots else None)
         return 130 if record.outcome.code == "interrupted" else 0
 
 
@@ -81,13 +83,13 @@ def simulate_with_progress(
         return simulate(scenario, every=every, progress=progress, error=error)
 
 
-def deliver(record: Record, folder: Path, plots: bool) -> None:
+def deliver(record: Record, folder: Path, figures: console.FigureOptions | None) -> None:
     """Writes a record and its plots, prints its table, and removes plots of an earlier record.
 
     Args:
         record: the run.
         folder: where to write.
-        plots: whether to draw the plots.
+        figures: how to write the plots; None for no plots.
 
     Raises:
         ParameterError: a file cannot be written.
@@ -95,13 +97,14 @@ def deliver(record: Record, folder: Path, plots: bool) -> None:
     try:
         earlier = (folder / "record.npz").exists()
         record.save(folder)
-        if plots or earlier:
+        if figures or earlier:
             from ..views import run_plots
 
-            drawn = run_plots.figures(record) if plots else {}
-            console.save_figures(drawn, folder)
-            for name in set(run_plots.FIGURES) - set(drawn) if earlier else ():
-                (folder / f"{name}.png").unlink(missing_ok=True)
+            drawn = run_plots.record_figures(record) if figures else {}
+            written = console.save_figures(drawn, folder, figures)
+            kept = {path for files in written.values() for path in files}
+            for path in run_plots.figure_files(folder) - kept if earlier else ():
+                path.unlink(missing_ok=True)
     finally:  # a full disk must not hide the results
         print(run_table(record))
     print(f"written to {folder}")

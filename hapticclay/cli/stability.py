@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -59,6 +59,7 @@ class StabilityCommand:
             in, over yield force and gain, in Bingham clay of this b.
         out: Folder for stability.json and the map.
         quick: Draw a coarse map.
+        figures: Format and style of the map.
     """
 
     axis: Literal["x", "y"] = "x"
@@ -76,6 +77,7 @@ class StabilityCommand:
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose", "gain-yield"] = "none"
     out: Path = Path("out/stability")
     quick: bool = False
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..model.compensator import Compensator
@@ -139,7 +141,7 @@ class StabilityCommand:
         chart = stability_map(
             self.map, loop, self.quick, lambda columns: console.progress_bar(columns, desc="map")
         )
-        console.save_figures({chart.kind: study_plots.stability_map_plot(chart)}, self.out)
+        self._save(chart.kind, study_plots.stability_map_plot, chart)
         print(disagreements(chart))
         return chart
 
@@ -148,9 +150,15 @@ class StabilityCommand:
         from ..views import study_plots
 
         chart = yield_map(loop, self.quick, lambda gains: console.progress_bar(gains, desc="map"))
-        console.save_figures({self.map: study_plots.yield_map_plot(chart)}, self.out)
+        self._save(self.map, study_plots.yield_map_plot, chart)
         print(yield_differences(chart))
         return chart
+
+    def _save(self, name: str, plot: Callable[[Any], Any], chart: Any) -> None:
+        from ..views.figure import Figure
+
+        figure = Figure(lambda: plot(chart), chart.tables)
+        console.save_figures({name: figure}, self.out, self.figures)
 
 
 def clay_of(words: Sequence[str], b: float | None = None) -> Flow:

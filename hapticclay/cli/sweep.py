@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -50,6 +51,7 @@ class SweepCommand:
         workers: Processes on this machine; by default one a core.
         scheduler: Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786.
         maps: Draw maps over the first two parameters.
+        figures: Formats and style of the maps.
     """
 
     spec: Annotated[Path | None, tyro.conf.Positional] = None
@@ -64,6 +66,7 @@ class SweepCommand:
     workers: int | None = None
     scheduler: str | None = None
     maps: bool = True
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..studies import sweep
@@ -138,13 +141,18 @@ class SweepCommand:
 
     def _draw(self, table: Any) -> None:
         from ..views import study_plots
+        from ..views.figure import Figure
 
         if len(study_plots.swept_parameters(table)) < 2:
             return
         for value in MAPPED:
             if not all(study_plots.missing_reasons(table, value)):
-                console.save_figures({value: study_plots.sweep_plot(table, value)}, self.out)
-                print(f"map: {self.out / f'{value}.png'}")
+                figure = Figure(
+                    partial(study_plots.sweep_plot, table, value),
+                    partial(study_plots.sweep_tables, table, value),
+                )
+                for files in console.save_figures({value: figure}, self.out, self.figures).values():
+                    print(f"map: {', '.join(map(str, files))}")
 
 
 @contextmanager

@@ -55,6 +55,7 @@ class ViewCommand:
         web: Show the session in a browser; needs no display here.
         host: Address to serve the browser on; a token guards any but this machine's.
         port: Port to serve the browser on.
+        figures: Formats and style of the plots.
     """
 
     scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
@@ -69,6 +70,7 @@ class ViewCommand:
     web: bool = False
     host: str = "127.0.0.1"
     port: int = 8080
+    figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..simulation.record import Record
@@ -89,7 +91,8 @@ class ViewCommand:
         if record is None:
             print("nothing was recorded")
             return 0
-        deliver(record, self.out or console.default_folder("view", record.scenario), self.plots)
+        out = self.out or console.default_folder("view", record.scenario)
+        deliver(record, out, self.figures if self.plots else None)
         return 0
 
     def _session(self, tool: Tool) -> Record | None:

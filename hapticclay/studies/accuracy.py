@@ -131,6 +131,18 @@ class Ladder:
                 out[asked] = min(fit, key=lambda x: x.wall or math.inf)
         return out
 
+    def tables(self) -> dict[str, dict[str, list]]:
+        """Returns what a figure of the ladder shows: errors and run time of each setting."""
+        settings = {
+            "method": [x.series for x in self.settings],
+            "dt [s]": [x.dt for x in self.settings],
+            "error of border times [s]": [x.time for x in self.settings],
+            "error of position [m]": [x.position for x in self.settings],
+            "run time [s]": [x.wall for x in self.settings],
+            "status": [x.status for x in self.settings],
+        }
+        return {"settings": settings}
+
     def summary(self) -> dict[str, Any]:
         """Everything, ready for JSON."""
         return {

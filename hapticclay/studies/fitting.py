@@ -164,6 +164,27 @@ class Fitted:
         quantile = _quantile(self.level, len(self.v) / self.correlation - len(theta))
         return quantile * np.sqrt(np.einsum("ij,jk,ik->i", J, self.covariance, J))
 
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of the fit shows: its samples, and the law over the velocity."""
+        law = [self.flow.force(v) for v in self.v]
+        return {
+            "samples": {
+                "time [s]": self.t,
+                "velocity [m/s]": self.v,
+                "force [N]": self.f,
+                "force of the law [N]": law,
+                f"half the {100 * self.level:g} % band [N]": self.band(self.v),
+                "residual [N]": self.residuals,
+            },
+            "parameters": {
+                "name": [p.name for p in self.parameters],
+                "unit": [p.unit for p in self.parameters],
+                "value": [p.value for p in self.parameters],
+                "low": [p.low for p in self.parameters],
+                "high": [p.high for p in self.parameters],
+            },
+        }
+
     def summary(self) -> dict[str, Any]:
         """Everything but the samples, ready for JSON."""
         speed = np.abs(self.v)

@@ -9,7 +9,7 @@ squares. Method and limits: docs/identify.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
@@ -186,6 +186,27 @@ class Identified:
             },
             "versions": versions(),
         }
+
+
+def response_tables(results: Sequence[Identified]) -> dict[str, dict[str, Any]]:
+    """Returns what a figure of one block shows: the response on each axis, and its equations.
+
+    Args:
+        results: of one block, on one axis or both.
+    """
+    unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
+    out: dict[str, dict[str, Any]] = {}
+    for r in results:
+        table: dict[str, Any] = {"frequency [Hz]": r.frequency}
+        for name, H in (
+            ("measured", r.response),
+            ("printed", response(r.what, printed_form(r.what, r.axis), r.frequency)),
+            ("fitted", response(r.what, r.values, r.frequency)),
+        ):
+            table |= {f"{name}, real [{unit}]": H.real, f"{name}, imaginary [{unit}]": H.imag}
+        table |= {f"deviation [{unit}]": r.deviation, "coherence": r.coherence}
+        out[r.axis] = table
+    return out
 
 
 def endpoint_mobility(x: float, y: float) -> tuple[float, float]:

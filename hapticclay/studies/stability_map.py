@@ -72,6 +72,25 @@ class StabilityMap:
     cells: tuple[MapCell, ...]
     notes: tuple[str, ...] = ()
 
+    def tables(self) -> dict[str, dict[str, list]]:
+        """Returns what a figure of the map shows: its cells, its lines, what runs found."""
+        x, y = self.x_name, self.y_name
+        cells = {
+            x: [c.x for c in self.cells],
+            y: [c.y for c in self.cells],
+            "stable by theory": [c.theory for c in self.cells],
+            "run": [c.simulated for c in self.cells],
+            "cause": [c.cause for c in self.cells],
+        }
+        out = {"cells": cells}
+        for name, lines in (("lines", self.lines), ("runs", self.found)):
+            out[name] = {
+                "line": [label for label, (places, _) in lines.items() for _ in places],
+                x: [place for places, _ in lines.values() for place in places],
+                y: [value for _, values in lines.values() for value in values],
+            }
+        return out
+
     def gap(self) -> float:
         """Largest relative gap between the runs and the exact line of their loop; NaN for none."""
         pairs = [

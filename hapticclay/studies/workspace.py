@@ -46,6 +46,16 @@ class Drift:
     coefficients: np.ndarray
     mobility: np.ndarray
 
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of the map shows: the gain of Sh at each pose."""
+        table: dict[str, Any] = {"world x [m]": self.x, "world y [m]": self.y}
+        for i, axis in enumerate(AXES):
+            for k, way in enumerate(("without shaping", "with shaping")):
+                gain = self.coefficients[:, k, DRIFT_BLOCKS.index("S"), i, 0]
+                table[f"gain of Sh along {axis} {way} [1/kg]"] = gain
+            table[f"W of the bare arm along {axis} [1/kg]"] = self.mobility[:, i]
+        return {"poses": table}
+
     def ranges(self) -> list[dict[str, Any]]:
         """Return the range of each coefficient over the poses, beside the printed value."""
         out = []

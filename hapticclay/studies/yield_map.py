@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -98,6 +98,25 @@ class YieldMap:
     critical: tuple[float, ...]
     speed: tuple[float, ...]
     cells: tuple[YieldCell, ...]
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Returns what a figure of the map shows: its cells, and its lines over the gain."""
+        return {
+            "cells": {
+                "Fy [N]": [c.Fy for c in self.cells],
+                "K [1/kg]": [c.K for c in self.cells],
+                "expected": [c.expected for c in self.cells],
+                "predicted speed [m/s]": [c.predicted for c in self.cells],
+                "exact speed [m/s]": [c.exact for c in self.cells],
+                "run": [c.simulated for c in self.cells],
+                "speed of the run [m/s]": [c.speed for c in self.cells],
+            },
+            "lines": {
+                "K [1/kg]": self.K,
+                "push that just sticks [m/s per N]": self.critical,
+                "speed of the cycle [m/s per N]": self.speed,
+            },
+        }
 
 
 def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:

@@ -9,13 +9,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.fitting import Fitted
-from .style import BLACK, BLUE, MID_GREY, VERMILION, figure_style, set_title
+from .style import (
+    BLACK,
+    BLUE,
+    MID_GREY,
+    VERMILION,
+    figure_size,
+    figure_style,
+    narrow,
+    points,
+    set_title,
+    stroke,
+)
 
 DOTS_SHOWN = 6000  # of a panel
 BINS = 24  # of speeds, in which residuals are averaged
 LEAST_IN_BIN = 5
 LAGS = 60  # of the autocorrelation
-DOTS: Any = dict(ms=1.6, mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
+DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 
 
 def fit_plot(fitted: Fitted) -> Figure:
@@ -27,10 +38,14 @@ def fit_plot(fitted: Fitted) -> Figure:
     shown = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
     t, v, f, left = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
     with figure_style():
-        figure = Figure(figsize=(9.6, 5.6))
-        axes = figure.subplot_mosaic("AB;AC;AD", width_ratios=(1.25, 1.0))
+        if narrow():
+            figure = Figure(figsize=figure_size(2, 10.2))
+            axes = figure.subplot_mosaic("A;B;C;D", height_ratios=(2.2, 1.0, 1.0, 1.0))
+        else:
+            figure = Figure(figsize=figure_size(2, 5.6))
+            axes = figure.subplot_mosaic("AB;AC;AD", width_ratios=(1.25, 1.0))
         law, speed, time, lag = (axes[k] for k in "ABCD")
-        law.plot(v, f, "o", label="data", **DOTS)
+        law.plot(v, f, "o", label="data", ms=stroke(1.6), **DOTS)
         _fitted_curve(law, fitted)
         law.set(xlabel="velocity [m/s]", ylabel="resisting force [N]")
         law.locator_params(axis="x", nbins=6)
@@ -44,7 +59,7 @@ def fit_plot(fitted: Fitted) -> Figure:
             "\n".join(_typeset(x) for x in words),
             transform=law.transAxes,
             va="top",
-            fontsize=9,
+            fontsize=points(9),
             color=BLACK,
         )
         chosen = next(c for c in fitted.candidates if c.law == fitted.law)
@@ -52,7 +67,7 @@ def fit_plot(fitted: Fitted) -> Figure:
         set_title(law, told, f"Akaike weight {chosen.weight:.2f}")
         _residual_panel(speed, v, left, "velocity [m/s]")
         _binned(speed, fitted)
-        speed.legend(loc="upper right", fontsize=8)
+        speed.legend(loc="upper right", fontsize=points(8))
         _residual_panel(time, t, left, "time [s]")
         _autocorrelation(lag, fitted)
         figure.align_ylabels([speed, time, lag])
@@ -97,8 +112,8 @@ def _typeset(text: str) -> str:
 
 
 def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str) -> None:
-    ax.plot(x, left, "o", **DOTS)
-    ax.axhline(0.0, color=BLACK, lw=0.8)
+    ax.plot(x, left, "o", ms=stroke(1.6), **DOTS)
+    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
     top = 1.05 * float(np.max(np.abs(left), initial=1e-12))
     ax.set(xlabel=label, ylabel="residual [N]", ylim=(-top, 1.5 * top))  # room for the legend
 
@@ -117,9 +132,9 @@ def _binned(ax: Axes, fitted: Fitted) -> None:
         mean,
         bar,
         fmt="s",
-        ms=3.0,
+        ms=stroke(3.0),
         color=VERMILION,
-        elinewidth=1.0,
+        elinewidth=stroke(1.0),
         zorder=3,
         label="means, 95 %",
     )
@@ -131,8 +146,8 @@ def _autocorrelation(ax: Axes, fitted: Fitted) -> None:
     power = float(x @ x) or 1.0
     rho = [float(x[k:] @ x[: len(x) - k]) / power for k in range(1, count + 1)]
     ax.axhspan(-1.96 / np.sqrt(len(x)), 1.96 / np.sqrt(len(x)), color=MID_GREY, alpha=0.3, lw=0)
-    ax.axhline(0.0, color=BLACK, lw=0.8)
-    ax.vlines(np.arange(1, count + 1), 0.0, rho, color=BLUE, lw=1.4)
+    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
+    ax.vlines(np.arange(1, count + 1), 0.0, rho, color=BLUE, lw=stroke(1.4))
     low, high = min(-0.1, *rho), max(0.1, *rho)
     ax.set(
         xlabel="lag [samples]; grey: white noise",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
 from ..theory import linear_loop
+from . import figure as shown
 from .style import (
     BLACK,
     BLUE,
@@ -40,10 +42,15 @@ from .style import (
     along_motion,
     clay_color,
     clay_share,
+    figure_size,
     figure_style,
+    map_size,
+    panel_grid,
+    points,
     set_title,
     shade_clay,
     shade_held,
+    stroke,
 )
 
 BEYOND = 1e4  # [cm], past every path
@@ -145,16 +152,17 @@ def path_plot(record: Record) -> Figure:
     breadth, depth = high - low + 1.0
     low, high = low - margin, high + margin
     with figure_style():
-        figure = Figure(figsize=(6.4, min(max(6.4 * depth / breadth, 1.0) + 1.3, 6.4)))
+        figure = Figure(figsize=map_size(6.4, 1.0, depth / breadth))
         ax = figure.add_subplot()
-        room = (high - low)[1] * 5.5 / (figure.get_figheight() - 1.3)
+        across, up = figure.get_figwidth() - stroke(0.9), figure.get_figheight() - stroke(1.3)
+        room = (high - low)[1] * across / up
         wider = max(0.0, 0.5 * (room - (high - low)[0]))  # axes as wide as the title over them
         low[0], high[0] = low[0] - wider, high[0] + wider
         if record.scenario.clay:
             _clay_map(ax, record.scenario.clay, low, high)
         ax.plot(p[:, 0], p[:, 1], color=BLUE, label="handle")
-        ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
-        ax.plot(*p[-1], "s", color=BLUE, ms=5, label="end")
+        ax.plot(*p[0], "o", color=BLUE, ms=stroke(5), label="start")
+        ax.plot(*p[-1], "s", color=BLUE, ms=stroke(5), label="end")
         ax.set(xlabel="position x [cm]", ylabel="position y [cm]", aspect="equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.grid(False)
@@ -186,7 +194,7 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
             shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
             if shown[0] > 0.12 and shown[1] > 0.08:
                 place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
-                text: Any = dict(ha="right", va="bottom", fontsize=8, color=GREY)
+                text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
                 ax.text(place[0], place[1], _clay_text(clay, middle), **text)
 
 
@@ -225,24 +233,24 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
     """
     i = AXES.index(axis)
     with figure_style():
-        figure = Figure(figsize=(6.4, 0.8 + 2.3 * len(records)))
+        figure = Figure(figsize=figure_size(1, 0.8 + 2.3 * len(records)))
         panels = figure.subplots(len(records), 1, sharex=over == "time", squeeze=False)[:, 0]
         for ax, r in zip(panels, records, strict=True):
             where = r.t if over == "time" else 100.0 * r.p[:, i]
             hand = BLUE
             if _yields(r.scenario):
                 hand = GREEN
-                ax.plot(where, r.fe[:, i], color=BLUE, lw=0.9, label="clay, f$_e$")
+                ax.plot(where, r.fe[:, i], color=BLUE, lw=stroke(0.9), label="clay, f$_e$")
                 if over == "time":
                     shade_held(ax, _held_spans(r, axis))
                 else:
                     _mark_held(ax, r, i, r.fe[:, i])
-            ax.plot(where, r.fh[:, i], color=hand, lw=0.9, label="operator, f$_h$")
+            ax.plot(where, r.fh[:, i], color=hand, lw=stroke(0.9), label="operator, f$_h$")
             if r.scenario.muscle is not None:
                 muscle = r.scenario.muscle
                 pieces = np.array_split(r.t, len(r.t) // 4096 + 1)  # it takes (n, lines) of memory
                 uh = r.scenario.force[i] + np.concatenate([muscle(t)[:, i] for t in pieces])
-                ax.plot(where, uh, color=VERMILION, lw=1.1, ls="--", label="muscle, u$_h$")
+                ax.plot(where, uh, color=VERMILION, lw=stroke(1.1), ls="--", label="muscle, u$_h$")
             ax.set_ylabel(f"force along {axis} [N]")
             set_title(ax, *_scenario_parts(r.scenario), r.outcome.code)
             if over != "time" or ax is panels[-1]:
@@ -261,7 +269,7 @@ def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:
     i = AXES.index(axis)
     looks = ((BLACK, "-"), (GREEN, "--"), (BLUE, "-"), (VERMILION, "-."))
     with figure_style():
-        figure = Figure(figsize=(6.4, 3.6))
+        figure = Figure(figsize=figure_size(1, 3.6))
         ax = figure.add_subplot()
         for (name, r), (color, style) in zip(records.items(), looks, strict=False):
             ax.plot(100.0 * r.p[:, i], 1000.0 * r.v[:, i], color=color, ls=style, label=name)
@@ -287,15 +295,15 @@ def ground_plot(record: Record) -> Figure:
     depth, breadth = (high - low)[::-1].tolist()
     colors = LinearSegmentedColormap.from_list("clay", [WHITE, CLAY_PALE, CLAY_DEEP])
     with figure_style():
-        figure = Figure(figsize=(6.4, min(max(4.7 * depth / breadth, 1.2) + 1.3, 6.4)))
+        figure = Figure(figsize=map_size(4.7, 1.2, depth / breadth))
         ax = figure.add_subplot()
         top = 1e3 * clay.groove.highest or 1.0
         look: Any = dict(cmap=colors, vmin=0.0, vmax=top, rasterized=True)
         image = ax.pcolormesh(x, y, 1e3 * ground.T, **look)
-        ax.plot(p[:, 0], p[:, 1], color=BLUE, lw=1.0, label="path of the tool")
-        ax.plot(*p[0], "o", color=BLUE, ms=5, label="start")
-        ax.plot(*p[-1], "s", color=BLUE, ms=5, label="end")
-        edge: Any = dict(fill=False, color=GREY, lw=0.6)
+        ax.plot(p[:, 0], p[:, 1], color=BLUE, lw=stroke(1.0), label="path of the tool")
+        ax.plot(*p[0], "o", color=BLUE, ms=stroke(5), label="start")
+        ax.plot(*p[-1], "s", color=BLUE, ms=stroke(5), label="end")
+        edge: Any = dict(fill=False, color=GREY, lw=stroke(0.6))
         ax.add_patch(Rectangle(tuple(corners[0]), *(corners[1] - corners[0]), **edge))
         bar = ax.inset_axes((1.03, 0.0, 0.03, 1.0))
         bar.grid(False)
@@ -341,11 +349,12 @@ def force_velocity_plot(record: Record) -> Figure:
     shown = list(dict.fromkeys(flow for flows in met.values() for flow in flows))
     colors = dict(zip(shown, FLOW_COLORS, strict=False))
     with figure_style():
-        figure = Figure(figsize=(6.4 if len(panels) == 1 else 9.6, 4.4))
-        several = figure.subplots(1, len(panels), squeeze=False)[0]
+        rows, columns = panel_grid(len(panels))
+        figure = Figure(figsize=figure_size(columns, 4.4 * rows))
+        several = figure.subplots(rows, columns, squeeze=False).ravel()
         for flow, color in colors.items():
             label = f"measured, {', '.join(_flow_parts([flow]))}"
-            several[0].plot([], [], ".", color=color, ms=9, label=label)
+            several[0].plot([], [], ".", color=color, ms=stroke(9), label=label)
         if any(held[:, x[0]].any() for x in panels.values()):
             several[0].plot([], [], **HELD_LOOK, label="held still")
         for ax, (name, (_, *measured)) in zip(several, panels.items(), strict=True):
@@ -381,14 +390,14 @@ def _forces_over_velocity(
     """Draws measured forces, those of a handle that is held, and the laws."""
     for flow, where in met.items():
         some = _spread(where[~held[where]], MOST_DOTS)
-        ax.plot(v[some], force[some], ".", color=colors[flow], ms=6, mew=0)
+        ax.plot(v[some], force[some], ".", color=colors[flow], ms=stroke(6), mew=0)
     some = _spread(np.flatnonzero(held), MOST_DOTS)
     ax.plot(v[some], force[some], **HELD_LOOK)
     label = "law of the clay"
     for flow, where in met.items():
         back = force[where].min() < -0.01 * flow.Fy
         x, y = _law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
-        ax.plot(x, y, color=VERMILION, ls="--", lw=1.3, label=label)
+        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(1.3), label=label)
         label = "_"
 
 
@@ -436,7 +445,8 @@ def _expected_speeds(ax: Axes, record: Record, axis: str) -> None:
     for piece in pieces if len(pieces) <= MOST_BORDERS else pieces[:3]:
         speed, x = record.expected_speed(axis, piece), 100.0 * record.p[piece, i]
         if speed is not None and math.isfinite(speed):
-            ax.plot([x.min(), x.max()], [speed] * 2, color=VERMILION, ls="--", lw=1.4, label=label)
+            look: Any = dict(color=VERMILION, ls="--", lw=stroke(1.4), label=label)
+            ax.plot([x.min(), x.max()], [speed] * 2, **look)
             label = "_"
 
 
@@ -444,7 +454,7 @@ def _mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
     """Marks where clay that yields held the handle, on a curve over the position."""
     some = _spread(np.flatnonzero(record.held()[:, i]), MOST_DOTS)
     if len(some):
-        look: Any = dict(color=ORANGE, ms=5, mew=0, zorder=4, label="held still")
+        look: Any = dict(color=ORANGE, ms=stroke(5), mew=0, zorder=4, label="held still")
         ax.plot(100.0 * record.p[some, i], y[some], "o", **look)
 
 
@@ -520,6 +530,71 @@ FIGURES: dict[str, Callable[[Record], Figure | None]] = {
 figure does not apply. To add a plot to `hapticclay run`, add an entry."""
 
 
+FIGURE_COLUMNS = {  # of a record, of which each figure shows some; other figures: all
+    "velocity": ("p", "v"),
+    "force": ("p", "v", "fh", "fe", "b"),
+    "path": ("p",),
+    "force_position": ("p", "fh", "fe"),
+    "force_velocity": ("v", "fe"),
+    "ground": ("p",),
+}
+COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
+
+
+def record_figures(record: Record) -> dict[str, shown.Figure]:
+    """Returns every figure of FIGURES, to be drawn in any style; some may not apply to the run.
+
+    Args:
+        record: the run.
+    """
+    return {
+        name: shown.Figure(
+            functools.partial(draw, record), functools.partial(run_tables, record, name)
+        )
+        for name, draw in FIGURES.items()
+    }
+
+
+def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
+    """Returns the numbers that a figure of FIGURES shows.
+
+    Args:
+        record: the run.
+        name: of the figure.
+    """
+    samples: dict[str, Any] = {"time [s]": record.t}
+    for part in FIGURE_COLUMNS.get(name, tuple(COLUMN_UNITS)):
+        for i, axis in enumerate(AXES):
+            word = axis if part == "p" else f"{part}_{axis}"
+            samples[f"{word} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
+    out = {"samples": samples}
+    if name == "velocity":
+        rows = [(axis, r[axis]) for axis in AXES for r in record.regions(axis)]
+        out["stretches"] = {
+            "axis": [axis for axis, _ in rows],
+            "from [m]": [r["from_m"] for _, r in rows],
+            "to [m]": [r["to_m"] for _, r in rows],
+            "steady speed [m/s]": [r["steady_speed"] for _, r in rows],
+            "expected speed [m/s]": [r["expected_speed"] for _, r in rows],
+        }
+    clay = record.scenario.clay
+    if name == "ground" and record.ground is not None and clay and clay.groove:
+        x, y = (0.5 * (e[1:] + e[:-1]) for e in clay.groove.edges)
+        i, j = (a.ravel() for a in np.indices(record.ground.shape))
+        out["cells"] = {"x [m]": x[i], "y [m]": y[j], "left [m]": record.ground.ravel()}
+    return out
+
+
+def figure_files(folder: Path) -> set[Path]:
+    """Lists the files that figures of FIGURES, in any format, and their numbers have in a folder.
+
+    Args:
+        folder: of a record.
+    """
+    ends = [f".{kind}" for kind in (*shown.FORMATS, "csv")] + ["-stretches.csv", "-cells.csv"]
+    return {path for name in FIGURES for end in ends if (path := folder / f"{name}{end}").exists()}
+
+
 def figures(record: Record) -> dict[str, Figure]:
     """Draws the figures of FIGURES that apply to a run.
 
@@ -535,8 +610,9 @@ def figures(record: Record) -> dict[str, Figure]:
 
 def _position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
     """A panel over the position along each axis, the clay shaded."""
-    figure = Figure(figsize=(6.4 if len(axes) == 1 else 9.6, 3.6))
-    panels = list(figure.subplots(1, len(axes), squeeze=False)[0])
+    rows, columns = panel_grid(len(axes))
+    figure = Figure(figsize=figure_size(columns, 3.6 * rows))
+    panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for name, ax in zip(axes, panels, strict=True):
         x = 100.0 * record.p[:, AXES.index(name)]
         low, high = float(x.min()), float(x.max())
@@ -577,7 +653,7 @@ def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
         x, b = 100.0 * record.p[piece, i], record.b[piece, i]
         constant = np.ptp(b) == 0.0
         x, y = ([x.min(), x.max()], [law(float(b[0]))] * 2) if constant else (x, law(b))
-        ax.plot(x, y, lw=1.4, zorder=3, **look)
+        ax.plot(x, y, lw=stroke(1.4), zorder=3, **look)
         look["label"] = "_"
 
 
@@ -667,7 +743,7 @@ class RunningPlots:
         self._curves = []
         for ax, x, y, color in curves:
             known = np.flatnonzero(np.isfinite(y))
-            (line,) = ax.plot([], [], color=color, lw=1.4)
+            (line,) = ax.plot([], [], color=color, lw=stroke(1.4))
             self._curves.append((line, known, x[known], y[known]))
 
     def draw(self, n: int) -> np.ndarray:
@@ -723,7 +799,7 @@ def running_figure(
                 shade_held(ax, _held_spans(record, AXES[i]))
         b = np.unique(record.b[:, i])
         for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 and not yields else ():
-            panels[1].axhline(value, color=VERMILION, ls="--", lw=0.9)
+            panels[1].axhline(value, color=VERMILION, ls="--", lw=stroke(0.9))
             at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
             panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
         canvas = FigureCanvasAgg(figure)
@@ -792,7 +868,7 @@ def _running_laws(ax: Axes, r: Record, i: int) -> None:
     for flow, where in _flows_met(r, i).items():
         back = fe[where].min() < -0.01 * flow.Fy
         x, y = _law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
-        ax.plot(x, y, color=VERMILION, ls="--", lw=0.9)
+        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(0.9))
 
 
 def _limits(values: np.ndarray) -> tuple[float, float]:

@@ -46,9 +46,14 @@ from .style import (
     WHITE,
     YELLOW,
     add_legend,
+    figure_size,
     figure_style,
     hand_name,
+    narrow,
+    panel_grid,
+    points,
     set_title,
+    stroke,
     unit_text,
 )
 
@@ -77,7 +82,7 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
     """
     factor, unit, shown = X_SCALES.get(chart.kind, (1.0, "", ""))
     with figure_style():
-        figure = Figure(figsize=(7.4, 6.0))
+        figure = Figure(figsize=figure_size(1, 6.0, 7.4))
         ax = figure.add_subplot()
         ax.set_yscale("log")
         if chart.kind != "gain-pose":
@@ -95,25 +100,25 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
                 ax.plot(factor * np.array(x), _positive(y), **look)
         for name, look in CELL_MARKS.items():
             if mine := [c for c in chart.cells if c.simulated == name]:
-                look = dict(look, color=GREY, ms=6, mew=1.2, label=f"a run: {name}")
+                look = dict(look, color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"a run: {name}")
                 mark([c.x for c in mine], [c.y for c in mine], **look)
         if wrong := [c for c in chart.cells if c.cause]:
-            look = dict(marker="o", mfc="none", color=VERMILION, ms=13, mew=1.5)
+            look = dict(marker="o", mfc="none", color=VERMILION, ms=stroke(13), mew=stroke(1.5))
             label = "unlike continuous time, no delay, nominal pose"
             mark([c.x for c in wrong], [c.y for c in wrong], label=label, **look)
         for (name, (x, y)), look in zip(chart.found.items(), BOUNDARY_MARKS, strict=False):
             label = name.replace("runs", "boundary found by runs")
-            mark(x, _positive(y), color=BLACK, ms=7, zorder=5, label=label, **look)
+            mark(x, _positive(y), color=BLACK, ms=stroke(7), zorder=5, label=label, **look)
         found = [(a, b) for x, y in chart.found.values() for a, b in zip(x, y, strict=True)]
         if beyond := [a for a, b in found if b > high]:
             look = dict(transform=ax.get_xaxis_transform(), clip_on=False, zorder=5, marker="^")
             label = "runs: stable up to here"
-            mark(beyond, [1.0] * len(beyond), color=BLACK, ms=8, label=label, **look)
+            mark(beyond, [1.0] * len(beyond), color=BLACK, ms=stroke(8), label=label, **look)
         ax.set_ylim(low, high)
         _log_ticks(ax, chart)
         x_name = chart.x_name.replace(unit, shown) if unit else chart.x_name
         ax.set(xlabel=unit_text(x_name), ylabel=unit_text(chart.y_name))
-        add_legend(figure, ax, 2, fontsize=9)
+        add_legend(figure, ax, 2, fontsize=points(9))
         set_title(ax, *_map_parts(chart), pad=10.0)  # over the triangles
     return figure
 
@@ -194,7 +199,7 @@ def yield_map_plot(chart: YieldMap) -> Figure:
     cycle = 1e3 * np.where(goes, np.outer(each, Fy), np.nan)
     grows = goes & (K >= chart.limit)[:, None]
     with figure_style():
-        figure = Figure(figsize=(7.4, 5.6))
+        figure = Figure(figsize=figure_size(1, 5.6, 7.4))
         ax = figure.add_subplot()
         ax.set(xscale="log", yscale="log", xlim=(Fy[0], Fy[-1]), ylim=(bottom, top))
         known = cycle[np.isfinite(cycle)]
@@ -216,9 +221,11 @@ def yield_map_plot(chart: YieldMap) -> Figure:
                 if name == "limit cycle":
                     own["mfc"] = shaded.cmap(colors(1e3 * c.speed))
                 label = f"a run: {PUSH_NAMES[name]}" if i == 0 else None
-                ax.plot(c.Fy, c.K, ls="none", ms=8, label=label, **own)
+                ax.plot(c.Fy, c.K, ls="none", ms=stroke(8), label=label, **own)
         if wrong := [c for c in chart.cells if c.simulated != c.expected]:
-            look: Any = dict(marker="o", mfc="none", color=VERMILION, ms=14, mew=1.5, ls="none")
+            look: Any = dict(
+                marker="o", mfc="none", color=VERMILION, ms=stroke(14), mew=stroke(1.5), ls="none"
+            )
             ax.plot([c.Fy for c in wrong], [c.K for c in wrong], label="unlike theory", **look)
         ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
         for side in (ax.xaxis, ax.yaxis):
@@ -227,7 +234,7 @@ def yield_map_plot(chart: YieldMap) -> Figure:
         bar = figure.colorbar(shaded, ax=ax, format="%g")
         bar.set_label(unit_text("largest speed of the limit cycle [mm/s]"))
         ax.set(xlabel=unit_text("yield force Fy [N]"), ylabel=unit_text("gain K [1/kg]"))
-        add_legend(figure, ax, 2, fontsize=9)
+        add_legend(figure, ax, 2, fontsize=points(9))
         s = chart.loop
         parts = [f"{s.axis} axis, push of {1e3 * push:g} mm/s", unit_text(f"b = {s.b:g} N.s/m")]
         parts += [
@@ -265,25 +272,35 @@ BLOCKS = {
 }
 
 
+HEIGHTS = (2.2, 2.0, 0.8)  # of magnitude, phase and coherence
+
+
 def identification_plot(results: Sequence[Identified]) -> Figure:
     """Plots magnitude, phase and coherence of one block with its printed equation.
 
     Args:
         results: of one block, on one axis or both; a column each.
     """
+    rows, columns = panel_grid(len(results))
     with figure_style():
-        figure = Figure(figsize=(max(1.2 + 3.6 * len(results), 6.0), 5.4))
-        axes: Any = figure.subplots(
-            3, len(results), sharex=True, sharey="row", squeeze=False, height_ratios=(2.2, 2.0, 0.8)
-        )
+        figure = Figure(figsize=figure_size(2, 5.4 * rows, max(1.2 + 3.6 * len(results), 6.0)))
+        look: Any = dict(sharex=True, squeeze=False)
+        axes: Any = figure.subplots(3 * rows, columns, height_ratios=HEIGHTS * rows, **look)
+        axes = axes.reshape(rows, 3, columns).transpose(1, 0, 2).reshape(3, -1)
+        for row in axes:
+            for ax in row[1:]:
+                ax.sharey(row[0])
+                ax.tick_params(labelleft=rows > 1)
         for column, result in zip(axes.T, results, strict=True):
             _response_column(column, result)
         labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
-        for ax, label in zip(axes[:, 0], labels, strict=True):
-            ax.set_ylabel(label)
+        named = axes if rows > 1 else axes[:, :1]
+        for row, label in zip(named, labels, strict=True):
+            for ax in row:
+                ax.set_ylabel(label)
         low = min(0.9, *(float(r.coherence.min()) for r in results))
         axes[2, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
-        figure.align_ylabels(axes[:, 0])
+        figure.align_ylabels(named.ravel())
         add_legend(figure, axes[0, 0], 3)
     return figure
 
@@ -297,13 +314,23 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     )
     share = result.deviation / np.abs(result.response)
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
-    marks: Any = dict(fmt="o", ms=4.0, mfc=WHITE, mew=1.2, color=BLUE, elinewidth=1.0, zorder=3)
+    marks: Any = dict(
+        fmt="o",
+        ms=stroke(4.0),
+        mfc=WHITE,
+        mew=stroke(1.2),
+        color=BLUE,
+        elinewidth=stroke(1.0),
+        zorder=3,
+    )
     label = f"{'simulated arm' if result.scenario else 'measured'}, with 95 % bars"
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
-        ax.plot(fine, part(known), color=VERMILION, lw=2.2, label="printed")
-        ax.plot(fine, part(fitted), color=BLACK, ls=":", lw=1.2, label="fitted to the points")
+        ax.plot(fine, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
+        ax.plot(
+            fine, part(fitted), color=BLACK, ls=":", lw=stroke(1.2), label="fitted to the points"
+        )
         ax.errorbar(f, part(result.response), e, label=label, **marks)
-    coherence.plot(f, result.coherence, "o", ms=3.0, color=BLUE)
+    coherence.plot(f, result.coherence, "o", ms=stroke(3.0), color=BLUE)
     coherence.set_xscale("log")
     coherence.set_xlabel("frequency [Hz]")
     coherence.xaxis.set_major_formatter("{x:g}")
@@ -316,7 +343,9 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
         unit_text(f"{c.name} {format_coefficient(c)} {c.unit}") for c in result.coefficients
     )
     where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
-    magnitude.text(0.04, s=text, transform=magnitude.transAxes, fontsize=8, color=GREY, **where)
+    magnitude.text(
+        0.04, s=text, transform=magnitude.transAxes, fontsize=points(8), color=GREY, **where
+    )
 
 
 def _decibel(H: np.ndarray) -> np.ndarray:
@@ -339,8 +368,9 @@ def workspace_plot(drift: Drift) -> Figure:
         drift: from `drift_map`; a row for each axis, without and with inertia shaping.
     """
     with figure_style(axes_grid=False):
-        figure = Figure(figsize=(9.4, 5.6))
-        axes: Any = figure.subplots(2, 2, sharex=True, sharey=True)
+        figure = Figure(figsize=figure_size(2, 12.4 if narrow() else 5.6, 9.4))
+        shape = (4, 1) if narrow() else (2, 2)
+        axes: Any = figure.subplots(*shape, sharex=True, sharey=True).reshape(2, 2)
         for i, row in enumerate(axes):
             fitted = drift.coefficients[:, :, DRIFT_BLOCKS.index("S"), i, 0]
             top = max(float(drift.mobility[:, i].max()), float(fitted.max()))
@@ -354,9 +384,10 @@ def workspace_plot(drift: Drift) -> Figure:
                 set_title(ax, f"gain of S$_{AXES[i]}$, {title}")
             bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
             bar.set_label("gain [1/kg] (line: printed)")
-            bar.ax.axhline(printed_form("S", AXES[i])[0], color=VERMILION, lw=2.0)
-            row[0].set_ylabel("world y [m]")
-        for ax in axes[1]:
+            bar.ax.axhline(printed_form("S", AXES[i])[0], color=VERMILION, lw=stroke(2.0))
+            for ax in row if narrow() else row[:1]:
+                ax.set_ylabel("world y [m]")
+        for ax in axes[1, 1:] if narrow() else axes[1]:
             ax.set_xlabel("world x [m]")
         add_legend(figure, axes[0, 0])
     return figure
@@ -385,21 +416,21 @@ def _mobility_contours(ax: Axes, i: int, top: float) -> None:
             w[n, m] = endpoint_mobility(float(x[m]), float(y[n]))[i]
     lines = ax.contour(x, y, w, np.arange(0.1, top, 0.2), colors=BLACK, linewidths=0.8)
     lines.set_path_effects([withStroke(linewidth=2.4, foreground=WHITE)])
-    for text in ax.clabel(lines, fmt="%.1f", fontsize=7):
+    for text in ax.clabel(lines, fmt="%.1f", fontsize=points(7)):
         text.set_path_effects([withStroke(linewidth=2.0, foreground=WHITE)])
-    ax.plot([], [], color=BLACK, lw=0.8, label="W of the bare arm [1/kg]")
+    ax.plot([], [], color=BLACK, lw=stroke(0.8), label="W of the bare arm [1/kg]")
 
 
 def _workspace_frame(ax: Axes) -> None:
     """Draws the limits of the reach, the shoulder, the default path and the nominal pose."""
     for r in (L1 + L2, abs(L2 - L1)):
         size = 2.0 * r, 2.0 * r
-        ax.add_patch(Arc((0.0, 0.0), *size, theta2=180.0, color=MID_GREY, lw=2.0))
-    ax.plot([], [], color=MID_GREY, lw=2.0, label="limits of the reach")
-    ax.plot(0.0, 0.0, "^", color=MID_GREY, ms=7, clip_on=False, label="shoulder")
+        ax.add_patch(Arc((0.0, 0.0), *size, theta2=180.0, color=MID_GREY, lw=stroke(2.0)))
+    ax.plot([], [], color=MID_GREY, lw=stroke(2.0), label="limits of the reach")
+    ax.plot(0.0, 0.0, "^", color=MID_GREY, ms=stroke(7), clip_on=False, label="shoulder")
     x, y = ORIGIN
     ax.plot((x, x + PATH_LENGTH), (y, y), color=VERMILION, label="default path")
-    pose: Any = dict(mfc="none", mec=VERMILION, mew=2.0, ms=9)
+    pose: Any = dict(mfc="none", mec=VERMILION, mew=stroke(2.0), ms=stroke(9))
     ax.plot(*NOMINAL_POSE, "o", label="nominal pose", **pose)
     ax.set(aspect="equal", xlim=(-0.62, 0.62), ylim=(-0.02, 0.62))
 
@@ -510,7 +541,7 @@ def sweep_plot(
         colors = ListedColormap(list(OUTCOME_COLORS.values()))
         look = dict(cmap=colors, vmin=-0.5, vmax=len(kinds) - 0.5)
     with figure_style():
-        figure = Figure(figsize=(6.4, 4.6))
+        figure = Figure(figsize=figure_size(1, 4.6))
         ax = figure.add_subplot()
         draw = _draw_grid if len(gx) * len(gy) <= 4 * len(z) else _draw_points
         image, handles = draw(ax, data, look)
@@ -519,7 +550,7 @@ def sweep_plot(
         elif np.isfinite(z).any():
             figure.colorbar(image, ax=ax, label=_column_label(value))
         if handles:
-            figure.legend(handles=handles, loc="outside upper center", ncols=4)
+            add_legend(figure, None, 4, handles=handles)
         for values, scale in ((gx, ax.set_xscale), (gy, ax.set_yscale)):
             if values[0] > 0.0 and _logarithmic(values):
                 scale("log")
@@ -527,6 +558,24 @@ def sweep_plot(
         ax.grid(False)
         set_title(ax, value.replace("_", " "), f"{len(z)} runs")
     return figure
+
+
+def sweep_tables(
+    table: Any, value: str = "status", x: str | None = None, y: str | None = None
+) -> dict[str, dict[str, list]]:
+    """Returns what a map of a sweep shows: its runs with both parameters and the column.
+
+    Args:
+        table: from `read_sweep`.
+        value: column shown.
+        x: as in `sweep_plot`.
+        y: as in `sweep_plot`.
+    """
+    names = swept_parameters(table)
+    x = x or names[0]
+    y = y or next(n for n in names if n != x)
+    columns = {_column_label(name): table[name].to_pylist() for name in (x, y, value)}
+    return {"runs": columns | {"why none": missing_reasons(table, value)}}
 
 
 class Mapped(NamedTuple):
@@ -643,8 +692,10 @@ def accuracy_plot(ladder: Ladder) -> Figure:
     """
     units = ladder.units()
     with figure_style():
-        figure = Figure(figsize=(4.4 * max(len(units), 1) + 0.6, 4.6))
-        axes = figure.subplots(1, max(len(units), 1), squeeze=False)[0]
+        count = max(len(units), 1)
+        rows, columns = panel_grid(count)
+        figure = Figure(figsize=figure_size(count, 4.6 * rows, 4.4 * count + 0.6))
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for ax, unit in zip(axes, units, strict=False):
             _accuracy_panel(ax, ladder, unit)
         if units:
@@ -656,20 +707,24 @@ def accuracy_plot(ladder: Ladder) -> Figure:
 
 def _accuracy_panel(ax: Axes, ladder: Ladder, unit: str) -> None:
     ax.set(xscale="log", yscale="log", xlabel="run time [s]", ylabel=ERROR_AXES[unit])
-    points = [(x, e) for x in ladder.settings if (e := ladder.shown(x, unit)) and x.wall]
+    marks = [(x, e) for x in ladder.settings if (e := ladder.shown(x, unit)) and x.wall]
     for name, (look, side) in SERIES_LOOKS.items():
-        mine = [(x.wall, e, x.dt) for x, e in points if x.series == name]
+        mine = [(x.wall, e, x.dt) for x, e in marks if x.series == name]
         if not mine:
             continue
         walls, errors, steps = zip(*mine, strict=True)
-        ax.plot(walls, errors, ms=5, lw=1.4, label=name, zorder=3, **look)
+        ax.plot(walls, errors, ms=stroke(5), lw=stroke(1.4), label=name, zorder=3, **look)
         for i in sorted({0, len(mine) - 1}):
             at: Any = (walls[i], errors[i])
-            told: Any = dict(side, textcoords="offset points", fontsize=8, color=look["color"])
+            told: Any = dict(
+                side, textcoords="offset points", fontsize=points(8), color=look["color"]
+            )
             ax.annotate(_step(steps[i]), at, **told)
-    best = [(x.wall, e) for x, e in points if x in ladder.cheapest(unit).values()]
+    best = [(x.wall, e) for x, e in marks if x in ladder.cheapest(unit).values()]
     if best:
-        ring: Any = dict(ls="none", marker="o", mfc="none", color=BLACK, ms=11, mew=1.2, zorder=4)
+        ring: Any = dict(
+            ls="none", marker="o", mfc="none", color=BLACK, ms=stroke(11), mew=stroke(1.2), zorder=4
+        )
         ax.plot(*zip(*best, strict=True), label="cheapest for an error", **ring)
     ax.margins(x=0.15, y=0.1)
     (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()

@@ -7,10 +7,14 @@ palette alone.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import contextlib
+from collections.abc import Iterator
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..errors import choice
 from ..model.clay import Clay, Grid, Profile, Smooth
 from ..model.operator import Operator
 
@@ -50,15 +54,145 @@ STYLE: Any = {
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
-    "savefig.dpi": 160,
     "figure.constrained_layout.use": True,
+    "pdf.fonttype": 42,  # text stays text, its fonts within the file; journals refuse type 3
+    "svg.fonttype": "path",  # text drawn as outlines: alike wherever the font is missing
+    "svg.hashsalt": "hapticclay",  # the same figure gives the same file
 }
-TITLE_SIZE = 9.0  # [points]
+PRINT: Any = STYLE | {
+    "font.size": 7.5,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 4.0,
+    "axes.linewidth": 0.6,
+    "axes.labelpad": 2.0,
+    "axes.titlepad": 4.0,
+    "grid.linewidth": 0.4,
+    "hatch.linewidth": 0.6,
+    **{f"{side}tick.{kind}.width": 0.5 for side in "xy" for kind in ("major", "minor")},
+    **{f"{side}tick.major.{what}": 2.5 for side in "xy" for what in ("size", "pad")},
+    **{f"{side}tick.minor.size": 1.5 for side in "xy"},
+    "legend.handlelength": 1.8,
+    "legend.columnspacing": 1.2,
+    "legend.labelspacing": 0.35,
+    "figure.constrained_layout.w_pad": 0.03,
+}
+SCREEN_WIDTHS = {1: 6.4, 2: 9.6}  # [inch] of figures of one and of two columns
+LEAST_TEXT = 6.0  # [points] that print can be read at
+TITLE_SIZE = 9.0  # [points] on a screen
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
 CLAY_ALPHA = 0.35  # of clay behind curves
 HELD_COLOR, HELD_ALPHA = SKY_BLUE, 0.35  # time for which clay that yields holds the handle
 SHADED_SPEED = 0.01  # [m/s] at which clays that yield are compared, about that of the paper's cut
 SHADED_DENT = 1e-3  # [m] at which clays that spring back are
+
+
+class Look(NamedTuple):
+    """How a style draws every figure.
+
+    Attributes:
+        parameters: rcParams of matplotlib.
+        width: of every figure [inch]; None where each has its own.
+        scale: of heights, and of sizes that a figure states, against the screen's.
+        dpi: of pictures made of pixels [1/inch].
+    """
+
+    parameters: Any
+    width: float | None
+    scale: float
+    dpi: float
+
+
+STYLES = {
+    "screen": Look(STYLE, None, 1.0, 100.0),
+    "print": Look(PRINT, 8.5 / 2.54, 0.75, 300.0),  # one column of a journal
+    "print-wide": Look(PRINT, 17.5 / 2.54, 0.75, 300.0),  # two columns
+}
+_STYLE: ContextVar[str] = ContextVar("style", default="screen")
+
+
+@contextlib.contextmanager
+def styled(style: str) -> Iterator[Look]:
+    """Draws, and saves, the figures made within this context in a style.
+
+    Args:
+        style: "screen", "print" for one column of 8.5 cm, or "print-wide" for two, 17.5 cm.
+
+    Raises:
+        ParameterError: there is no such style.
+    """
+    import matplotlib
+
+    before = _STYLE.set(choice("style", style, tuple(STYLES)))
+    try:
+        with matplotlib.rc_context(STYLES[style].parameters):
+            yield STYLES[style]
+    finally:
+        _STYLE.reset(before)
+
+
+def look() -> Look:
+    """Returns how figures are drawn now."""
+    return STYLES[_STYLE.get()]
+
+
+def narrow() -> bool:
+    """Tells whether figures are one printed column wide: panels then stand one under another."""
+    return _STYLE.get() == "print"
+
+
+def figure_size(columns: int, height: float, width: float | None = None) -> tuple[float, float]:
+    """Returns the size of a figure in the style of now, to be given as `figsize` [inch].
+
+    Args:
+        columns: 1 for a usual figure, 2 for one with panels side by side.
+        height: on a screen [inch]; print scales it by `Look.scale`, as it does the fonts.
+        width: on a screen where it is not that of SCREEN_WIDTHS [inch].
+    """
+    now = look()
+    return now.width or width or SCREEN_WIDTHS[columns], now.scale * height
+
+
+def map_size(across: float, least: float, ratio: float) -> tuple[float, float]:
+    """Returns the size of a figure of a map to scale, in the style of now [inch].
+
+    Args:
+        across: width of its axes on a screen [inch].
+        least: their least height on a screen [inch].
+        ratio: height over width of what is shown.
+    """
+    width, scale = figure_size(1, 1.0)
+    across *= width / SCREEN_WIDTHS[1]
+    return width, min(max(across * ratio, scale * least) + 1.3 * scale, width)
+
+
+def panel_grid(count: int) -> tuple[int, int]:
+    """Returns rows and columns of some panels: side by side, or in one printed column stacked.
+
+    Args:
+        count: of the panels.
+    """
+    return (count, 1) if narrow() else (1, count)
+
+
+def points(size: float) -> float:
+    """Returns a size of text in the style of now [points].
+
+    Args:
+        size: on a screen [points].
+    """
+    return size if _STYLE.get() == "screen" else max(LEAST_TEXT, look().scale * size)
+
+
+def stroke(size: float) -> float:
+    """Returns a width of a line, or the size of a marker, in the style of now [points].
+
+    Args:
+        size: on a screen [points].
+    """
+    return look().scale * size
 
 
 def rgb(color: str) -> tuple[float, float, float]:
@@ -178,11 +312,11 @@ def figure_style(**more: Any) -> Any:
     """Returns the context in which figures are drawn.
 
     Args:
-        more: rcParams of matplotlib that differ from STYLE, dots written as underscores.
+        more: rcParams of matplotlib that differ from the style's, dots written as underscores.
     """
     import matplotlib
 
-    parameters: Any = {**STYLE, **{k.replace("_", ".", 1): v for k, v in more.items()}}
+    parameters: Any = {**look().parameters, **{k.replace("_", ".", 1): v for k, v in more.items()}}
     return matplotlib.rc_context(parameters)
 
 
@@ -191,35 +325,50 @@ def set_title(ax: Axes, *parts: str, **more: Any) -> None:
 
     Args:
         ax: the axes.
-        parts: phrases, joined by commas; lines break between them.
+        parts: phrases, joined by commas; lines break between them, and between words only where a
+            phrase alone is too long.
         more: further arguments of `Axes.set_title`.
     """
     from matplotlib.textpath import TextPath
 
-    figure: Any = ax.figure
-    room = 72.0 * (figure.get_figwidth() - TITLE_MARGIN)
-    lines = [parts[0]]
-    for part in parts[1:]:
-        longer = f"{lines[-1]}, {part}"
-        if TextPath((0.0, 0.0), longer, size=TITLE_SIZE).get_extents().width <= room:
-            lines[-1] = longer
-        else:
-            lines[-1] += ","
-            lines.append(part)
-    ax.set_title("\n".join(lines), fontsize=TITLE_SIZE, loc="left", color=GREY, **more)
+    figure, size = ax.figure, points(TITLE_SIZE)
+    room = 72.0 * (figure.get_figwidth() - stroke(TITLE_MARGIN))  # type: ignore[union-attr]
+
+    def fits(text: str) -> bool:
+        return TextPath((0.0, 0.0), text, size=size).get_extents().width <= room
+
+    lines: list[str] = []
+    for i, part in enumerate(parts):
+        part += "," * (i < len(parts) - 1)
+        if lines and fits(f"{lines[-1]} {part}".removesuffix(",")):
+            lines[-1] += f" {part}"
+            continue
+        lines.append("")
+        for word in part.split(" ") if not fits(part.removesuffix(",")) else [part]:
+            longer = f"{lines[-1]} {word}".lstrip()
+            if lines[-1] and not fits(longer):
+                lines.append(word)
+            else:
+                lines[-1] = longer
+    ax.set_title("\n".join(lines), fontsize=size, loc="left", color=GREY, **more)
 
 
-def add_legend(figure: Figure, ax: Axes, ncols: int = 5, **more: Any) -> None:
-    """Puts the legend of one of the axes above the figure.
+def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> None:
+    """Puts the legend of one of the axes above the figure, in as many columns as fit into it.
 
     Args:
         figure: the figure.
-        ax: the axes whose labels it lists.
+        ax: the axes whose labels it lists; None where `more` has handles.
         ncols: columns, at most.
         more: further arguments of `Figure.legend`.
     """
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=ncols, **more)
+    if ax is not None:
+        more["handles"], more["labels"] = ax.get_legend_handles_labels()
+    for columns in range(ncols, 0, -1):
+        legend = figure.legend(loc="outside upper center", ncols=columns, **more)
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
 
 
 def hand_name(operator: Operator | None | tuple[Operator | None, Operator | None]) -> str:

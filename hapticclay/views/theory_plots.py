@@ -24,9 +24,13 @@ from .style import (
     PALE_GREY,
     VERMILION,
     add_legend,
+    figure_size,
     figure_style,
     hand_name,
+    narrow,
+    points,
     set_title,
+    stroke,
 )
 
 BREAK_NAMES = {"force": "at the net force", "compensator": "at the compensator"}
@@ -49,26 +53,26 @@ def bode_plot(
     L = _response(*margins.open_loop(loop, at=at), w)
     phase = np.degrees(np.unwrap(np.angle(L)))
     phase -= 360.0 * round((phase[0] + 90.0) / 360.0)
-    bar: Any = dict(lw=3.0, solid_capstyle="butt")
+    bar: Any = dict(lw=stroke(3.0), solid_capstyle="butt")
     with figure_style():
-        figure = Figure(figsize=(6.4, 5.2))
+        figure = Figure(figsize=figure_size(1, 5.2))
         top, low = figure.subplots(2, 1, sharex=True)
         top.loglog(w, np.abs(L), color=BLUE)
-        top.axhline(1.0, color=BLACK, lw=0.8)
+        top.axhline(1.0, color=BLACK, lw=stroke(0.8))
         low.semilogx(w, phase, color=BLUE)
-        low.axhline(-180.0, color=BLACK, lw=0.8)
+        low.axhline(-180.0, color=BLACK, lw=stroke(0.8))
         if m.stable and math.isfinite(m.gain[1]):
             where, height = m.gain_omega[1], 1.0 / m.gain[1]
             top.plot([where, where], [height, 1.0], color=VERMILION, **bar)
             _note(top, where, math.sqrt(height), f"gain margin {m.gain[1]:.3g}", VERMILION)
-            low.plot(where, np.interp(where, w, phase), "o", color=VERMILION, ms=5)
+            low.plot(where, np.interp(where, w, phase), "o", color=VERMILION, ms=stroke(5))
         if m.stable and math.isfinite(m.phase):
             where, here = m.phase_omega, float(np.interp(m.phase_omega, w, phase))
             far = -180.0 + 360.0 * round((here + 180.0) / 360.0)
             low.plot([where, where], [far, here], color=GREEN, **bar)
             text = f"phase margin {math.degrees(m.phase):.3g}\u00b0"
             _note(low, where, 0.5 * (far + here), text, GREEN, "right")
-            top.plot(where, 1.0, "o", color=GREEN, ms=5)
+            top.plot(where, 1.0, "o", color=GREEN, ms=stroke(5))
         top.set_ylabel("magnitude of L")
         low.set(xlabel=OMEGA_LABEL, ylabel="phase of L [degrees]", xlim=omega)
         low.set_yticks(np.arange(45.0 * math.floor(phase.min() / 45.0), phase.max() + 45.0, 45.0))
@@ -90,10 +94,11 @@ def nyquist_plot(
         at: where the loop is broken, "compensator" or "force".
     """
     with figure_style():
-        figure = Figure(figsize=(5.6, 5.7 + 0.2 * len(gains)))  # for the legend
+        height = (4.5 if narrow() else 5.7) + 0.2 * len(gains)  # for the legend
+        figure = Figure(figsize=figure_size(1, height, 5.6))
         ax = figure.add_subplot()
         columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
-        ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=0.9, ls=(0, (4, 3)))
+        ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=stroke(0.9), ls=(0, (4, 3)))
         for K, (color, style) in zip(gains, CURVE_STYLES, strict=False):
             found = margins.nyquist(loop, K=K, at=at)
             m = margins.margins(loop, K=K, at=at)
@@ -106,17 +111,17 @@ def nyquist_plot(
             ax.plot(found.L.real, found.L.imag, color=color, ls=style, label=label)
             _arrow(ax, found.L, color)
             if m.stable and math.isfinite(m.gain[1]):
-                ax.plot(-1.0 / m.gain[1], 0.0, "o", color=color, ms=4.5, zorder=4)
+                ax.plot(-1.0 / m.gain[1], 0.0, "o", color=color, ms=stroke(4.5), zorder=4)
             if m.stable and math.isfinite(m.phase):
                 L = margins.open_loop(loop, K=K, at=at)
                 z = _response(*L, np.array([m.phase_omega]))[0]
-                ax.plot(z.real, z.imag, "s", color=color, ms=4.5, zorder=4)
-        ax.plot(-1.0, 0.0, "+", color=BLACK, ms=12, mew=2.0, zorder=5)
-        ax.annotate("-1", (-1.0, 0.0), (5.0, -13.0), textcoords="offset points", fontsize=9)
+                ax.plot(z.real, z.imag, "s", color=color, ms=stroke(4.5), zorder=4)
+        ax.plot(-1.0, 0.0, "+", color=BLACK, ms=stroke(12), mew=stroke(2.0), zorder=5)
+        ax.annotate("-1", (-1.0, 0.0), (5.0, -13.0), textcoords="offset points", fontsize=points(9))
         ax.set(xlabel="real part of L", ylabel="imaginary part of L", aspect="equal")
         ax.set(xlim=(-2.6, 1.6), ylim=(-2.3, 1.5))
         title = "margins of gain (circle) and phase (square); arrows: rising frequency"
-        add_legend(figure, ax, columns, title=title, title_fontsize=9)
+        add_legend(figure, ax, columns, title=title, title_fontsize=points(9))
         set_title(ax, f"{_loop_name(loop)}; broken {BREAK_NAMES[at]}")
     return figure
 
@@ -137,7 +142,7 @@ def small_gain_plot(loop: Loop, *, omega: tuple[float, float] = (0.1, 1000.0)) -
     left = np.abs(_response(active, d, w))
     right = left / np.abs(_response(*margins.open_loop(loop, at="compensator"), w))
     with figure_style():
-        figure = Figure(figsize=(6.4, 3.8))
+        figure = Figure(figsize=figure_size(1, 3.8))
         ax = figure.add_subplot()
         for k, (low, high) in enumerate(verdict.fails):
             span = max(low, omega[0]), min(high, omega[1])
@@ -171,10 +176,10 @@ def transparency_plot(
     """
     w = np.geomspace(*omega, 1000)
     with figure_style():
-        figure = Figure(figsize=(6.4, 3.8))
+        figure = Figure(figsize=figure_size(1, 3.8))
         ax = figure.add_subplot()
         ax.axvspan(*band, color=PALE_GREY, lw=0, zorder=0)
-        ax.axhline(1.0, color=BLACK, lw=0.8)
+        ax.axhline(1.0, color=BLACK, lw=stroke(0.8))
         for (label, K, shape), (color, style) in zip(designs, CURVE_STYLES, strict=False):
             share = np.abs(margins.transparency(replace(loop, compensator=shape, K=K), w))
             ax.semilogx(w, share, color=color, ls=style, label=label)
@@ -198,7 +203,9 @@ def _note(
     ax: Axes, x: float, y: float, text: str, color: str, side: str = "left", up: float = 0.0
 ) -> None:
     offset = (8.0 if side == "left" else -8.0, up)
-    look: Any = dict(textcoords="offset points", ha=side, va="center", color=color, fontsize=9)
+    look: Any = dict(
+        textcoords="offset points", ha=side, va="center", color=color, fontsize=points(9)
+    )
     ax.annotate(text, (x, y), offset, **look)
 
 

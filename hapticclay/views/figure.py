@@ -1,0 +1,157 @@
+"""One figure as a thing: how it is drawn, what numbers it shows, and its files."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ParameterError, choice, number
+from ..files import atomic
+from . import style as styles
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+Table = Mapping[str, Sequence[Any]]  # columns by name and unit, "K [N/m]", of equal length
+FORMATS = ("png", "svg", "pdf")
+UNDATED: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
+
+
+class Figure:
+    """A figure that is drawn anew in each style, and the numbers that it shows.
+
+    Args:
+        draw: returns the figure of matplotlib in the style of now (`style.figure_style`), or None
+            where it does not apply.
+        tables: the numbers by name of table, and by name and unit of column; or a function that
+            returns them, called when they are asked for.
+    """
+
+    def __init__(
+        self,
+        draw: Callable[[], matplotlib.figure.Figure | None],
+        tables: Mapping[str, Table] | Callable[[], Mapping[str, Table]] | None = None,
+    ):
+        self._draw = draw
+        self._tables = tables
+
+    def draw(self, style: str = "screen") -> matplotlib.figure.Figure | None:
+        """Draws the figure, ready to be shown.
+
+        Args:
+            style: "screen", "print" (8.5 cm wide) or "print-wide" (17.5 cm).
+
+        Raises:
+            ParameterError: there is no such style.
+        """
+        with styles.styled(style):
+            figure = self._draw()
+            if figure is not None:
+                figure.draw_without_rendering()  # makes its ticks, in this style
+            return figure
+
+    def tables(self) -> Mapping[str, Table]:
+        """Returns the numbers that the figure shows, by table and column."""
+        return (self._tables() if callable(self._tables) else self._tables) or {}
+
+    def save(
+        self,
+        path: str | Path,
+        formats: Sequence[str] = (),
+        dpi: float | None = None,
+        style: str = "screen",
+        data: bool = False,
+    ) -> list[Path]:
+        """Writes the figure, each file whole or not at all; all are made before one is written.
+
+        Args:
+            path: the file; its ending says the format unless `formats` does.
+            formats: of "png", "svg" and "pdf"; path is then without an ending. "png" without
+                either.
+            dpi: pixels an inch, of PNG and of pictures within the others [1/inch]; None for that
+                of the style, 100 on a screen and 300 in print.
+            style: "screen", "print" (8.5 cm wide) or "print-wide" (17.5 cm).
+            data: whether to write the numbers too: the first table as PATH.csv, each other one as
+                PATH-TABLE.csv.
+
+        Returns:
+            The files written; none where the figure does not apply.
+
+        Raises:
+            ParameterError: an unknown format or style, dpi out of bounds, no numbers to write, or
+                a file that cannot be written.
+        """
+        path = Path(path)
+        if not formats and path.suffix:
+            formats, path = (path.suffix[1:],), path.with_suffix("")
+        kinds = [choice("format", kind, FORMATS) for kind in dict.fromkeys(formats or ("png",))]
+        if dpi is not None:
+            number("dpi", dpi, 10.0, 2400.0)
+        with styles.styled(style) as look:
+            figure = self._draw()
+            if figure is None:
+                return []
+            files = {
+                f"{path.name}.{kind}": _encoded(figure, kind, dpi or look.dpi) for kind in kinds
+            }
+        if data:
+            tables = self.tables()
+            if not tables:
+                raise ParameterError("data", data, f"{path.name} has no numbers to write")
+            for i, (name, table) in enumerate(tables.items()):
+                stem = f"{path.name}-{name}" if i else path.name
+                files[f"{stem}.csv"] = csv_text(table).encode()
+        written = []
+        for name, content in files.items():
+            with atomic(path.parent / name) as f:
+                f.write(content)
+            written.append(path.parent / name)
+        return written
+
+    def svg(self, style: str = "screen") -> str:
+        """Returns the figure as the text of an SVG file.
+
+        Args:
+            style: as in `draw`.
+        """
+        with styles.styled(style) as look:
+            figure = self._draw()
+            return "" if figure is None else _encoded(figure, "svg", look.dpi).decode()
+
+    def _repr_svg_(self) -> str | None:
+        return self.svg() or None
+
+
+def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
+    data = io.BytesIO()
+    figure.savefig(data, format=kind, dpi=dpi, metadata=UNDATED[kind])
+    return data.getvalue()
+
+
+def csv_text(table: Table) -> str:
+    """Returns a table as CSV; numbers read back as the same bits.
+
+    Args:
+        table: columns by name and unit.
+
+    Raises:
+        ParameterError: the columns are of different lengths.
+    """
+    lengths = {name: len(column) for name, column in table.items()}
+    if len(set(lengths.values())) > 1:
+        raise ParameterError("table", lengths, "must have columns of equal length")
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows(
+        zip(*([_as_written(x) for x in column] for column in table.values()), strict=True)
+    )
+    return out.getvalue()
+
+
+def _as_written(x: Any) -> Any:
+    x = x.item() if hasattr(x, "item") else x
+    return repr(x) if isinstance(x, float) else "" if x is None else x
