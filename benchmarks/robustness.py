@@ -99,13 +99,13 @@ def measure(seeds: int, runs: int) -> list[dict[str, Any]]:
         events, every = sum(t.events for t in totals), sum(t.runs for t in totals)
         rows.append({
             "case": name,
-            "quadrature": exact,
-            "change with fewer nodes": coarse - exact,
+            "quadrature": float(exact),
+            "change with fewer nodes": float(coarse - exact),
             "seeds": seeds,
             "runs a seed": runs,
-            "inside": sum(t.low <= exact <= t.high for t in totals),
+            "inside": int(sum(t.low <= exact <= t.high for t in totals)),
             "all seeds": events / every,
-            "off by standard errors": (events / every - exact)
+            "off by standard errors": float(events / every - exact)
             / math.sqrt(exact * (1.0 - exact) / every),
             "repeated": float(np.mean([x.longer.mean() for x in found])),
         })  # fmt: skip

@@ -30,6 +30,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "stability": "hapticclay.cli.stability:StabilityCommand",
     "accuracy": "hapticclay.cli.accuracy:AccuracyCommand",
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
+    "robustness": "hapticclay.cli.robustness:RobustnessCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
     "fit": "hapticclay.cli.fit:FitCommand",

@@ -151,3 +151,22 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
     from scipy.special import ndtr
 
     return ndtr(z)
+
+
+def parse_laws(text: str) -> dict[str, Distribution]:
+    """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02".
+
+    Args:
+        text: the distributions.
+
+    Raises:
+        ParameterError: a word is not name=law:number:number, or a name stands twice.
+    """
+    out: dict[str, Distribution] = {}
+    for word in text.split():
+        name, equals, law = word.partition("=")
+        if not equals or not name or name in out:
+            bound = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
+            raise ParameterError("vary", word, bound)
+        out[name] = Distribution.parse(name, law)
+    return out

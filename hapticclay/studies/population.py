@@ -351,5 +351,6 @@ def _band(
     for v in progress(values):
         rows.append([limit(v, hand) for hand in drawn])
         nominal.append(limit(v, middle))
-    told = next((k for k, v in POPULATIONS.items() if v == hands), "hands of one's own")
+    own = hands.spread or "of one's own"
+    told = next((k for k, v in POPULATIONS.items() if v == hands), own)
     return Band(*names, np.array(values), np.array(rows), drawn, np.array(nominal), told)
