@@ -10,14 +10,14 @@ import numpy as np
 
 from ..errors import ParameterError, check_fields, choice
 
-Law = Literal["normal", "log-normal", "uniform", "log-uniform"]
-LAWS = get_args(Law)
+LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
+LAWS = get_args(LawName)
 SIDES = ("mean", "standard deviation", "low", "high")
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """Law of a random number. Both numbers have the unit of the parameter.
+    """LawName of a random number. Both numbers have the unit of the parameter.
 
     Attributes:
         law: "normal" or "log-normal", known by mean and standard deviation; "uniform" or
@@ -26,7 +26,7 @@ class Distribution:
         second: standard deviation, > 0; or greatest value, above the least.
     """
 
-    law: Law
+    law: LawName
     first: float
     second: float
 

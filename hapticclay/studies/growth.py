@@ -12,7 +12,7 @@ import numpy as np
 
 from .boundary import MODE_SHARE, SLOWEST_MODE
 
-SAMPLES = 55  # of a motion
+MOTION_SAMPLES = 55  # of a motion
 RANKS = (1e-5, 1e-7)  # singular values below these shares of the largest are left out
 LEAST_RATE = 0.3  # [1/s] slower growth or decay is left undecided
 AGREEMENT = 0.1  # the two rates may differ by this share of the smaller one

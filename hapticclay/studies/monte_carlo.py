@@ -41,9 +41,9 @@ TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
 SPAN_STEPS = 200.0  # of a repeated run, at least
 PROBED = 200  # runs that an estimate of the cost is made from
-REFUSED = -1  # in place of 0, stable, and 1, unstable
+NOT_RUN = -1  # in place of 0, stable, and 1, unstable
 LEVEL = 0.95  # of a confidence interval
-LINE_POINTS = 61  # of a boundary
+CURVE_POINTS = 61  # of a boundary
 
 
 @dataclass(frozen=True)
@@ -243,10 +243,10 @@ def judge(
         threads: as in `simulate_batch`.
 
     Returns:
-        Whether each is unstable: 1 or 0, REFUSED for one that cannot be run (a pose out of reach),
+        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of reach),
         shape (runs,); whether it was repeated, shape (runs,).
     """
-    unstable = np.full(len(points), REFUSED)
+    unstable = np.full(len(points), NOT_RUN)
     rate = np.full(len(points), np.nan)
     short: dict[int, Scenario] = {}
     steps = np.zeros(len(points), dtype=int)
@@ -255,16 +255,18 @@ def judge(
             made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
             # Odd, so that half the sampling frequency does not fold onto zero.
             steps[i] = 2 * round(0.5 * boundary.GROWTH_SAMPLE / made.dt) + 1
-            short[i] = replace(made, t_max=(growth.SAMPLES + 0.5) * float(steps[i]) * made.dt)
+            short[i] = replace(
+                made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
+            )
     axis = AXES.index(trials.axis)
     for every in np.unique(steps[steps > 0]).tolist():
         members = np.flatnonzero(steps == every)
         scenarios = [short[i] for i in members.tolist()]
         records = simulate_batch(scenarios, threads=threads, every=every)
-        v = np.full((len(members), growth.SAMPLES), np.nan)
+        v = np.full((len(members), growth.MOTION_SAMPLES), np.nan)
         for k, record in enumerate(records):
-            if len(record.v) > growth.SAMPLES:
-                v[k] = record.v[1 : growth.SAMPLES + 1, axis]
+            if len(record.v) > growth.MOTION_SAMPLES:
+                v[k] = record.v[1 : growth.MOTION_SAMPLES + 1, axis]
             else:  # it ended before its time
                 rate[members[k]] = math.inf
         dt = np.array([s.dt for s in scenarios])
@@ -311,7 +313,7 @@ def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.nd
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Probability:
     """A probability that was counted.
 
     Attributes:
@@ -377,7 +379,7 @@ class Instability:
     Attributes:
         trials: what they are of.
         points: their parameters, shape (n, trials.names).
-        unstable: 1, 0, or REFUSED, shape (n,).
+        unstable: 1, 0, or NOT_RUN, shape (n,).
         longer: whether the first run left it undecided, shape (n,).
     """
 
@@ -389,23 +391,23 @@ class Instability:
     @property
     def refused(self) -> int:
         """Number of draws that cannot be run; no probability counts them."""
-        return int(np.sum(self.unstable == REFUSED))
+        return int(np.sum(self.unstable == NOT_RUN))
 
     @property
-    def total(self) -> Estimate:
+    def total(self) -> Probability:
         """Probability of instability over all runs; over a grid, the mean of its cells."""
         return self.estimate()
 
-    def estimate(self, level: float = LEVEL) -> Estimate:
+    def estimate(self, level: float = LEVEL) -> Probability:
         """Probability of instability over all runs.
 
         Args:
             level: of confidence, 0 to 1.
         """
-        judged = self.unstable[self.unstable != REFUSED]
+        judged = self.unstable[self.unstable != NOT_RUN]
         n, k = len(judged), int(judged.sum())
         low, high = clopper_pearson(k, n, level)
-        return Estimate(k / n if n else math.nan, float(low), float(high), n, k, level)
+        return Probability(k / n if n else math.nan, float(low), float(high), n, k, level)
 
     def map(self) -> RiskMap:
         """Probability in each cell of the grid.
@@ -456,7 +458,7 @@ class Instability:
             index, counts = [*index, np.zeros(len(self.points), dtype=int)], [*counts, 1]
         (x_name, y_name), (x, y) = names, values
         cell = np.asarray(np.ravel_multi_index(index, counts))
-        judged = self.unstable != REFUSED
+        judged = self.unstable != NOT_RUN
         size = math.prod(counts)
         runs = np.bincount(cell[judged], minlength=size).reshape(counts)
         events = np.bincount(cell[self.unstable == 1], minlength=size).reshape(counts)
@@ -475,7 +477,7 @@ class Instability:
             return None
         grid = self.trials.grid[other[0]].grid()
         log = grid.min() > 0.0 and grid.max() > 30.0 * grid.min()
-        x = (np.geomspace if log else np.linspace)(grid.min(), grid.max(), LINE_POINTS)
+        x = (np.geomspace if log else np.linspace)(grid.min(), grid.max(), CURVE_POINTS)
         middle = {k: v for k, v in self.trials.middle().items() if k != "K"}
         return x, np.array([_exact_limit(self.trials.loop({**middle, other[0]: v})) for v in x])
 
@@ -588,7 +590,7 @@ def monte_carlo(
             announce(measure_cost(trials, len(trials)))
         rows = []
         for n in range(trials.chunks):
-            rows.append(_columns(trials, n))
+            rows.append(_judged_chunk(trials, n))
             show(len(rows[-1][1]))
         return Instability(trials, *(np.concatenate(x) for x in zip(*rows, strict=True)))
     folder = Path(out)
@@ -626,6 +628,6 @@ def stored_runs(trials: Trials, out: Path | str) -> Instability:
     return Instability(trials, points, columns["unstable"], columns["longer"])
 
 
-def _columns(trials: Trials, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _judged_chunk(trials: Trials, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     points = trials.points(number)
     return (points, *judge(trials, points))

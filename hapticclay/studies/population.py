@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -17,12 +17,12 @@ from ..theory.gain_limit import gain_limit
 from ..theory.linear_loop import Loop
 from ..theory.margins import Box
 from .distribution import LAWS, Distribution, normal_score
+from .stability_map import Progress
 
 HAND = ("mass", "damper", "spring")
 HAND_UNITS = ("kg", "N.s/m", "N/m")
 PAIRS = tuple(itertools.combinations(HAND, 2))
 MOST_HANDS = 100_000
-Progress = Callable[[Iterable], Iterable]
 
 
 @dataclass(frozen=True)
@@ -292,7 +292,7 @@ def gain_band(
     if not isinstance(loop, Loop):
         raise ParameterError("loop", loop, "must be a Loop")
     parts = Loop(**{f: getattr(loop, f) for f in Loop.__dataclass_fields__})
-    return _band(
+    return _limit_band(
         ("clay b [N.s/m]", "gain limit K"),
         lambda x, hand: gain_limit(replace(parts, b=x, operator=hand)),
         b,
@@ -325,7 +325,7 @@ def wall_band(
     """
     if not isinstance(wall, VirtualWall):
         raise ParameterError("wall", wall, "must be a VirtualWall")
-    return _band(
+    return _limit_band(
         ("virtual damping B [N.s/m]", "largest stable K [N/m]"),
         lambda x, hand: wall_limits.stiffness_band(replace(wall, B=x, operator=hand))[1],
         B,
@@ -335,7 +335,7 @@ def wall_band(
     )
 
 
-def _band(
+def _limit_band(
     names: tuple[str, str],
     limit: Callable[[float, Operator], float],
     x: Sequence[float],

@@ -38,25 +38,47 @@ BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
 
 
 class Stored(Protocol):
-    """What is stored as a sweep is, besides a Sweep: its own rows, chunk by chunk."""
-
-    @property
-    def chunk(self) -> int: ...
+    """What is stored as a sweep is, besides a Sweep: it makes its own rows, chunk by chunk."""
 
     def __len__(self) -> int: ...
 
     @property
-    def chunks(self) -> int: ...
+    def chunk(self) -> int:
+        """Runs in one file."""
+        ...
 
-    def chunk_runs(self, number: int) -> range: ...
+    @property
+    def chunks(self) -> int:
+        """Number of files."""
+        ...
 
-    def chunk_rows(self, number: int) -> list[dict[str, Any]]: ...
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one file.
 
-    def blank_row(self) -> dict[str, Any]: ...
+        Args:
+            number: of the file, from 0.
+        """
+        ...
 
-    def described(self) -> dict[str, Any]: ...
+    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
+        """Makes the runs of one file.
 
-    def digest(self) -> str: ...
+        Args:
+            number: of the file, from 0.
+        """
+        ...
+
+    def blank_row(self) -> dict[str, Any]:
+        """A row, for the types of its columns."""
+        ...
+
+    def described(self) -> dict[str, Any]:
+        """All of it as data."""
+        ...
+
+    def digest(self) -> str:
+        """Its fingerprint."""
+        ...
 
 
 Plan = Sweep | Stored

@@ -35,9 +35,10 @@ BOUNDED = 0.1  # ... and the one whose interval is
 LEAST_EVENTS = 2.0  # expected in a cell of that probability, or its contour is left out
 CONTOUR_STYLES = (":", "--", "-")
 WIDE = 30.0  # values over such a ratio are drawn on a logarithmic axis
+MOST_RATIO = 100.0  # of limits that a band shows
 MOST_PANELS = 4
-BINS = 10  # of a panel
-UNITS = {
+PANEL_BINS = 10  # of a panel
+PARAMETER_NAMES = {
     "K": "gain K",
     "b": "clay b [N.s/m]",
     "B": "virtual damping B [N.s/m]",
@@ -61,11 +62,12 @@ def band_plot(band: Band) -> Figure:
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.0))
         ax = figure.subplots()
-        tops = band.limits[np.isfinite(band.limits)]
-        top = 2.0 * float(tops.max()) if tops.size else 1.0  # where there is no limit
+        seen = band.limits[np.isfinite(band.limits) & (band.limits > 0.0)]
+        least = float(seen.min()) if seen.size else 1.0
+        top = min(1.5 * float(seen.max(initial=least)), MOST_RATIO * least)
 
-        def drawn(y: np.ndarray) -> np.ndarray:
-            return np.where(np.isfinite(y), y, top)
+        def drawn(y: np.ndarray) -> np.ndarray:  # no limit leaves the figure upwards
+            return np.minimum(y, 1e6 * top)
 
         low, high = drawn(band.quantile(0.05)), drawn(band.quantile(0.95))
         ax.fill_between(
@@ -74,14 +76,13 @@ def band_plot(band: Band) -> Figure:
         ax.plot(band.x, drawn(band.quantile(0.5)), color=BLUE, label="median")
         ax.plot(band.x, drawn(band.least), color=VERMILION, ls="--", label="least")
         ax.plot(band.x, drawn(band.nominal), color=BLACK, ls=":", label="hand of medians")
-        if _wide(band.x):
+        if _spans_decades(band.x):
             ax.set_xscale("log")
-        some = np.concatenate([low[low > 0.0], high[high > 0.0]])
-        if _wide(some):  # limits of 0 leave the figure downwards
+        if top > WIDE * least:  # limits of 0 leave it downwards
             ax.set_yscale("log", nonpositive="clip")
-            ax.set_ylim(0.5 * float(some.min()), min(top, 1.5 * float(some.max())))
+            ax.set_ylim(0.5 * least, top)
         else:
-            ax.set_ylim(0.0, min(top, 1.1 * float(high.max())))
+            ax.set_ylim(0.0, top)
         ax.set(xlabel=unit_text(band.x_name), ylabel=unit_text(band.y_name))
         ax.set_xlim(float(band.x.min()), float(band.x.max()))
         set_title(ax, f"{len(band.hands)} hands, {band.told}", "exact limit of each")
@@ -122,7 +123,7 @@ def _panels(result: Instability) -> list[RiskMap]:
         for n in result.trials.names
         if np.ptp(result.points[:, result.trials.names.index(n)]) > 0.0
     ]
-    charts = [result.binned(n, bins=BINS) for n in varied]
+    charts = [result.binned(n, bins=PANEL_BINS) for n in varied]
     charts.sort(key=lambda c: -float(np.nanstd(c.probability)))
     return charts[:MOST_PANELS]
 
@@ -134,7 +135,7 @@ def _risk_curve(ax: Axes, chart: RiskMap) -> None:
         chart.x, share, (share - low, high - share), fmt="o", color=BLUE, ms=stroke(4.5),
         elinewidth=stroke(1.2), capsize=stroke(2.5),
     )  # fmt: skip
-    if _wide(chart.x):
+    if _spans_decades(chart.x):
         ax.set_xscale("log")
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     ax.set_xlabel(_name(chart.x_name))
@@ -158,7 +159,7 @@ def _risk_plane(result: Instability) -> Figure:
             rasterized=True,
         )  # fmt: skip
         for name, values in (("x", x), ("y", y)):
-            if _wide(values):
+            if _spans_decades(values):
                 getattr(ax, f"set_{name}scale")("log")
         handles: list[Any] = []
         if min(len(x), len(y)) > 1:
@@ -205,10 +206,10 @@ def _title(result: Instability) -> list[str]:
 
 
 def _name(name: str) -> str:
-    return unit_text(UNITS.get(name, name))
+    return unit_text(PARAMETER_NAMES.get(name, name))
 
 
-def _wide(values: np.ndarray) -> bool:
+def _spans_decades(values: np.ndarray) -> bool:
     return bool(len(values) > 1 and values.min() > 0.0 and values.max() > WIDE * values.min())
 
 
@@ -216,7 +217,7 @@ def _cell_borders(values: np.ndarray) -> np.ndarray:
     """Borders half way between the values, on the scale they are drawn on."""
     if len(values) == 1:
         return values[0] + np.array([-0.5, 0.5])
-    v = np.log(values) if _wide(values) else values
+    v = np.log(values) if _spans_decades(values) else values
     middle = 0.5 * (v[1:] + v[:-1])
     borders = np.concatenate(([2.0 * v[0] - middle[0]], middle, [2.0 * v[-1] - middle[-1]]))
-    return np.exp(borders) if _wide(values) else borders
+    return np.exp(borders) if _spans_decades(values) else borders

@@ -37,7 +37,7 @@ MOVED = {
 @given(st.data())
 def test_the_growth_of_known_modes_is_found_or_left_undecided(data):
     dt = 4e-3
-    t = dt * np.arange(growth.SAMPLES)
+    t = dt * np.arange(growth.MOTION_SAMPLES)
     count = data.draw(st.integers(1, 3))
     rates = [data.draw(st.floats(-30.0, 20.0)) for _ in range(count)]
     v = np.zeros(len(t))
@@ -55,7 +55,7 @@ def test_the_growth_of_known_modes_is_found_or_left_undecided(data):
 
 def test_what_is_no_linear_motion_is_left_undecided():
     rng = np.random.default_rng(0)
-    t = 4e-3 * np.arange(growth.SAMPLES)
+    t = 4e-3 * np.arange(growth.MOTION_SAMPLES)
     noise = rng.normal(size=len(t))
     square = np.sign(np.cos(40.0 * t))
     bad = np.full(len(t), np.nan)
@@ -150,7 +150,7 @@ def test_what_cannot_be_run_is_not_counted():
     far = hc.Distribution("uniform", -0.1, 0.45)  # the greater half is out of reach
     result = hc.monte_carlo(hc.Trials(PushedLoop("x", b=50.0), {"pose.x": far}, runs=30))
     out = result.points[:, 0] > 0.2
-    assert np.all((result.unstable == monte_carlo.REFUSED)[out])
+    assert np.all((result.unstable == monte_carlo.NOT_RUN)[out])
     assert result.refused >= out.sum() and result.total.runs == 30 - result.refused
 
 
