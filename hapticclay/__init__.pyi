@@ -55,6 +55,7 @@ from .simulation.stepwise import Simulation as Simulation
 from .stepping.engine import build as build
 from .stepping.monitor import Outcome as Outcome
 from .stepping.run import Crossing as Crossing
+from .studies.distribution import Distribution as Distribution
 from .studies.fitting import Fitted as Fitted
 from .studies.fitting import fit_flow as fit_flow
 from .studies.identification import Identified as Identified
@@ -66,6 +67,16 @@ from .studies.mbk import arm_mbk as arm_mbk
 from .studies.mbk import device_mbk as device_mbk
 from .studies.measurement import Measurement as Measurement
 from .studies.measurement import identify_data as identify_data
+from .studies.monte_carlo import Instability as Instability
+from .studies.monte_carlo import Trials as Trials
+from .studies.monte_carlo import monte_carlo as monte_carlo
+from .studies.monte_carlo import stored_runs as stored_runs
+from .studies.population import POPULATIONS as POPULATIONS
+from .studies.population import Band as Band
+from .studies.population import Draw as Draw
+from .studies.population import Hands as Hands
+from .studies.population import gain_band as gain_band
+from .studies.population import wall_band as wall_band
 from .studies.removal import removed as removed
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map

@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,6 +35,53 @@ MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's dige
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
+
+
+class Stored(Protocol):
+    """What is stored as a sweep is, besides a Sweep: it makes its own rows, chunk by chunk."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def chunk(self) -> int:
+        """Runs in one file."""
+        ...
+
+    @property
+    def chunks(self) -> int:
+        """Number of files."""
+        ...
+
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one file.
+
+        Args:
+            number: of the file, from 0.
+        """
+        ...
+
+    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
+        """Makes the runs of one file.
+
+        Args:
+            number: of the file, from 0.
+        """
+        ...
+
+    def blank_row(self) -> dict[str, Any]:
+        """A row, for the types of its columns."""
+        ...
+
+    def described(self) -> dict[str, Any]:
+        """All of it as data."""
+        ...
+
+    def digest(self) -> str:
+        """Its fingerprint."""
+        ...
+
+
+Plan = Sweep | Stored
 
 
 def result_row(
@@ -101,7 +148,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
         return result_row(index, names, point, None, str(error))
 
 
-def run_chunk(sweep: Sweep, number: int, out: str) -> int:
+def run_chunk(sweep: Plan, number: int, out: str) -> int:
     """Runs one chunk and writes its file, in any process; returns the number of its runs.
 
     Args:
@@ -110,14 +157,17 @@ def run_chunk(sweep: Sweep, number: int, out: str) -> int:
         out: folder of the sweep.
     """
     runs = sweep.chunk_runs(number)
-    points = sweep.points(runs.start, runs.stop)
-    rows = [run_point(sweep, index, point) for index, point in zip(runs, points, strict=True)]
+    if isinstance(sweep, Sweep):
+        points = sweep.points(runs.start, runs.stop)
+        rows = [run_point(sweep, index, point) for index, point in zip(runs, points, strict=True)]
+    else:
+        rows = sweep.chunk_rows(number)
     with atomic(sweep_part(Path(out), number)) as f:
         _write_part(rows, parquet_schema(sweep, number), f)
     return len(runs)
 
 
-def parquet_schema(sweep: Sweep, number: int) -> Any:
+def parquet_schema(sweep: Plan, number: int) -> Any:
     """The pyarrow Schema of a chunk's file; its metadata tell the sweep and the chunk.
 
     Args:
@@ -126,7 +176,10 @@ def parquet_schema(sweep: Sweep, number: int) -> Any:
     """
     import pyarrow as pa
 
-    empty = result_row(0, list(sweep.vary), np.zeros(len(sweep.vary)), None)
+    if isinstance(sweep, Sweep):
+        empty = result_row(0, list(sweep.vary), np.zeros(len(sweep.vary)), None)
+    else:
+        empty = sweep.blank_row()
     marks = dict(zip(MARKS, (sweep.digest().encode(), b"%d" % number), strict=True))
     return pa.Table.from_pylist([empty]).schema.with_metadata(marks)
 
@@ -171,7 +224,7 @@ def _part_files(out: Path) -> list[Path]:
     return sorted((out / "data").glob("part-*.parquet"))
 
 
-def missing_parts(sweep: Sweep, out: Path) -> list[int]:
+def missing_parts(sweep: Plan, out: Path) -> list[int]:
     """Chunks without a file.
 
     Args:
@@ -181,7 +234,7 @@ def missing_parts(sweep: Sweep, out: Path) -> list[int]:
     return [n for n in range(sweep.chunks) if not sweep_part(out, n).is_file()]
 
 
-def begin_sweep(sweep: Sweep, out: Path) -> list[int]:
+def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     """Prepares the folder, or checks that it holds this same sweep; returns the chunks to run.
 
     Parts that are damaged, or of another sweep or place, are named and removed, as are the remains
@@ -223,7 +276,7 @@ def begin_sweep(sweep: Sweep, out: Path) -> list[int]:
     return missing_parts(sweep, out)
 
 
-def _fault(sweep: Sweep, number: int, file: Path, wanted: Any) -> str:
+def _fault(sweep: Plan, number: int, file: Path, wanted: Any) -> str:
     """The fault of a chunk's file, "" for none; wanted: the schema of any chunk."""
     table = _read_part(file)
     if table is None:
@@ -245,7 +298,7 @@ def _marks(table: Any) -> tuple[bytes, ...]:
 
 
 @contextlib.contextmanager
-def claimed(sweep: Sweep, out: Path) -> Iterator[list[int]]:
+def claimed(sweep: Plan, out: Path) -> Iterator[list[int]]:
     """Locks the folder for this process and prepares it; yields the chunks to run.
 
     Args:
@@ -327,7 +380,7 @@ def run_sweep(
 
 
 def run_chunks(
-    sweep: Sweep,
+    sweep: Plan,
     out: Path,
     todo: list[int],
     workers: int | None = None,
@@ -363,7 +416,7 @@ def processes(todo: list[int], workers: int | None) -> int:
     return max(1, min(workers or cores(), len(todo)))
 
 
-def _run_here(sweep: Sweep, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
+def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
@@ -405,7 +458,7 @@ def _end_with_parent() -> None:
 
 
 def _run_on_cluster(
-    sweep: Sweep, out: Path, todo: list[int], address: str
+    sweep: Plan, out: Path, todo: list[int], address: str
 ) -> Generator[int, None, None]:
     try:
         from distributed import Client, as_completed
@@ -433,8 +486,6 @@ def estimate_time(sweep: Sweep) -> tuple[float, float]:
     Args:
         sweep: the sweep.
     """
-    import pyarrow as pa
-
     drawn = np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist()
     probe = lambda i: run_point(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
     probe(drawn[0])  # the first run loads and compiles
@@ -444,12 +495,24 @@ def estimate_time(sweep: Sweep) -> tuple[float, float]:
         spent = time.perf_counter() - begin
         if spent > PROBE_TIME:
             break
+    return spent / len(rows), row_size(sweep, rows)
+
+
+def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
+    """Room on disk [bytes] that a run takes in files of a whole chunk.
+
+    Args:
+        sweep: the sweep.
+        rows: some of its rows.
+    """
+    import pyarrow as pa
+
     sizes = []
     for some in (rows, rows[:1]):
         _write_part(some, parquet_schema(sweep, 0), file := pa.BufferOutputStream())
         sizes.append(file.tell())
     each = (sizes[0] - sizes[1]) / max(1, len(rows) - 1)
-    return spent / len(rows), each + (sizes[1] - each) / min(sweep.chunk, len(sweep))
+    return each + (sizes[1] - each) / min(sweep.chunk, len(sweep))
 
 
 def read_sweep(out: str | os.PathLike[str]):

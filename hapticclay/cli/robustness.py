@@ -1,0 +1,195 @@
+"""`hapticclay robustness`: limits and the probability of instability over a population of hands."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..errors import integer
+from ..files import versions, writable
+from . import console
+
+if TYPE_CHECKING:
+    from ..studies.boundary import PushedLoop
+    from ..studies.monte_carlo import Cost, Instability, Trials
+    from ..studies.population import Band
+
+ROBUSTNESS_SCHEMA = "hapticclay-robustness-1"
+GRIDS = {"x": "K=1:8:15 b=10:1000:11log", "y": "K=0.2:2:15 b=10:1000:11log"}
+BAND_CLAYS = (1.0, 3000.0, 25)  # [N.s/m] from, to, and number of clays of the band
+HANDS_HEAD = ["hands", "mass [kg]", "damper [N.s/m]", "spring [N/m]", "subjects", "spread"]
+
+
+@dataclass(frozen=True)
+class RobustnessCommand:
+    """Judge a loop over a population of hands, and whatever else varies.
+
+    Draws the gain limit as a band over the hands, and the probability of instability over a plane,
+    from runs that judge themselves. A study that was interrupted goes on with the same command.
+
+    Attributes:
+        axis: Axis of the loop.
+        b: Damping of the clay [N.s/m], where the grid does not vary it.
+        gain: K of the compensator, where nothing varies it.
+        Ts: Control sample [s]; None for continuous time.
+        delay: From a measurement to the torque computed from it [s], with --Ts.
+        shaping: Let the servo shape the inertia, so that Sh holds at every pose.
+        hands: Name of a population; hapticclay robustness --list prints them.
+        variation: Take log-normal hands around the population's hand of medians, with this
+            standard deviation over the mean: an assumption.
+        vary: What else varies, as in "delay=uniform:0:1e-3 pose.x=normal:0:0.02"; the laws are
+            normal and log-normal (mean, standard deviation), uniform and log-uniform (low, high).
+        grid: One or two parameters with their values, as in "K=1:8:15 b=10:1000:11log"; "" for
+            none.
+        runs: Runs of each cell of the grid; without a grid, of all.
+        seed: Seed of the random numbers.
+        chunk: Runs that are stored together, the most that a killed process loses.
+        out: Folder for the runs, robustness.json and the figures.
+        workers: Processes on this machine; by default one a core.
+        band: Draw the gain limit over clay as a band, of this many hands; 0 for none.
+        list: Print the populations, and nothing else.
+        figures: Formats and style of the figures.
+    """
+
+    axis: Literal["x", "y"] = "x"
+    b: float = 90.0
+    gain: float | None = None
+    Ts: float | None = None
+    delay: float = 0.0
+    shaping: bool = True
+    hands: str = "published range"
+    variation: float | None = None
+    vary: str = ""
+    grid: str | None = None
+    runs: int = 50
+    seed: int = 0
+    chunk: int = 1000
+    out: Path = Path("out/robustness")
+    workers: int | None = None
+    band: int = 200
+    list: bool = False
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        from ..simulation.batch import cores
+        from ..studies import monte_carlo
+        from ..studies.population import POPULATIONS, Draw, gain_band, hands_of
+
+        if self.list:
+            rows = [hands.row(name) for name, hands in POPULATIONS.items()]
+            print(console.text_table([r[:-1] for r in rows], HANDS_HEAD, "lrrrrl"))
+            for row in rows:
+                print(f"{row[0]}: {row[-1]}")
+            return 0
+        writable(self.out)
+        trials = self._trials()
+        draw = Draw(self.band, self.seed) if self.band else None
+        workers = integer("workers", cores() if self.workers is None else self.workers, 1, 1024)
+        hands = trials.hands or hands_of(self.hands)
+        assert not isinstance(hands, str)
+        print(console.text_table([hands.row(self.hands)[:-1]], HANDS_HEAD, "lrrrrl"))
+        try:
+            with console.progress_bar(total=len(trials), unit="run", desc="runs") as bar:
+                result = monte_carlo.monte_carlo(
+                    trials,
+                    out=self.out,
+                    workers=workers,
+                    announce=lambda cost: _announce(cost, workers, self.out, bar),
+                    progress=bar.update,
+                )
+        except KeyboardInterrupt:
+            kept = self.out / "data"
+            print(f"the runs made so far are in {kept}; the same command goes on")
+            raise
+        band = None
+        if draw:
+            clays = np.geomspace(*BAND_CLAYS).tolist()
+            band = gain_band(
+                trials.base.linear,  # type: ignore[union-attr]
+                hands,
+                clays,
+                draw,
+                lambda b: console.progress_bar(b, desc="band"),
+            )
+        self._show(result, band)
+        return 0
+
+    def _trials(self) -> Trials:
+        from ..model.constants import AXES, GAIN
+        from ..studies.boundary import PushedLoop
+        from ..studies.distribution import parse_laws
+        from ..studies.monte_carlo import Trials
+        from ..studies.population import Hands, hands_of
+        from ..studies.sampling import parse_grid
+
+        base: PushedLoop = PushedLoop(
+            self.axis,
+            b=self.b,
+            K=GAIN[AXES.index(self.axis)] if self.gain is None else self.gain,
+            operator=None,
+            Ts=self.Ts,
+            delay=self.delay,
+            shaping=self.shaping,
+        )
+        hands = hands_of(self.hands)
+        if self.variation is not None:
+            source = f"{hands.source}: the mean alone" if hands.source else ""
+            hands = Hands.around(hands.median, self.variation, source=source)
+        grid = GRIDS[self.axis] if self.grid is None else self.grid
+        return Trials(
+            base,
+            parse_laws(self.vary),
+            hands,
+            parse_grid(grid) if grid else {},
+            self.runs,
+            seed=self.seed,
+            chunk=self.chunk,
+        )
+
+    def _show(self, result: Instability, band: Band | None) -> None:
+        from ..views import robustness_plots
+        from ..views.figure import Figure
+
+        total = result.total
+        print(f"unstable: {total.events} of {total.runs} runs, {total}")
+        if result.trials.grid:
+            print("over a grid this is the mean of its cells")
+        print(f"{100.0 * result.longer.mean():.1f} % of the runs were repeated for longer")
+        if result.refused:
+            print(f"{result.refused} draws cannot be run (out of reach or bounds): not counted")
+        drawn = {
+            "instability": Figure(lambda: robustness_plots.instability_plot(result), result.tables)
+        }
+        if band is not None:
+            drawn["gain_band"] = Figure(lambda: robustness_plots.band_plot(band), band.tables)
+        console.save_figures(drawn, self.out, self.figures)
+        found: dict[str, Any] = {
+            "schema": ROBUSTNESS_SCHEMA,
+            "trials": result.trials.described(),
+            "total": asdict(total),
+            "repeated": int(result.longer.sum()),
+            "refused": result.refused,
+            "tables": result.tables(),
+            "band": band.tables()["band"] if band is not None else None,
+            "versions": versions(),
+        }
+        console.save_json(found, self.out / "robustness.json")
+        print(f"written to {self.out}")
+
+
+def _announce(cost: Cost, workers: int, out: Path, bar: Any) -> None:
+    """Prints the time and room on disk that the runs left will take."""
+    from tqdm import tqdm
+
+    bar.update(bar.total - cost.runs - bar.n)
+    free = f"{tqdm.format_sizeof(cost.free, 'B')} free"
+    print(
+        f"hapticclay: {cost.runs} runs: about {tqdm.format_interval(cost.seconds)} on {workers} "
+        f"process{'es' if workers > 1 else ''}, {tqdm.format_sizeof(cost.size, 'B')} in "
+        f"{out / 'data'} ({free})",
+        file=sys.stderr,
+    )

@@ -1,0 +1,356 @@
+"""Populations of hands: the mass, damper and spring of an arm at a handle, and bands over them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
+from ..model.operator import Operator
+from ..model.virtual_wall import VirtualWall
+from ..theory import wall_limits
+from ..theory.gain_limit import gain_limit
+from ..theory.linear_loop import Loop
+from ..theory.margins import Box
+from .distribution import LAWS, Distribution, normal_score
+from .stability_map import Progress
+
+HAND = ("mass", "damper", "spring")
+HAND_UNITS = ("kg", "N.s/m", "N/m")
+PAIRS = tuple(itertools.combinations(HAND, 2))
+MOST_HANDS = 100_000
+
+
+@dataclass(frozen=True)
+class Hands:
+    """A population of hands: what is known of the mass, damper and spring of Th.
+
+    Attributes:
+        mass: [kg], a number or its distribution over the population.
+        damper: [N.s/m], likewise.
+        spring: [N/m], likewise.
+        source: who published the numbers, and where; "" for numbers of one's own.
+        spread: what the spread stands for, as "subjects", or "assumed".
+        subjects: number of people who were measured, 0 where that is not known.
+        correlation: of the normal scores of (mass, damper), (mass, spring) and (damper, spring), -1
+            to 1; that of the logarithms where both are log-normal. 0 where none was published.
+    """
+
+    mass: float | Distribution
+    damper: float | Distribution
+    spring: float | Distribution
+    source: str = ""
+    spread: str = ""
+    subjects: int = 0
+    correlation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        for name, unit in zip(HAND, HAND_UNITS, strict=True):
+            value = getattr(self, name)
+            if not isinstance(value, Distribution):
+                value = number(f"hands.{name}", value, 0.0, unit=unit)
+                object.__setattr__(self, name, value)
+            elif value.law == "normal" or value.first < 0.0:
+                laws = ", ".join(x for x in LAWS if x != "normal")
+                bound = f"must have no negative values: {laws}, from 0 on"
+                raise ParameterError(f"hands.{name}", value, bound)
+        integer("hands.subjects", self.subjects, 0, 1_000_000)
+        names = [f"{a}, {b}" for a, b in PAIRS]
+        found = numbers_of("hands.correlation", self.correlation, names, -1.0, 1.0)
+        object.__setattr__(self, "correlation", found)
+        if np.linalg.eigvalsh(self._correlations).min() < -1e-12:
+            bound = "must be those of three numbers: no such numbers exist"
+            raise ParameterError("hands.correlation", self.correlation, bound)
+
+    @classmethod
+    def around(cls, operator: Operator, variation: float = 0.3, **about: Any) -> Hands:
+        """Log-normal hands around one: an assumption, where no spread was published.
+
+        Args:
+            operator: mean of the hands.
+            variation: standard deviation over mean of each number, 0.001 to 10.
+            **about: other attributes.
+        """
+        c = number("variation", variation, 1e-3, 10.0)
+        mass, damper, spring = (
+            Distribution("log-normal", x, c * x) if x else 0.0
+            for x in (operator.mass, operator.damper, operator.spring)
+        )
+        return cls(
+            mass, damper, spring, **{"spread": f"assumed: {100.0 * c:g} % of the mean", **about}
+        )
+
+    @property
+    def random(self) -> tuple[str, ...]:
+        """Which of mass, damper and spring vary."""
+        return tuple(n for n in HAND if isinstance(getattr(self, n), Distribution))
+
+    @property
+    def median(self) -> Operator:
+        """The hand whose mass, damper and spring are medians."""
+        values = [getattr(self, n) for n in HAND]
+        return Operator(*(x.median if isinstance(x, Distribution) else x for x in values))
+
+    @property
+    def _correlations(self) -> np.ndarray:
+        md, ms, ds = self.correlation
+        return np.array([[1.0, md, ms], [md, 1.0, ds], [ms, ds, 1.0]])
+
+    def spread_over(self, u: np.ndarray) -> np.ndarray:
+        """Hands of uniform samples, correlated as the population is (a Gaussian copula).
+
+        Args:
+            u: samples of the unit cube, 0 < u < 1, shape (n, 3).
+
+        Returns:
+            Mass [kg], damper [N.s/m] and spring [N/m], shape (n, 3).
+        """
+        z = normal_score(u)
+        if any(self.correlation):
+            w, v = np.linalg.eigh(self._correlations)  # singular ones have no Cholesky factor
+            z = z @ (v * np.sqrt(np.maximum(w, 0.0))) @ v.T
+        out = np.empty_like(z)
+        for i, name in enumerate(HAND):
+            law = getattr(self, name)
+            out[:, i] = law.of_score(z[:, i]) if isinstance(law, Distribution) else law
+        return out
+
+    def sample(self, n: int, seed: int = 0) -> list[Operator]:
+        """Draw hands.
+
+        Args:
+            n: number of hands, 1 to 100000.
+            seed: of the generator.
+        """
+        n = integer("n", n, 1, MOST_HANDS)
+        u = open_uniform(np.random.default_rng(seed), (n, 3))
+        return [Operator(*row) for row in self.spread_over(u).tolist()]
+
+    def box(self, share: float = 0.9) -> Box:
+        """Ranges that hold a share of each number alone, for `worst_case`.
+
+        Args:
+            share: of the population between the ends of each range, 0 to 1.
+        """
+        out = 0.5 * (1.0 - number("share", share, 0.0, 1.0 - 1e-9))
+        ends = {}
+        for name in HAND:
+            law = getattr(self, name)
+            x = law.spread(np.array([out, 1.0 - out])) if isinstance(law, Distribution) else law
+            ends[name] = (float(np.min(x)), float(np.max(x)))
+        return Box(**ends)
+
+    def row(self, name: str) -> list[str]:
+        """A row of a table of populations: name, mass, damper, spring, subjects, spread, source.
+
+        Args:
+            name: of the population.
+        """
+        values = [getattr(self, n) for n in HAND]
+        told = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
+        return [name, *told, str(self.subjects or "-"), self.spread or "none", self.source]
+
+
+PAPER_HAND = "Her, Hsu, Lan, Karkoub 2002, J. Intelligent and Robotic Systems 35, Eq. 19"
+POSTURE_HAND = (
+    "van Beek, Bergmann Tiest, Mugge, Kappers 2015, Scientific Reports 5:18004, caption of Fig. 3"
+)
+# Only what could be read at its source. docs/robustness.md names other measurements, without
+# numbers, whose tables could not be read.
+POPULATIONS = {
+    "paper": Hands(0.25, 2.0, 6.0, PAPER_HAND),
+    "posture": Hands(0.554, 6.45, 135.0, POSTURE_HAND, "one trial of one participant", 1),
+    "published range": Hands(
+        Distribution("log-uniform", 0.25, 0.554),
+        Distribution("log-uniform", 2.0, 6.45),
+        Distribution("log-uniform", 6.0, 135.0),
+        f"{PAPER_HAND}; {POSTURE_HAND}",
+        "assumed: log-uniform between two published hands",
+    ),
+}
+
+
+def hands_of(given: str | Hands) -> Hands:
+    """A population, itself or by its name in POPULATIONS.
+
+    Args:
+        given: the population, or its name.
+
+    Raises:
+        ParameterError: there is no such population.
+    """
+    if isinstance(given, Hands):
+        return given
+    return POPULATIONS[choice("hands", given, tuple(POPULATIONS))]
+
+
+def open_uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+    """Uniform random numbers in 0 < u < 1, whose normal scores are finite.
+
+    Args:
+        rng: generator.
+        shape: of the array.
+    """
+    return (rng.integers(0, 2**52, shape) + 0.5) * 2.0**-52
+
+
+# ---- bands -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Band:
+    """A limit over a parameter, as a band over a population of hands.
+
+    Attributes:
+        x_name: the parameter and its unit.
+        y_name: the limit and its unit.
+        x: values of the parameter, shape (n,).
+        limits: limit of each hand, inf for none, shape (n, hands).
+        hands: the hands, drawn from the population.
+        nominal: limit of the hand of medians, shape (n,).
+        told: the population in words.
+    """
+
+    x_name: str
+    y_name: str
+    x: np.ndarray
+    limits: np.ndarray
+    hands: list[Operator]
+    nominal: np.ndarray
+    told: str
+
+    def quantile(self, share: float) -> np.ndarray:
+        """Limit that a share of the hands lies at or below, shape (n,).
+
+        Args:
+            share: 0 to 1.
+        """
+        share = number("share", share, 0.0, 1.0)
+        return np.quantile(self.limits, share, axis=1, method="inverted_cdf")
+
+    @property
+    def least(self) -> np.ndarray:
+        """Least limit of the hands drawn, shape (n,)."""
+        return self.limits.min(axis=1)
+
+    def tables(self) -> dict[str, dict[str, Sequence]]:
+        """What the figure of it shows, by table name: columns by name with unit."""
+        y = self.y_name
+        columns = {"5 %": self.quantile(0.05), "median": self.quantile(0.5),
+                   "95 %": self.quantile(0.95), "least": self.least,
+                   "hand of medians": self.nominal}  # fmt: skip
+        rows: dict[str, Sequence] = {self.x_name: self.x.tolist()}
+        rows |= {f"{y}, {k}": v.tolist() for k, v in columns.items()}
+        hands: dict[str, Sequence] = {
+            f"{n} [{u}]": [getattr(h, n) for h in self.hands]
+            for n, u in zip(HAND, HAND_UNITS, strict=True)
+        }
+        return {"band": rows, "hands": hands}
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How many hands a band is made of.
+
+    Attributes:
+        hands: number of hands, 2 to 100000.
+        seed: of the generator, 0 to 2^32 - 1.
+    """
+
+    hands: Annotated[int, Bound(2, MOST_HANDS)] = 200
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+
+    def __post_init__(self):
+        check_fields(self, "draw.")
+
+
+def gain_band(
+    loop: Loop,
+    hands: str | Hands,
+    b: Sequence[float],
+    draw: Draw = Draw(),
+    progress: Progress = iter,
+) -> Band:
+    """Gain limit over clay, for each hand of a population: exact, by `gain_limit`.
+
+    A limit takes about 1.5 ms in continuous time, 30 ms with sampling or delay.
+
+    Args:
+        loop: all but clay, hand and K; with sampling or delay, or without.
+        hands: the population, or its name in POPULATIONS.
+        b: clay [N.s/m], shape (n,).
+        draw: number of hands, and seed.
+        progress: wraps the iterable of clays.
+
+    Raises:
+        ParameterError: no such population, or b out of its bounds.
+    """
+    if not isinstance(loop, Loop):
+        raise ParameterError("loop", loop, "must be a Loop")
+    parts = Loop(**{f: getattr(loop, f) for f in Loop.__dataclass_fields__})
+    return _limit_band(
+        ("clay b [N.s/m]", "gain limit K"),
+        lambda x, hand: gain_limit(replace(parts, b=x, operator=hand)),
+        b,
+        hands_of(hands),
+        draw,
+        progress,
+    )
+
+
+def wall_band(
+    wall: VirtualWall,
+    hands: str | Hands,
+    B: Sequence[float],
+    draw: Draw = Draw(),
+    progress: Progress = iter,
+) -> Band:
+    """Largest stable stiffness of a virtual wall over its damping, for each hand: exact.
+
+    The linear wall's, without friction and quantum, by `wall_limits.stiffness_band`: the upper end.
+
+    Args:
+        wall: all but stiffness, damping and hand.
+        hands: the population, or its name in POPULATIONS.
+        B: virtual damping [N.s/m], shape (n,).
+        draw: number of hands, and seed.
+        progress: wraps the iterable of dampings.
+
+    Raises:
+        ParameterError: no such population, or B out of its bounds.
+    """
+    if not isinstance(wall, VirtualWall):
+        raise ParameterError("wall", wall, "must be a VirtualWall")
+    return _limit_band(
+        ("virtual damping B [N.s/m]", "largest stable K [N/m]"),
+        lambda x, hand: wall_limits.stiffness_band(replace(wall, B=x, operator=hand))[1],
+        B,
+        hands_of(hands),
+        draw,
+        progress,
+    )
+
+
+def _limit_band(
+    names: tuple[str, str],
+    limit: Callable[[float, Operator], float],
+    x: Sequence[float],
+    hands: Hands,
+    draw: Draw,
+    progress: Progress,
+) -> Band:
+    values = [float(v) for v in x]
+    if not values:
+        raise ParameterError(names[0], x, "must hold a value")
+    drawn, middle = hands.sample(draw.hands, draw.seed), hands.median
+    rows, nominal = [], []
+    for v in progress(values):
+        rows.append([limit(v, hand) for hand in drawn])
+        nominal.append(limit(v, middle))
+    own = hands.spread or "of one's own"
+    told = next((k for k, v in POPULATIONS.items() if v == hands), own)
+    return Band(*names, np.array(values), np.array(rows), drawn, np.array(nominal), told)
