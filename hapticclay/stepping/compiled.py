@@ -17,6 +17,7 @@ import re
 import signal
 import sys
 import threading
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -41,12 +42,12 @@ from ..model import (
 )
 from ..model.sampled_controller import DESK, TORQUE, LawCaller
 from ..model.scenario import Scenario
-from . import energy, leapfrog, loop, modes, monitor, path, run, runge_kutta, sampled
+from . import energy, leapfrog, loop, many, modes, monitor, path, run, runge_kutta, sampled
 from .engine import mujoco
 
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, regions, pieces, spring,
-    energy, leapfrog, loop, modes, path, runge_kutta, sampled,
+    energy, leapfrog, loop, many, modes, monitor, path, runge_kutta, sampled,
 )  # fmt: skip
 LOOPS = (leapfrog.Leapfrog, runge_kutta.RungeKutta, sampled.Sampled)
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
@@ -99,10 +100,10 @@ def _put_row(rows, at, *row):
         rows[i, j] = row[j]
 
 
-def _mark(kind: type[run.Run], whole: bool) -> Path:
+def _mark(name: str) -> Path:
     """A file that says that this machine code is kept on disk; the null device without a home."""
     try:
-        return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
+        return run.cache_folder() / name
     except (OSError, RuntimeError):
         return Path(os.devnull, "nothing")
 
@@ -121,9 +122,10 @@ def _compiled(*functions: Any) -> list[Any]:
 
 
 _register()
-_advance, _leap, _vary, _march, _calm = _compiled(
-    path.advance, leapfrog.leap_block, leapfrog.vary, runge_kutta.march_block, monitor.is_quiet
-)
+_advance, _leap, _vary, _march, _calm, _carry = _compiled(
+    path.advance, leapfrog.leap_block, leapfrog.vary, runge_kutta.march_block, monitor.is_quiet,
+    many.carry,
+)  # fmt: skip
 
 
 def _library() -> ctypes.CDLL:
@@ -137,7 +139,7 @@ def _function(name: str) -> Any:
 
 
 LIBRARY = _library()
-STEP, FORWARD = _function("mj_step"), _function("mj_forward")
+STEP, FORWARD, RESET = _function("mj_step"), _function("mj_forward"), _function("mj_resetData")
 
 
 class _Mixed:
@@ -331,9 +333,13 @@ class BatchPool:
 
     def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[run.Run, float]:
         """The run, made by this thread's engines, and the seconds it took."""
+        return run.completed(scenario, every, WHOLE, self.store(), None, brief)
+
+    def store(self) -> run.EngineStore:
+        """The engines of this thread."""
         if not hasattr(self.own, "store"):
             self.own.store = run.EngineStore(WHOLE)
-        return run.completed(scenario, every, WHOLE, self.own.store, None, brief)
+        return self.own.store
 
     def run(self, scenario: Scenario) -> tuple[run.Run, float]:
         """Makes a run.
@@ -357,6 +363,21 @@ class BatchPool:
         """
         return self._go(scenario, LAST_ONLY, True)[0].brief()
 
+    def many(
+        self, scenarios: Sequence[Scenario]
+    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
+        """Makes short runs of one kind together, without their samples.
+
+        Args:
+            scenarios: what to run.
+
+        Returns:
+            As many.Lane.make.
+        """
+        if not hasattr(self.own, "lane"):
+            self.own.lane = many.Lane(WHOLE, self.store(), _carry, RESET)
+        return self.own.lane.make(scenarios)
+
 
 def kernel(scenario: Scenario) -> run.Kernel:
     """What runs a scenario fastest, compiled or loaded before it begins.
@@ -365,7 +386,7 @@ def kernel(scenario: Scenario) -> run.Kernel:
         scenario: the scenario.
     """
     kind = run.kind_of(scenario)
-    if _mixes(kind) and not (kind in WARM or _mark(kind, True).exists()):
+    if _mixes(kind) and not (kind in WARM or _mark(f"{kind.__name__}.whole").exists()):
         warm(kind, False)  # what surrounds the whole steps is rare, and takes longest to compile
         return MIXED
     warm(kind)
@@ -396,20 +417,43 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
         kind: of the run.
         whole: the whole path, or the whole steps alone.
     """
-    mark = _mark(kind, whole)
+    kernel = WHOLE if whole else MIXED
+    _prepare(
+        _mark(f"{kind.__name__}.{'whole' if whole else 'mixed'}"), lambda: _example(kind, kernel)
+    )
+    if whole:
+        WARM.add(kind)
+
+
+@functools.cache
+def warm_many(kind: type[run.Run]) -> None:
+    """As `warm`, for short runs that are made together.
+
+    Args:
+        kind: of the runs.
+    """
+    if kind.first_loop:  # others are never made together
+        examples = [EXAMPLES[kind.__name__]] * many.FEWEST
+        _prepare(_mark(f"many.{kind.__name__}"), lambda: BatchPool(1).many(examples))
+
+
+def _example(kind: type[run.Run], kernel: run.Kernel) -> None:
+    kind(EXAMPLES[kind.__name__], 1, kernel).go(None)
+
+
+def _prepare(mark: Path, make: Callable[[], Any]) -> None:
+    """Makes a first run, with a word where it takes long; Ctrl-C waits for the end of it."""
     told = NOTICE if sys.stderr and sys.stderr.isatty() and not mark.exists() else ""
     print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
     try:
-        kind(EXAMPLES[kind.__name__], 1, WHOLE if whole else MIXED).go(None)
+        make()
     finally:
         print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
         if before is not None:
             signal.signal(signal.SIGINT, before)
-    if whole:
-        WARM.add(kind)
     with contextlib.suppress(OSError):  # nowhere to keep it
         mark.touch()
     if caught:
