@@ -439,14 +439,14 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
         if kinds[1:] == (...,):
             if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
-            names = _places(len(value))
+            names = _place_names(len(value))
         return numbers_of(field, value, names, **_bound_limits(bound, part))
 
     return check
 
 
 @functools.lru_cache(maxsize=64)
-def _places(n: int) -> list[str]:
+def _place_names(n: int) -> list[str]:
     """Names of n numbers."""
     return [str(i) for i in range(n)]
 

@@ -24,7 +24,7 @@ from .simulate import NUMBA, has_numba, load_compiled, simulate
 
 KEEP = ("records", "summaries")
 MANY = 32  # runs of a batch from which on those of one kind are made together
-STEPS = 20_000.0  # of a part of such a batch: 50 ms, after which Ctrl-C is heard
+PART_STEPS = 20_000.0  # of a part of such a batch: 50 ms, after which Ctrl-C is heard
 WORKS = (
     "muscle",
     "motors",
@@ -113,9 +113,9 @@ def simulate_batch(
     warmed: set[Any] = set()
 
     def parts() -> Iterator[list[Scenario]]:
-        for part in _parts(itertools.chain(first, todo), together):
+        for part in _in_parts(itertools.chain(first, todo), together):
             for kind in {kind_of(s) for s in part} - warmed:
-                (module.warm_many if together else module.warm)(kind)
+                module.warm(kind)
                 warmed.add(kind)
             yield part
 
@@ -180,13 +180,13 @@ def _checked(scenarios: Iterable[Any]) -> Iterator[Scenario]:
         yield s
 
 
-def _parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Scenario]]:
-    """Scenarios that a thread takes at once: one, or as many as have about STEPS together."""
+def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Scenario]]:
+    """Scenarios that a thread takes at once: one, or as many as have about PART_STEPS together."""
     part, steps = [], 0.0
     for s in scenarios:
         part.append(s)
         steps += s.t_max / s.dt
-        if not together or steps >= STEPS:
+        if not together or steps >= PART_STEPS:
             yield part
             part, steps = [], 0.0
     if part:

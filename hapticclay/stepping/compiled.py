@@ -17,7 +17,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -100,10 +100,10 @@ def _put_row(rows, at, *row):
         rows[i, j] = row[j]
 
 
-def _mark(name: str) -> Path:
+def _mark(kind: type[run.Run], whole: bool) -> Path:
     """A file that says that this machine code is kept on disk; the null device without a home."""
     try:
-        return run.cache_folder() / name
+        return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
     except (OSError, RuntimeError):
         return Path(os.devnull, "nothing")
 
@@ -122,10 +122,13 @@ def _compiled(*functions: Any) -> list[Any]:
 
 
 _register()
-_advance, _leap, _vary, _march, _calm, _carry = _compiled(
-    path.advance, leapfrog.leap_block, leapfrog.vary, runge_kutta.march_block, monitor.is_quiet,
-    many.carry,
-)  # fmt: skip
+_advance, _leap, _vary, _march, _calm = _compiled(
+    many.advance_or_carry,
+    leapfrog.leap_block,
+    leapfrog.vary,
+    runge_kutta.march_block,
+    monitor.is_quiet,
+)
 
 
 def _library() -> ctypes.CDLL:
@@ -186,8 +189,14 @@ def _mixed(run: Any, room: int) -> None:
 
 def _whole(run: Any, room: int) -> None:
     run.s.push()
-    _advance(run.method, run.s.record, run.native, room)
+    _advance(run.method, run.s.record, run.native, room, _no_runs(type(run)))
     run.s.pull()
+
+
+@functools.cache
+def _no_runs(kind: type[run.Run]) -> many.ManyRuns:
+    states: Any = np.zeros(0, run.state_type(kind))
+    return many.ManyRuns.of(states, np.zeros((0, 0)), np.zeros((0, 4)), np.zeros((0, 2)), RESET)
 
 
 def _handles(model: Any, data: Any) -> tuple[Any, ...]:
@@ -375,7 +384,7 @@ class BatchPool:
             As many.Lane.make.
         """
         if not hasattr(self.own, "lane"):
-            self.own.lane = many.Lane(WHOLE, self.store(), _carry, RESET)
+            self.own.lane = many.Lane(WHOLE, self.store(), _advance, RESET)
         return self.own.lane.make(scenarios)
 
 
@@ -386,7 +395,7 @@ def kernel(scenario: Scenario) -> run.Kernel:
         scenario: the scenario.
     """
     kind = run.kind_of(scenario)
-    if _mixes(kind) and not (kind in WARM or _mark(f"{kind.__name__}.whole").exists()):
+    if _mixes(kind) and not (kind in WARM or _mark(kind, True).exists()):
         warm(kind, False)  # what surrounds the whole steps is rare, and takes longest to compile
         return MIXED
     warm(kind)
@@ -417,43 +426,20 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
         kind: of the run.
         whole: the whole path, or the whole steps alone.
     """
-    kernel = WHOLE if whole else MIXED
-    _prepare(
-        _mark(f"{kind.__name__}.{'whole' if whole else 'mixed'}"), lambda: _example(kind, kernel)
-    )
-    if whole:
-        WARM.add(kind)
-
-
-@functools.cache
-def warm_many(kind: type[run.Run]) -> None:
-    """As `warm`, for short runs that are made together.
-
-    Args:
-        kind: of the runs.
-    """
-    if kind.first_loop:  # others are never made together
-        examples = [EXAMPLES[kind.__name__]] * many.FEWEST
-        _prepare(_mark(f"many.{kind.__name__}"), lambda: BatchPool(1).many(examples))
-
-
-def _example(kind: type[run.Run], kernel: run.Kernel) -> None:
-    kind(EXAMPLES[kind.__name__], 1, kernel).go(None)
-
-
-def _prepare(mark: Path, make: Callable[[], Any]) -> None:
-    """Makes a first run, with a word where it takes long; Ctrl-C waits for the end of it."""
+    mark = _mark(kind, whole)
     told = NOTICE if sys.stderr and sys.stderr.isatty() and not mark.exists() else ""
     print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
     try:
-        make()
+        kind(EXAMPLES[kind.__name__], 1, WHOLE if whole else MIXED).go(None)
     finally:
         print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
         if before is not None:
             signal.signal(signal.SIGINT, before)
+    if whole:
+        WARM.add(kind)
     with contextlib.suppress(OSError):  # nowhere to keep it
         mark.touch()
     if caught:

@@ -36,10 +36,15 @@ _scene = operator.attrgetter(
 _shared, _hand = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
 
 
-class Kept(NamedTuple):
-    """What `carry` keeps of each run, and its workspace.
+class ManyRuns(NamedTuple):
+    """Runs that `carry` makes, what it keeps of each, and its workspace.
 
     Attributes:
+        states: of the runs, with the numbers of their scenarios; become final, shape (n,).
+        tables: from regions.region_table, shape (n, len(Engine.table)).
+        starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
+        limits: of the engine's motors, shape (m, 2).
+        reset: mj_resetData.
         good: 1 for a run that has nothing for the monitor, else 0, shape (n,).
         last: its last row, shape (n, path.ROW).
         force: of the clay there [N], shape (n, 2).
@@ -51,6 +56,11 @@ class Kept(NamedTuple):
         swings: workspace of monitor.is_quiet.
     """
 
+    states: Any
+    tables: Any
+    starts: Any
+    limits: Any
+    reset: Any
     good: Any
     last: Any
     force: Any
@@ -61,41 +71,57 @@ class Kept(NamedTuple):
     swings: Any
 
     @classmethod
-    def of(cls, n: int) -> Kept:
-        """Room for n runs.
+    def of(cls, states: Any, tables: Any, starts: Any, limits: Any, reset: Any) -> ManyRuns:  # noqa: PLR0913
+        """Runs that are to be made.
 
         Args:
-            n: their number.
+            states: as the attribute.
+            tables: as the attribute.
+            starts: as the attribute.
+            limits: as the attribute.
+            reset: as the attribute.
         """
+        n = len(states)
         crossings = np.full((n, SUMMARY_CROSSINGS, 3), np.nan)
         crossings[:, :, 0] = -1.0
         counts = np.zeros(n, np.int64), np.zeros(n, np.int64)
         seen = np.tile(np.array([0, -1, -1, 0]), (n, 1))
         rows = np.empty((n, path.ROW)), np.empty((n, 2))
         return cls(
-            counts[0], *rows, crossings, counts[1], seen, np.empty((n, 4)),
-            np.zeros((2, monitor.QUIET)),
+            states, tables, starts, limits, reset, counts[0], *rows, crossings, counts[1], seen,
+            np.empty((n, 4)), np.zeros((2, monitor.QUIET)),
         )  # fmt: skip
 
 
-def carry(m, states, e, tables, starts, limits, reset, kept):  # noqa: PLR0913  # compiled
+def advance_or_carry(m, s, e, room, runs):
+    """One run, as path.advance, or many: what is compiled once need not be compiled for both.
+
+    Args:
+        m: the method.
+        s: state of the run.
+        e: arrays of the run, or of the runs, which all use.
+        room: largest number of rows to fill; 0 makes the many runs.
+        runs: as ManyRuns.
+    """
+    if room > 0:
+        path.advance(m, s, e, room)
+    else:
+        carry(m, e, runs)
+
+
+def carry(m, e, runs):
     """Makes runs one after the other.
 
     Args:
         m: the method.
-        states: of the runs, with the numbers of their scenarios, shape (n,); become final.
         e: arrays of a run, which all use.
-        tables: from regions.region_table, shape (n, len(e.table)).
-        starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
-        limits: of the engine's motors, shape (m, 2).
-        reset: mj_resetData.
-        kept: a Kept.
+        runs: as ManyRuns.
     """
-    room = len(e.rows)
-    for k in range(len(states)):
-        s = states[k]
+    room, kept, starts, limits = len(e.rows), runs, runs.starts, runs.limits
+    for k in range(len(runs.states)):
+        s = runs.states[k]
         for j in range(len(e.table)):
-            e.table[j] = tables[k, j]
+            e.table[j] = runs.tables[k, j]
         for i in range(len(e.ring)):
             for j in range(sampled.HOLD + 1):
                 e.ring[i, j] = 0.0
@@ -103,7 +129,7 @@ def carry(m, states, e, tables, starts, limits, reset, kept):  # noqa: PLR0913  
             limits[j, 0], limits[j, 1] = -s["torque_limit"][j], s["torque_limit"][j]
             for i in range(monitor.QUIET):
                 kept.swings[j, i] = 0.0
-        reset(e.model, e.data)
+        runs.reset(e.model, e.data)
         x, y, vx, vy = starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3]
         path.put_handle(s, e, x, y, vx, vy)
         path.settle(s, e.table)
@@ -364,25 +390,22 @@ class Lane:
         """Runs of one kind: fields of a summary of those that are good, and which are."""
         self.store.engine(p.scenario)
         p.native.timestep[0] = p.scenario.dt
-        states, tables, kept = p.states(jobs), p.tables(jobs), Kept.of(len(jobs))
-        starts = np.array([(*s.start, *s.velocity) for s in jobs])
+        states, starts = p.states(jobs), np.array([(*s.start, *s.velocity) for s in jobs])
         native, limits = p.arrays(states)._replace(table=p.table.copy()), p.model.actuator_ctrlrange
-        self.carry(p.method, states, native, tables, starts, limits, self.reset, kept)
-        good = kept.good > 0
-        if not good.all():
-            states = states[good]
-            kept = Kept._make([*(x[good] for x in kept[:-1]), kept.swings])
-        return fields_of(p.scenario, states, kept), good
+        runs = ManyRuns.of(states, p.tables(jobs), starts, limits, self.reset)
+        self.carry(p.method, p.state, native, 0, runs)
+        good = runs.good > 0
+        return {name: x[good] for name, x in summary_columns(p.scenario, runs).items()}, good
 
 
-def fields_of(like: Scenario, states: Any, kept: Kept) -> dict[str, Any]:
+def summary_columns(like: Scenario, kept: ManyRuns) -> dict[str, Any]:
     """The fields of summaries, arrays over runs.
 
     Args:
         like: a scenario of their kind.
-        states: of the runs, final.
-        kept: of them.
+        kept: the runs, made.
     """
+    states = kept.states
     seen, moved, unbound, _ = kept.seen.T
     saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
     ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
@@ -393,7 +416,8 @@ def fields_of(like: Scenario, states: Any, kept: Kept) -> dict[str, Any]:
         balance["residual"] = balance["residual"] - work[:, path.SUMS - len(energy.HARDWARE_WORK)]
     last, crossings = kept.last, kept.crossings
     return dict(
-        code=code, axis="", time=states["t"], step=states["i"], steps=states["steps"],
+        code=code, axis=np.zeros(len(code), "U1"), time=states["t"], step=states["i"],
+        steps=states["steps"],
         crossings=kept.crossed, crossing_axis=crossings[:, :, 0].astype(np.int64),
         crossing_time=crossings[:, :, 1], crossing_speed=crossings[:, :, 2],
         p=last[:, 2:4], v=last[:, 4:6], fh=last[:, 6:8], fe=kept.force, b=last[:, 12:14], **balance,

@@ -77,7 +77,7 @@ class State(dict[str, Any]):
 
     def __init__(self, fields: list[Any]):
         fields = sorted(fields, key=len)  # numbers first
-        memory: Any = np.zeros(1, np.dtype([tuple(x) for x in fields]))
+        memory: Any = np.zeros(1, _type_of(fields))
         self.record: Any = memory[0]
         self._names = [x[0] for x in fields if len(x) == 2]
         self._format = struct.Struct(
@@ -116,6 +116,19 @@ class State(dict[str, Any]):
         """
         self._bytes[:] = saved
         self.pull()
+
+
+def _type_of(fields: list[Any]) -> np.dtype[Any]:
+    return np.dtype([tuple(x) for x in sorted(fields, key=len)])
+
+
+def state_type(kind: type[Run]) -> np.dtype[Any]:
+    """Type of the record of a run's state.
+
+    Args:
+        kind: of the run.
+    """
+    return _type_of(path.SCENARIO + path.STATE + kind.fields)
 
 
 class Kernel(NamedTuple):
@@ -342,7 +355,7 @@ class Run:
         for name in ("dt", "t_max"):
             now[name] = float(getattr(s, name))
         names = "gain", "origin", "torque_limit"
-        self._put(force=steady_force(s), **{x: getattr(s, x) for x in names})
+        self._put(force=_steady_force(s), **{x: getattr(s, x) for x in names})
         self._put(handx=(x.mass, x.damper, x.spring), handy=(y.mass, y.damper, y.spring))
         now["mobility"] = s.mobility
         self._put(arm=s.arm.links, servox=s.servo[0].numbers, servoy=s.servo[1].numbers)
@@ -520,7 +533,7 @@ class Run:
             force: (x, y) [N].
         """
         self.scenario = replace(self.scenario, force=force)
-        self._put(force=steady_force(self.scenario))
+        self._put(force=_steady_force(self.scenario))
 
     def uh(self, t: np.ndarray, h: float) -> np.ndarray:
         """Mean muscle force over intervals.
@@ -532,7 +545,7 @@ class Run:
         Returns:
             Force [N], shape (n, 2).
         """
-        force = np.broadcast_to(steady_force(self.scenario), (len(t), 2))
+        force = np.broadcast_to(_steady_force(self.scenario), (len(t), 2))
         return force + self.muscle.mean(t, h) if self.muscle else force
 
     def shift(self, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -744,12 +757,8 @@ def _drives(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def steady_force(scenario: Scenario) -> tuple[float, float]:
-    """The constant part of the muscle force, (x, y) [N].
-
-    Args:
-        scenario: the scenario.
-    """
+def _steady_force(scenario: Scenario) -> tuple[float, float]:
+    """The constant part of the muscle force, (x, y) [N]."""
     (x, y), muscle = scenario.force, scenario.muscle
     if muscle is not None and not muscle.varies:
         more = muscle(0.0)

@@ -132,7 +132,7 @@ def test_a_generator_is_taken_as_it_is_run():
 
     found = hc.simulate_batch(generated(), keep="summaries", threads=2)
     assert len(found) == 1500 and np.all(found["steps"] == 401)
-    part = round(batch.STEPS / 400.0) + 1
+    part = round(batch.PART_STEPS / 400.0) + 1
     # two parts a thread wait or run, one is being gathered; and the first, and patterns
     assert max(most) <= 5 * part + batch.MANY + 4
     assert found.nbytes == 1500 * batch.SUMMARY.itemsize
