@@ -45,7 +45,7 @@ def kinds(rng):
     guarded = hc.Interface(delay=1e-4, passivity=True, coupling=hc.Coupling(5e3, 5.0))
     while True:
         b = rng.uniform(5.0, 300.0)
-        clay = hc.slab(b, 0.05, 0.05 + rng.uniform(0.01, 0.1))
+        clay = hc.slab(b, 0.05, 0.06)
         yield varied(CUT, rng, clay=clay)
         yield varied(dataclasses.replace(CUT, operator=hc.Operator()), rng)
         yield varied(CUT, rng, clay=hc.slab(1e5 * b, 0.05, 0.15))  # stiff
@@ -116,7 +116,7 @@ def test_resting_handles_are_told_as_the_monitor_tells_them():
     bound = dataclasses.replace(CUT, torque_limit=(1e-5, 1e-5), force=(1e-4, 0.0))
     for s in (still, bound):
         found = hc.simulate_batch([s] * 40, keep="summaries")
-        np.testing.assert_array_equal(found, np.repeat(entry(s), 40))
+        assert found.tobytes() == np.repeat(entry(s), 40).tobytes()
     assert hc.simulate_batch([still] * 40, keep="summaries")["code"][0] == "stalled"
 
 
@@ -147,9 +147,8 @@ def test_no_run_is_lost_where_summaries_grow():
     )
     assert len(found) == n and np.all(found["steps"] == 21)
     for i in (0, 1, 999, 1000, 1001, n - 1):
-        np.testing.assert_array_equal(
-            found[i : i + 1], entry(dataclasses.replace(same, gain=(float(gains[i]), 0.2)))
-        )
+        alone = entry(dataclasses.replace(same, gain=(float(gains[i]), 0.2)))
+        assert found[i].tobytes() == alone[0].tobytes()
 
 
 def test_ctrl_c_in_a_generator_without_end_ends_the_batch():
