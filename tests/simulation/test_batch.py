@@ -53,7 +53,7 @@ def kinds(rng):
         yield varied(CUT, rng, operator=(hc.Operator(0.2, b, 1.0), None))
         yield varied(CUT, rng, servo=(other if b > 100.0 else SERVO[0], SERVO[1]))
         yield varied(CUT, rng, origin=(rng.uniform(0.0, 0.02), 0.15), torque_limit=(9.0, 5.0))
-        yield varied(CUT, rng, length=0.06)  # many finish
+        yield varied(CUT, rng, clay=None, start=(0.058, 0.0), velocity=(0.3, 0.0), length=0.06)
         yield varied(
             CUT, rng, clay=hc.Clay(hc.Profile((0.05,), (1.0, b)), hc.Profile((0.0,), (b, 2.0), "y"))
         )
