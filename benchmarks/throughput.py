@@ -2,8 +2,9 @@
 
     python -m benchmarks.throughput [--out DIR] [--rounds N] [--steps N] [--full]
 
-Ratios hold on a noisy machine, microseconds do not. --full takes minutes more: 16384 runs in a
-batch, 100 000 runs for linearity, and a stability map. Writes throughput.json; benchmarks.bench
+Ratios hold on a noisy machine, microseconds do not. Short runs, of 100 steps, are 1e6, and 1e4
+where it is quick. --full takes minutes more: 16384 runs in a batch, 100 000 runs for linearity, and
+a stability map. Writes throughput.json; benchmarks.bench
 makes the page.
 """
 
@@ -16,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,13 @@ import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.model.constants import CLAY_X as CLAY
 from hapticclay.simulation import simulate
 
 from . import common
 
 LONG = 5555  # steps of 2 s, as the runs of the map
+SHORT, SHORT_QUICK, SHORT_STEPS = 1_000_000, 10_000, 100  # runs, steps of each
 OFTEN = 5  # compiled runs to one in Python, which takes as long
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
@@ -167,14 +170,21 @@ def beside(
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
     class Turns(compiled.BatchPool):
-        def _go(self, *args: Any) -> Any:
+        def _turn(self, runs: int) -> None:
             made = self.own.__dict__.setdefault("made", 0)
-            if made % each == 0:
+            if made == 0 or made // each != (made - runs) // each:
                 begin = both()
                 bare.append(floor(todo[0], max(500, each * steps // 5), both))
                 aside.append(both() - begin)
-            self.own.made = made + 1
+            self.own.made = made + runs
+
+        def _go(self, *args: Any) -> Any:
+            self._turn(1)
             return super()._go(*args)
+
+        def many(self, scenarios: Any) -> Any:
+            self._turn(len(scenarios))
+            return super().many(scenarios)
 
     usual, compiled.BatchPool = compiled.BatchPool, Turns
     try:
@@ -247,6 +257,51 @@ def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
     return rows
 
 
+def monte_carlo(n: int, control: str) -> Iterator[hc.Scenario]:
+    """Short runs that differ in operator, clay, gain and start, and where sampled in the delay."""
+    same = hc.constant_cut(start=(0.02, 0.0), operator=hc.Operator(), control=control)
+    same, rng = lasting(same, SHORT_STEPS), np.random.default_rng(n)
+    for _ in range(n):
+        mass, damper, spring, b, gain, start, delay = rng.random(7).tolist()
+        own: Any = dict(interface=hc.Interface(delay=1e-3 * delay)) if control == "sampled" else {}
+        yield dataclasses.replace(
+            same,
+            operator=hc.Operator(0.1 + mass, 1.0 + damper, 2.0 + 8.0 * spring),
+            clay=hc.slab(10.0 + 190.0 * b, *CLAY),
+            gain=(0.2 + 0.8 * gain, 0.2),
+            start=(0.049 * start, 0.0),
+            **own,
+        )
+
+
+def short_runs(n: int, control: str) -> dict[str, Any]:
+    """Many short runs from a generator: seconds, and those of their engine steps alone."""
+    first = next(monte_carlo(1, control))
+    hc.simulate_batch(monte_carlo(100, control), keep="summaries")
+    before = floor(first, 20_000)
+    begin = time.perf_counter()
+    found = hc.simulate_batch(monte_carlo(n, control), keep="summaries")
+    wall = time.perf_counter() - begin
+    steps = int(found["steps"].sum())
+    bare = 0.5 * (before + floor(first, 20_000)) * steps / common.CORES
+    few = max(1, n // 100)
+    begin = time.perf_counter()
+    for _ in monte_carlo(few, control):
+        pass
+    making = (time.perf_counter() - begin) * n / few
+    return {
+        "runs": n,
+        "steps": SHORT_STEPS,
+        "control": control,
+        "engine_steps": steps,
+        "wall_s": wall,
+        "floor_s": bare,
+        "over_floor": wall / bare,
+        "making_scenarios_s": making,
+        "peak_MiB": memory(),
+    }
+
+
 def stability_map() -> dict[str, float]:
     """50 dampings by 20 gains, 2 s each: seconds, and how many are unstable."""
     grid = [(b, k) for b in np.geomspace(5.0, 500.0, 50) for k in np.linspace(0.2, 6.0, 20)]
@@ -272,6 +327,8 @@ TITLES = {
     "linearity": "Time a run, from a small batch to a large one, over the floor in the same way; "
     "the most memory the "
     "process has taken so far.",
+    "short": "Short runs from a generator, summaries alone, on all cores: seconds, those of as "
+    "many steps of the bare engine on all cores, and those that making the scenarios takes.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
@@ -314,6 +371,8 @@ def main(
     if native:
         sizes = [(64, 1000)] if quick else [(64, 1000), (1024, 1000), (64, LONG), (1024, LONG)]
         data["batch"] = batches(sizes + full * [(16384, LONG)], 1 if quick else min(rounds, 5))
+        runs = SHORT_QUICK if quick else SHORT
+        data["short"] = [short_runs(runs, "continuous"), short_runs(runs // 10, "sampled")]
     if native and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]

@@ -57,23 +57,27 @@ def number(
     Raises:
         ParameterError: wrong type, NaN, infinite, or out of bounds.
     """
-    if type(value) is float and low < value < high:
+    if type(value) is float and _is_within(value, low, high, above):
         return value
+    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+        try:
+            x = float(value)
+        except (OverflowError, ValueError):
+            x = math.nan
+        if _is_within(x, low, high, above):
+            return x
     bound = "must be a finite number"
     if low > -math.inf:
         bound += f" {'>' if above else '>='} {low:g}"
     if high < math.inf:
         bound += f"{' and' if low > -math.inf else ''} <= {high:g}"
-    bound += f" {unit}" if unit else ""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ParameterError(field, value, bound)
-    try:
-        x = float(value)
-    except (OverflowError, ValueError):
-        raise ParameterError(field, value, bound) from None
-    if not math.isfinite(x) or x < low or x > high or (above and x == low):
-        raise ParameterError(field, value, bound)
-    return x
+    raise ParameterError(field, value, bound + (f" {unit}" if unit else ""))
+
+
+def _is_within(x: float, low: float, high: float, above: bool) -> bool:
+    return low < x < high or (
+        (x == high or (x == low and not above)) and low <= x <= high and math.isfinite(x)
+    )
 
 
 def integer(field: str, value: object, low: int, high: int) -> int:
@@ -88,6 +92,8 @@ def integer(field: str, value: object, low: int, high: int) -> int:
     Raises:
         ParameterError: wrong type, or out of bounds.
     """
+    if type(value) is int and low <= value <= high:
+        return value
     if (
         isinstance(value, bool)
         or not isinstance(value, numbers.Integral)
@@ -136,14 +142,19 @@ def numbers_of(
     Raises:
         ParameterError: another count of numbers, or one of them was refused.
     """
-    bound = f"must be {len(names)} numbers ({', '.join(names)})"
+    if type(value) is tuple and len(value) == len(names):
+        for x in value:
+            if type(x) is not float or not _is_within(x, low, high, above):
+                break
+        else:
+            return value
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, bound)
     items = tuple(value)
     if len(items) != len(names):
+        bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, f"{bound}, got {len(items)}")
-    if all(type(x) is float and low < x < high for x in items):
-        return items
     return tuple(
         number(f"{field}[{name}]", item, low, high, above=above, unit=unit)
         for name, item in zip(names, items, strict=True)
@@ -269,8 +280,10 @@ def check_fields(part: Any, prefix: str = "") -> None:
     Raises:
         ParameterError: a field was refused.
     """
-    for name, told, check in _field_checks(type(part), prefix):
+    for name, told, check, good in _checks_to_make(type(part), prefix):
         value = getattr(part, name)
+        if value is good:
+            continue
         checked = check(told, value, part)
         if checked is not value:
             object.__setattr__(part, name, checked)
@@ -303,6 +316,22 @@ def _field_checks(kind: type, prefix: str) -> list[tuple[str, str, Check]]:
     ]
 
 
+@functools.cache
+def _checks_to_make(kind: type, prefix: str) -> list[tuple[str, str, Check, Any]]:
+    """As `_field_checks`, with the default where it is good as it is; else MISSING."""
+    defaults = {f.name: f.default for f in dataclasses.fields(kind)}
+    out = []
+    for name, told, check in _field_checks(kind, prefix):
+        bound, good = field_types(kind)[name][1], defaults[name]
+        try:  # not where the bound is another field
+            if (bound and isinstance(bound.low, str)) or check(told, good, None) is not good:
+                good = dataclasses.MISSING
+        except ParameterError:
+            good = dataclasses.MISSING
+        out.append((name, told, check, good))
+    return out
+
+
 def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
     """The check of a value of this type."""
     origin, args = get_origin(hint), get_args(hint)
@@ -315,7 +344,7 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
     if origin is tuple:
         return _check_tuple(args, bound)
     if hint is float:
-        return lambda field, value, part: number(field, value, **_bound_limits(bound, part))
+        return _check_number(bound)
     if hint is int:
         high = int(bound.high)
         return lambda field, value, part: integer(
@@ -331,6 +360,13 @@ def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
         article = "an" if hint.__name__[0] in "AEIOU" else "a"
         return _check_part(hint, f"must be {article} {hint.__name__}{optional}")
     raise TypeError(f"{hint}: no check for fields of this type")
+
+
+def _check_number(bound: Bound) -> Check:
+    low, high, above, unit = bound.low, bound.high, bound.above, bound.unit
+    if isinstance(low, str):
+        return lambda field, value, part: number(field, value, **_bound_limits(bound, part))
+    return lambda field, value, part: number(field, value, low, high, above=above, unit=unit)
 
 
 def _bound_limits(bound: Bound, part: Any) -> dict[str, Any]:
@@ -403,10 +439,16 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
         if kinds[1:] == (...,):
             if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
-            names = [str(i) for i in range(len(value))]
+            names = _place_names(len(value))
         return numbers_of(field, value, names, **_bound_limits(bound, part))
 
     return check
+
+
+@functools.lru_cache(maxsize=64)
+def _place_names(n: int) -> list[str]:
+    """Names of n numbers."""
+    return [str(i) for i in range(n)]
 
 
 def _check_parts(kind: type) -> Check:

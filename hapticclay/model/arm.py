@@ -247,4 +247,9 @@ def inverse_kinematics(x: float, y: float, links: Links) -> tuple[float, float]:
     c = (x * x + y * y - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
     q2 = -math.acos(min(1.0, max(-1.0, c)))
     q1 = math.atan2(y, x) - math.atan2(l2 * math.sin(q2), l1 + l2 * math.cos(q2))
-    return math.remainder(q1, 2.0 * math.pi), q2
+    # the IEEE remainder by a turn, which compiled code has no function for: exact, by Sterbenz
+    if q1 > math.pi:
+        q1 -= 2.0 * math.pi
+    elif q1 < -math.pi:
+        q1 += 2.0 * math.pi
+    return q1, q2

@@ -371,16 +371,16 @@ class Profile(CellLaw):
 
     def __post_init__(self):
         check_fields(self, "clay.")
-        regions = [str(i) for i in range(len(self.edges) + 1)]
+        regions = range(len(self.edges) + 1)
         if self.springs and len(self.springs) != len(regions):
             bound = f"must be {len(regions)} springs, one a region, got {len(self.springs)}"
             raise ParameterError("clay.springs", self.springs, bound)
         if not any(x.k or x.k1 for x in self.springs):
             object.__setattr__(self, "springs", ())
-        numbers_of("clay.values", self.values, regions)
-        for name in OPTIONAL:
+        for name in ("values", *OPTIONAL):
             given = getattr(self, name)
-            numbers_of(f"clay.{name}", given, regions if given else ())
+            if len(given) != len(regions) and (given or name == "values"):
+                numbers_of(f"clay.{name}", given, [str(i) for i in regions])  # tells what is amiss
         check_ascending("clay.edges", self.edges)
         _leave_out(self)
 
@@ -727,12 +727,13 @@ def _flow_of(law: Profile | Grid) -> tuple[Any, tuple[float, float, float]]:
 
 def _leave_out(law: Profile | Grid) -> None:
     """Empties what changes nothing, so that laws alike are equal; refuses n without any K."""
-    if not law.K and np.any(np.array(law.n) != 1.0):
+    if not law.K and law.n and np.any(np.array(law.n) != 1.0):
         raise ParameterError("clay.n", law.n, "must be empty without K")
     for name in ("growth", "Fy", "K"):
-        if not np.any(getattr(law, name)):
+        given = getattr(law, name)
+        if given and not (any(given) if isinstance(law, Profile) else np.any(given)):
             object.__setattr__(law, name, ())
-    if not law.K:
+    if not law.K and law.n:
         object.__setattr__(law, "n", ())
 
 
@@ -778,6 +779,10 @@ def check_ascending(field: str, edges: tuple[float, ...]) -> None:
 NOTHING = Profile((), (0.0,))
 
 
+def _yield_alike(x: Profile | Grid | Smooth, y: Profile | Grid | Smooth) -> bool:
+    return x.borders == y.borders and all(map(np.array_equal, x.flows, y.flows))
+
+
 @dataclass(frozen=True)
 class Clay:
     """Clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1), or clay that
@@ -802,8 +807,7 @@ class Clay:
     def __post_init__(self):
         check_fields(self, "clay.")
         x, y = self.laws
-        alike = x.borders == y.borders and all(map(np.array_equal, x.flows, y.flows))
-        if self.isotropic and not alike:
+        if self.isotropic and not (x is y or _yield_alike(x, y)):
             raise ParameterError(
                 "clay.isotropic", True, "must be False where Fy, K or n differ between the axes"
             )

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -313,31 +314,31 @@ def feedback_vector(servo: Servo) -> np.ndarray:
 
 
 def controller_matrices(
-    servo: Servo, compensator: Compensator, K: float
+    servo: Servo, compensator: Compensator, K: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
 
     Args:
         servo: of the axis.
         compensator: shape of C, of order n.
-        K: gain of the compensator.
+        K: gain of the compensator, or gains, shape (m,).
 
     Returns:
-        A, shape (n + 2, n + 2), and B, shape (n + 2,); z holds the states of
+        A, shape (n + 2, n + 2), and B, shape (n + 2,) or (m, n + 2); z holds the states of
         `Compensator.state_space`, with K in its input, then y = G delta and y'. As printed, the
         states of the compensator are delta and delta'.
     """
     g, n = servo.G, compensator.order
     own, drive, out, through = compensator.state_space()
-    A, B = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
+    A, unit = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     A[:n, :n], A[n, n + 1] = own, 1.0
     A[n + 1, :n], A[n + 1, n:] = g.gain * out, (-g.stiffness, -g.damping)
-    B[:n], B[n + 1] = K * drive, K * (g.gain * through)
-    return A, B
+    unit[:n], unit[n + 1] = drive, g.gain * through
+    return A, np.multiply.outer(K, unit)
 
 
 def held_compensator(
-    servo: Servo, compensator: Compensator, K: float, T: float
+    servo: Servo, compensator: Compensator, K: Any, T: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compensator and reference model over a sample in which the net force is held: z+ = A z + B f.
 
@@ -346,28 +347,29 @@ def held_compensator(
     Args:
         servo: of the axis.
         compensator: shape of C, of order n.
-        K: gain of the compensator.
+        K: gain of the compensator, or gains, shape (m,).
         T: length of the sample [s].
 
     Returns:
-        A, shape (n + 2, n + 2), and B, shape (n + 2,); z as in `controller_matrices`.
+        A, shape (n + 2, n + 2), and B, shape (n + 2,), or one of each a gain, shapes (m, n + 2,
+        n + 2) and (m, n + 2); z as in `controller_matrices`.
     """
     A, B = controller_matrices(servo, compensator, K)
-    n = len(B)
-    m = np.zeros((n + 1, n + 1))
-    m[:n, :n], m[:n, n] = A, B
+    n = B.shape[-1]
+    m = np.zeros((*B.shape[:-1], n + 1, n + 1))
+    m[..., :n, :n], m[..., :n, n] = A, B
     e = matrix_exponential(T * m)
-    return e[:n, :n], e[:n, n]
+    return e[..., :n, :n], e[..., :n, n]
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
     """Matrix exponential.
 
     Args:
-        a: shape (n, n).
+        a: shape (n, n), or a stack of such, shape (m, n, n).
 
     Returns:
-        Shape (n, n).
+        As a.
     """
     from scipy.linalg import expm
 

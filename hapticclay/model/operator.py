@@ -50,6 +50,19 @@ def operator_force(
     return spring * p - mass * c + before * v
 
 
+def mobility_with(trace, mass):
+    """Largest acceleration of handle and hand per unit of force. Numbers, or arrays.
+
+    Args:
+        trace: of the mobility of the arm [1/kg], see `arm.Arm.links`.
+        mass: of the hand, the lesser of both axes [kg].
+
+    Returns:
+        [1/kg].
+    """
+    return trace / (1.0 + mass * trace)
+
+
 @dataclass(frozen=True)
 class Operator:
     """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -86,16 +85,30 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
     return np.concatenate((head, *parts))
 
 
-def region_of(table: Any, p: Sequence[float]) -> tuple[int, int]:
+def region_of(table, p):
     """Indices along x and along y of the region in which a place lies; on a border, of that beyond.
 
     Args:
         table: from `region_table`.
         p: the place, (x, y) [m].
+
+    Returns:
+        Indices (x, y).
     """
-    edges = [table[int(table[EDGES + i]) : int(table[EDGES + i + 1])] for i in (0, 1)]
-    x, y = (bisect.bisect_right(e, at, 1) - 1 for e, at in zip(edges, p, strict=True))
-    return x, y
+    return _region_along(table, 0, p[0]), _region_along(table, 1, p[1])
+
+
+def _region_along(table, i, at):
+    """Index of the region along one axis: the last border at or before the place."""
+    begin, high = int(table[EDGES + i]), int(table[EDGES + i + 1])
+    low = begin + 1
+    while low < high:
+        middle = (low + high) // 2
+        if at < table[middle]:
+            high = middle
+        else:
+            low = middle + 1
+    return low - 1 - begin
 
 
 def keep_entries(table: np.ndarray, before: np.ndarray) -> None:

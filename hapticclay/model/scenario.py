@@ -16,7 +16,7 @@ from .compensator import PRINTED, Compensator
 from .constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from .controller import SERVO, Servo
 from .hardware import JOINTS, Interface
-from .operator import Operator
+from .operator import Operator, mobility_with
 from .sampled_controller import Controller
 from .signals import Signal
 
@@ -188,8 +188,8 @@ class Scenario:
     @property
     def mobility(self) -> float:
         """Largest acceleration of handle and hand per unit of force [1/kg]."""
-        trace = self.arm.links[4]
-        return trace / (1.0 + min(th.mass if th else 0.0 for th in self.operators) * trace)
+        mass = min(th.mass if th else 0.0 for th in self.operators)
+        return mobility_with(self.arm.links[4], mass)
 
     @property
     def driven(self) -> bool:

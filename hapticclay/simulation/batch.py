@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,15 @@ from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
+from ..stepping.many import SUMMARY_CROSSINGS
 from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, kind_of
 from . import record
 from .simulate import NUMBA, has_numba, load_compiled, simulate
 
 KEEP = ("records", "summaries")
-SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
+MANY = 32  # runs of a batch from which on those of one kind are made together
+PART_STEPS = 20_000.0  # of a part of such a batch: 50 ms, after which Ctrl-C is heard
 WORKS = (
     "muscle",
     "motors",
@@ -67,10 +70,12 @@ def simulate_batch(
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
     The number of threads and the order do not matter. Without numba, scenes run one after the
-    other. A record takes 160 bytes a sample, a summary 500 bytes.
+    other. A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
+    generator: they are taken as they are run, and those of summaries are not held.
 
     Args:
-        scenarios: what to run; they may differ in anything.
+        scenarios: what to run; they may differ in anything. Many short runs, of up to 10 000 steps,
+            that differ in numbers alone are fastest, at the speed of the bare engine.
         threads: number of parallel runs; None for one a core.
         every: keep each every-th sample, and the last.
         keep: "records", or "summaries" without samples.
@@ -81,37 +86,133 @@ def simulate_batch(
     Raises:
         ParameterError: a scenario, or another argument, is of the wrong kind.
     """
-    jobs = list(scenarios)
-    for i, s in enumerate(jobs):
+    threads = integer("threads", cores() if threads is None else threads, 1, 1024)
+    every = integer("every", every, 1, 1_000_000)
+    summaries = choice("keep", keep, KEEP) == "summaries"
+    if isinstance(scenarios, Sequence):  # refused before the first run, if they can be
+        for _ in _checked(scenarios):
+            pass
+    todo = _checked(scenarios)
+    first = list(itertools.islice(todo, MANY))
+    out = _Summaries() if summaries else _Records()
+    module = load_compiled() if first and has_numba() else None
+    if module is None:
+        if first and not has_numba():
+            print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
+        for i, scenario in enumerate(itertools.chain(first, todo)):
+            r = simulate(scenario, every=every, engine="python")
+            out.put(i, [summary_entry(*record.brief(r))] if summaries else [r])
+        return out.all()
+    pool, together = module.BatchPool(every), summaries and len(first) == MANY
+
+    def make(jobs: list[Scenario], stopped: Callable[[], bool]) -> Any:
+        if summaries:
+            return _summaries_of(pool, jobs, together, stopped)
+        return [record.Record.of(*pool.run(s)) for s in jobs if not stopped()]
+
+    warmed: set[Any] = set()
+
+    def parts() -> Iterator[list[Scenario]]:
+        for part in _in_parts(itertools.chain(first, todo), together):
+            for kind in {kind_of(s) for s in part} - warmed:
+                module.warm(kind)
+                warmed.add(kind)
+            yield part
+
+    with warnings_caught():
+        _on_threads(parts(), make, out.put, min(threads, len(first)))
+    return out.all()
+
+
+class _Records:
+    """The results of a batch, in the order of its scenarios."""
+
+    def __init__(self):
+        self.found: list[Any] = []
+
+    def put(self, first: int, results: Sequence[Any]) -> None:
+        """Takes the results of some runs that follow each other.
+
+        Args:
+            first: place of the first.
+            results: of them.
+        """
+        end = first + len(results)
+        self.found += [None] * (end - len(self.found))
+        self.found[first:end] = results
+
+    def all(self) -> Any:
+        """All of them."""
+        return self.found
+
+
+class _Summaries:
+    """The same, an array of SUMMARY that grows in place."""
+
+    def __init__(self):
+        self.found, self.n = np.zeros(0, SUMMARY), 0
+
+    def put(self, first: int, results: Any) -> None:
+        """Takes the results of some runs that follow each other.
+
+        Args:
+            first: place of the first.
+            results: of them.
+        """
+        end = first + len(results)
+        self.n = max(self.n, end)
+        if end > len(self.found):
+            self.found.resize(max(end, len(self.found) + len(self.found) // 4), refcheck=False)
+        self.found[first:end] = results
+
+    def all(self) -> Any:
+        """All of them."""
+        self.found.resize(self.n, refcheck=False)
+        return self.found
+
+
+def _checked(scenarios: Iterable[Any]) -> Iterator[Scenario]:
+    for i, s in enumerate(scenarios):
         if not isinstance(s, Scenario):
             raise ParameterError(
                 f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns"
             )
-    threads = integer("threads", cores() if threads is None else threads, 1, 1024)
-    every = integer("every", every, 1, 1_000_000)
-    summaries = choice("keep", keep, KEEP) == "summaries"
-    out: Any = np.zeros(len(jobs), SUMMARY) if summaries else [None] * len(jobs)
-    module = load_compiled() if jobs and has_numba() else None
-    if module:
-        for kind in {kind_of(s) for s in jobs}:
-            module.warm(kind)
-        pool = module.BatchPool(every)
+        yield s
 
-        def run(i: int) -> None:
-            out[i] = (
-                summary_entry(*pool.brief(jobs[i]))
-                if summaries
-                else record.Record.of(*pool.run(jobs[i]))
-            )
 
-        with warnings_caught():
-            _on_threads(range(len(jobs)), run, min(threads, len(jobs)))
-        return out
-    if jobs and not has_numba():
-        print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
-    for i, scenario in enumerate(jobs):
-        r = simulate(scenario, every=every, engine="python")
-        out[i] = summary_entry(*record.brief(r)) if summaries else r
+def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Scenario]]:
+    """Scenarios that a thread takes at once: one, or as many as have about PART_STEPS together."""
+    part, steps = [], 0.0
+    for s in scenarios:
+        part.append(s)
+        steps += s.t_max / s.dt
+        if not together or steps >= PART_STEPS:
+            yield part
+            part, steps = [], 0.0
+    if part:
+        yield part
+
+
+def _summaries_of(
+    pool: Any, jobs: list[Scenario], together: bool, stopped: Callable[[], bool]
+) -> np.ndarray:
+    """Summaries of runs.
+
+    Args:
+        pool: a compiled.BatchPool.
+        jobs: what to run.
+        together: whether to make runs of one kind together.
+        stopped: whether the batch is over before its end.
+    """
+    out = np.zeros(len(jobs), SUMMARY)
+    done, left = pool.many(jobs) if together else ([], range(len(jobs)))
+    for places, fields in done:
+        for name, values in fields.items():
+            out[name][places] = values
+    for i in left:
+        if stopped():
+            break
+        out[i] = summary_entry(*pool.brief(jobs[i]))
     return out
 
 
@@ -120,22 +221,41 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _on_threads(jobs: Iterable[int], run: Callable[[int], None], threads: int) -> None:
-    """run(job) for each job, on several threads; the first exception ends all and is raised."""
-    todo, stop = iter(jobs), threading.Event()
+def _on_threads(
+    parts: Iterable[list[Scenario]],
+    make: Callable[[list[Scenario], Callable[[], bool]], Any],
+    put: Callable[[int, Any], None],
+    threads: int,
+) -> None:
+    """Makes parts of a batch on several threads; the first exception ends all and is raised.
 
-    def work() -> None:
-        for job in todo:
-            if stop.is_set():
-                return
-            run(job)
+    This thread takes the scenarios and keeps the results, so that a generator runs where it was
+    made, Ctrl-C reaches it, and no more than two parts a thread are held.
+
+    Args:
+        parts: of the batch.
+        make: results of a part, asked for with a function that tells whether the batch is over.
+        put: takes the place of the first run of a part, and the results.
+        threads: their number.
+    """
+    stop, at = threading.Event(), 0
+    working: dict[Future[Any], int] = {}
+
+    def collect(most: int) -> None:
+        while len(working) > most:
+            for future in wait(working, return_when=FIRST_COMPLETED).done:
+                put(working.pop(future), future.result())
 
     with ThreadPoolExecutor(threads) as pool:
         try:
-            for worker in as_completed([pool.submit(work) for _ in range(threads)]):
-                worker.result()
+            for part in parts:
+                working[pool.submit(make, part, stop.is_set)] = at
+                at += len(part)
+                collect(2 * threads - 1)
+            collect(0)
         except BaseException:  # Ctrl-C too
             stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 

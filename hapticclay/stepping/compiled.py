@@ -17,6 +17,7 @@ import re
 import signal
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -41,12 +42,12 @@ from ..model import (
 )
 from ..model.sampled_controller import DESK, TORQUE, LawCaller
 from ..model.scenario import Scenario
-from . import energy, leapfrog, loop, modes, monitor, path, run, runge_kutta, sampled
+from . import energy, leapfrog, loop, many, modes, monitor, path, run, runge_kutta, sampled
 from .engine import mujoco
 
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, regions, pieces, spring,
-    energy, leapfrog, loop, modes, path, runge_kutta, sampled,
+    energy, leapfrog, loop, many, modes, monitor, path, runge_kutta, sampled,
 )  # fmt: skip
 LOOPS = (leapfrog.Leapfrog, runge_kutta.RungeKutta, sampled.Sampled)
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
@@ -122,7 +123,11 @@ def _compiled(*functions: Any) -> list[Any]:
 
 _register()
 _advance, _leap, _vary, _march, _calm = _compiled(
-    path.advance, leapfrog.leap_block, leapfrog.vary, runge_kutta.march_block, monitor.is_quiet
+    many.advance_or_carry,
+    leapfrog.leap_block,
+    leapfrog.vary,
+    runge_kutta.march_block,
+    monitor.is_quiet,
 )
 
 
@@ -137,7 +142,7 @@ def _function(name: str) -> Any:
 
 
 LIBRARY = _library()
-STEP, FORWARD = _function("mj_step"), _function("mj_forward")
+STEP, FORWARD, RESET = _function("mj_step"), _function("mj_forward"), _function("mj_resetData")
 
 
 class _Mixed:
@@ -184,8 +189,14 @@ def _mixed(run: Any, room: int) -> None:
 
 def _whole(run: Any, room: int) -> None:
     run.s.push()
-    _advance(run.method, run.s.record, run.native, room)
+    _advance(run.method, run.s.record, run.native, room, _no_runs(type(run)))
     run.s.pull()
+
+
+@functools.cache
+def _no_runs(kind: type[run.Run]) -> many.ManyRuns:
+    states: Any = np.zeros(0, run.state_type(kind))
+    return many.ManyRuns.of(states, np.zeros((0, 0)), np.zeros((0, 4)), np.zeros((0, 2)), RESET)
 
 
 def _handles(model: Any, data: Any) -> tuple[Any, ...]:
@@ -331,9 +342,13 @@ class BatchPool:
 
     def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[run.Run, float]:
         """The run, made by this thread's engines, and the seconds it took."""
+        return run.completed(scenario, every, WHOLE, self.store(), None, brief)
+
+    def store(self) -> run.EngineStore:
+        """The engines of this thread."""
         if not hasattr(self.own, "store"):
             self.own.store = run.EngineStore(WHOLE)
-        return run.completed(scenario, every, WHOLE, self.own.store, None, brief)
+        return self.own.store
 
     def run(self, scenario: Scenario) -> tuple[run.Run, float]:
         """Makes a run.
@@ -356,6 +371,21 @@ class BatchPool:
             As Run.brief.
         """
         return self._go(scenario, LAST_ONLY, True)[0].brief()
+
+    def many(
+        self, scenarios: Sequence[Scenario]
+    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
+        """Makes short runs of one kind together, without their samples.
+
+        Args:
+            scenarios: what to run.
+
+        Returns:
+            As many.Lane.make.
+        """
+        if not hasattr(self.own, "lane"):
+            self.own.lane = many.Lane(WHOLE, self.store(), _advance, RESET)
+        return self.own.lane.make(scenarios)
 
 
 def kernel(scenario: Scenario) -> run.Kernel:

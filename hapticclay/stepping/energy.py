@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-from ..model.operator import NO_HAND
-from ..model.scenario import Scenario
+from typing import Any
 
 HARDWARE_WORK = (
     "friction",
@@ -14,13 +12,11 @@ HARDWARE_WORK = (
 )  # entries of an interface; the last two are part of motors
 
 
-def stored_energy(
-    scenario: Scenario, r1: float, r2: float, p: Sequence[float], v: Sequence[float]
-) -> tuple[float, float]:
+def stored_energy(s, r1, r2, p, v):
     """Energy of the arm, and of mass and spring of the operator's arm.
 
     Args:
-        scenario: for the arm, and the operator's arm.
+        s: state of the run, for the numbers of the arm and of the operator's arm.
         r1: rate of link 1 [rad/s].
         r2: absolute rate of link 2 [rad/s].
         p: handle position, (x, y) [m].
@@ -29,12 +25,12 @@ def stored_energy(
     Returns:
         (arm, operator) [J].
     """
-    a, (x, y) = scenario.arm, (th or NO_HAND for th in scenario.operators)
+    arm, x, y = s["arm"], s["handx"], s["handy"]
     at_hand = 0.5 * (
-        both_axes(x.mass, y.mass, v[0] * v[0], v[1] * v[1])
-        + both_axes(x.spring, y.spring, p[0] * p[0], p[1] * p[1])
+        both_axes(x[0], y[0], v[0] * v[0], v[1] * v[1])
+        + both_axes(x[2], y[2], p[0] * p[0], p[1] * p[1])
     )
-    return 0.5 * float(a.I1 * r1 * r1 + a.I2 * r2 * r2), float(at_hand)
+    return 0.5 * (arm[2] * r1 * r1 + arm[3] * r2 * r2), at_hand
 
 
 def both_axes(x, y, ax, ay):
@@ -50,9 +46,11 @@ def both_axes(x, y, ax, ay):
 
 
 def energy_balance(
-    work: Sequence[float], first: tuple[float, float], last: tuple[float, float]
-) -> dict[str, float]:
+    work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]
+) -> dict[str, Any]:
     """muscle + motors = clay + hand_damper + kinetic + hand_stored + residual [J].
+
+    Floats, or arrays over runs.
 
     Args:
         work: of muscle, motors, clay and damper of the hand, and throughput [J].

@@ -796,6 +796,16 @@ class Leapfrog(NamedTuple):
 
     order: int = 2
 
+    def begin(self, s, e, x, y):
+        """Readies a run whose handle has been put to its start: nothing is left to do.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            x: position of the handle, x [m].
+            y: the same, y [m].
+        """
+
     def glide(self, s, e, room):
         i, dt = s["i"], s["dt"]
         n = min(s["last"] - i, room - s["filled"])

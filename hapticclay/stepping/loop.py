@@ -10,6 +10,8 @@ and error terms: docs/equations.md, section 4.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 from ..model import clay, controller, flow, groove, operator
 from ..model.controller import Servo
@@ -18,11 +20,11 @@ NO_FLOW = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)  # Fy, K, n of x and of y where nothing
 
 
 def initial_state(
-    p: tuple[float, float], v: tuple[float, float], servo: tuple[Servo, Servo]
-) -> tuple[float, ...]:
+    p: Sequence[Any], v: Sequence[Any], servo: tuple[Servo, Servo]
+) -> tuple[Any, ...]:
     """State of a loop whose handle has moved evenly for long, as of `leapfrog.kicks`.
 
-    The compensator leads by the lag of G at constant speed.
+    The compensator leads by the lag of G at constant speed. Floats, or arrays over runs.
 
     Args:
         p: handle position, (x, y) [m].

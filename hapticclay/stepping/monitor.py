@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -132,7 +133,6 @@ class StabilityMonitor:
         if outcome.code == "interrupted":
             since = self.onset
             return replace(outcome, cause=f"{since.axis} axis: {since.cause}") if since else outcome
-        recent = max(1, min(self.seen, round(WHILE / s.dt)))
         if self.onset is not None:
             cycles = self.bound.sum() > OFTEN * len(self.bound)
             cause = (
@@ -140,13 +140,14 @@ class StabilityMonitor:
             )
             return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
         if outcome.code == "time limit":
-            if self.seen - 1 - self.unbound >= recent:
+            saturated, stalled = at_rest(self.seen, self.moved, self.unbound, s.dt)
+            if saturated:
                 least = "rms" if isinstance(s.muscle, Multisine) else "the force"
                 advice = f"{self._raise_limit()}, or lower {least}"
                 return replace(
                     outcome, code="saturated", cause="a motor stays in its limit", advice=advice
                 )
-            if self.seen - 1 - self.moved >= recent:
+            if stalled:
                 return replace(
                     outcome,
                     code="stalled",
@@ -317,6 +318,22 @@ class StabilityMonitor:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
+    """How a handle rests at the time limit, if it does. Numbers, or arrays over runs.
+
+    Args:
+        seen: samples.
+        moved: last sample with the handle faster than STILL.
+        unbound: last sample with no motor at its limit.
+        dt: length of a sample [s].
+
+    Returns:
+        Whether motors stay at their limits; whether it has long not moved.
+    """
+    recent = np.maximum(1, np.minimum(seen, round(WHILE / dt)))
+    return seen - 1 - unbound >= recent, seen - 1 - moved >= recent
 
 
 def is_quiet(rows, n, limit1, limit2, swings, seen):

@@ -525,6 +525,28 @@ def side(p, low, high):
     return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0
 
 
+def put_handle(s, e, x, y, vx, vy):
+    """Puts the handle to its start.
+
+    Args:
+        s: state of the run, with the numbers of the scenario.
+        e: its arrays.
+        x: position, x [m].
+        y: the same, y [m].
+        vx: velocity, x [m/s].
+        vy: the same, y [m/s].
+    """
+    links, origin = arm_of(s), s["origin"]
+    q1, q2 = arm.inverse_kinematics(origin[0] + x, origin[1] + y, links)
+    r1, r2 = arm.joint_velocity(vx, vy, arm.jacobian(q1, q2, links), 1.0)
+    e.q[0], e.q[1], e.w[0], e.w[1] = q1, q2, r1, r2 - r1
+    for j in range(2):
+        s["q"][j], s["w"][j] = e.q[j], e.w[j]
+    s["fine"], s["struck"], s["first"], s["resolved"] = INF, 1, -1, INF
+    ix, iy = regions.region_of(e.table, (x, y))
+    s["index"][0], s["index"][1] = ix, iy
+
+
 def settle(s, table):
     """Takes borders and clay of the region in which the run continues.
 

@@ -9,7 +9,7 @@ import math
 import os
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +21,7 @@ from ..errors import ParameterError
 from ..model import arm, compensator, regions
 from ..model.compensator import Compensator
 from ..model.constants import AXES
+from ..model.controller import Servo
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from . import energy, engine, leapfrog, loop, monitor, path
@@ -76,7 +77,7 @@ class State(dict[str, Any]):
 
     def __init__(self, fields: list[Any]):
         fields = sorted(fields, key=len)  # numbers first
-        memory: Any = np.zeros(1, np.dtype([tuple(x) for x in fields]))
+        memory: Any = np.zeros(1, _type_of(fields))
         self.record: Any = memory[0]
         self._names = [x[0] for x in fields if len(x) == 2]
         self._format = struct.Struct(
@@ -115,6 +116,19 @@ class State(dict[str, Any]):
         """
         self._bytes[:] = saved
         self.pull()
+
+
+def _type_of(fields: list[Any]) -> np.dtype[Any]:
+    return np.dtype([tuple(x) for x in sorted(fields, key=len)])
+
+
+def state_type(kind: type[Run]) -> np.dtype[Any]:
+    """Type of the record of a run's state.
+
+    Args:
+        kind: of the run.
+    """
+    return _type_of(path.SCENARIO + path.STATE + kind.fields)
 
 
 class Kernel(NamedTuple):
@@ -259,6 +273,7 @@ class Run:
 
     fields: list[Any] = []  # of the state, beside those of path
     method: Any = None
+    first_loop: Any = None  # of a method that has a state `loop`: what it is at the start
 
     def __init__(
         self,
@@ -308,16 +323,9 @@ class Run:
 
     def _start(self) -> None:
         """Puts the handle to its start."""
-        s, data, now = self.scenario, self.data, self.s
+        s, now = self.scenario, self.s
         self._tell(s)
-        (x, y), (ox, oy) = s.start, s.origin
-        q1, q2 = arm.inverse_kinematics(ox + x, oy + y, s.arm.links)
-        r1, r2 = arm.joint_velocity(*s.velocity, arm.jacobian(q1, q2, s.arm.links), 1.0)
-        data.qpos[:], data.qvel[:] = (q1, q2), (r1, r2 - r1)
-        self._put(q=data.qpos, w=data.qvel)
-        now["fine"], now["struck"], now["first"] = math.inf, 1, -1
-        self._put(index=regions.region_of(self.table, s.start))
-        now["resolved"] = math.inf
+        path.put_handle(now, self.e, *s.start, *s.velocity)
         if now["beyond"]:
             self.render()
             self.stop_rows = np.zeros((4 * CHUNK, 3))  # an axis stops and goes on in each step
@@ -334,7 +342,7 @@ class Run:
             path.cut_place(now, self.e)
         self._put(old=(*now["base"], *now["rate"]), flow_old=now["flow"])
         w1, w2 = now["w"]
-        self.first = energy.stored_energy(s, w1, w1 + w2, s.start, s.velocity)
+        self.first = energy.stored_energy(now, w1, w1 + w2, s.start, s.velocity)
 
     def render(self) -> None:
         """Keeps the force of the clay, which b v does not tell."""
@@ -721,7 +729,7 @@ class Run:
     def balance(self) -> dict[str, float]:
         """The energy balance, as Record.energy."""
         px, py, vx, vy, w1, w2 = (float(x) for x in self.s["final"])
-        last = energy.stored_energy(self.scenario, w1, w1 + w2, (px, py), (vx, vy))
+        last = energy.stored_energy(self.s, w1, w1 + w2, (px, py), (vx, vy))
         work = [float(x) for x in self.s["work"]][:5]
         out = energy.energy_balance(work, self.first if self.looked else last, last)
         if self.s["springs"]:
@@ -766,11 +774,22 @@ class LeapfrogRun(Run):
     def _start(self) -> None:
         super()._start()
         s = self.scenario
-        x = loop.initial_state(s.start, s.velocity, s.servo)
-        ratio = [servo.numbers[0] for servo in s.servo] * 2
-        self._put(loop=[a * b for a, b in zip(x[:4], ratio, strict=True)] + list(x[4:]))
+        self._put(loop=self.first_loop(s.start, s.velocity, s.servo))
         if self.s["formed"]:
             self._put(form_of=(-1.0, -1.0), form_states=self.moving_states())
+
+    @staticmethod
+    def first_loop(p: Sequence[Any], v: Sequence[Any], servo: tuple[Servo, Servo]) -> list[Any]:
+        """State `loop` at the start. Floats, or arrays over runs.
+
+        Args:
+            p: handle position, (x, y) [m].
+            v: handle velocity, (x, y) [m/s].
+            servo: of each axis.
+        """
+        x = loop.initial_state(p, v, servo)
+        ratio = [each.numbers[0] for each in servo] * 2
+        return [a * b for a, b in zip(x[:4], ratio, strict=True)] + list(x[4:])
 
     def _make(self, room: int) -> None:
         if self.varies or self.s["smooth"] or self.s["grooved"] == 2:  # b varies too

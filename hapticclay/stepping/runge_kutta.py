@@ -749,6 +749,16 @@ class RungeKutta(NamedTuple):
 
     order: int = 4
 
+    def begin(self, s, e, x, y):
+        """Readies a run whose handle has been put to its start: nothing is left to do.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            x: position of the handle, x [m].
+            y: the same, y [m].
+        """
+
     def glide(self, s, e, room):
         i, parts = s["i"], s["substeps"]
         n = min(s["last"] - i, room - s["filled"])

@@ -10,6 +10,7 @@ virtual coupling to the same loop.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -1401,6 +1402,28 @@ def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.nd
     return out
 
 
+def delay_in_samples(delay: float, Ts: float) -> tuple[int, float]:
+    """A delay as whole samples, and what remains of one.
+
+    Args:
+        delay: the delay [s].
+        Ts: control sample [s].
+    """
+    delay /= Ts
+    whole = math.floor(delay + SLACK)
+    return whole, max(delay - whole, 0.0)
+
+
+def ring_rows(window: int, whole_delay: int) -> int:
+    """Rows of Engine.ring.
+
+    Args:
+        window: as in hardware.Interface.
+        whole_delay: from `delay_in_samples`.
+    """
+    return window + (whole_delay + 2) + (whole_delay + 4)
+
+
 class Sampled(NamedTuple):
     """The method; `path.Method` says what each part does.
 
@@ -1409,6 +1432,27 @@ class Sampled(NamedTuple):
     """
 
     order: int = 2
+
+    def begin(self, s, e, x, y):
+        """Readies a run whose handle has been put to its start.
+
+        Args:
+            s: state of the run.
+            e: its arrays.
+            x: position of the handle, x [m].
+            y: the same, y [m].
+        """
+        measure_pose(s)
+        s["due"], s["due_next"] = INF, INF
+        if s["wired"]:
+            wires, q, w, Ts, window = s["wires"], s["q"], s["w"], s["Ts"], s["window"]
+            wires[0], wires[1], wires[10], wires[11], wires[12], wires[13] = w[0], w[1], x, y, x, y
+            for n in range(window):  # before the start the joints have turned so for long
+                j = n - window
+                e.ring[n, 0] = float(j)
+                e.ring[n, 1] = hardware.encode(q[0] + j * Ts * w[0], s["encoder"])
+                e.ring[n, 2] = hardware.encode(q[1] + j * Ts * w[1], s["encoder"])
+        look_ahead(s, e.chance)
 
     def glide(self, s, e, room):
         i, dt, rate = s["i"], s["dt"], s["rate"]
@@ -1556,11 +1600,11 @@ class SampledRun(Run):
             self._arrays(stops=self.stop_rows)
         self.law: LawCaller | None = None
         parts = list(zip(s.servo, s.compensators, s.gain, strict=True))
-        x = loop.initial_state(s.start, s.velocity, s.servo)
-        self._put(loop=(*x[0:8:2], *x[1:8:2]))
+        first = self.first_loop(s.start, s.velocity, s.servo)
+        self._put(loop=first)
         if now["formed"]:
             rows = [formed_memory(*axis, now["Ts"]) for axis in parts]
-            self._put(form_memory=np.ravel(rows), form_start=x[0:2])
+            self._put(form_memory=np.ravel(rows), form_start=first[0:5:4])
             self._put(form_states=self.moving_states())
         else:
             rows = [
@@ -1569,12 +1613,22 @@ class SampledRun(Run):
             self._put(memory=np.ravel(rows))
         if s.controller is not None:
             self.take_over(s.controller)
-        measure_pose(now)
-        now["due"] = now["due_next"] = math.inf
         self.ring = np.zeros((0, 1 + HOLD))
         if s.interface:
             self._wire(s.interface)
-        look_ahead(now, self.e.chance)
+        self.method.begin(now, self.e, *s.start)
+
+    @staticmethod
+    def first_loop(p: Sequence[Any], v: Sequence[Any], servo: tuple[Servo, Servo]) -> list[Any]:
+        """State `loop` at the start. Floats, or arrays over runs.
+
+        Args:
+            p: handle position, (x, y) [m].
+            v: handle velocity, (x, y) [m/s].
+            servo: of each axis.
+        """
+        x = loop.initial_state(p, v, servo)
+        return [*x[0:8:2], *x[1:8:2]]
 
     def take_over(self, controller: Controller) -> None:
         """Lets a controller of the user's own act, from the start of the run on.
@@ -1595,7 +1649,7 @@ class SampledRun(Run):
     def _wire(self, parts: hardware.Interface) -> None:
         """Sets up the hardware."""
         s, now, Ts = self.scenario, self.s, self.s["Ts"]
-        cutoff, delay = parts.force_filter, parts.delay / Ts
+        cutoff = parts.force_filter
         now["wired"] = 1
         now["uneven"] = int(parts.jitter > 0.0 or parts.delay > 0.0)
         now["random"] = int(parts.jitter > 0.0 or parts.lost > 0.0 or parts.force_noise > 0.0)
@@ -1604,8 +1658,7 @@ class SampledRun(Run):
         now["cutoff"] = float(parts.velocity_filter or 0.0)
         now["adc_bits"], now["dac_bits"] = parts.adc_bits or 0, parts.dac_bits or 0
         now["adc_range"], now["delay"] = float(parts.adc_range), float(parts.delay)
-        now["whole_delay"] = whole = math.floor(delay + SLACK)
-        now["part_delay"] = max(delay - whole, 0.0)
+        now["whole_delay"], now["part_delay"] = delay_in_samples(parts.delay, Ts)
         now["rubs"], now["guarded"] = int(any(parts.friction)), int(parts.passivity)
         now["coupled"] = int(parts.coupling is not None)
         if parts.coupling:
@@ -1614,19 +1667,7 @@ class SampledRun(Run):
             now["filters"] = 1
             self._put(force_filter=hardware.butterworth(cutoff, parts.filter_order, Ts))
         self._put(friction=parts.friction, dac_range=parts.dac_range or s.torque_limit)
-        (q1, q2), (w1, w2) = self.data.qpos.tolist(), self.data.qvel.tolist()
-        self._put(wires=(w1, w2, *[0.0] * 8, *s.start, *s.start))
-        # before the start the joints have turned so for long
-        past = [
-            (
-                float(j),
-                hardware.encode(q1 + j * Ts * w1, now["encoder"]),
-                hardware.encode(q2 + j * Ts * w2, now["encoder"]),
-            )
-            for j in range(-parts.window, 0)
-        ]
-        self.ring = np.zeros((parts.window + whole + 2 + whole + 4, 1 + HOLD))
-        self.ring[: parts.window, :3] = past
+        self.ring = np.zeros((ring_rows(parts.window, now["whole_delay"]), 1 + HOLD))
         self._arrays(ring=self.ring)
         if s.render == "held":
             self.render()

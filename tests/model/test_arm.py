@@ -108,6 +108,16 @@ def test_inverse_reaches_the_point_with_the_elbow_bent_right(r, phi):
     assert q2 < 0.0
 
 
+@given(st.floats(0.12, 0.58), st.floats(-math.pi, math.pi) | st.sampled_from([math.pi, -math.pi]))
+def test_inverse_takes_the_remainder_by_a_turn_exactly(r, phi):
+    """Bit for bit the IEEE remainder, for which compiled code has no function."""
+    x, y = r * math.cos(phi), r * math.sin(phi)
+    q1, q2 = arm.inverse_kinematics(x, y, arm.PAPER.links)
+    l1, l2 = arm.PAPER.l1, arm.PAPER.l2
+    turned = math.atan2(y, x) - math.atan2(l2 * math.sin(q2), l1 + l2 * math.cos(q2))
+    assert q1 == math.remainder(turned, 2.0 * math.pi)
+
+
 @given(arms, st.floats(-3.1, 3.1), st.floats(0.15, 2.99))
 def test_inverse_finds_the_joint_angles_of_any_arm(a, q1, bend):
     x, y = oracle(a).forward((q1, -bend))

@@ -1,3 +1,4 @@
+import bisect
 import math
 from random import Random
 
@@ -54,6 +55,16 @@ def test_impulse_of_a_step_is_b_times_its_distance_in_any_clay(bx, by, h0, h, h1
     for i in (0, 1):
         assert H0 * first[2 * i + 1] + H1 * then[2 * i] == pytest.approx(b[i] * h, rel=1e-12)
         assert H1 * then[2 * i] * 0.92 <= 1.0 + 1e-12  # the part before never overshoots
+
+
+places = st.floats(-1.0, 1.0) | st.sampled_from([-0.5, 0.0, 0.05, 0.15, 0.5])
+
+
+@given(st.lists(places, max_size=9, unique=True).map(sorted), places, places)
+def test_a_place_is_in_the_region_between_the_borders_around_it(edges, x, y):
+    grid = Profile(tuple(edges), (1.0,) * (len(edges) + 1))
+    table = region_table(Clay(grid, Profile((0.05,), (1.0, 2.0), "y")), None)
+    assert region_of(table, (x, y)) == (bisect.bisect_right(edges, x), int(y >= 0.05))
 
 
 @given(*[st.floats(0.0, 1e6)] * 2)

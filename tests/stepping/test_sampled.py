@@ -170,6 +170,15 @@ def test_held_block_is_the_step_response_of_C_and_G(axis, K):
     )
 
 
+def test_held_blocks_of_many_gains_are_those_of_each_bit_for_bit():
+    servo, gains = controller.SERVO[0], np.geomspace(1e-3, 1e5, 40)
+    A, B = controller.held_compensator(servo, PRINTED, gains, 0.01)
+    for i, K in enumerate(gains.tolist()):
+        alone = controller.held_compensator(servo, PRINTED, K, 0.01)
+        np.testing.assert_array_equal(A[i], alone[0])
+        np.testing.assert_array_equal(B[i], alone[1])
+
+
 SHAPES = {  # order 0 to 4: without and with an output at once, complex poles
     "gain": hc.Compensator((0.002,), (1.0,)),
     "lag": hc.Compensator((1.0, 3.0), (1.0, 12.0)),
