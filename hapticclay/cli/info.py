@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import tyro
 
 from ..display import one_line
@@ -41,6 +40,8 @@ def record_text(record: Record, size: int) -> str:
         record: the record.
         size: of its file [bytes].
     """
+    import numpy as np
+
     from ..model.scenario_text import scenario_rows
     from ..simulation.record import RECORD_SCHEMA
 
@@ -72,7 +73,9 @@ def array_table(record: Record) -> str:
     Args:
         record: the record.
     """
-    from ..simulation.tables import LONG_NAMES, UNITS, recorded_arrays
+    import numpy as np
+
+    from ..simulation.tables import LONG_NAMES, ARRAY_UNITS, recorded_arrays
 
     arrays = recorded_arrays(record)
     if record.ground is not None:
@@ -82,7 +85,7 @@ def array_table(record: Record) -> str:
         known = x[np.isfinite(x)]
         ends = [f"{v():.6g}" for v in (known.min, known.max)] if known.size else ["-", "-"]
         shape = " x ".join(map(str, x.shape))
-        rows.append([name, shape, UNITS.get(name, "m"), *ends, LONG_NAMES[name]])
+        rows.append([name, shape, ARRAY_UNITS.get(name, "m"), *ends, LONG_NAMES[name]])
     head = ("array", "shape", "unit", "lowest", "highest", "what it is")
     return console.text_table(rows, head, "lrlrrl")
 

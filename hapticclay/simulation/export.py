@@ -110,7 +110,7 @@ def _sample_schema(record: Record) -> dict[str, Any]:
     """The JSON schema of a sample."""
 
     def entry(name: str) -> dict[str, Any]:
-        told = {"description": f"{tables.LONG_NAMES[name]} [{tables.UNITS[name]}]"}
+        told = {"description": f"{tables.LONG_NAMES[name]} [{tables.ARRAY_UNITS[name]}]"}
         parts = tables.parts_of(name)
         if not parts:
             return {"type": "number", **told}
@@ -128,12 +128,13 @@ def _rerun(record: Record, file: IO[bytes]) -> None:
     memory = recording.memory_recording()  # a file of its own would not tell of a full disk
     for name, text in told.items():
         recording.log(f"about/{name}", rr.TextDocument(str(text)), static=True)
-    time = rr.TimeColumn("t", duration=record.t)
+    whole = np.rint(1e9 * record.t).astype("timedelta64[ns]")  # of floats it cuts the rest off
+    time = rr.TimeColumn("t", duration=whole)
     for name, x in tables.recorded_arrays(record).items():
         if name == "t":
             continue
         lines = [f"{name}_{part}" for part in tables.parts_of(name)] or [name]
-        labels = [f"{line} [{tables.UNITS[name]}]" for line in lines]
+        labels = [f"{line} [{tables.ARRAY_UNITS[name]}]" for line in lines]
         recording.log(name, rr.SeriesLines(names=labels), static=True)
         if len(x):
             recording.send_columns(name, indexes=[time], columns=rr.Scalars.columns(scalars=x))
@@ -148,7 +149,7 @@ def _matlab(record: Record, file: IO[bytes]) -> None:
     from scipy.io.matlab import MatWriteError
 
     arrays = tables.recorded_arrays(record)
-    units = {name: tables.UNITS[name] for name in arrays}
+    units = {name: tables.ARRAY_UNITS[name] for name in arrays}
     if record.ground is not None:
         arrays, units = arrays | {"ground": record.ground}, units | {"ground": "m"}
     told = tables.told_of(record)

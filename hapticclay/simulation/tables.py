@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-UNITS = ARRAYS | EXTRA
+ARRAY_UNITS = ARRAYS | EXTRA
 OF_JOINTS = ("q", "qd", "tau")  # arrays whose columns are the joints; others have the axes
 LONG_NAMES = {
     "t": "time",
@@ -97,7 +97,7 @@ def column_units(record: Record) -> dict[str, str]:
         record: the record.
     """
     return {
-        f"{name}_{part}" if part else name: UNITS[name]
+        f"{name}_{part}" if part else name: ARRAY_UNITS[name]
         for name in recorded_arrays(record)
         for part in parts_of(name) or ("",)
     }
@@ -175,4 +175,4 @@ def to_xarray(record: Record) -> Dataset:
 
 
 def _labels(name: str) -> dict[str, str]:
-    return {"units": UNITS.get(name, "m"), "long_name": LONG_NAMES[name]}
+    return {"units": ARRAY_UNITS.get(name, "m"), "long_name": LONG_NAMES[name]}

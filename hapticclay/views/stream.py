@@ -14,7 +14,7 @@ from ..model.constants import AXES
 if TYPE_CHECKING:
     from .session import Replay, Session
 
-FORM = "must be HOST:PORT, as in localhost:9870"
+ADDRESS_FORM = "must be HOST:PORT, as in localhost:9870"
 
 
 class UdpStream:
@@ -35,7 +35,7 @@ class UdpStream:
     def __init__(self, address: str):
         host, _, port = address.rpartition(":")
         if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-            raise ParameterError("stream", address, FORM)
+            raise ParameterError("stream", address, ADDRESS_FORM)
         try:  # once: a name server may take its time
             found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
