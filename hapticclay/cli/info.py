@@ -75,7 +75,7 @@ def array_table(record: Record) -> str:
     """
     import numpy as np
 
-    from ..simulation.tables import LONG_NAMES, ARRAY_UNITS, recorded_arrays
+    from ..simulation.tables import ARRAY_UNITS, LONG_NAMES, recorded_arrays
 
     arrays = recorded_arrays(record)
     if record.ground is not None:
