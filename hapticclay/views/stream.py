@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
 from ..model.constants import AXES
+from .session import FRAME_TIME
 
 if TYPE_CHECKING:
-    from .session import Replay, Session
+    from .session import Frame, Replay, Session
 
 ADDRESS_FORM = "must be HOST:PORT, as in localhost:9870"
 
@@ -44,17 +45,20 @@ class UdpStream:
         family, kind, protocol, _, self._to = found[0]
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
-        self._before, self._last = 0.0, 0.0  # time of runs before a restart; of this one [s]
+        self._before, self._last = 0.0, -FRAME_TIME  # time up to a restart; of this run [s]
+        self._frames: list[Frame] = []
 
     def send(self, play: Session | Replay) -> None:
-        """Sends the last frame of a session; drops it where the system does not take it at once.
+        """Sends the last frame, if it is new; drops it where the system does not take it at once.
 
         Args:
             play: the session, or the replay of a record.
         """
         frame = play.frames[-1]
-        if frame.t < self._last:  # it began again
-            self._before += self._last
+        if play.frames is not self._frames:  # it begins, or began again
+            self._frames, self._before = play.frames, self._before + self._last + FRAME_TIME
+        elif frame.t == self._last:
+            return
         self._last = frame.t
         values: dict[str, Any] = {"timestamp": self._before + frame.t, "t": frame.t}
         for name in ("p", "v", "fh", "fe"):

@@ -82,9 +82,11 @@ def test_time_goes_on_over_a_restart(receiver):
             if restarts:
                 session.restart()
             for _ in range(3):
-                session.advance(FRAME_TIME)
                 stream.send(session)
+                stream.send(session)  # nothing new: not sent
+                session.advance(FRAME_TIME)
     got = heard(receiver, 9)
+    assert got[0]["timestamp"] == got[0]["t"] == 0.0
     stamps = [x["timestamp"] for x in got]
     assert all(b > a for a, b in zip(stamps, stamps[1:], strict=False))
     assert got[3]["t"] == got[0]["t"] < got[2]["t"]
@@ -117,10 +119,12 @@ def test_nobody_listening_neither_blocks_nor_fails():
     session, stream = Session(hc.free()), UdpStream(f"localhost:{port}")
     with contextlib.closing(stream):
         begin = time.perf_counter()
-        for _ in range(2000):
+        for _ in range(300):
+            session.advance(FRAME_TIME)
             stream.send(session)
-        assert time.perf_counter() - begin < 30.0  # never waits; a second on this machine
+        assert time.perf_counter() - begin < 60.0  # never waits; a second on this machine
         assert not stream._socket.getblocking()
+    session.advance(FRAME_TIME)
     stream.send(session)  # closed: dropped as well
 
 
