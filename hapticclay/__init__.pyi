@@ -61,6 +61,7 @@ from .studies.identification import identify as identify
 from .studies.measurement import Measurement as Measurement
 from .studies.measurement import identify_data as identify_data
 from .studies.removal import removed as removed
+from .studies.sweep import read_sweep as read_sweep
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map
 from .theory.describing import LimitCycle as LimitCycle
