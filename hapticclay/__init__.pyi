@@ -78,6 +78,7 @@ from .studies.population import Hands as Hands
 from .studies.population import gain_band as gain_band
 from .studies.population import wall_band as wall_band
 from .studies.removal import removed as removed
+from .studies.sweep import read_sweep as read_sweep
 from .studies.workspace import Drift as Drift
 from .studies.workspace import drift_map as drift_map
 from .studies.zwidth import Press as Press

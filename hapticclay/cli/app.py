@@ -43,6 +43,8 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "materials": "hapticclay.cli.materials:MaterialsCommand",
     "view": "hapticclay.cli.view:ViewCommand",
     "video": "hapticclay.cli.video:VideoCommand",
+    "info": "hapticclay.cli.info:InfoCommand",
+    "export": "hapticclay.cli.export:ExportCommand",
     "version": "hapticclay.cli.app:VersionCommand",
 }
 PATHS = ("file", "record")  # words behind a command before the path of a scenario or a record
@@ -261,7 +263,7 @@ def _hints(kind: type) -> dict[str, Any]:
 
 
 def _option_names(known: dict[str, Any]) -> list[str]:
-    names = [n for n in known if n not in ("scenario", "spec", "source")]  # these are words
+    names = [n for n in known if n not in ("scenario", "spec", "source", "record")]  # words
     return names + [f"no-{n}" for n in names if known[n] is bool]
 
 

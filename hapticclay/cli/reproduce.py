@@ -19,13 +19,13 @@ class ReproduceCommand:
         out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
         quick: Leave out the map of Sh over the workspace.
         page: Also write the table of numbers alone, as Markdown, to this file.
-        figures: Formats and style of figures/; those of the report are for a screen.
+        figures: Formats and style of figures/; the report itself has SVG for a screen.
     """
 
     out: Path = Path("out/paper")
     quick: bool = False
     page: Path | None = None
-    figures: FigureOptions = FigureOptions()
+    figures: FigureOptions = FigureOptions(format=("svg",))
 
     def __call__(self) -> int:
         writable(self.out)

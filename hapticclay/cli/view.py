@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +19,7 @@ from .run import deliver
 if TYPE_CHECKING:
     from ..simulation.record import Record
     from ..studies.removal import Tool
-    from ..views.session import Session
+    from ..views.session import Replay, Session
 
 
 def tool_size(name: str) -> Callable[[], float]:
@@ -56,6 +57,8 @@ class ViewCommand:
         host: Address to serve the browser on; a token guards any but this machine's.
         port: Port to serve the browser on.
         figures: Formats and style of the plots.
+        stream: Send the session, 60 times a second, as JSON over UDP to HOST:PORT, as in
+            localhost:9870, for PlotJuggler.
     """
 
     scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
@@ -71,6 +74,7 @@ class ViewCommand:
     host: str = "127.0.0.1"
     port: int = 8080
     figures: console.FigureOptions = console.FigureOptions()
+    stream: str | None = None
 
     def __call__(self) -> int:
         from ..simulation.record import Record
@@ -84,7 +88,7 @@ class ViewCommand:
                     True,
                     "shows sessions only: make a film of a record with hapticclay video",
                 )
-            replay(self.scenario, tool)
+            replay(self.scenario, tool, self.stream)
             return 0
         writable(self.out or Path("out/view"))
         record = self._session(tool)
@@ -100,7 +104,7 @@ class ViewCommand:
         from ..views.session import Session, stoppable
 
         session = Session(self.scenario, self.stiffness, tool, self.every)
-        with stoppable() as stop:
+        with stoppable() as stop, streaming(session, self.stream):
             if self.web:
                 _serve_page(session, self.host, self.port, stop.is_set)
             else:
@@ -110,23 +114,48 @@ class ViewCommand:
         return session.record() if session.recorded else None
 
 
-def replay(record: Record, tool: Tool) -> None:
+@contextlib.contextmanager
+def streaming(play: Session | Replay, address: str | None) -> Iterator[None]:
+    """Sends what is played over UDP meanwhile.
+
+    Args:
+        play: the session, or the replay.
+        address: HOST:PORT; None for nowhere.
+
+    Raises:
+        ParameterError: it is no such address, or there is no such host.
+    """
+    if address is None:
+        yield
+        return
+    from ..views.stream import UdpStream
+
+    play.stream = UdpStream(address)
+    try:
+        yield
+    finally:
+        play.stream.close()
+
+
+def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
     """Shows a record in a window, in real time, until it is closed.
 
     Args:
         record: the run.
         tool: the cutter.
+        stream: where to send it meanwhile, HOST:PORT; None for nowhere.
 
     Raises:
-        ParameterError: there is no display, no OpenGL, or nothing in the record.
+        ParameterError: there is no display, no OpenGL, nothing in the record, or no such host.
     """
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
     from ..views.session import Replay, stoppable
     from ..views.window import Window
 
-    with stoppable() as stop:
-        Window(Replay(record, tool)).show(stop.is_set)
+    play = Replay(record, tool)
+    with stoppable() as stop, streaming(play, stream):
+        Window(play).show(stop.is_set)
 
 
 def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:

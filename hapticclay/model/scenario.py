@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
+from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, check_fields, number
 from . import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from .arm import PAPER, Arm
@@ -18,6 +19,7 @@ from .controller import SERVO, Servo
 from .hardware import JOINTS, Interface
 from .operator import Operator, mobility_with
 from .sampled_controller import Controller
+from .scenario_text import scenario_rows
 from .signals import Signal
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
@@ -144,6 +146,13 @@ class Scenario:
                     "length", self.length, f"must lie ahead of start x = {self.start[0]:g} m"
                 )
             self._check_reach("length", (self.length, self.start[1]))
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{name}: {value}" for name, value in scenario_rows(self))
+        return f"<Scenario {one_line(self.name)}; {told}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(f"Scenario {self.name}", scenario_rows(self))
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Scenario:

@@ -6,6 +6,7 @@ import base64
 import functools
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from .claims import STATUSES, Row, Runs
 
 LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"
+WIDE = 7.0  # [inch] wider figures have panels side by side, and take both columns of the page
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Picture:
         title: over the figure.
         caption: under the figure.
         draw: draws the figure from the runs of the ledger.
+        paper: what of the paper's own figure stands beside ours; its curves are not reproduced.
         quick: whether the quick report has it.
     """
 
@@ -40,6 +43,7 @@ class Picture:
     title: str
     caption: str
     draw: Callable[[Runs], Any]
+    paper: str = ""
     quick: bool = True
 
 
@@ -67,18 +71,22 @@ PICTURES = (
         "Fig. 4: closed position loop G",
         "Response of the simulated arm to position commands, and Eqs. 15 and 16.",
         lambda r: _identified(r, "G"),
+        "its fitted curve, Eqs. 15 and 16, is drawn; its measured points are lost.",
     ),
     Picture(
         "fig05",
         "Fig. 5: sensitivity Sh",
         "Response of the simulated arm to forces at the handle, and Eqs. 17 and 18.",
         lambda r: _identified(r, "S"),
+        "its fitted curve, Eqs. 17 and 18, is drawn; its measured points are lost.",
     ),
     Picture(
         "fig06",
         "Fig. 6: operator's arm Th",
         "Hand force over handle position, and Eq. 19.",
         lambda r: _identified(r, "Th"),
+        "its fitted curve, Eq. 19, is drawn, and its crossover near 3 rad/s is in the table; the "
+        "points measured on three operators are lost.",
     ),
     Picture(
         "fig07",
@@ -86,12 +94,16 @@ PICTURES = (
         "Straight through the slab. Without inertia shaping the arm pulls the handle aside by less "
         "than a millimetre.",
         lambda r: views.run_plots.path_plot(r.constant()),
+        "the place and the length of the slab, 5 cm and 10 cm, are drawn as printed; its path is "
+        "lost.",
     ),
     Picture(
         "fig08a",
         "Fig. 8, top: velocity over position",
         "The speed is K f/(10 + K b) in the clay and ten times that outside.",
         lambda r: views.run_plots.velocity_plot(r.constant()),
+        "no speed is printed, only that it is about constant; its curve is lost. The level drawn "
+        "follows from the printed K, b and force.",
     ),
     Picture(
         "fig08b",
@@ -99,12 +111,16 @@ PICTURES = (
         "The clay's share is b inside the slab and zero outside; the operator also feels 10/K, the "
         "compensator's own damping.",
         lambda r: views.run_plots.force_ratio_plot(r.constant()),
+        "90 N·s/m in the clay and about zero outside, both printed, are in the table and in the "
+        "levels drawn; its curve is lost.",
     ),
     Picture(
         "fig09",
         "Fig. 9: path of the variable cut",
         "Clay of 50 N·s/m up to 5 cm on each axis and of 100 N·s/m beyond, growing in x.",
         lambda r: views.run_plots.path_plot(r.variable()),
+        "the contours of the clay are drawn as printed: 5 cm on both axes, 50 and 100 N·s/m; its "
+        "path is lost.",
     ),
     Picture(
         "fig10",
@@ -112,12 +128,15 @@ PICTURES = (
         "Constant up to 5 cm, then an abrupt drop, then a slow decrease in x as the clay grows by "
         "30 N·s/m each second.",
         lambda r: views.run_plots.velocity_plot(r.variable(), "xy"),
+        "its words are constant, an abrupt drop at 5 cm and a slow decrease: the table has each as "
+        "a number; its curve is lost.",
     ),
     Picture(
         "fig10_printed",
         "Fig. 10 with K = 1 on both axes, as printed",
         "The printed model is unstable in y. The run ends once the instability is certain.",
         lambda r: views.run_plots.velocity_plot(r.variable(as_printed=True), "xy"),
+        "it shows a steady cut with these gains, which its own Eqs. 16 and 18 rule out.",
     ),
     Picture(
         "readings",
@@ -131,12 +150,15 @@ PICTURES = (
         "Below the gain limit the hand feels its own muscle. Far above it the motors swing between "
         "their limits.",
         lambda r: _maneuver(r, "time"),
+        "the gains, K = 3 and 25 in the text, 2 and 25 in the caption, and the words irregular and "
+        "much smaller are in the table as numbers; its curves are lost.",
     ),
     Picture(
         "fig11b",
         "Fig. 11: force during a maneuver, over position",
         "The same runs.",
         lambda r: _maneuver(r, "position"),
+        "its caption names a position as the second axis, its text the time: both are drawn.",
     ),
     Picture(
         "nyquist_x",
@@ -184,7 +206,29 @@ def format_number(x: float | None, unit: str = "") -> str:
     if math.isnan(x):
         return "none"
     text = "0" if abs(x) < 1e-9 else f"{x:.6g}"
-    return f"{text} {unit}".strip() if unit != "1" else text
+    return f"{text} {typeset(unit)}".strip()
+
+
+def typeset(unit: str) -> str:
+    """Typesets a unit: N·s/m, 1/s²; nothing for "1".
+
+    Args:
+        unit: as a Row has it, N.s/m, 1/s^2.
+    """
+    return "" if unit == "1" else unit.replace("N.", "N·").replace("^2", "²")
+
+
+def aligned(x: float | None) -> Any:
+    """Formats a value so that the decimal points of a column of HTML stand in one line.
+
+    Args:
+        x: the value.
+    """
+    import markupsafe  # jinja2 needs it anyway
+
+    whole, point, rest = format_number(x).partition(".")
+    cell = '<span><span class="i">{}</span><span class="f">{}</span></span>'
+    return markupsafe.Markup(cell).format(whole, point + rest)
 
 
 def format_error(row: Row) -> str:
@@ -223,6 +267,8 @@ def _environment():
     )
     env.filters |= {
         "number": format_number,
+        "aligned": aligned,
+        "unit": typeset,
         "error": format_error,
         "verdict": format_verdict,
         "cell": lambda s: s.replace("|", "\\|"),
@@ -252,7 +298,7 @@ def reproduce(
         out: folder.
         quick: whether to leave out the map over the workspace.
         progress: called with the title of each step before it begins.
-        save: writes figures by name to a folder; None for PNG files as in the report.
+        save: writes figures by name to a folder; None for the SVG files of the report alone.
         runs: runs to use again; None to make them.
 
     Returns:
@@ -267,14 +313,16 @@ def reproduce(
         if progress:
             progress(p.title)
         figure = Figure(functools.partial(p.draw, runs))
-        png = figure.png()
-        if save is None:
-            with atomic(out / "figures" / f"{p.name}.png") as f:
-                f.write(png)
-        else:
+        svg = figure.svg()
+        with atomic(out / "figures" / f"{p.name}.svg") as f:
+            f.write(svg.encode())
+        if save is not None:
             save({p.name: figure}, out / "figures")
-        code = base64.b64encode(png).decode()
-        pictures.append({"name": p.name, "title": p.title, "caption": p.caption, "data": code})
+        width = re.search(r'width="([\d.]+)pt"', svg)
+        assert width
+        wide = float(width[1]) / 72.0 > WIDE
+        code = base64.b64encode(svg.encode()).decode()
+        pictures.append({"picture": p, "data": code, "wide": wide})
     found = {"rows": rows, "statuses": STATUSES, "pictures": pictures, "versions": versions()}
     env = _environment()
     for name in ("report.html", "report.md"):

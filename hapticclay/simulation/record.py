@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
 from ..model.constants import AXES
 from ..model.fields import make_part, plain_data
 from ..model.scenario import Scenario
+from ..model.scenario_text import scenario_rows
 from ..model.signals import Multisine
 from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
@@ -25,6 +27,10 @@ from ..theory import linear_loop
 from ..theory.margins import Verdict
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from ..views.record_plots import RecordPlots
     from .accuracy import Accuracy
 
 RECORD_SCHEMA = "hapticclay-record-1"
@@ -141,6 +147,83 @@ class Record:
     def status(self) -> str:
         """How the run ended, in one line: its code, the axis and time, and the cause."""
         return str(self.outcome)
+
+    def __repr__(self) -> str:
+        return f"<Record {one_line(self.scenario.name)}: {self.status}; {self._samples()}>"
+
+    def _repr_html_(self) -> str:
+        s = self.scenario
+        rows = [("status", self.status), ("samples", self._samples())]
+        rows += [("advice", self.outcome.advice)] * bool(self.outcome.advice)
+        rows += [("error", str(self.error))] * (self.error is not None)
+        kept = ", ".join(f"{name} [{unit}]" for name, unit in self._units().items())
+        rows += [("arrays", kept), *scenario_rows(s)]
+        return html_table(f"Record {s.name}", rows)
+
+    def _samples(self) -> str:
+        n = len(self.t)
+        return f"{n} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s" if n else "no samples"
+
+    def _units(self) -> dict[str, str]:
+        """Unit of each array that the record has."""
+        extra = {name: EXTRA[name] for name in self.extra}
+        return ARRAYS | extra | ({"ground": "m"} if self.ground is not None else {})
+
+    @property
+    def plot(self) -> RecordPlots:
+        """Draws the run: `plot()`, or `plot.velocity()`, `plot.force()`, `plot.path()`, ...
+
+        The plots live in `views`, a room above; this is the one place that looks up.
+        """
+        from ..views.record_plots import RecordPlots
+
+        return RecordPlots(self)
+
+    def to_frame(self) -> DataFrame:
+        """The arrays as a pandas DataFrame, a row a sample.
+
+        Its index is t [s]; columns are p_x, p_y, v_x, ..., q_shoulder, q_elbow, ..., with those of
+        `extra`. Its attrs have units, by column; title, source, status, outcome, end_time [s]; and
+        scenario and summary, as JSON. `ground` is not in it.
+
+        Raises:
+            ParameterError: pandas is not installed.
+        """
+        from .tables import to_frame
+
+        return to_frame(self)
+
+    def to_xarray(self) -> Dataset:
+        """The arrays as an xarray Dataset over time [s], axis (x, y) and joint (shoulder, elbow).
+
+        Variables have units and long_name; the attributes are those of `to_frame`, without units.
+        What is left of clay that stays cut is over cell_x and cell_y [m].
+
+        Raises:
+            ParameterError: xarray is not installed.
+        """
+        from .tables import to_xarray
+
+        return to_xarray(self)
+
+    def export(self, path: str | os.PathLike[str], format: str | None = None) -> Path:
+        """Writes a file for other programs, whole or not at all: docs/data.md.
+
+        Args:
+            path: the file; an older one is replaced.
+            format: "nc", "parquet", "csv", "mcap", "rrd" or "mat"; None for what the file's name
+                ends with.
+
+        Returns:
+            The file.
+
+        Raises:
+            ParameterError: there is no such format, a package for it is not installed, the record
+                does not fit into it, or the file cannot be written.
+        """
+        from .export import export_record
+
+        return export_record(self, path, format)
 
     def ratio(self, force: np.ndarray) -> np.ndarray:
         """force / v along each axis; NaN where the handle is at rest.
@@ -306,9 +389,6 @@ class Record:
             more["error"] = dataclasses.asdict(self.error)
         if self.stops:
             more["stops"] = [dataclasses.asdict(x) for x in self.stops]
-        extra = {name: EXTRA[name] for name in self.extra}
-        if self.ground is not None:
-            extra["ground"] = "m"
         return {
             "schema": RECORD_SCHEMA,
             "status": self.status,
@@ -326,8 +406,7 @@ class Record:
                 "energy": "J",
                 "crossings": "m, s, m/s",
                 "regions": "m, N.s/m, m/s",
-                **ARRAYS,
-                **extra,
+                **self._units(),
             },
             "versions": self.versions,
             **more,

@@ -99,7 +99,8 @@ class Measurement:
         """Read a CSV file, whose first line names its columns.
 
         Comma, semicolon or tab separate cells; empty lines and lines that begin with # are left
-        out. Other columns may hold anything.
+        out, as is a last row after a shorter step: a run ends between two samples. Other columns
+        may hold anything.
 
         Args:
             path: the file.
@@ -114,6 +115,9 @@ class Measurement:
             choice("columns", key, tuple(COLUMNS))
         wanted = {key: key for key in ("t", "input", "output")} | dict(columns or {})
         cells = _read_columns(Path(path), wanted)
+        steps = np.diff(cells["t"])
+        if len(steps) > 1 and 0.0 < steps[-1] < (1.0 - JITTER) * float(np.median(steps)):
+            cells = {key: x[:-1] for key, x in cells.items()}
         return cls(**cells, name=Path(path).name)
 
 

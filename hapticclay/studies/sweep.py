@@ -12,6 +12,7 @@ import json
 import math
 import os
 import platform
+import re
 import sys
 import time
 from collections.abc import Callable, Generator, Iterator
@@ -23,6 +24,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..files import atomic
 from ..model.constants import AXES
+from ..model.experiments import parameter_unit
 from ..simulation.batch import cores
 from ..simulation.record import Record
 from ..simulation.simulate import has_numba, simulate
@@ -35,6 +37,31 @@ MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's dige
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
+NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
+RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
+    "run": ("", "number of the run"),
+    "status": ("", "how it ended; refused if a parameter was out of bounds"),
+    "axis": ("", "the unstable axis, empty for none"),
+    "cause": ("", "what happened, or why it was refused"),
+    "end_time": ("s", "simulated time of the end"),
+    "crossing1": ("s", "when the handle crossed a border, of the first three"),
+    "b_x": ("N.s/m", "damping of the stiffest clay that the handle met"),
+    "fe_over_v_x": ("N.s/m", "force of that clay over the velocity, where the speed is steady"),
+    "speed_x": ("m/s", "steady speed in that clay"),
+    "gain_margin_x": ("factor on K", "gain limit of the linear loop in that clay, over K"),
+    "energy_residual": ("of what went through", "what is left over of the energy balance"),
+    "wall_time": ("s", "run time"),
+}
+
+
+def column_told(name: str) -> tuple[str, str]:
+    """Unit and description of a column of the data set, "" where there is none.
+
+    Args:
+        name: of the column: a result, or a parameter.
+    """
+    like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
+    return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
 
 
 class Stored(Protocol):
@@ -170,6 +197,8 @@ def run_chunk(sweep: Plan, number: int, out: str) -> int:
 def parquet_schema(sweep: Plan, number: int) -> Any:
     """The pyarrow Schema of a chunk's file; its metadata tell the sweep and the chunk.
 
+    Metadata of each field are its unit and description.
+
     Args:
         sweep: the sweep.
         number: the chunk.
@@ -181,7 +210,17 @@ def parquet_schema(sweep: Plan, number: int) -> Any:
     else:
         empty = sweep.blank_row()
     marks = dict(zip(MARKS, (sweep.digest().encode(), b"%d" % number), strict=True))
-    return pa.Table.from_pylist([empty]).schema.with_metadata(marks)
+    return _told(pa.Table.from_pylist([empty]).schema).with_metadata(marks)
+
+
+def _told(schema: Any) -> Any:
+    """A schema with unit and description of each field."""
+    import pyarrow as pa
+
+    told = {
+        name: zip(("unit", "description"), column_told(name), strict=True) for name in schema.names
+    }
+    return pa.schema([f.with_metadata(dict(told[f.name])) for f in schema])
 
 
 def _write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
@@ -518,6 +557,9 @@ def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
 def read_sweep(out: str | os.PathLike[str]):
     """The data set of a sweep, all its chunks, as a pyarrow Table in the order of the runs.
 
+    Metadata of each field are its unit and description; the DataFrame of `to_pandas()` has them by
+    column in attrs["units"] and attrs["descriptions"].
+
     Args:
         out: folder of the sweep.
 
@@ -549,4 +591,11 @@ def read_sweep(out: str | os.PathLike[str]):
         raise ParameterError(
             "part", file.name, f"is {fault}: the command of the sweep in {out} makes it again"
         )
-    return pa.concat_tables(tables).replace_schema_metadata(None)
+    table = pa.concat_tables(tables)
+    told = {name: column_told(name) for name in table.column_names}
+    attrs = {
+        "units": {name: unit for name, (unit, _) in told.items() if unit},
+        "descriptions": {name: text for name, (_, text) in told.items()},
+    }
+    more = {b"pandas": json.dumps({"attributes": attrs, **NO_INDEX}).encode()}
+    return table.cast(_told(table.schema).with_metadata(more))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ..display import html_table
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of
 from ..model.operator import Operator
 from . import gain_limit, linear_loop, roots
@@ -50,6 +51,18 @@ class Verdict:
 
     def __bool__(self) -> bool:
         return self.verdict
+
+    def __repr__(self) -> str:
+        at = "" if math.isnan(self.omega) else f" at {self.omega:.4g} rad/s"
+        return f"<Verdict {self.verdict}: {self.measures} {self.margin:.4g}{at}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(self.measures, f"{self.margin:.6g}")]
+        rows += [("at", f"{self.omega:.6g} rad/s")] * (not math.isnan(self.omega))
+        bands = [f"{low:.4g} to {high:.4g} rad/s" for low, high in self.fails]
+        rows += [("fails from", "\n".join(bands))] * bool(bands)
+        rows += [("method", self.method), ("assumes", "\n".join(self.assumptions))]
+        return html_table(f"Verdict: {'it holds' if self.verdict else 'it fails'}", rows)
 
 
 @dataclass(frozen=True)

@@ -326,7 +326,7 @@ def force_velocity_plot(record: Record) -> Figure:
     Args:
         record: the run, in clay that yields somewhere.
     """
-    clay, main = record.scenario.clay, AXES.index(_main_axis(record.scenario))
+    clay, main = record.scenario.clay, AXES.index(main_axis(record.scenario))
     assert clay is not None
     c, s = math.cos(clay.angle), math.sin(clay.angle)
     own = np.array(((c, -s), (s, c)))  # columns: the clay's axes
@@ -473,7 +473,12 @@ def _clay_along_both_axes(s: Scenario) -> bool:
     return s.clay is not None and s.clay.along == AXES[0] + AXES[1]
 
 
-def _main_axis(s: Scenario) -> str:
+def main_axis(s: Scenario) -> str:
+    """The axis along which the operator pushes most.
+
+    Args:
+        s: the scenario.
+    """
     size = s.force
     if isinstance(s.muscle, Multisine):
         size = s.muscle.rms
@@ -483,18 +488,27 @@ def _main_axis(s: Scenario) -> str:
     return "y" if abs(size[1]) > abs(size[0]) else "x"
 
 
+def shown_axes(s: Scenario) -> str:
+    """The axes whose velocity is drawn: "xy" where the clay changes along both, or the main one.
+
+    Args:
+        s: the scenario.
+    """
+    return "xy" if _clay_along_both_axes(s) else main_axis(s)
+
+
 def _velocity(record: Record) -> Figure | None:
     s = record.scenario
     if s.muscle is not None:
         return None
-    return velocity_plot(record, "xy" if _clay_along_both_axes(s) else _main_axis(s))
+    return velocity_plot(record, shown_axes(s))
 
 
 def _force(record: Record) -> Figure | None:
     s = record.scenario
     if s.muscle is not None or _yields(s):
-        return maneuver_plot([record], _main_axis(s))
-    return None if _clay_along_both_axes(s) else force_ratio_plot(record, _main_axis(s))
+        return maneuver_plot([record], main_axis(s))
+    return None if _clay_along_both_axes(s) else force_ratio_plot(record, main_axis(s))
 
 
 def _path(record: Record) -> Figure | None:
@@ -505,7 +519,7 @@ def _path(record: Record) -> Figure | None:
 def _force_position(record: Record) -> Figure | None:
     s = record.scenario
     some = s.muscle is not None or record.ground is not None
-    return maneuver_plot([record], _main_axis(s), "position") if some else None
+    return maneuver_plot([record], main_axis(s), "position") if some else None
 
 
 def _force_velocity(record: Record) -> Figure | None:

@@ -18,7 +18,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from ..stepping.monitor import Outcome
 from ..stepping.run import LeapfrogRun
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import gain_limit
+
+if TYPE_CHECKING:
+    from .stream import UdpStream
 
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
@@ -286,7 +289,10 @@ class Session:
         clock: of real time.
         point: that the hand pulls to [m]; None if it does not.
         frames: end of each slice so far.
+        stream: that a player tells of each slice; None for none.
     """
+
+    stream: UdpStream | None = None
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
@@ -621,7 +627,10 @@ class Replay:
         t: time reached [s].
         n: sample reached.
         frames: states shown so far.
+        stream: as of a session.
     """
+
+    stream: UdpStream | None = None
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample.
@@ -742,6 +751,8 @@ class Player(threading.Thread):
                         play.clock.rest()
                     else:
                         play.advance(play.clock.due(time.perf_counter()))
+                        if play.stream is not None:
+                            play.stream.send(play)
                 at = max(at + FRAME_TIME, time.perf_counter())
                 self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
         except Exception as error:  # raised again by stop()

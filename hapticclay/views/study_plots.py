@@ -17,7 +17,6 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, N
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES, L1, L2, ORIGIN, PATH_LENGTH
-from ..model.experiments import parameter_unit
 from ..studies.accuracy import CLEAR, SAMPLED, Ladder
 from ..studies.identification import (
     NOMINAL_POSE,
@@ -28,6 +27,7 @@ from ..studies.identification import (
     response,
 )
 from ..studies.stability_map import StabilityMap
+from ..studies.sweep import column_told
 from ..studies.workspace import DRIFT_BLOCKS, Drift
 from ..studies.yield_map import YieldMap
 from .style import (
@@ -455,16 +455,6 @@ MISSING = {  # why a run has no figure: look of its cell and of its point
     "no steady speed": dict(color=PALE_GREY, hatch="....", marker="+"),
     "no figure": dict(color=WHITE, hatch="xxxx", marker="1"),
 }
-MEASURED_UNITS = {
-    "b": "N.s/m",
-    "crossing": "s",
-    "end_time": "s",
-    "energy_residual": "of what went through",
-    "fe_over_v": "N.s/m",
-    "gain_margin": "factor on K",
-    "speed": "m/s",
-    "wall_time": "s",
-}
 
 
 def swept_parameters(table: Any) -> list[str]:
@@ -633,8 +623,7 @@ def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, lis
 
 
 def _column_label(name: str) -> str:
-    stem = name.rstrip("123").removesuffix("_x").removesuffix("_y")
-    unit = MEASURED_UNITS.get(stem) or parameter_unit(name)
+    unit = column_told(name)[0]
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 

@@ -70,8 +70,8 @@ def test_report_is_one_file_with_every_figure(written):
     text = (out / "report.html").read_text()
     names = [p.name for p in report.PICTURES if p.quick]
     for name in names:
-        assert f'id="{name}"' in text and (out / "figures" / f"{name}.png").stat().st_size > 8000
-    assert text.count("data:image/png;base64,") == len(names)
+        assert f'id="{name}"' in text and (out / "figures" / f"{name}.svg").stat().st_size > 8000
+    assert text.count("data:image/svg+xml;base64,") == len(names)
     assert not re.search(r'(src|href)="(?!data:)', text), "must not load anything"
     for figure in (
         "Fig. 4",
@@ -87,7 +87,10 @@ def test_report_is_one_file_with_every_figure(written):
     ):
         assert figure in text
     for row in rows:
-        assert report.format_number(row.ours, row.unit) in text
+        assert report.aligned(row.ours) in text and report.typeset(row.unit) in text
+    for p in report.PICTURES:  # of the paper's figures: what of it stands beside ours
+        assert (p.paper and p.paper in text) or not p.name.startswith("fig")
+    assert 'class="wide"' in text and "@page { size: A4" in text
 
 
 def test_markdown_says_the_same(written):

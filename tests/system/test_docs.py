@@ -120,8 +120,8 @@ def test_readme_commands_run(line, tmp_path, capsys, monkeypatch):
 def test_readme_figures_and_links_exist():
     for target in re.findall(r"!\[.*?\]\((.*?)\)", README):
         assert (ROOT / target).is_file(), target
-    for target in re.findall(r"`((?:docs|mjcf)/\S+?)`", README):
-        assert (ROOT / target).is_file(), target
+    for target in re.findall(r"`((?:docs|mjcf)/\S+?)`|\]\(([^)#:]+)\)", README):
+        assert (ROOT / (target[0] or target[1])).is_file(), target
     assert len(README.splitlines()) <= 95
 
 

@@ -1,0 +1,40 @@
+"""`hapticclay export`: a record as a file that other programs open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from ..errors import ParameterError
+from . import console
+
+
+@dataclass(frozen=True)
+class ExportCommand:
+    """Write a saved record for other programs: netCDF, Parquet, CSV, MCAP, Rerun or MATLAB.
+
+    Attributes:
+        record: The record: its folder, or its record.npz.
+        format: nc for xarray and MATLAB, parquet for data frames, csv for spreadsheets, mcap for
+            Foxglove, rrd for Rerun, mat for MATLAB and Octave; else the end of --out tells.
+        out: The file; an older one is replaced.
+    """
+
+    record: Annotated[Path, tyro.conf.Positional]
+    format: Literal["nc", "parquet", "csv", "mcap", "rrd", "mat"] | None = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: record.FORMAT beside the record)")
+    ] = None
+
+    def __call__(self) -> int:
+        if self.format is None and (self.out is None or not self.out.suffix):
+            bound = "must be given, as in --format csv or --out cut.csv"
+            raise ParameterError("format", "", bound)
+        record = console.load_record(self.record)
+        folder = self.record if self.record.is_dir() else self.record.parent
+        out = self.out or folder / f"record.{self.format}"
+        print(f"written to {record.export(out, self.format)}")
+        return 0

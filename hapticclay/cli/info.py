@@ -1,0 +1,98 @@
+"""`hapticclay info`: what is in a saved record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from ..display import one_line
+from ..files import versions
+from . import console
+
+if TYPE_CHECKING:
+    from ..simulation.record import Record
+
+
+@dataclass(frozen=True)
+class InfoCommand:
+    """Tell what a saved record holds: scenario, outcome, samples, arrays with units and ranges.
+
+    Attributes:
+        record: The record: its folder, or its record.npz.
+    """
+
+    record: Annotated[Path, tyro.conf.Positional]
+
+    def __call__(self) -> int:
+        record = console.load_record(self.record)
+        file = self.record / "record.npz" if self.record.is_dir() else self.record
+        print(record_text(record, file.stat().st_size))
+        return 0
+
+
+def record_text(record: Record, size: int) -> str:
+    """What a record holds, for a terminal.
+
+    Args:
+        record: the record.
+        size: of its file [bytes].
+    """
+    import numpy as np
+
+    from ..model.scenario_text import scenario_rows
+    from ..simulation.record import RECORD_SCHEMA
+
+    r, n = record, len(record.t)
+    lines = [f"record of {one_line(r.scenario.name)}, {RECORD_SCHEMA}, {_size_text(size)}"]
+    rows = [("status", r.status)]
+    rows += [("advice", r.outcome.advice)] * bool(r.outcome.advice)
+    span = f"{n}, from {r.t[0]:.6g} to {r.t[-1]:.6g} s" if n else "0"
+    step = f", every {np.median(np.diff(r.t)):.6g} s" if n > 1 else ""
+    rows.append(("samples", span + step))
+    rows.append(("run", f"{r.steps} steps in {r.wall_time:.2f} s"))
+    events = [f"{len(r.crossings)} borders crossed", f"held still {len(r.stops)} times"]
+    rows.append(("events", ", ".join(events[: 1 + bool(r.stops)])))
+    rows += [("error", one_line(r.error, 200))] * (r.error is not None)
+    rows += [("notes", ", ".join(r.notes))] * bool(r.notes)
+    rows += scenario_rows(r.scenario)
+    rows.append(("written by", "  ".join(f"{k} {v}" for k, v in r.versions.items())))
+    now = versions()["hapticclay"]
+    if r.versions.get("hapticclay") != now:
+        rows.append(("read by", f"hapticclay {now}"))
+    width = max(len(name) for name, _ in rows)
+    lines += [f"{name:{width}}  {value}" for name, value in rows]
+    return "\n".join([*lines, "", array_table(r)])
+
+
+def array_table(record: Record) -> str:
+    """Shape, unit and range of each array, for a terminal.
+
+    Args:
+        record: the record.
+    """
+    import numpy as np
+
+    from ..simulation.tables import ARRAY_UNITS, LONG_NAMES, recorded_arrays
+
+    arrays = recorded_arrays(record)
+    if record.ground is not None:
+        arrays["ground"] = record.ground
+    rows = []
+    for name, x in arrays.items():
+        known = x[np.isfinite(x)]
+        ends = [f"{v():.6g}" for v in (known.min, known.max)] if known.size else ["-", "-"]
+        shape = " x ".join(map(str, x.shape))
+        rows.append([name, shape, ARRAY_UNITS.get(name, "m"), *ends, LONG_NAMES[name]])
+    head = ("array", "shape", "unit", "lowest", "highest", "what it is")
+    return console.text_table(rows, head, "lrlrrl")
+
+
+def _size_text(size: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} GB"

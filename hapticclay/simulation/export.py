@@ -1,0 +1,173 @@
+"""A record as a file that other programs open: netCDF, Parquet, CSV, MCAP, Rerun, MATLAB."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from ..display import one_line
+from ..errors import ParameterError, choice
+from ..files import atomic
+from . import tables
+from .record import Record
+
+TOPIC = "/hapticclay"  # of MCAP
+RECORDING = "hapticclay"  # application of a Rerun recording
+ROWS = 4096  # of a text that are written at once
+
+
+def export_record(record: Record, path: str | os.PathLike[str], kind: str | None = None) -> Path:
+    """Writes a record in a format of EXPORTS, whole or not at all; an older file is replaced.
+
+    Args:
+        record: the record.
+        path: the file.
+        kind: a name in EXPORTS; None for the one that the file's name ends with.
+
+    Returns:
+        The file.
+
+    Raises:
+        ParameterError: there is no such format, a package for it is not installed, the record does
+            not fit into it, or the file cannot be written.
+    """
+    file = Path(path)
+    if kind is None:
+        kind = file.suffix[1:].lower()
+    write = EXPORTS[choice("format", kind, tuple(EXPORTS))]
+    with atomic(file) as f:
+        write(record, f)
+    return file
+
+
+def _netcdf(record: Record, file: IO[bytes]) -> None:
+    with tables.needing("nc", "h5netcdf"):
+        import h5netcdf  # noqa: F401  # xarray finds it by name
+        import h5py  # noqa: F401
+    file.write(record.to_xarray().to_netcdf(engine="h5netcdf"))
+
+
+def _parquet(record: Record, file: IO[bytes]) -> None:
+    frame = record.to_frame().reset_index()
+    with tables.needing("parquet", "pyarrow"):
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    units = frame.attrs["units"]
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    fields = [f.with_metadata({"unit": units[f.name]}) for f in table.schema]
+    pq.write_table(table.cast(pa.schema(fields, table.schema.metadata)), file)
+
+
+def _csv(record: Record, file: IO[bytes]) -> None:
+    columns, units = tables.record_columns(record), tables.column_units(record)
+    told = [f"{one_line(record.scenario.name)}: {one_line(record.status, 200)}"]
+    told.append(", ".join(f"{name} [{unit}]" for name, unit in units.items()))
+    head = [*(f"# {line}" for line in told), ",".join(columns)]
+    file.write(("\n".join(head) + "\n").encode())
+    values = np.column_stack(list(columns.values()))
+    for i in range(0, len(values), ROWS):  # repr gives back the same float
+        rows = values[i : i + ROWS].tolist()
+        file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
+
+
+def _mcap(record: Record, file: IO[bytes]) -> None:
+    with tables.needing("mcap", "mcap"):
+        from mcap.writer import Writer
+    told = tables.told_of(record)
+    writer = Writer(file)
+    writer.start(library=told["source"])
+    writer.add_metadata("hapticclay", {k: str(v) for k, v in told.items()})
+    schema = writer.register_schema(
+        "hapticclay.Sample", "jsonschema", json.dumps(_sample_schema(record)).encode()
+    )
+    channel = writer.register_channel(TOPIC, "json", schema)
+    arrays = {name: x.tolist() for name, x in tables.recorded_arrays(record).items()}
+    keys = {name: tables.parts_of(name) for name in arrays}
+    for i, t in enumerate(arrays["t"]):
+        sample = {
+            name: _finite(x[i])
+            if not keys[name]
+            else dict(zip(keys[name], map(_finite, x[i]), strict=True))
+            for name, x in arrays.items()
+        }
+        at = round(1e9 * t)
+        writer.add_message(channel, at, json.dumps(sample).encode(), at, i)
+    writer.finish()
+
+
+def _finite(x: float) -> float | None:
+    """The number; JSON has null for NaN."""
+    return x if math.isfinite(x) else None
+
+
+def _sample_schema(record: Record) -> dict[str, Any]:
+    """The JSON schema of a sample."""
+
+    def entry(name: str) -> dict[str, Any]:
+        told = {"description": f"{tables.LONG_NAMES[name]} [{tables.ARRAY_UNITS[name]}]"}
+        parts = tables.parts_of(name)
+        if not parts:
+            return {"type": "number", **told}
+        return {"type": "object", **told, "properties": {x: {"type": "number"} for x in parts}}
+
+    names = tables.recorded_arrays(record)
+    return {"type": "object", "properties": {name: entry(name) for name in names}}
+
+
+def _rerun(record: Record, file: IO[bytes]) -> None:
+    with tables.needing("rrd", "rerun-sdk", "rerun"):
+        import rerun as rr
+    told = tables.told_of(record)
+    recording = rr.RecordingStream(RECORDING)
+    memory = recording.memory_recording()  # a file of its own would not tell of a full disk
+    for name, text in told.items():
+        recording.log(f"about/{name}", rr.TextDocument(str(text)), static=True)
+    whole = np.rint(1e9 * record.t).astype("timedelta64[ns]")  # of floats it cuts the rest off
+    time = rr.TimeColumn("t", duration=whole)
+    for name, x in tables.recorded_arrays(record).items():
+        if name == "t":
+            continue
+        lines = [f"{name}_{part}" for part in tables.parts_of(name)] or [name]
+        labels = [f"{line} [{tables.ARRAY_UNITS[name]}]" for line in lines]
+        recording.log(name, rr.SeriesLines(names=labels), static=True)
+        if len(x):
+            recording.send_columns(name, indexes=[time], columns=rr.Scalars.columns(scalars=x))
+    content = memory.drain_as_bytes()
+    if content is None:
+        raise ParameterError("format", "rrd", "rerun gave no recording")
+    file.write(content)
+
+
+def _matlab(record: Record, file: IO[bytes]) -> None:
+    from scipy.io import savemat
+    from scipy.io.matlab import MatWriteError
+
+    arrays = tables.recorded_arrays(record)
+    units = {name: tables.ARRAY_UNITS[name] for name in arrays}
+    if record.ground is not None:
+        arrays, units = arrays | {"ground": record.ground}, units | {"ground": "m"}
+    told = tables.told_of(record)
+    axes = {name: np.array(tables.parts_of(name) or ("",), dtype=object) for name in units}
+    try:
+        savemat(file, {**arrays, "units": units, "columns": axes, **told}, oned_as="column")
+    except MatWriteError as error:
+        bound = f"must be smaller for a MAT file ({error}): use nc, which MATLAB reads"
+        raise ParameterError("format", "mat", bound) from None
+
+
+EXPORTS: dict[str, Callable[[Record, IO[bytes]], None]] = {
+    "nc": _netcdf,
+    "parquet": _parquet,
+    "csv": _csv,
+    "mcap": _mcap,
+    "rrd": _rerun,
+    "mat": _matlab,
+}
+"""Name of each format, and the end of its files; the function that writes a record into a file. To
+add a format, add an entry."""

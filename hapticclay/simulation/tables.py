@@ -1,0 +1,178 @@
+"""A record as columns, as a pandas DataFrame and as an xarray Dataset."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model.constants import AXES
+from ..model.fields import plain_data
+from ..model.hardware import JOINTS
+from .record import ARRAYS, EXTRA, SCALAR, Record
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+ARRAY_UNITS = ARRAYS | EXTRA
+OF_JOINTS = ("q", "qd", "tau")  # arrays whose columns are the joints; others have the axes
+LONG_NAMES = {
+    "t": "time",
+    "p": "position of the handle",
+    "v": "velocity of the handle",
+    "fh": "force of the operator on the handle",
+    "fe": "resisting force of the clay",
+    "b": "damping of the clay at the handle",
+    "q": "joint angle",
+    "qd": "joint rate",
+    "tau": "motor torque",
+    "delta": "output of the compensator",
+    "removed": "volume of clay removed",
+    "removal_rate": "rate of removal",
+    "target": "point that the hand pulls to",
+    "gain": "gain K of the compensator",
+    "ground": "height of the clay that is left",
+}
+
+
+@contextlib.contextmanager
+def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
+    """Says how to install a package where importing it fails.
+
+    Args:
+        what: what needs it, for the error.
+        package: its name.
+        extra: of hapticclay, that brings it.
+
+    Raises:
+        ParameterError: the package is not installed.
+    """
+    try:
+        yield
+    except ImportError:
+        bound = f"is not installed: pip install 'hapticclay[{extra}]'"
+        raise ParameterError(what, package, bound) from None
+
+
+def recorded_arrays(record: Record) -> dict[str, np.ndarray]:
+    """The arrays over time of a record by name, t among them, then those in `extra`.
+
+    Args:
+        record: the record.
+    """
+    return {name: getattr(record, name) for name in ARRAYS} | record.extra
+
+
+def parts_of(name: str) -> tuple[str, ...]:
+    """Names of the columns of an array: axes or joints; empty for an array of one number a sample.
+
+    Args:
+        name: of the array.
+    """
+    return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
+
+
+def record_columns(record: Record) -> dict[str, np.ndarray]:
+    """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ...
+
+    Args:
+        record: the record.
+    """
+    out = {}
+    for name, x in recorded_arrays(record).items():
+        parts = parts_of(name)
+        out |= {f"{name}_{part}": x[:, i] for i, part in enumerate(parts)} if parts else {name: x}
+    return out
+
+
+def column_units(record: Record) -> dict[str, str]:
+    """Unit of each of the `record_columns`.
+
+    Args:
+        record: the record.
+    """
+    return {
+        f"{name}_{part}" if part else name: ARRAY_UNITS[name]
+        for name in recorded_arrays(record)
+        for part in parts_of(name) or ("",)
+    }
+
+
+def told_of(record: Record) -> dict[str, Any]:
+    """Texts and numbers that go with the arrays into any file.
+
+    Args:
+        record: the record.
+
+    Returns:
+        title, source (the release), status, outcome (its code), end_time [s]; scenario, JSON of all
+        its fields; and summary, JSON of `Record.summary` without scenario and regions.
+    """
+    summary = {k: v for k, v in record.summary().items() if k not in ("scenario", "regions")}
+    return {
+        "title": f"hapticclay record: {record.scenario.name}",
+        "source": f"hapticclay {record.versions.get('hapticclay', 'unknown')}",
+        "status": record.status,
+        "outcome": record.outcome.code,
+        "end_time": float(record.outcome.time),
+        "scenario": json.dumps(plain_data(record.scenario, left_out=[])),
+        "summary": json.dumps(summary),
+    }
+
+
+def to_frame(record: Record) -> DataFrame:
+    """A record as a pandas DataFrame: see `Record.to_frame`.
+
+    Args:
+        record: the record.
+
+    Raises:
+        ParameterError: pandas is not installed.
+    """
+    with needing("to_frame", "pandas"):
+        import pandas as pd
+
+    columns = record_columns(record)
+    out = pd.DataFrame(columns, index=pd.Index(columns.pop("t"), name="t"))
+    out.attrs |= {"units": column_units(record), **told_of(record)}
+    return out
+
+
+def to_xarray(record: Record) -> Dataset:
+    """A record as an xarray Dataset: see `Record.to_xarray`.
+
+    Args:
+        record: the record.
+
+    Raises:
+        ParameterError: xarray is not installed.
+    """
+    with needing("to_xarray", "xarray"):
+        import xarray as xr
+
+    dims = {(): ("time",), AXES: ("time", "axis"), JOINTS: ("time", "joint")}
+    values: dict[str, Any] = {
+        name: (dims[parts_of(name)], x, _labels(name))
+        for name, x in recorded_arrays(record).items()
+    }
+    coords = {
+        "time": ("time", values.pop("t")[1], _labels("t")),
+        "axis": list(AXES),
+        "joint": list(JOINTS),
+    }
+    block = record.scenario.clay and record.scenario.clay.groove
+    if record.ground is not None and block:
+        for name, edges in zip(("cell_x", "cell_y"), block.edges, strict=True):
+            told = {"units": "m", "long_name": f"centre of a cell of clay along {name[-1]}"}
+            coords[name] = (name, 0.5 * (edges[1:] + edges[:-1]), told)
+        values["ground"] = (("cell_x", "cell_y"), record.ground, _labels("ground"))
+    return xr.Dataset(values, coords, told_of(record))
+
+
+def _labels(name: str) -> dict[str, str]:
+    return {"units": ARRAY_UNITS.get(name, "m"), "long_name": LONG_NAMES[name]}

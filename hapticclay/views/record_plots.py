@@ -1,0 +1,188 @@
+"""`record.plot`: the figures of `run_plots` by name, and energy over time."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..errors import ParameterError, choice
+from ..model.constants import AXES
+from ..simulation.record import Record, port_energy
+from ..stepping.energy import stored_energy
+from . import run_plots
+from .style import BLUE, GREEN, ORANGE, VERMILION, add_legend, figure_style, set_title
+
+AXIS_CHOICES = (*AXES, "xy")
+OVER_CHOICES = ("time", "position")
+
+
+class RecordPlots:
+    """The figures of a record; each call draws one and returns it.
+
+    A figure has `savefig`, and `axes` to change; notebooks show it. Lengths are in cm, as in the
+    paper's figures.
+
+    Args:
+        record: the run.
+
+    Attributes:
+        record: the run.
+    """
+
+    def __init__(self, record: Record):
+        self.record = record
+
+    def __call__(self) -> Figure:
+        """The first figure that `hapticclay run` draws: velocity, or in a maneuver the force."""
+        return next(iter(self.all().values()))
+
+    def __repr__(self) -> str:
+        return f"<plots of {self.record!r}: plot(), .velocity(), .force(), .path(), .energy()>"
+
+    def all(self) -> dict[str, Figure]:
+        """The figures that `hapticclay run` draws, by file name."""
+        figures = run_plots.figures(self._sampled())
+        return {name: _with_picture(figure) for name, figure in figures.items()}
+
+    def velocity(self, axis: str | None = None) -> Figure:
+        """Velocity over position, beside the expected steady speeds (Fig. 8, top; Fig. 10).
+
+        Args:
+            axis: "x", "y", or "xy" for a panel each; None for those along which the clay changes.
+
+        Raises:
+            ParameterError: there is no such axis, or the record has no samples.
+        """
+        record = self._sampled()
+        axis = choice("axis", axis, AXIS_CHOICES) if axis else run_plots.shown_axes(record.scenario)
+        return _with_picture(run_plots.velocity_plot(record, axis))
+
+    def force(self, axis: str | None = None, over: str | None = None) -> Figure:
+        """The forces of hand and clay: their ratio to the velocity over position (Fig. 8, bottom).
+
+        In a maneuver, in clay that yields, and where `over` is given, the operator's force itself,
+        and that of clay that yields (Fig. 11).
+
+        Args:
+            axis: "x" or "y"; None for the one along which the operator pushes.
+            over: "time" or "position"; None for the ratio where it says more.
+
+        Raises:
+            ParameterError: there is no such axis, or the record has no samples.
+        """
+        record = self._sampled()
+        s = record.scenario
+        axis = choice("axis", axis, AXES) if axis else run_plots.main_axis(s)
+        if over or s.muscle is not None or (s.clay and s.clay.yields):
+            over = choice("over", over or "time", OVER_CHOICES)
+            return _with_picture(run_plots.maneuver_plot([record], axis, over))
+        return _with_picture(run_plots.force_ratio_plot(record, axis))
+
+    def path(self) -> Figure:
+        """The path of the handle over a map of the clay (Figs. 7, 9).
+
+        Raises:
+            ParameterError: the record has no samples.
+        """
+        return _with_picture(run_plots.path_plot(self._sampled()))
+
+    def energy(self) -> Figure:
+        """Energy over time: what hand and motors have put in, what the clay took, what moves.
+
+        See `energy_plot`.
+
+        Raises:
+            ParameterError: the record has no samples.
+        """
+        return _with_picture(energy_plot(self._sampled()))
+
+    def _sampled(self) -> Record:
+        if not len(self.record.t):
+            raise ParameterError("record", self.record.scenario.name, "holds no samples")
+        return self.record
+
+
+def energies(record: Record) -> dict[str, np.ndarray]:
+    """Energies over time, from the samples.
+
+    Integrals are trapezoidal: they miss what happens between samples kept far apart, and while a
+    session did not record.
+
+    Args:
+        record: of a run.
+
+    Returns:
+        [J], shape (n,) each: put in at the handle by the "hand" (the integral of fh v), by the
+        "motors" (tau qd); taken by the "clay" (fe v); "kinetic", of the arm.
+    """
+
+    def work(power: np.ndarray) -> np.ndarray:
+        steps = 0.5 * np.diff(record.t) * (power[1:] + power[:-1])
+        return np.concatenate(([0.0], np.cumsum(steps)))
+
+    rates = record.qd[:, 0], record.qd.sum(axis=1)  # of the links
+    moving = [
+        stored_energy(record.scenario, r1, r2, (0.0, 0.0), (0.0, 0.0))[0]
+        for r1, r2 in zip(*(r.tolist() for r in rates), strict=True)
+    ]
+    return {
+        "hand": port_energy(record).sum(axis=1),
+        "motors": work((record.tau * record.qd).sum(axis=1)),
+        "clay": work((record.fe * record.v).sum(axis=1)),
+        "kinetic": np.array(moving),
+    }
+
+
+def energy_plot(record: Record) -> Figure:
+    """Plots `energies` over time, and as dots what the run itself has added up at every step.
+
+    Hand and motors put in what clay and motion have: without friction, hand + motors = clay +
+    kinetic energy gained.
+
+    Args:
+        record: of a run.
+    """
+    looks = {
+        "hand": (GREEN, "-", "put in by the hand"),
+        "motors": (ORANGE, "-", "put in by the motors"),
+        "clay": (BLUE, "-", "taken by the clay"),
+        "kinetic": (VERMILION, "--", "kinetic, of the arm"),
+    }
+    found = energies(record)
+    with figure_style():
+        figure = Figure(figsize=(6.4, 3.6))
+        ax = figure.add_subplot()
+        for name, (color, style, label) in looks.items():
+            ax.plot(record.t, found[name], color=color, ls=style, label=label)
+        if total := _added_up(record):
+            label = "added up by the run"
+            for name, value in total.items():
+                ax.plot(record.t[-1], value, "o", color=looks[name][0], ms=5, label=label)
+                label = "_"
+        ax.set(xlabel="time [s]", ylabel="energy [J]")
+        add_legend(figure, ax, ncols=3)
+        set_title(ax, record.scenario.name, record.status)
+    return figure
+
+
+def _added_up(record: Record) -> dict[str, float]:
+    """The run's own balance at the end, in the terms of `energies`; empty where it has none."""
+    e = record.energy
+    if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
+        return {}
+    hand = e["muscle"] - e["hand_damper"] - e["hand_stored"]
+    return {"hand": hand, "motors": e["motors"], "clay": e["clay"]}
+
+
+def _with_picture(figure: Figure) -> Figure:
+    """The figure, which a notebook shows although pyplot does not know of it."""
+
+    def picture() -> bytes:
+        file = io.BytesIO()
+        figure.savefig(file, format="png")
+        return file.getvalue()
+
+    figure._repr_png_ = picture  # type: ignore[attr-defined]
+    return figure

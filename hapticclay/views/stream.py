@@ -1,0 +1,79 @@
+"""A session as JSON over UDP while it goes on, in the form that PlotJuggler reads."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import socket
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ParameterError
+from ..model.constants import AXES
+from .session import FRAME_TIME
+
+if TYPE_CHECKING:
+    from .session import Frame, Replay, Session
+
+ADDRESS_FORM = "must be HOST:PORT, as in localhost:9870"
+
+
+class UdpStream:
+    """Sends the present state of a session, a datagram a call, without ever waiting.
+
+    A datagram is one JSON object: timestamp [s], which goes on over restarts; t, the time of the
+    session [s]; p [m], v [m/s], fh, fe [N], b [N.s/m] and gain [1/kg], each with x and y; held,
+    1 where clay that yields holds the handle; target [m] while the hand pulls. null stands for a
+    number that is not finite. What nobody receives is lost.
+
+    Args:
+        address: HOST:PORT, or [HOST]:PORT.
+
+    Raises:
+        ParameterError: it is no such address, or there is no such host.
+    """
+
+    def __init__(self, address: str):
+        host, _, port = address.rpartition(":")
+        if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+            raise ParameterError("stream", address, ADDRESS_FORM)
+        try:  # once: a name server may take its time
+            found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
+        except (OSError, UnicodeError) as error:
+            told = getattr(error, "strerror", None) or error
+            raise ParameterError("stream", address, f"must name a host ({told})") from None
+        family, kind, protocol, _, self._to = found[0]
+        self._socket = socket.socket(family, kind, protocol)
+        self._socket.setblocking(False)
+        self._before, self._last = 0.0, -FRAME_TIME  # time up to a restart; of this run [s]
+        self._frames: list[Frame] = []
+
+    def send(self, play: Session | Replay) -> None:
+        """Sends the last frame, if it is new; drops it where the system does not take it at once.
+
+        Args:
+            play: the session, or the replay of a record.
+        """
+        frame = play.frames[-1]
+        if play.frames is not self._frames:  # it begins, or began again
+            self._frames, self._before = play.frames, self._before + self._last + FRAME_TIME
+        elif frame.t == self._last:
+            return
+        self._last = frame.t
+        values: dict[str, Any] = {"timestamp": self._before + frame.t, "t": frame.t}
+        for name in ("p", "v", "fh", "fe"):
+            values[name] = _by_axis(getattr(frame, name))
+        values |= {"b": _by_axis(play.b), "gain": _by_axis(play.gain)}
+        values["held"] = dict(zip(AXES, map(int, frame.held), strict=True))
+        if (target := getattr(play, "point", None)) is not None:
+            values["target"] = _by_axis(target)
+        with contextlib.suppress(OSError):  # a full buffer, a network that is down
+            self._socket.sendto(json.dumps(values).encode(), self._to)
+
+    def close(self) -> None:
+        """Closes the socket."""
+        self._socket.close()
+
+
+def _by_axis(pair: tuple[float, float]) -> dict[str, float | None]:
+    return {a: x if math.isfinite(x) else None for a, x in zip(AXES, pair, strict=True)}
