@@ -31,6 +31,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "accuracy": "hapticclay.cli.accuracy:AccuracyCommand",
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
     "passivity": "hapticclay.cli.passivity:PassivityCommand",
+    "compare": "hapticclay.cli.compare:CompareCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "zwidth": "hapticclay.cli.zwidth:ZWidthCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",
