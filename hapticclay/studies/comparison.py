@@ -144,7 +144,7 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
         "stable K, worst hand [N/m]": wall_limits.hand_box_limit(wall, HANDS),
         "passive K, at most [N/m]": passive,
         "passivity margin [N.s/m]": float(np.min(wall_limits.passivity_index(wall, omega))),
-        "dynamic range, stable over passive K": high / passive if passive else math.nan,
+        "stable K over passive K": high / passive if passive else math.nan,
         **_run_numbers(record, error),
     }
     return Compared(name, wall, None, numbers, _flat(plain_data(wall)), record)
