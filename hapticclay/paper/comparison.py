@@ -89,7 +89,7 @@ def inline_svg(text: str, name: str) -> str:
 
 
 def _number_text(x: float) -> str:
-    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.5g}"
+    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.6g}"
 
 
 def _field_text(value: Any) -> str:
