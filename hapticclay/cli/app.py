@@ -32,6 +32,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "reproduce": "hapticclay.cli.reproduce:ReproduceCommand",
     "passivity": "hapticclay.cli.passivity:PassivityCommand",
     "robustness": "hapticclay.cli.robustness:RobustnessCommand",
+    "compare": "hapticclay.cli.compare:CompareCommand",
     "sweep": "hapticclay.cli.sweep:SweepCommand",
     "zwidth": "hapticclay.cli.zwidth:ZWidthCommand",
     "identify": "hapticclay.cli.identify:IdentifyCommand",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ..files import versions, writable
-from ..model.constants import AXES
+from ..model.constants import AXES, TS
 from . import console
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class PassivityCommand:
         if self.cut:
             cut = load_scenario(self.cut)
             return cut, cut
-        stiff: Any = dict(b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.012)
+        stiff: Any = dict(b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=33 * TS)
         return constant_cut(), replace(constant_cut(control="sampled", **stiff), stop=False)
 
     def _save(

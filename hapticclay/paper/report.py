@@ -254,7 +254,8 @@ def format_verdict(row: Row) -> str:
     return {True: "yes", False: "NO", None: ""}[row.agrees]
 
 
-def _environment():
+def template_environment() -> Any:
+    """The templates of this room, with filters for numbers and verdicts."""
     import jinja2
 
     env = jinja2.Environment(
@@ -282,7 +283,7 @@ def paper_page(rows: list[Row]) -> str:
     Args:
         rows: of the ledger.
     """
-    return _environment().get_template("paper.md").render(rows=rows, statuses=STATUSES)
+    return template_environment().get_template("paper.md").render(rows=rows, statuses=STATUSES)
 
 
 def reproduce(
@@ -324,7 +325,7 @@ def reproduce(
         code = base64.b64encode(svg.encode()).decode()
         pictures.append({"picture": p, "data": code, "wide": wide})
     found = {"rows": rows, "statuses": STATUSES, "pictures": pictures, "versions": versions()}
-    env = _environment()
+    env = template_environment()
     for name in ("report.html", "report.md"):
         with atomic(out / name) as f:
             f.write(env.get_template(name).render(found).encode())

@@ -1,0 +1,57 @@
+"""`hapticclay compare`: controllers or bare devices side by side on one page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from ..files import atomic, versions, writable
+from . import console
+
+COMPARE_SCHEMA = "hapticclay-compare-1"
+
+
+@dataclass(frozen=True)
+class CompareCommand:
+    """Set controllers, or bare devices, side by side: key numbers, figures and fields on one page.
+
+    Attributes:
+        source: Two to five scenario files, or files of walls.
+        axis: Axis of the arm.
+        out: Folder for compare.html (self-contained), compare.json and the figures.
+        figures: Formats and style of the figures; those of the page are for a screen.
+    """
+
+    source: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    axis: Literal["x", "y"] = "x"
+    out: Path = Path("out/compare")
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        from ..paper.comparison import comparison_page, number_rows
+        from ..studies.comparison import compare_files, differing_fields
+        from ..views.compare_plots import compare_figures
+
+        writable(self.out)
+        found = compare_files(self.source, self.axis)
+        rows = [[name, *cells] for name, cells in number_rows(found).items()]
+        try:
+            with atomic(self.out / "compare.html") as f:
+                f.write(comparison_page(found).encode())
+            data = {
+                "schema": COMPARE_SCHEMA,
+                "files": {x.name: x.numbers for x in found},
+                "fields": differing_fields(found),
+                "versions": versions(),
+            }
+            console.save_json(data, self.out / "compare.json")
+            figures = {name: figure for name, (_, figure) in compare_figures(found).items()}
+            console.save_figures(figures, self.out, self.figures)
+        finally:  # a full disk must not hide the results
+            names = [x.name for x in found]
+            print(console.text_table(rows, ["", *names], "l" + "r" * len(names)))
+        print(f"page: {(self.out / 'compare.html').resolve()}")
+        return 0

@@ -1,0 +1,96 @@
+"""The page of `hapticclay compare`: controllers or bare devices side by side."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from ..files import versions
+from ..model.virtual_wall import VirtualWall
+from ..studies.comparison import HANDS, PUSHED, Compared, differing_fields
+from ..views.compare_plots import compare_figures
+from .report import template_environment
+
+SVG_COLORS = {  # of a figure, and the variable of the page that takes its place, light or dark
+    "#000000": "--ink",
+    "#222222": "--ink",
+    "#262626": "--ink",
+    "#555555": "--soft",
+    "#ffffff": "--paper",
+    "#e6e6e6": "--grid",
+    "#0072b2": "--blue",
+    "#d55e00": "--red",
+    "#009e73": "--green",
+    "#cc79a7": "--pink",
+    "#e69f00": "--amber",
+}
+ABOUT = {
+    True: f"Bare devices with a virtual wall each; the run is a push of {1e3 * PUSHED:g} mm/s.",
+    False: "Controllers, each with its own scenario, which is also its run.",
+}
+NOTES = {
+    True: "Stable and passive stiffness are exact for the linear wall at its own B, M, Ts and "
+    "delay; friction and encoder are left out. ",
+    False: "The gain limit has the scenario's sampling and delay; margins, worst hand, passivity "
+    "and damper are of continuous time. ",
+}
+
+
+def comparison_page(found: Sequence[Compared]) -> str:
+    """Renders a comparison as one HTML page that needs no other file.
+
+    Args:
+        found: from `compare_files`.
+    """
+    walls = isinstance(found[0].subject, VirtualWall)
+    (m0, m1), (d0, d1), (k0, k1) = HANDS.mass, HANDS.damper, HANDS.spring
+    hands = f"Worst hand of {m0:g} to {m1:g} kg, {d0:g} to {d1:g} N.s/m, {k0:g} to {k1:g} N/m."
+    context = {
+        "names": [x.name for x in found],
+        "about": ABOUT[walls],
+        "notes": NOTES[walls] + hands,
+        "numbers": number_rows(found),
+        "pictures": [
+            {"name": name, "title": title, "svg": inline_svg(figure.svg(), name)}
+            for name, (title, figure) in compare_figures(found).items()
+        ],
+        "fields": {
+            name: [_field_text(x) for x in row] for name, row in differing_fields(found).items()
+        },
+        "versions": versions(),
+    }
+    return template_environment().get_template("compare.html").render(context)
+
+
+def number_rows(found: Sequence[Compared]) -> dict[str, list[str]]:
+    """Key numbers as text, a row a number, a cell a file.
+
+    Args:
+        found: from `compare_files`.
+    """
+    rows = {name: [_number_text(x.numbers[name]) for x in found] for name in found[0].numbers}
+    return rows | {"outcome of its run": [x.record.status for x in found]}
+
+
+def inline_svg(text: str, name: str) -> str:
+    """An SVG file made fit to stand in a page: no head, names of its own, colours of the page.
+
+    Args:
+        text: of the file.
+        name: put before its ids.
+    """
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
+    text = re.sub(r'\b(id="|href="#|url\(#)', rf"\g<1>{name}-", text)
+    for color, variable in SVG_COLORS.items():
+        text = re.sub(f"{color}\\b", f"var({variable})", text, flags=re.I)
+    return text
+
+
+def _number_text(x: float) -> str:
+    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.6g}"
+
+
+def _field_text(value: Any) -> str:
+    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,225 @@
+"""Controllers or bare devices side by side: key numbers, runs, and the fields that differ."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model.constants import AXES
+from ..model.fields import plain_data
+from ..model.scenario import Scenario
+from ..model.scenario_file import load_scenario, read_settings
+from ..model.virtual_wall import WALL_SCHEMA, VirtualWall
+from ..simulation.record import Record
+from ..simulation.simulate import simulate
+from ..theory import design, margins, wall_limits
+from ..theory.gain_limit import gain_limit
+from ..theory.impedance import loop_impedance
+from ..theory.linear_loop import TIMING, Loop
+
+MOST_COMPARED = 5  # as many looks as curves have
+HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
+SLOW = 1e-4  # [rad/s] at which motion counts as steady
+PUSHED = 0.01  # [m/s] of a device in its run
+PUSHED_TIME = 0.5  # [s] of that run
+WALL_WORDS = frozenset(("device", "K", "B", "M", "window", "velocity_filter", "surface"))
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """One file: what it says, what theory says of it, and its run.
+
+    Attributes:
+        name: of the file.
+        subject: the scenario, or the wall on its device.
+        loop: of a scenario, one axis; None for a wall.
+        numbers: key numbers by name and unit; NaN where there is none.
+        settings: every field by dotted name.
+        record: its run.
+    """
+
+    name: str
+    subject: Scenario | VirtualWall
+    loop: Loop | None
+    numbers: dict[str, float]
+    settings: dict[str, Any]
+    record: Record
+
+
+def compare_files(paths: Sequence[str | os.PathLike[str]], axis: str = "x") -> tuple[Compared, ...]:
+    """Loads, judges and runs controllers (scenario files) or bare devices (files of walls).
+
+    Args:
+        paths: two to MOST_COMPARED files of one kind.
+        axis: of the arm, for scenarios.
+
+    Raises:
+        ParameterError: fewer or more files, files of both kinds, or one that cannot be read.
+    """
+    if not 2 <= len(paths) <= MOST_COMPARED:
+        bound = f"must be 2 to {MOST_COMPARED} files"
+        raise ParameterError("files", [str(p) for p in paths], bound)
+    kinds = {is_wall_file(p) for p in paths}
+    if len(kinds) > 1:
+        bound = "must be all scenarios or all walls: their numbers do not compare"
+        raise ParameterError("files", [str(p) for p in paths], bound)
+    stems = [Path(p).stem for p in paths]
+    names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]
+    judge = compared_wall if kinds == {True} else compared_scenario
+    return tuple(judge(p, n, axis) for p, n in zip(paths, names, strict=True))
+
+
+def is_wall_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is that of a virtual wall.
+
+    Args:
+        path: the file, .toml or .json.
+    """
+    data = read_settings(path)
+    return data.get("schema") == WALL_SCHEMA or bool(WALL_WORDS & {k.split(".")[0] for k in data})
+
+
+def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Compared:
+    """Judges and runs the controller of a scenario file.
+
+    Margins, hands, passivity and the steady damper are those of continuous time without delay; the
+    gain limit is that of the scenario's own sampling and delay.
+
+    Args:
+        path: the file.
+        name: to be shown.
+        axis: "x" or "y".
+    """
+    scenario = load_scenario(path)
+    loop = Loop.of(scenario, axis)
+    plain = replace(loop, **TIMING)
+    record, error = run_and_error(scenario)
+    alone = replace(plain, operator=None)
+    m = margins.margins(plain)
+    Z = loop_impedance(alone, np.array([SLOW]))[0]
+    steady = Z.real - loop.b if SLOW * abs(Z.imag) < 1e-3 * max(abs(Z.real), 1.0) else math.nan
+    numbers = {
+        "gain K [1/kg]": loop.gain,
+        "clay b [N.s/m]": loop.b,
+        "gain limit, as sampled [1/kg]": gain_limit(loop),
+        "gain margin": m.gain[1] if m.stable else math.nan,
+        "phase margin [degrees]": math.degrees(m.phase) if m.stable else math.nan,
+        "delay margin [ms]": 1e3 * m.delay if m.stable else math.nan,
+        "disk margin": m.disk if m.stable else math.nan,
+        "gain limit, worst hand [1/kg]": worst_limit(plain),
+        "passivity margin [N.s/m]": _passivity_margin(alone),
+        "steady damper [N.s/m]": steady,
+        "error of transparency": design.transparency_error(plain) if loop.gain else math.nan,
+        **_run_numbers(record, error),
+    }
+    return Compared(name, scenario, loop, numbers, _flat(plain_data(scenario, left_out=[])), record)
+
+
+def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> Compared:
+    """Judges and runs the wall of a file.
+
+    Args:
+        path: the file.
+        name: to be shown.
+        axis: not used; as in `compared_scenario`.
+    """
+    wall = VirtualWall.load(path)
+    record, error = run_and_error(wall.scenario(PUSHED_TIME, push=PUSHED))
+    low, high = wall_limits.stiffness_band(wall)
+    passive = wall_limits.colgate_schenkel_limit(wall)
+    edge = math.pi / wall.Ts
+    omega = np.geomspace(1e-4 * edge, edge * (1.0 - 1e-9), 2000)
+    numbers = {
+        "stiffness K [N/m]": wall.K,
+        "damping B [N.s/m]": wall.B,
+        "stable K, at least [N/m]": low,
+        "stable K, at most [N/m]": high,
+        "stable K, worst hand [N/m]": wall_limits.hand_box_limit(wall, HANDS),
+        "passive K, at most [N/m]": passive,
+        "passivity margin [N.s/m]": float(np.min(wall_limits.passivity_index(wall, omega))),
+        "stable K over passive K": high / passive if passive else math.nan,
+        **_run_numbers(record, error),
+    }
+    return Compared(name, wall, None, numbers, _flat(plain_data(wall)), record)
+
+
+def worst_limit(loop: Loop) -> float:
+    """Largest K up to which every hand of HANDS is stable; NaN for a gain of zero.
+
+    Args:
+        loop: one axis, in continuous time.
+    """
+    return margins.worst_case(loop, HANDS).limit if loop.gain else math.nan
+
+
+def _passivity_margin(loop: Loop) -> float:
+    from ..theory.passivity import passivity
+
+    return passivity(loop).margin
+
+
+def run_and_error(scenario: Scenario) -> tuple[Record, float]:
+    """Runs a scenario, and again at half the step.
+
+    Args:
+        scenario: the run.
+
+    Returns:
+        The record; the largest change of position at the samples that both have [m], NaN where
+        they end differently. It is about the error of the second run times 3.
+    """
+    record = simulate(scenario)
+    sampled = scenario.control == "sampled"
+    finer = replace(
+        scenario, dt=0.5 * scenario.dt, Ts=(scenario.Ts or scenario.dt) if sampled else None
+    )
+    fine = simulate(finer)
+    n = min(len(record.t), (len(fine.t) + 1) // 2) - 1
+    if n < 1 or record.outcome.code != fine.outcome.code:
+        return record, math.nan
+    return record, float(np.abs(record.p[:n] - fine.p[::2][:n]).max())
+
+
+def _run_numbers(record: Record, error: float) -> dict[str, float]:
+    return {
+        "simulated [s]": float(record.t[-1]) if len(record.t) else 0.0,
+        "change of position at half the step [m]": error,
+        "engine steps": float(record.steps),
+        "run time [s]": record.wall_time,
+    }
+
+
+def differing_fields(found: Sequence[Compared]) -> dict[str, list[Any]]:
+    """Fields that are not alike in all files: the value of each file, None where it has none.
+
+    Args:
+        found: from `compare_files`.
+    """
+    names = dict.fromkeys(name for x in found for name in x.settings if name != "name")
+    rows = {name: [x.settings.get(name) for x in found] for name in names}
+    return {name: row for name, row in rows.items() if any(v != row[0] for v in row[1:])}
+
+
+def main_axis(scenario: Scenario) -> str:
+    """The axis along which the muscle pushes most.
+
+    Args:
+        scenario: the run.
+    """
+    return AXES[int(abs(scenario.force[1]) > abs(scenario.force[0]))]
+
+
+def _flat(data: Any, path: str = "") -> dict[str, Any]:
+    if isinstance(data, dict):
+        out: dict[str, Any] = {}
+        for name, value in data.items():
+            out |= _flat(value, f"{path}.{name}" if path else str(name))
+        return out
+    return {path: data}

@@ -1,0 +1,136 @@
+"""Controllers and devices side by side: numbers against the analysis of each, and the page."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.cli import app
+from hapticclay.errors import ParameterError
+from hapticclay.paper.comparison import SVG_COLORS, comparison_page, inline_svg
+from hapticclay.studies import comparison
+
+SCENES = {
+    "printed": 'experiment = "constant"\nt_max = 0.5\n',
+    "faster": 'experiment = "constant"\nt_max = 0.5\nb = 60\ngain = [2.0, 0.5]\n',
+}
+WALLS = {
+    "near": "K = 500\ndevice.damper = 1.0\n",
+    "far": 'K = 300\ndevice.damper = 2.0\nTs = "2 ms"\n',
+}
+
+
+def files(folder, texts):
+    paths = []
+    for name, text in texts.items():
+        paths.append(folder / f"{name}.toml")
+        paths[-1].write_text(text)
+    return paths
+
+
+@pytest.fixture(scope="module")
+def controllers(tmp_path_factory):
+    return comparison.compare_files(files(tmp_path_factory.mktemp("c"), SCENES))
+
+
+@pytest.fixture(scope="module")
+def walls(tmp_path_factory):
+    return comparison.compare_files(files(tmp_path_factory.mktemp("w"), WALLS))
+
+
+def test_numbers_are_those_of_the_analysis(controllers):
+    for x, (K, b) in zip(controllers, ((1.0, 90.0), (2.0, 60.0)), strict=True):
+        n, m = x.numbers, hc.margins("x", K, b, operator=None)
+        assert n["gain K [1/kg]"] == K and n["clay b [N.s/m]"] == b
+        # the arm's own mobility differs from the printed gain of Sh by some percent
+        assert n["gain margin"] == pytest.approx(m.gain[1], rel=0.05)
+        assert n["steady damper [N.s/m]"] == pytest.approx(10.0 / K, rel=1e-4)  # 10/K, the paper's
+        assert n["engine steps"] == x.record.steps
+        assert 0.0 < n["change of position at half the step [m]"] < 1e-6
+        assert n["gain limit, worst hand [1/kg]"] <= n["gain limit, as sampled [1/kg]"] * (1 + 1e-9)
+
+
+def test_numbers_of_walls_are_the_closed_forms(walls):
+    for x, (K, b, Ts) in zip(walls, ((500.0, 1.0, 1e-3), (300.0, 2.0, 2e-3)), strict=True):
+        assert x.numbers["passive K, at most [N/m]"] == pytest.approx(2.0 * b / Ts)
+        assert x.numbers["passivity margin [N.s/m]"] == pytest.approx(b - 0.5 * K * Ts)
+        assert x.numbers["stable K, at most [N/m]"] >= 2.0 * b / Ts
+        # a passive hand cannot make a passive wall unstable
+        assert x.numbers["stable K, worst hand [N/m]"] >= 2.0 * b / Ts * (1.0 - 1e-6)
+
+
+def test_only_fields_that_differ_are_told(controllers, walls):
+    fields = comparison.differing_fields(controllers)
+    assert {"gain", "clay.x.values"} <= {re.sub(r"\.\d+$", "", k) for k in fields} or fields
+    assert not any(name.startswith("arm") for name in fields)
+    told = comparison.differing_fields(walls)
+    assert told == {"K": [500.0, 300.0], "device.damper": [1.0, 2.0], "Ts": [1e-3, 2e-3]}
+
+
+class Page(HTMLParser):
+    """Ids, tags and what they point to."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.tags = [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        for name, value in attrs:
+            self.ids += [value] * (name == "id")
+            self.links += [value] * (name in ("src", "href", "xlink:href"))
+
+
+@pytest.mark.parametrize("kind", ["controllers", "walls"])
+def test_the_page_needs_no_other_file(kind, request):
+    found = request.getfixturevalue(kind)
+    text = comparison_page(found)
+    page = Page(text)
+    assert page.tags.count("svg") == {"controllers": 5, "walls": 4}[kind]
+    assert all(link.startswith("#") for link in page.links)
+    assert len(page.ids) == len(set(page.ids))
+    assert {link[1:] for link in page.links} <= set(page.ids)
+    assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
+    assert "prefers-color-scheme: dark" in text and "@page" in text
+    for x in found:
+        assert text.count(x.name) >= 3
+
+
+def test_an_inline_picture_takes_the_colours_of_the_page():
+    text = '<?xml?><svg><g id="a" style="fill: #222222"/><use href="#a"/></svg>'
+    assert inline_svg(text, "p") == (
+        '<svg><g id="p-a" style="fill: var(--ink)"/><use href="#p-a"/></svg>'
+    )
+    assert all(re.fullmatch("#[0-9a-f]{6}", color) for color in SVG_COLORS)
+
+
+def test_the_command_writes_page_numbers_and_figures(tmp_path, capsys):
+    paths = files(tmp_path, WALLS)
+    words = ["compare", *map(str, paths), "--format", "pdf", "--data", "--out", str(tmp_path / "o")]
+    assert app.main(words) == 0
+    names = {p.name for p in (tmp_path / "o").iterdir()}
+    assert {"compare.html", "compare.json", "zwidth.pdf", "zwidth.csv"} <= names
+    data = json.loads((tmp_path / "o" / "compare.json").read_text())
+    assert data["files"]["near"]["stiffness K [N/m]"] == 500.0
+    assert "near" in capsys.readouterr().out
+
+
+def test_what_does_not_compare_is_refused(tmp_path):
+    scene, wall = files(tmp_path, {"a": SCENES["printed"], "b": WALLS["near"]})
+    with pytest.raises(ParameterError, match="all scenarios or all walls"):
+        comparison.compare_files([scene, wall])
+    with pytest.raises(ParameterError, match="2 to 5"):
+        comparison.compare_files([wall])
+    with pytest.raises(ParameterError):
+        comparison.compare_files([wall, tmp_path / "none.toml"])
+
+
+def test_the_run_changes_with_the_square_of_the_step():
+    """Second order: a quarter at half the step; half the tolerance for the next order."""
+    scene = hc.constant_cut(t_max=0.3)
+    errors = [comparison.run_and_error(hc.with_fields(scene, {"dt": dt}))[1] for dt in (4e-4, 2e-4)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
