@@ -192,3 +192,44 @@ def test_the_tables_ask_all_questions():
         "plot",
     ):
         assert word in asked, word
+
+
+START = (ROOT / "docs" / "start.md").read_text()
+
+
+@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", START, re.S))
+def test_start_page_says_what_it_prints(block, tmp_path):
+    out = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
+
+
+@pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", START, re.M))
+def test_start_page_commands_run(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert app.main([*shlex.split(line), "--no-plots"]) == 0
+
+
+API = "\n".join(page.read_text() for page in sorted((ROOT / "docs" / "api").glob("*.rst")))
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+
+
+def test_the_reference_has_every_public_name_once():
+    told = re.findall(r"^\.\. (?:auto\w+|py:data):: (\w+)$", API, re.M)
+    public = set(hc.__all__) - {"__version__"}
+    assert sorted(name for name in told if name in public) == sorted(public)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
+def test_links_within_the_documents_lead_somewhere(page):
+    """Files exist, and headings too; the site's own build checks them again."""
+    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", page.read_text()):
+        name, _, heading = target.partition("#")
+        if re.match(r"(gallery|tutorials)/", name):  # made by the build
+            continue
+        file = page.parent / name if name else page
+        assert file.is_file(), target
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", file.read_text(), re.M)
+            assert heading in {re.sub(r"[^\w\- ]", "", t.lower()).replace(" ", "-") for t in titles}
