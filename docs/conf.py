@@ -19,6 +19,7 @@ sys.path.insert(0, str(DOCS.parent))  # the checkout, not an installed release
 
 import numpy as np  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
+from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
 
@@ -54,6 +55,7 @@ html_title = f"hapticclay {release}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
+pygments_dark_style = "monokai"
 
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True  # the fields of a part in one list
@@ -66,11 +68,17 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
+SOURCES = [*DOCS.parent.glob("examples/*/*.py"), *DOCS.parent.glob("tutorials/*.py")]
+FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
 sphinx_gallery_conf = {
     "examples_dirs": ["../tutorials", "../examples"],
     "gallery_dirs": ["tutorials", "gallery"],
     "filename_pattern": r"\.py$",
-    "within_subsection_order": "FileNameSortKey",
+    "subsection_order": ExplicitOrder(
+        [f"../examples/{x}" for x in ("runs", "clay", "parts", "hardware", "theory", "studies")]
+        + ["*"]
+    ),
+    "within_subsection_order": ExplicitOrder(FIRST + sorted({x.name for x in SOURCES} - {*FIRST})),
     "backreferences_dir": "gallery/backreferences",
     "doc_module": ("hapticclay",),
     "abort_on_example_error": True,
@@ -252,9 +260,13 @@ def examples_of(name: str) -> list[str]:
 def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
     """Examples by the public name that they use, and how many names each uses."""
     uses: dict[str, set[str]] = collections.defaultdict(set)
-    for path in [*DOCS.parent.glob("examples/*/*.py"), *DOCS.parent.glob("tutorials/*.py")]:
+    for path in SOURCES:
         for name in set(re.findall(r"\bhc\.(\w+)", path.read_text())):
             uses[f"hapticclay.{name}"].add(os.path.relpath(path, DOCS))
+    for name in hc.__all__:  # what a function returns, as a Verdict
+        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
+        for result in set(re.findall(r"\w+", returned)) & set(hc.__all__):
+            uses[f"hapticclay.{result}"] |= uses[f"hapticclay.{name}"]
     return uses, collections.Counter(path for paths in uses.values() for path in paths)
 
 

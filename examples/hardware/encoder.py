@@ -34,7 +34,7 @@ for ax, (name, part) in zip(axes, parts.items(), strict=True):
     ax.set_title(f"{name}: rms {100 * rms:.1f} %", fontsize=9, loc="left")
 count = 0.24 * math.tau / counts / Ts / record.v[-1, 0]
 print(f"one count of the shoulder in a sample: {100 * count:.0f} % of the speed")
-axes[0].set(xlim=(7.9, 8.2), ylim=(-150, 400))
+axes[0].set(xlim=(7.9, 8.2), ylim=(-20, 220))
 axes[-1].set_xlabel("position x [cm]")
 fig.supylabel("force of the clay over velocity [N·s/m]", fontsize=10)
 plt.show()

@@ -129,7 +129,9 @@ def test_make_targets_named_in_the_documents_exist():
     makefile = (ROOT / "Makefile").read_text()
     for text in (README, (ROOT / "CONTRIBUTING.md").read_text()):
         for names in re.findall(
-            r"^    make ((?:demo|test|coverage|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M
+            r"^    make ((?:demo|test|coverage|check|docs|bench|build)(?: \w+)*?)(?:  |$)",
+            text,
+            re.M,
         ):
             for name in names.split():
                 assert re.search(rf"^{name}:", makefile, re.M), name
@@ -219,6 +221,19 @@ def test_the_reference_has_every_public_name_once():
     told = re.findall(r"^\.\. (?:auto\w+|py:data):: (\w+)$", API, re.M)
     public = set(hc.__all__) - {"__version__"}
     assert sorted(name for name in told if name in public) == sorted(public)
+
+
+SOURCES = [*(ROOT / "examples").rglob("*.py"), *(ROOT / "tutorials").glob("*.py")]
+
+
+def test_every_public_name_has_an_example():
+    """Its own, that of a function which returns it, or one that its entry names."""
+    used = set(re.findall(r"\bhc\.(\w+)", "\n".join(x.read_text() for x in SOURCES)))
+    for name in used & set(hc.__all__):
+        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
+        used |= set(re.findall(r"\w+", returned))
+    entry = r"^\.\. auto\w+:: (\w+)\n(?:   :.*\n)*\n   (?:\.\. minigallery::|Example:)"
+    assert set(hc.__all__) - {"__version__"} <= used | set(re.findall(entry, API, re.M))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
