@@ -37,7 +37,7 @@ check: .venv/dev.done  ## lint, types, layers
 	@touch $@
 
 docs: .venv/docs.done  ## the site, examples run, warnings are errors: out/docs/index.html
-	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
+	$(BIN)/python -m sphinx -E -W --keep-going -q docs out/docs
 
 linkcheck: .venv/docs.done  ## follow the links of the site to other sites
 	$(BIN)/python -m sphinx -W --keep-going -q -b linkcheck docs out/linkcheck
