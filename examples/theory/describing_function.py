@@ -1,6 +1,6 @@
 """
-The damper that yielding clay is
-================================
+Yielding clay as a damper
+=========================
 
 For an oscillation of velocity amplitude V, clay acts as a damper N(V), stiff at small speeds. Where
 N lies in a band of dampings in which the loop is unstable, oscillations grow.
