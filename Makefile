@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test coverage check bench build clean
+.PHONY: demo test coverage check docs linkcheck bench build clean
 .DELETE_ON_ERROR:
 
 .venv/run.done: pyproject.toml
@@ -32,6 +32,16 @@ check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
 
+.venv/docs.done: .venv/dev.done
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@touch $@
+
+docs: .venv/docs.done  ## the site, examples run, warnings are errors: out/docs/index.html
+	$(BIN)/python -m sphinx -E -W --keep-going -q docs out/docs
+
+linkcheck: .venv/docs.done  ## follow the links of the site to other sites
+	$(BIN)/python -m sphinx -W --keep-going -q -b linkcheck docs out/linkcheck
+
 bench: .venv/dev.done  ## error against run time, stiff and extreme scenes, throughput: one page in out/bench
 	$(BIN)/hapticclay bench --quick
 
@@ -39,4 +49,4 @@ build: .venv/dev.done  ## wheel and sdist into dist/
 	$(BIN)/python -m build --quiet
 
 clean:
-	rm -rf .venv out dist
+	rm -rf .venv out dist docs/gallery docs/tutorials

@@ -129,7 +129,9 @@ def test_make_targets_named_in_the_documents_exist():
     makefile = (ROOT / "Makefile").read_text()
     for text in (README, (ROOT / "CONTRIBUTING.md").read_text()):
         for names in re.findall(
-            r"^    make ((?:demo|test|coverage|check|bench|build)(?: \w+)*?)(?:  |$)", text, re.M
+            r"^    make ((?:demo|test|coverage|check|docs|bench|build)(?: \w+)*?)(?:  |$)",
+            text,
+            re.M,
         ):
             for name in names.split():
                 assert re.search(rf"^{name}:", makefile, re.M), name
@@ -192,3 +194,57 @@ def test_the_tables_ask_all_questions():
         "plot",
     ):
         assert word in asked, word
+
+
+START = (ROOT / "docs" / "start.md").read_text()
+
+
+@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", START, re.S))
+def test_start_page_says_what_it_prints(block, tmp_path):
+    out = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
+
+
+@pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", START, re.M))
+def test_start_page_commands_run(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert app.main([*shlex.split(line), "--no-plots"]) == 0
+
+
+API = "\n".join(page.read_text() for page in sorted((ROOT / "docs" / "api").glob("*.rst")))
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+
+
+def test_the_reference_has_every_public_name_once():
+    told = re.findall(r"^\.\. (?:auto\w+|py:data):: (\w+)$", API, re.M)
+    public = set(hc.__all__) - {"__version__"}
+    assert sorted(name for name in told if name in public) == sorted(public)
+
+
+SOURCES = [*(ROOT / "examples").rglob("*.py"), *(ROOT / "tutorials").glob("*.py")]
+
+
+def test_every_public_name_has_an_example():
+    """Its own, that of a function which returns it, or one that its entry names."""
+    used = set(re.findall(r"\bhc\.(\w+)", "\n".join(x.read_text() for x in SOURCES)))
+    for name in used & set(hc.__all__):
+        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
+        used |= set(re.findall(r"\w+", returned))
+    entry = r"^\.\. auto\w+:: (\w+)\n(?:   :.*\n)*\n   (?:\.\. minigallery::|Example:)"
+    assert set(hc.__all__) - {"__version__"} <= used | set(re.findall(entry, API, re.M))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
+def test_links_within_the_documents_lead_somewhere(page):
+    """Files exist, and headings too; the site's own build checks them again."""
+    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", page.read_text()):
+        name, _, heading = target.partition("#")
+        if re.match(r"(gallery|tutorials)/", name):  # made by the build
+            continue
+        file = page.parent / name if name else page
+        assert file.is_file(), target
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", file.read_text(), re.M)
+            assert heading in {re.sub(r"[^\w\- ]", "", t.lower()).replace(" ", "-") for t in titles}

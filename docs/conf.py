@@ -1,0 +1,278 @@
+"""Sphinx configuration: `make docs` builds the site, docs/*.md are its pages.
+
+docs/gallery and docs/tutorials are made from examples/ and tutorials/, and no part of the checkout.
+"""
+
+import collections
+import functools
+import os
+import re
+import sys
+import typing
+import zlib
+from pathlib import Path
+
+os.environ.setdefault("MPLBACKEND", "agg")
+DOCS = Path(__file__).parent
+COLON = "\N{RATIO}"  # stands for a colon while napoleon looks for one
+sys.path.insert(0, str(DOCS.parent))  # the checkout, not an installed release
+
+import numpy as np  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
+
+import hapticclay as hc  # noqa: E402
+
+CHECKED = {"np": np, "Figure": Figure, "Accuracy": hc.Accuracy}  # imported for type checks alone
+
+project = "hapticclay"
+author = "The hapticclay authors"
+copyright = author
+version = release = hc.__version__
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.intersphinx",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["gallery/**/*.ipynb", "**/sg_execution_times.rst"]
+highlight_language = "none"  # indented blocks are equations and commands
+default_role = "py:obj"  # `name` in a docstring links to the name, where there is one
+myst_heading_anchors = 4
+suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:obj", ".*"),  # `text` in a docstring may be any code
+    ("py:class", r"hapticclay\.model\.fields\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
+]
+linkcheck_timeout = 20
+
+html_theme = "furo"
+html_title = f"hapticclay {release}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+pygments_dark_style = "monokai"
+
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True  # the fields of a part in one list
+napoleon_use_rtype = False
+napoleon_attr_annotations = False  # the signature has the types
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+autodoc_typehints = "signature"
+python_maximum_signature_line_length = 88
+add_module_names = False
+toc_object_entries_show_parents = "hide"
+
+SOURCES = [*DOCS.parent.glob("examples/*/*.py"), *DOCS.parent.glob("tutorials/*.py")]
+FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
+sphinx_gallery_conf = {
+    "examples_dirs": ["../tutorials", "../examples"],
+    "gallery_dirs": ["tutorials", "gallery"],
+    "filename_pattern": r"\.py$",
+    "subsection_order": ExplicitOrder(
+        [f"../examples/{x}" for x in ("runs", "clay", "parts", "hardware", "theory", "studies")]
+        + ["*"]
+    ),
+    "within_subsection_order": ExplicitOrder(FIRST + sorted({x.name for x in SOURCES} - {*FIRST})),
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("hapticclay",),
+    "abort_on_example_error": True,
+    "capture_repr": (),
+    "image_srcset": ["2x"],
+    "write_computation_times": False,
+    "download_all_examples": False,
+}
+
+
+def write_inventories(folder: Path) -> dict[str, tuple[str, str]]:
+    """Turns docs/objects.txt into inventories, so that a build needs no network.
+
+    Args:
+        folder: where they are written.
+
+    Returns:
+        `intersphinx_mapping`.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    mapping, names = {}, {}
+    for line in (DOCS / "objects.txt").read_text().splitlines():
+        if line.startswith("["):
+            project, address = line.strip("[]").split()
+            mapping[project] = (address, str(folder / f"{project}.inv"))
+            names[project] = []
+        elif line:
+            name, role, place = line.split()
+            names[project].append(f"{name} py:{role} 1 {place} -\n")
+    for project, lines in names.items():
+        head = f"# Sphinx inventory version 2\n# Project: {project}\n# Version:\n"
+        head += "# The remainder of this file is compressed using zlib.\n"
+        body = zlib.compress("".join(lines).encode())
+        (folder / f"{project}.inv").write_bytes(head.encode() + body)
+    return mapping
+
+
+intersphinx_mapping = write_inventories(DOCS.parent / "out" / "inventories")
+
+
+def list_others(app, docname: str, source: list[str]) -> None:
+    """Lists under How-to the pages of docs/ that no other page lists.
+
+    Args:
+        app: the application.
+        docname: name of the page.
+        source: its text, changed in place.
+    """
+    if docname == "howto":
+        listed = {
+            "index",
+            *re.findall(r"^[\w/]+$", "\n".join(map(toctrees, DOCS.glob("*.md"))), re.M),
+        }
+        others = sorted(page.stem for page in DOCS.glob("*.md") if page.stem not in listed)
+        source[0] = source[0].replace("(others)", "\n".join(others))
+
+
+def toctrees(page: Path) -> str:
+    """The toctrees of a page.
+
+    Args:
+        page: its file.
+    """
+    return "\n".join(re.findall(r"^```\{toctree\}\n(.*?)^```", page.read_text(), re.M | re.S))
+
+
+def plain_types(app, call, bound_method: bool) -> None:
+    """Resolves the types of a signature, without bounds: the docstring states these.
+
+    Args:
+        app: the application.
+        call: the function.
+        bound_method: whether it is a method.
+    """
+    call = getattr(call, "__func__", call)
+    spelled = getattr(call, "__annotations__", {})
+    if signature := getattr(call, "__signature__", None):
+        spelled = {name: p.annotation for name, p in signature.parameters.items()}
+    module = vars(sys.modules.get(call.__module__, hc))
+    found = {name: resolved(text, module) for name, text in spelled.items()}
+    if signature:
+        given = [p.replace(annotation=found[n]) for n, p in signature.parameters.items()]
+        call.__signature__ = signature.replace(parameters=given)
+    elif found:
+        call.__annotations__ = found
+
+
+def plain_defaults(app, what, name, thing, options, signature, returned):
+    """Writes ... for a default that is made anew, which is no Python as dataclasses print it.
+
+    Args:
+        app: the application.
+        what: kind of the object.
+        name: its name.
+        thing: the object.
+        options: of the directive.
+        signature: the text of its arguments.
+        returned: the text of what it returns.
+    """
+    return (signature or "").replace("<factory>", "...") or None, returned
+
+
+def resolved(annotation, module: dict):
+    """The type of an annotation without its bounds; the text itself where it has none.
+
+    Args:
+        annotation: a type, or its text.
+        module: names of the module that has the annotation.
+    """
+    holder = type("Holder", (), {"__annotations__": {"it": annotation}})
+    try:
+        return typing.get_type_hints(holder, {**CHECKED, **module})["it"]
+    except (NameError, TypeError):
+        return annotation
+
+
+def plain_text(app, what: str, name: str, thing, options, lines: list[str]) -> None:
+    """Escapes what reStructuredText would take for markup, as in |v|: before napoleon.
+
+    Args:
+        app: the application.
+        what: kind of the object.
+        name: its name.
+        thing: the object.
+        options: of the directive.
+        lines: its docstring, changed in place.
+    """
+    out, code = [], False
+    for last, line in zip(["", *lines], lines, strict=False):
+        if line and not line.startswith(" "):
+            code = False
+        elif line and not last and out and not code and not section(out):
+            out += ["::", ""]  # an indented block outside of a section
+            code = True
+        out.append(line if code else re.sub(r"([|*\\])", r"\\\1", line))
+    if what in ("property", "attribute") and out:  # "The speed: ..." has no type to split off
+        out[0] = out[0].replace(":", COLON)
+    lines[:] = out
+
+
+def section(lines: list[str]) -> bool:
+    """Whether the last line that is not indented is the head of a section.
+
+    Args:
+        lines: of the docstring so far.
+    """
+    heads = [line for line in lines if line and not line.startswith(" ")]
+    return bool(heads) and re.fullmatch(r"[A-Z]\w+:", heads[-1]) is not None
+
+
+def mended(app, what: str, name: str, thing, options, lines: list[str]) -> None:
+    """Joins what napoleon took for the type of a returned value, and adds the examples.
+
+    Args:
+        app: the application.
+        what: kind of the object.
+        name: its name.
+        thing: the object.
+        options: of the directive.
+        lines: its docstring, changed in place.
+    """
+    text = re.sub(r"^(:returns: )\*(.*?)\* -- ", r"\1\2: ", "\n".join(lines), flags=re.M)
+    lines[:] = text.replace(COLON, ":").splitlines()
+    if what in ("class", "function", "exception") and (found := examples_of(name)):
+        lines += ["", ".. minigallery::", "", *(f"   {path}" for path in found), ""]
+
+
+def examples_of(name: str) -> list[str]:
+    """The examples that use a name: those that use the fewest others, three at most.
+
+    Args:
+        name: with its module.
+    """
+    uses, size = gallery_uses()
+    return sorted(uses.get(name, ()), key=lambda path: (size[path], path))[:3]
+
+
+@functools.cache
+def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
+    """Examples by the public name that they use, and how many names each uses."""
+    uses: dict[str, set[str]] = collections.defaultdict(set)
+    for path in SOURCES:
+        for name in set(re.findall(r"\bhc\.(\w+)", path.read_text())):
+            uses[f"hapticclay.{name}"].add(os.path.relpath(path, DOCS))
+    for name in hc.__all__:  # what a function returns, as a Verdict
+        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
+        for result in set(re.findall(r"\w+", returned)) & set(hc.__all__):
+            uses[f"hapticclay.{result}"] |= uses[f"hapticclay.{name}"]
+    return uses, collections.Counter(path for paths in uses.values() for path in paths)
+
+
+def setup(app):
+    app.connect("source-read", list_others)
+    app.connect("autodoc-before-process-signature", plain_types)
+    app.connect("autodoc-process-signature", plain_defaults)
+    app.connect("autodoc-process-docstring", plain_text, priority=400)
+    app.connect("autodoc-process-docstring", mended, priority=600)
