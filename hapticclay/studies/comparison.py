@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
-from ..model.constants import AXES
 from ..model.fields import plain_data
 from ..model.scenario import Scenario
 from ..model.scenario_file import load_scenario, read_settings
@@ -207,15 +206,6 @@ def differing_fields(found: Sequence[Compared]) -> dict[str, list[Any]]:
     names = dict.fromkeys(name for x in found for name in x.settings if name != "name")
     rows = {name: [x.settings.get(name) for x in found] for name in names}
     return {name: row for name, row in rows.items() if any(v != row[0] for v in row[1:])}
-
-
-def main_axis(scenario: Scenario) -> str:
-    """The axis along which the muscle pushes most.
-
-    Args:
-        scenario: the run.
-    """
-    return AXES[int(abs(scenario.force[1]) > abs(scenario.force[0]))]
 
 
 def _by_dotted_name(data: Any, path: str = "") -> dict[str, Any]:
