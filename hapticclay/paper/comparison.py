@@ -9,7 +9,7 @@ from typing import Any
 
 from ..files import versions
 from ..model.virtual_wall import VirtualWall
-from ..studies.comparison import HANDS, PUSHED, Compared, differing_fields
+from ..studies.comparison import COMPARED_HANDS, PUSHED, Compared, differing_fields
 from ..views.compare_plots import compare_figures
 from .report import template_environment
 
@@ -45,7 +45,7 @@ def comparison_page(found: Sequence[Compared]) -> str:
         found: from `compare_files`.
     """
     walls = isinstance(found[0].subject, VirtualWall)
-    (m0, m1), (d0, d1), (k0, k1) = HANDS.mass, HANDS.damper, HANDS.spring
+    (m0, m1), (d0, d1), (k0, k1) = COMPARED_HANDS.mass, COMPARED_HANDS.damper, COMPARED_HANDS.spring
     hands = f"Worst hand of {m0:g} to {m1:g} kg, {d0:g} to {d1:g} N.s/m, {k0:g} to {k1:g} N/m."
     context = {
         "names": [x.name for x in found],

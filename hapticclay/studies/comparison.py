@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
-from ..model.constants import AXES
 from ..model.fields import plain_data
 from ..model.scenario import Scenario
 from ..model.scenario_file import load_scenario, read_settings
@@ -25,7 +24,7 @@ from ..theory.impedance import loop_impedance
 from ..theory.linear_loop import TIMING, Loop
 
 MOST_COMPARED = 5  # as many looks as curves have
-HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
+COMPARED_HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
 SLOW = 1e-4  # [rad/s] at which motion counts as steady
 PUSHED = 0.01  # [m/s] of a device in its run
 PUSHED_TIME = 0.5  # [s] of that run
@@ -119,7 +118,9 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
         "error of transparency": design.transparency_error(plain) if loop.gain else math.nan,
         **_run_numbers(record, error),
     }
-    return Compared(name, scenario, loop, numbers, _flat(plain_data(scenario, left_out=[])), record)
+    return Compared(
+        name, scenario, loop, numbers, _by_dotted_name(plain_data(scenario, left_out=[])), record
+    )
 
 
 def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> Compared:
@@ -141,22 +142,22 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
         "damping B [N.s/m]": wall.B,
         "stable K, at least [N/m]": low,
         "stable K, at most [N/m]": high,
-        "stable K, worst hand [N/m]": wall_limits.hand_box_limit(wall, HANDS),
+        "stable K, worst hand [N/m]": wall_limits.hand_box_limit(wall, COMPARED_HANDS),
         "passive K, at most [N/m]": passive,
         "passivity margin [N.s/m]": float(np.min(wall_limits.passivity_index(wall, omega))),
         "stable K over passive K": high / passive if passive else math.nan,
         **_run_numbers(record, error),
     }
-    return Compared(name, wall, None, numbers, _flat(plain_data(wall)), record)
+    return Compared(name, wall, None, numbers, _by_dotted_name(plain_data(wall)), record)
 
 
 def worst_limit(loop: Loop) -> float:
-    """Largest K up to which every hand of HANDS is stable; NaN for a gain of zero.
+    """Largest K up to which every hand of COMPARED_HANDS is stable; NaN for a gain of zero.
 
     Args:
         loop: one axis, in continuous time.
     """
-    return margins.worst_case(loop, HANDS).limit if loop.gain else math.nan
+    return margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
 
 
 def _passivity_margin(loop: Loop) -> float:
@@ -207,19 +208,10 @@ def differing_fields(found: Sequence[Compared]) -> dict[str, list[Any]]:
     return {name: row for name, row in rows.items() if any(v != row[0] for v in row[1:])}
 
 
-def main_axis(scenario: Scenario) -> str:
-    """The axis along which the muscle pushes most.
-
-    Args:
-        scenario: the run.
-    """
-    return AXES[int(abs(scenario.force[1]) > abs(scenario.force[0]))]
-
-
-def _flat(data: Any, path: str = "") -> dict[str, Any]:
+def _by_dotted_name(data: Any, path: str = "") -> dict[str, Any]:
     if isinstance(data, dict):
         out: dict[str, Any] = {}
         for name, value in data.items():
-            out |= _flat(value, f"{path}.{name}" if path else str(name))
+            out |= _by_dotted_name(value, f"{path}.{name}" if path else str(name))
         return out
     return {path: data}

@@ -28,9 +28,9 @@ ARM_BAND = (0.5, 30.0)  # [Hz]
 INDEX_POINTS = 2000  # of a computed line
 REGION_SPAN = 10.0  # Ts is shown down to that of the wall over this, and up to so many times it
 REGION_POINTS = 61
-AMPLITUDE = 1e-4  # [m] of the worst paths
+WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 
-Progress = Callable[[Iterable[Any]], Iterable[Any]]
+Jobs = Callable[[Iterable[Any]], Iterable[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ class PassiveRegion:
         return out
 
 
-def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequency:
+def wall_index(wall: VirtualWall, progress: Jobs = iter) -> IndexOverFrequency:
     """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
 
     Args:
@@ -230,7 +230,7 @@ def passive_region(
     wall: VirtualWall,
     delays: Sequence[float] = (0.0, 0.5, 1.0, 2.0),
     run_Ts: Sequence[float] | None = None,
-    progress: Progress = iter,
+    progress: Jobs = iter,
 ) -> PassiveRegion:
     """Largest passive K of a wall over Ts for some delays, by theory and by runs.
 
@@ -292,7 +292,7 @@ def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
     energy taken along it is the damping to spare times the integral of v^2. With one, the damper
     itself is lowered until its worst path takes nothing.
     """
-    path = polygon(wall, turn, AMPLITUDE)
+    path = polygon(wall, turn, WORST_AMPLITUDE)
     if not path.middles:
         ways = np.diff(path.places, append=path.places[0])
         return taken_energy(wall, path) * wall.Ts / float((ways * ways).sum())
@@ -303,7 +303,7 @@ def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
 
     def energy(damper: float) -> float:
         other = replace(wall, device=replace(wall.device, damper=damper))
-        return taken_energy(other, polygon(other, turn, AMPLITUDE))
+        return taken_energy(other, polygon(other, turn, WORST_AMPLITUDE))
 
     low, high = 0.5 * asked, 2.0 * asked
     if energy(low) > 0.0 or energy(high) < 0.0:

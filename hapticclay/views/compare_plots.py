@@ -31,7 +31,7 @@ from .style import (
     unit_text,
 )
 
-DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s/m]
+CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s/m]
 BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 WALL_DAMPINGS = 61  # of the plane of K and B
 
@@ -106,8 +106,8 @@ def gain_overlay(found: Sequence[Compared]) -> Figure:
 
     def limits(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         assert x.loop is not None
-        K = np.array([gain_limit(replace(x.loop, b=float(b))) for b in DAMPINGS])
-        return DAMPINGS, np.where((K > 0.0) & np.isfinite(K), K, np.nan)
+        K = np.array([gain_limit(replace(x.loop, b=float(b))) for b in CLAY_DAMPINGS])
+        return CLAY_DAMPINGS, np.where((K > 0.0) & np.isfinite(K), K, np.nan)
 
     labels = dict(xlabel=unit_text("damping of the clay b [N.s/m]"), ylabel="gain K [1/kg]")
     figure = _overlay(found, limits, xscale="log", yscale="log", **labels)
@@ -119,7 +119,7 @@ def gain_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def _impedance(x: Compared) -> tuple[np.ndarray, np.ndarray]:
+def _felt_by_hand(x: Compared) -> tuple[np.ndarray, np.ndarray]:
     """Frequency [rad/s] and fh/v [N.s/m] without the hand; of a controller in continuous time."""
     if isinstance(x.subject, VirtualWall):
         omega = BAND[BAND < 0.95 * math.pi / x.subject.Ts]
@@ -140,7 +140,7 @@ def spare_plot(found: Sequence[Compared]) -> Figure:
             edge = math.pi / x.subject.Ts
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
             return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
-        omega, Z = _impedance(x)
+        omega, Z = _felt_by_hand(x)
         return omega / (2.0 * math.pi), Z.real
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
@@ -155,7 +155,7 @@ def impedance_overlay(found: Sequence[Compared]) -> Figure:
     """
 
     def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        omega, Z = _impedance(x)
+        omega, Z = _felt_by_hand(x)
         return omega / (2.0 * math.pi), np.abs(Z)
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("|f$_h$/v| [N.s/m]"))

@@ -133,10 +133,10 @@ def region_plot(found: PassiveRegion) -> Figure:
         for i, (delay, limits) in enumerate(zip(found.delays, found.limits, strict=True)):
             color, dash = CURVE_STYLES[i % len(CURVE_STYLES)]
             label = "no delay" if not delay else f"delay {delay:g} Ts"
-            ax.plot(1e3 * found.Ts, _known(limits), color=color, ls=dash, label=label)
+            ax.plot(1e3 * found.Ts, _where_passive(limits), color=color, ls=dash, label=label)
             mark: Any = dict(mec=color, mfc=WHITE, ls="none", ms=stroke(6.5), mew=stroke(1.3))
             mark["marker"] = REGION_MARKS[i % len(REGION_MARKS)]
-            ax.plot(1e3 * found.run_Ts, _known(found.found[i]), zorder=4, **mark)
+            ax.plot(1e3 * found.run_Ts, _where_passive(found.found[i]), zorder=4, **mark)
         ax.set(xlabel="control sample Ts [ms]", ylabel="largest passive stiffness K [N/m]")
         ax.set_xlim(1e3 * found.Ts[0], 1e3 * found.Ts[-1])
         for axis in (ax.xaxis, ax.yaxis):
@@ -148,6 +148,6 @@ def region_plot(found: PassiveRegion) -> Figure:
     return figure
 
 
-def _known(K: Sequence[float] | np.ndarray) -> np.ndarray:
+def _where_passive(K: Sequence[float] | np.ndarray) -> np.ndarray:
     K = np.asarray(K, dtype=float)
     return np.where(np.isfinite(K) & (K > 0.0), K, np.nan)
