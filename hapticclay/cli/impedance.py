@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..model.virtual_wall import VirtualWall
     from ..studies.impedance import MeasuredImpedance, Subject
 
-WALL_WORDS = {  # short names of what a wall has below its first level
+DEVICE_WORDS = {  # short names of what a wall has below its first level
     "mass": "device.mass",
     "damper": "device.damper",
     "friction": "device.friction",
@@ -136,7 +136,7 @@ def wall_of(words: Sequence[str]) -> VirtualWall:
     from ..model.virtual_wall import VirtualWall
 
     given = named_values("--wall", " ".join(words).split())
-    return with_fields(VirtualWall(), {WALL_WORDS.get(k, k): v for k, v in given.items()})
+    return with_fields(VirtualWall(), {DEVICE_WORDS.get(k, k): v for k, v in given.items()})
 
 
 def impedance_table(found: MeasuredImpedance) -> str:

@@ -114,7 +114,7 @@ class PassivityCommand:
 
         figures: dict[str, Figure] = {
             "index": Figure(lambda: plots.index_plot(found), found.tables),
-            "energy": Figure(lambda: plots.energy_plot(energy), energy.tables),
+            "energy": Figure(lambda: plots.port_energy_plot(energy), energy.tables),
             "region": Figure(lambda: plots.region_plot(region), region.tables),
         }
         for axis, arm in arms.items():

@@ -31,7 +31,6 @@ DEVICE_OPTIONS = {  # dotted names of the options
     "window": "window",
     "filter": "velocity_filter",
 }
-HAND = ("mass", "damper", "spring")
 
 
 @dataclass(frozen=True)

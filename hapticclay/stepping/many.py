@@ -33,7 +33,7 @@ SHARED = (
 _scene = operator.attrgetter(
     "control", "shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
 )
-_shared, _hand = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
+_shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
 
 
 class ManyRuns(NamedTuple):
@@ -273,7 +273,7 @@ class Pattern:
 
     def _put_hands(self, out: Any, jobs: Sequence[Scenario]) -> None:
         """Puts the operators' arms into states."""
-        hands = np.array([[_hand(th or NO_HAND) for th in s.operators] for s in jobs])
+        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
         out["handx"], out["handy"] = hands[:, 0], hands[:, 1]
         mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
         out["mobility"] = mobility_with(float(self.state["arm"][4]), mass)

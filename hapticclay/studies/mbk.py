@@ -29,7 +29,7 @@ MBK_SCHEMA = "hapticclay-mbk-1"
 MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}
 WALL_PUSH = 1e-4  # [m/s] initial velocity of the device
 GROWTH_SAMPLES = 800  # of a run whose growth is read
-GROWTH_STEPS = 2  # of the engine a sample: under a held force each is exact but for the damping
+BORDER_STEPS = 2  # of the engine a sample: under a held force each is exact but for the damping
 FADED_SHARE = 1e-6  # of the push: what is left may be rounding
 MOST_SOUGHT = 100.0  # times the exact border: end of a search
 HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
@@ -240,7 +240,7 @@ def wall_growth(wall: VirtualWall) -> float:
         wall: with its K, B and M.
     """
     t_max = GROWTH_SAMPLES * wall.Ts
-    record = simulate(wall.scenario(t_max, push=WALL_PUSH, steps=GROWTH_STEPS))
+    record = simulate(wall.scenario(t_max, push=WALL_PUSH, steps=BORDER_STEPS))
     v = np.abs(record.v[:, 0])
     end = float(v[int(0.9 * len(v)) :].max())
     if end < FADED_SHARE * WALL_PUSH:

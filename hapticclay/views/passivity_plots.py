@@ -89,7 +89,7 @@ def _plain_ticks(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def energy_plot(found: EnergyOverTime) -> Figure:
+def port_energy_plot(found: EnergyOverTime) -> Figure:
     """Plots the energy that rendered clay has taken, and the velocity, of both runs.
 
     Args:

@@ -34,7 +34,7 @@ CONTOURS = (0.01, 0.1, 0.5)  # probabilities whose contours are drawn ...
 BOUNDED = 0.1  # ... and the one whose interval is
 LEAST_EVENTS = 2.0  # expected in a cell of that probability, or its contour is left out
 CONTOUR_STYLES = (":", "--", "-")
-WIDE = 30.0  # values over such a ratio are drawn on a logarithmic axis
+WIDE_RATIO = 30.0  # values over such a ratio are drawn on a logarithmic axis
 MOST_RATIO = 100.0  # of limits that a band shows
 MOST_PANELS = 4
 PANEL_BINS = 10  # of a panel
@@ -78,7 +78,7 @@ def band_plot(band: Band) -> Figure:
         ax.plot(band.x, drawn(band.nominal), color=BLACK, ls=":", label="hand of medians")
         if _spans_decades(band.x):
             ax.set_xscale("log")
-        if top > WIDE * least:  # limits of 0 leave it downwards
+        if top > WIDE_RATIO * least:  # limits of 0 leave it downwards
             ax.set_yscale("log", nonpositive="clip")
             ax.set_ylim(0.5 * least, top)
         else:
@@ -210,7 +210,7 @@ def _name(name: str) -> str:
 
 
 def _spans_decades(values: np.ndarray) -> bool:
-    return bool(len(values) > 1 and values.min() > 0.0 and values.max() > WIDE * values.min())
+    return bool(len(values) > 1 and values.min() > 0.0 and values.max() > WIDE_RATIO * values.min())
 
 
 def _cell_borders(values: np.ndarray) -> np.ndarray:

@@ -92,7 +92,7 @@ def test_figures_show_runs_beside_theory(index, energy, region):
     assert "index (Colgate, Schenkel 1997)" in labels and "runs: worst path of a hand" in labels
     assert "[Hz]" in ax.get_xlabel() and "N$\\cdot$s/m" in ax.get_ylabel()
     assert "passive" in ax.get_title(loc="left")
-    top, low = plots.energy_plot(energy).axes
+    top, low = plots.port_energy_plot(energy).axes
     assert len(top.lines) == 3 and "[ms]" in low.get_xlabel()
     assert len(plots.region_plot(region).axes[0].lines) == 4
 

@@ -182,7 +182,7 @@ CASES = {
     "nyquist": lambda: theory_plots.nyquist_plot(LOOP, (0.5, 1.0, 3.0, 10.0, 30.0)),
     "small gain": lambda: theory_plots.small_gain_plot(LOOP),
     "passivity index": lambda: passivity_plots.index_plot(passive("index")),
-    "passivity energy": lambda: passivity_plots.energy_plot(passive("energy")),
+    "passivity energy": lambda: passivity_plots.port_energy_plot(passive("energy")),
     "passivity region": lambda: passivity_plots.region_plot(passive("region")),
     "transparency": lambda: theory_plots.transparency_plot(
         LOOP, [("as printed", 1.0, hc.Compensator()), ("designed", 2.0, hc.Compensator())]
