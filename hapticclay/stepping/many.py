@@ -17,6 +17,7 @@ import numpy as np
 
 from ..model import controller, regions
 from ..model.clay import Profile
+from ..model.controller import Servo
 from ..model.operator import NO_HAND, mobility_with
 from ..model.scenario import Scenario
 from . import energy, monitor, path, run, sampled
@@ -296,13 +297,14 @@ class Pattern:
     def _memory(self, jobs: Sequence[Scenario], i: int) -> np.ndarray:
         """Rows of controller.held_compensator of an axis, shape (n, 20)."""
         Ts, shape = float(self.state["Ts"]), jobs[0].compensators[i]
-        servos = {id(s.servo[i]): s.servo[i] for s in jobs}
-        if len(servos) > 1:
-            each = [controller.held_compensator(s.servo[i], shape, s.gain[i], Ts) for s in jobs]
-            return np.array([np.column_stack(x).ravel() for x in each])
-        gains, which = np.unique([s.gain[i] for s in jobs], return_inverse=True)
-        A, B = controller.held_compensator(jobs[0].servo[i], shape, gains, Ts)
-        return np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
+        out, places = np.empty((len(jobs), 20)), dict[Servo, list[int]]()
+        for k, s in enumerate(jobs):
+            places.setdefault(s.servo[i], []).append(k)
+        for servo, at in places.items():
+            gains, which = np.unique([jobs[k].gain[i] for k in at], return_inverse=True)
+            A, B = controller.held_compensator(servo, shape, gains, Ts)
+            out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
+        return out
 
     def tables(self, jobs: Sequence[Scenario]) -> np.ndarray:
         """Their tables of the clay, shape (n, len(table)).

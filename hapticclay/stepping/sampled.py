@@ -9,6 +9,7 @@ virtual coupling to the same loop.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -19,6 +20,7 @@ from ..model import arm, clay, compensator, controller, flow, hardware, operator
 from ..model import spring as springs
 from ..model.compensator import Compensator
 from ..model.controller import Servo
+from ..model.exponential import matrix_exponential
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
 from . import energy, loop, path
 from .path import INF, TOUCH, put4, put6, put8, put10, put14, put22
@@ -1378,6 +1380,7 @@ def ready_kicks(s, ahead, row, grows):
         s["whole"][5], s["whole"][6] = whole
 
 
+@functools.lru_cache(maxsize=256)
 def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndarray:
     """Rows of `next_form` of one axis: exact, by a matrix exponential, under a held force.
 
@@ -1395,10 +1398,29 @@ def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.nd
     m = np.zeros((n + 4, n + 4))
     m[: n + 2, : n + 2], m[: n + 2, n + 3] = A, B
     m[n + 1, n + 2] = servo.G.gain  # the start adds to delta
-    e = controller.matrix_exponential(T * m)
+    e = matrix_exponential(T * m)
     used = [*range(n), *range(most, most + 2)]
     out = np.zeros((most + 2, most + 4))
     out[np.ix_(used, [*used, most + 2, most + 3])] = e[: n + 2]
+    out.flags.writeable = False
+    return out
+
+
+@functools.lru_cache(maxsize=256)
+def held_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndarray:
+    """State `memory` of one axis.
+
+    Args:
+        servo: of the axis.
+        shape: of C.
+        K: gain of the compensator.
+        T: length of the sample [s].
+
+    Returns:
+        Rows (A, B) of controller.held_compensator, shape (20,).
+    """
+    out = np.column_stack(controller.held_compensator(servo, shape, K, T)).ravel()
+    out.flags.writeable = False
     return out
 
 
@@ -1607,10 +1629,7 @@ class SampledRun(Run):
             self._put(form_memory=np.ravel(rows), form_start=first[0:5:4])
             self._put(form_states=self.moving_states())
         else:
-            rows = [
-                np.column_stack(controller.held_compensator(*axis, now["Ts"])) for axis in parts
-            ]
-            self._put(memory=np.ravel(rows))
+            self._put(memory=np.ravel([held_memory(*axis, now["Ts"]) for axis in parts]))
         if s.controller is not None:
             self.take_over(s.controller)
         self.ring = np.zeros((0, 1 + HOLD))
