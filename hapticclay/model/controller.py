@@ -21,7 +21,6 @@ from ..errors import check_fields
 from . import arm
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
-from .exponential import matrix_exponential
 
 
 @dataclass(frozen=True)
@@ -361,3 +360,17 @@ def held_compensator(
     m[..., :n, :n], m[..., :n, n] = A, B
     e = matrix_exponential(T * m)
     return e[..., :n, :n], e[..., :n, n]
+
+
+def matrix_exponential(a: np.ndarray) -> np.ndarray:
+    """Matrix exponential.
+
+    Args:
+        a: shape (n, n), or a stack of such, shape (m, n, n).
+
+    Returns:
+        As a.
+    """
+    from scipy.linalg import expm
+
+    return expm(a)

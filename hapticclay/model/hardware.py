@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import Bound, ParameterError, check_fields
 from . import flow
-from .exponential import matrix_exponential
 
 STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
@@ -188,13 +187,15 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
     Returns:
         (A00, A01, A10, A11, B0, B1); of order 1, A00 and B0 alone are not zero.
     """
+    from scipy.linalg import expm
+
     w = tau * cutoff
     a = (
         [[-w, w], [0.0, 0.0]]
         if order == 1
         else [[0.0, 1.0, 0.0], [-w * w, -sqrt(2.0) * w, w * w], [0.0, 0.0, 0.0]]
     )
-    e = matrix_exponential(Ts * np.array(a))
+    e = expm(Ts * np.array(a))
     A, B = np.zeros((2, 2)), np.zeros(2)
     A[:order, :order], B[:order] = e[:order, :order], e[:order, order]
     return (*A.ravel().tolist(), *B.tolist())

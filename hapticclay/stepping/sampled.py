@@ -20,7 +20,6 @@ from ..model import arm, clay, compensator, controller, flow, hardware, operator
 from ..model import spring as springs
 from ..model.compensator import Compensator
 from ..model.controller import Servo
-from ..model.exponential import matrix_exponential
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
 from . import energy, loop, path
 from .path import INF, TOUCH, put4, put6, put8, put10, put14, put22
@@ -1398,7 +1397,7 @@ def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.nd
     m = np.zeros((n + 4, n + 4))
     m[: n + 2, : n + 2], m[: n + 2, n + 3] = A, B
     m[n + 1, n + 2] = servo.G.gain  # the start adds to delta
-    e = matrix_exponential(T * m)
+    e = controller.matrix_exponential(T * m)
     used = [*range(n), *range(most, most + 2)]
     out = np.zeros((most + 2, most + 4))
     out[np.ix_(used, [*used, most + 2, most + 3])] = e[: n + 2]

@@ -22,7 +22,6 @@ from ..model import controller
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES, B_MAX
 from ..model.controller import SERVO, Servo
-from ..model.exponential import matrix_exponential
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Render, Scenario
 from ..model.spring import STIFFNESS_MAX
@@ -629,7 +628,7 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
     a[n : 2 * n] = np.hstack((w @ force, w))
-    change = matrix_exponential(t * a) - np.eye(3 * n)
+    change = controller.matrix_exponential(t * a) - np.eye(3 * n)
     return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
 
 
@@ -658,7 +657,7 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
         sums = (pulse - mean(slow * t) * t) / fast
     else:
         chain = np.array([[0.0, 1.0, 0.0], [0.0, slow, 1.0], [0.0, 0.0, fast]])
-        sums = matrix_exponential(t * chain)[0, 2]
+        sums = controller.matrix_exponential(t * chain)[0, 2]
     pulse, sums = pulse.real, sums.real
     change = [[own[0] * sums, pulse], [own[0] * pulse, own[1] * pulse + own[0] * sums]]
     return np.array(change), w * np.array([sums, pulse])
@@ -691,16 +690,16 @@ def crossing_times(
         A = np.zeros((n + 1, n + 1))
         A[:n] = np.hstack(state_space(replace(loop, b=here)))
         step = 1e-3
-        E = matrix_exponential(A * step)
+        E = controller.matrix_exponential(A * step)
         while (ahead := E @ z)[0] < edge and t < t_max:
             z, t = ahead, t + step
         if t >= t_max:
             break
 
         def beyond(h: float, A=A, z=z, edge=edge) -> float:
-            return float((matrix_exponential(A * h) @ z)[0]) - edge
+            return float((controller.matrix_exponential(A * h) @ z)[0]) - edge
 
         h: Any = brentq(beyond, 0.0, step, xtol=1e-15)
-        z, t = matrix_exponential(A * h) @ z, t + h
+        z, t = controller.matrix_exponential(A * h) @ z, t + h
         out.append(t)
     return out

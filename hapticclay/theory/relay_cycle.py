@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..model.compensator import moving_states
-from ..model.exponential import matrix_exponential
+from ..model.controller import matrix_exponential
 from ..model.flow import Flow
 from . import linear_loop, roots
 from .describing import is_flow, limit_cycles, push_outcomes, without_spring
