@@ -7,8 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from ..errors import integer
 from ..files import versions, writable
 from . import console
@@ -107,6 +105,8 @@ class RobustnessCommand:
             raise
         band = None
         if draw:
+            import numpy as np
+
             clays = np.geomspace(*BAND_CLAYS).tolist()
             band = gain_band(
                 trials.base.linear,  # type: ignore[union-attr]
