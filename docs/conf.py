@@ -1,6 +1,6 @@
 """Sphinx configuration: `make docs` builds the site, docs/*.md are its pages.
 
-docs/gallery and docs/tutorials are made from examples/ and tutorials/, and no part of the checkout.
+docs/gallery is made from examples/, and no part of the checkout.
 """
 
 import collections
@@ -68,16 +68,14 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
-SOURCES = [*DOCS.parent.glob("examples/*/*.py"), *DOCS.parent.glob("tutorials/*.py")]
+SECTIONS = "tutorials runs records clay parts hardware theory walls studies robustness".split()
+SOURCES = [*DOCS.parent.glob("examples/*/*.py")]
 FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
 sphinx_gallery_conf = {
-    "examples_dirs": ["../tutorials", "../examples"],
-    "gallery_dirs": ["tutorials", "gallery"],
+    "examples_dirs": ["../examples"],
+    "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "subsection_order": ExplicitOrder(
-        [f"../examples/{x}" for x in ("runs", "clay", "parts", "hardware", "theory", "studies")]
-        + ["*"]
-    ),
+    "subsection_order": ExplicitOrder([*(f"../examples/{x}" for x in SECTIONS), "*"]),
     "within_subsection_order": ExplicitOrder(FIRST + sorted({x.name for x in SOURCES} - {*FIRST})),
     "backreferences_dir": "gallery/backreferences",
     "doc_module": ("hapticclay",),
