@@ -18,12 +18,25 @@ COLON = "\N{RATIO}"  # stands for a colon while napoleon looks for one
 sys.path.insert(0, str(DOCS.parent))  # the checkout, not an installed release
 
 import numpy as np  # noqa: E402
+import pandas as pd  # noqa: E402
+import xarray as xr  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
+from hapticclay.model import scenario, spring  # noqa: E402
+from hapticclay.views.record_plots import RecordPlots  # noqa: E402
 
-CHECKED = {"np": np, "Figure": Figure, "Accuracy": hc.Accuracy}  # imported for type checks alone
+CHECKED = {  # imported for type checks alone, or by the module of a base class
+    "np": np,
+    "DataFrame": pd.DataFrame,
+    "Dataset": xr.Dataset,
+    "Figure": Figure,
+    "Accuracy": hc.Accuracy,
+    "RecordPlots": RecordPlots,
+    "Render": scenario.Render,
+    "STIFFNESS_MAX": spring.STIFFNESS_MAX,
+}
 
 project = "hapticclay"
 author = "The hapticclay authors"

@@ -12,12 +12,25 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import hapticclay as hc
-from hapticclay.views.run_plots import velocity_plot
+from hapticclay.views import style
 
-record = hc.simulate(hc.constant_cut(b=90.0))
-figure = hc.Figure(lambda: velocity_plot(record))
+record = hc.simulate(hc.constant_cut(b=90.0), every=30)
+
+
+def velocity():
+    """Draws in the style of now: sizes come from ``style``."""
+    with style.figure_style():
+        fig, ax = plt.subplots(figsize=style.figure_size(1, 2.4))
+        ax.plot(100 * record.p[:, 0], 100 * record.v[:, 0], lw=style.stroke(1.5), label="x")
+        ax.set(xlabel="position [cm]", ylabel="velocity [cm/s]")
+        ax.legend()
+    return fig
+
+
+figure = hc.Figure(velocity)
 with tempfile.TemporaryDirectory() as folder:
     for path in figure.save(Path(folder) / "velocity.pdf", style="print", data=True):
         print(path.name, path.stat().st_size, "bytes")
-figure.draw("print")
+plt.close("all")
+print(f"{2.54 * figure.draw('print').get_figwidth():.1f} cm wide")
 plt.show()

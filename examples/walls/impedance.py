@@ -26,7 +26,7 @@ for ax, part, unit in zip(
 ):
     ax.semilogx(measured.frequency, getattr(measured, part), "o", ms=4, label="measured")
     ax.plot(computed.frequency, getattr(computed, part), "-", label="computed")
-    ax.set(ylabel=f"effective {part} [{unit}]", ylim=(0.0, None))
+    ax.set(ylabel=f"effective {part} [{unit}]", ylim=(0.0, {"mass": 0.12}.get(part)))
 free = hc.wall_impedance(hc.VirtualWall(device=device, Ts=1e-3), omega)  # motor off
 axes[2].plot(omega / (2.0 * np.pi), free.imag / omega, "k:", label="device alone")
 axes[0].legend()

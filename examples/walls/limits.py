@@ -16,8 +16,8 @@ import hapticclay as hc
 
 plt.style.use("hapticclay.views.figure")
 
-wall = hc.VirtualWall(B=0.2, device=hc.Device(mass=0.1, damper=1.0), Ts=1e-3)  # N.s/m, kg, s
-box = hc.Box(mass=(0.0, 1.0), damper=(0.0, 5.0), spring=(0.0, 300.0))  # hands at the wall
+wall = hc.VirtualWall(B=0.8, device=hc.Device(mass=0.1, damper=1.0), Ts=1e-3)  # N.s/m, kg, s
+box = hc.Box(mass=(0.0, 1.0), damper=(0.0, 5.0), spring=(0.0, 0.0))  # hands at the wall
 delays = np.linspace(0.0, 5e-3, 21)  # s
 late = [replace(wall, delay=float(x)) for x in delays]
 
@@ -31,7 +31,7 @@ for samples in (0, 1):
     one = replace(wall, delay=samples * wall.Ts)
     ax.plot(1e3 * one.delay, hc.jury_limit(one), "ko", ms=5, label="Jury" if samples else "")
     B, K = hc.hulin_boundary(0.1, 1.0, wall.Ts, samples)
-    ax.plot(1e3 * one.delay, np.interp(0.2, B[: B.argmax()], K[: B.argmax()]), "k+", ms=14)
+    ax.plot(1e3 * one.delay, np.interp(wall.B, B[: B.argmax()], K[: B.argmax()]), "k+", ms=14)
 ax.plot([], [], "k+", ms=14, label="Hulin's boundary")
 print("stable at 1 kN/m without delay:", hc.stable_wall(replace(wall, K=1e3)))
 ax.set(xlabel="delay [ms]", ylabel="largest K [N/m]", ylim=(50.0, None))

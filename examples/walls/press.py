@@ -16,9 +16,7 @@ plt.style.use("hapticclay.views.figure")
 device = hc.Device(mass=0.1, damper=0.5, friction=0.02)  # kg, N.s/m, N
 wall = hc.VirtualWall(device=device, Ts=1e-3)
 quanta = (20e-6, 80e-6)  # m
-found = hc.zwidth(
-    wall, "quantum", quanta, B=(0.0, 10.0), press=hc.Press(force=1.0, still=1e-6)
-)
+found = hc.zwidth(wall, "quantum", quanta, B=(0.0, 10.0), press=hc.Press(force=1.0, still=1e-6))
 
 fig, ax = plt.subplots()
 for region, quantum, mark in zip(found.regions, quanta, "os", strict=True):
