@@ -49,4 +49,4 @@ build: .venv/dev.done  ## wheel and sdist into dist/
 	$(BIN)/python -m build --quiet
 
 clean:
-	rm -rf .venv out dist docs/gallery docs/tutorials
+	rm -rf .venv out dist docs/gallery

@@ -1,6 +1,6 @@
 """Sphinx configuration: `make docs` builds the site, docs/*.md are its pages.
 
-docs/gallery and docs/tutorials are made from examples/ and tutorials/, and no part of the checkout.
+docs/gallery is made from examples/, and no part of the checkout.
 """
 
 import collections
@@ -18,12 +18,25 @@ COLON = "\N{RATIO}"  # stands for a colon while napoleon looks for one
 sys.path.insert(0, str(DOCS.parent))  # the checkout, not an installed release
 
 import numpy as np  # noqa: E402
+import pandas as pd  # noqa: E402
+import xarray as xr  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
+from hapticclay.model import scenario, spring  # noqa: E402
+from hapticclay.views.record_plots import RecordPlots  # noqa: E402
 
-CHECKED = {"np": np, "Figure": Figure, "Accuracy": hc.Accuracy}  # imported for type checks alone
+CHECKED = {  # imported for type checks alone, or by the module of a base class
+    "np": np,
+    "DataFrame": pd.DataFrame,
+    "Dataset": xr.Dataset,
+    "Figure": Figure,
+    "Accuracy": hc.Accuracy,
+    "RecordPlots": RecordPlots,
+    "Render": scenario.Render,
+    "STIFFNESS_MAX": spring.STIFFNESS_MAX,
+}
 
 project = "hapticclay"
 author = "The hapticclay authors"
@@ -68,16 +81,14 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
-SOURCES = [*DOCS.parent.glob("examples/*/*.py"), *DOCS.parent.glob("tutorials/*.py")]
+SECTIONS = "tutorials runs records clay parts hardware theory walls studies robustness".split()
+SOURCES = [*DOCS.parent.glob("examples/*/*.py")]
 FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
 sphinx_gallery_conf = {
-    "examples_dirs": ["../tutorials", "../examples"],
-    "gallery_dirs": ["tutorials", "gallery"],
+    "examples_dirs": ["../examples"],
+    "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "subsection_order": ExplicitOrder(
-        [f"../examples/{x}" for x in ("runs", "clay", "parts", "hardware", "theory", "studies")]
-        + ["*"]
-    ),
+    "subsection_order": ExplicitOrder([*(f"../examples/{x}" for x in SECTIONS), "*"]),
     "within_subsection_order": ExplicitOrder(FIRST + sorted({x.name for x in SOURCES} - {*FIRST})),
     "backreferences_dir": "gallery/backreferences",
     "doc_module": ("hapticclay",),

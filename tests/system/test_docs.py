@@ -63,6 +63,38 @@ def test_groove_of_the_clay_page_says_what_it_prints():
     assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
 
+@pytest.mark.parametrize("page", ["figures.md", "passivity.md", "robustness.md"])
+def test_snippets_of_the_page_run_and_print_its_numbers(page, tmp_path):
+    text = (ROOT / "docs" / page).read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    out = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    printed = re.findall(r"^[\d.e+-]+|(?<=\[)[\d.]+", out.stdout, re.M)
+    for said in re.findall(r"print\(.*\)  # ([\d.]+)", code):
+        assert any(float(x) == pytest.approx(float(said), rel=1e-3) for x in printed), said
+
+
+FIGURE_PAGES = ("zwidth", "impedance", "passivity", "robustness", "compare", "figures")
+LINES = [
+    line
+    for page in FIGURE_PAGES
+    for line in re.findall(
+        r"^    hapticclay (.+)$", (ROOT / "docs" / f"{page}.md").read_text(), re.M
+    )
+]
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_options_of_the_commands_of_a_page_exist(line, capsys):
+    """Their runs take too long for a page each; tests/cli runs them."""
+    command, *words = line.split()
+    assert app.main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    for option in (word for word in words if word.startswith("--")):
+        assert re.search(rf"{option}\b", shown), option
+
+
 PARTS = (ROOT / "docs" / "parts.md").read_text()
 BLOCKS = re.findall(r"## ([^\n]*)\n\n```python\n(.*?)```", PARTS, re.S)
 
@@ -192,6 +224,13 @@ def test_the_tables_ask_all_questions():
         "experiment",
         "command",
         "plot",
+        "wall",
+        "Z-width",
+        "impedance",
+        "Monte Carlo",
+        "population",
+        "PDF",
+        "export",
     ):
         assert word in asked, word
 
@@ -223,7 +262,7 @@ def test_the_reference_has_every_public_name_once():
     assert sorted(name for name in told if name in public) == sorted(public)
 
 
-SOURCES = [*(ROOT / "examples").rglob("*.py"), *(ROOT / "tutorials").glob("*.py")]
+SOURCES = [*(ROOT / "examples").rglob("*.py")]
 
 
 def test_every_public_name_has_an_example():
@@ -241,7 +280,7 @@ def test_links_within_the_documents_lead_somewhere(page):
     """Files exist, and headings too; the site's own build checks them again."""
     for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", page.read_text()):
         name, _, heading = target.partition("#")
-        if re.match(r"(gallery|tutorials)/", name):  # made by the build
+        if re.match(r"gallery/", name):  # made by the build
             continue
         file = page.parent / name if name else page
         assert file.is_file(), target

@@ -11,8 +11,8 @@ import pytest
 from hapticclay.views import style
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
-TUTORIALS = sorted((ROOT / "tutorials").glob("*.py"))
+TUTORIALS = sorted((ROOT / "examples" / "tutorials").glob("*.py"))
+EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS})
 PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
 

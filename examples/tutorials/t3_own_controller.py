@@ -134,4 +134,4 @@ n = len(short.t) - 1
 print(f"largest difference of position: {np.abs(short.p[:n] - record.p[:n]).max():.1e} m")
 
 # %%
-# Next: :doc:`t4_sweep`. More: :doc:`../parts`, :doc:`../gallery/hardware/index`.
+# Next: :doc:`t4_sweep`. More: :doc:`/parts`, :doc:`/gallery/hardware/index`.

@@ -106,5 +106,5 @@ K = hc.design_gain("y", 90.0, hc.Operator(), disk_margin=0.5)
 print(f"K = {K:.3f} keeps a disk margin of 0.5")
 
 # %%
-# Next: :doc:`t3_own_controller`. More: :doc:`../stability`, :doc:`../gallery/theory/index`. On the
+# Next: :doc:`t3_own_controller`. More: :doc:`/stability`, :doc:`/gallery/theory/index`. On the
 # command line: ``hapticclay stability --axis y --b 90``.

@@ -104,4 +104,4 @@ print(exact.error)
 print(f"the default step was off by {record.crossings[-1].time - exact.crossings[-1].time:.1e} s")
 
 # %%
-# Next: :doc:`t2_stability`. More clay: :doc:`../clay`, :doc:`../gallery/clay/index`.
+# Next: :doc:`t2_stability`. More clay: :doc:`/clay`, :doc:`/gallery/clay/index`.

@@ -1,0 +1,38 @@
+"""
+Probability of instability
+==========================
+
+Hand and delay are random; each run is judged by itself. The interval says what so few runs tell.
+Runs stay in their folder, and the same call goes on where it was interrupted.
+"""
+
+import tempfile
+
+import matplotlib.pyplot as plt
+
+import hapticclay as hc
+from hapticclay.studies.boundary import PushedLoop
+from hapticclay.studies.sampling import Range
+
+plt.style.use("hapticclay.views.figure")
+
+trials = hc.Trials(
+    PushedLoop("x", b=90.0, Ts=1e-3),  # N.s/m, s
+    vary={"delay": hc.Distribution("uniform", 0.0, 2e-3)},  # s
+    hands=hc.Hands.around(hc.Operator(), variation=0.5),
+    grid={"K": Range(1.0, 5.0, 4)},
+    runs=40,  # of each K
+)
+with tempfile.TemporaryDirectory() as folder:
+    hc.monte_carlo(trials, out=folder)
+    result = hc.stored_runs(trials, folder)
+print(f"over all K: {result.total}")
+
+chart = result.map()
+fig, ax = plt.subplots()
+share = 100.0 * chart.probability[:, 0]  # %
+low, high = (100.0 * x[:, 0] for x in chart.interval())
+ax.errorbar(chart.x, share, (share - low, high - share), fmt="o", capsize=4, label="40 runs each")
+ax.set(xlabel="gain K [1/kg]", ylabel="unstable runs, 95 % interval [%]", ylim=(-3.0, 103.0))
+ax.legend()
+plt.show()

@@ -1,0 +1,27 @@
+"""
+Transparency of the arm
+=======================
+
+What the hand feels at the handle of the paper's arm in clay: the share of its force that is
+rendered, and the felt over the rendered impedance.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hapticclay as hc
+
+plt.style.use("hapticclay.views.figure")
+
+omega = 2.0 * np.pi * np.geomspace(0.1, 30.0, 300)  # rad/s
+fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 5.0))
+for b, dash in ((30.0, "-"), (90.0, "--"), (300.0, ":")):  # N.s/m
+    felt = hc.loop_response("x", 1.0, b, omega)
+    above.loglog(felt.frequency, abs(felt.felt), dash, label=f"b = {b:g} N·s/m")
+    below.loglog(felt.frequency, abs(felt.ratio), dash)
+    Z = hc.loop_impedance("x", 1.0, b, omega[:1])[0]
+    print(f"b = {b:g}: Re Z = {Z.real:.3g} N.s/m at 0.1 Hz, 10/K + b = {10.0 + b:g}")
+above.set(ylabel="|fe/fh|")
+above.legend()
+below.set(xlabel="frequency [Hz]", ylabel="|Z/Ze|")
+plt.show()
