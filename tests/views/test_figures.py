@@ -269,7 +269,10 @@ def compared(kind):
         scenes = [hc.constant_cut(gain=gain, operator=HAND, t_max=4.0) for gain in gains]
         loops = [Loop.of(x, "x") for x in scenes]
         found = zip(names, scenes, loops, [hc.simulate(x) for x in scenes], strict=True)
-    return tuple(comparison.Compared(n, w, o, {}, {}, r) for n, w, o, r in found)
+    region = z_region("", hc.VirtualWall(device=hc.Device(0.1, 1.0)))
+    return tuple(
+        comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found
+    )
 
 
 def run_case(name, figure):
@@ -344,7 +347,12 @@ CASES = {
             ),
             "walls": (compare_plots.wall_region_plot, compare_plots.push_plot),
         }.items()
-        for plot in (*plots, compare_plots.spare_plot, compare_plots.impedance_overlay)
+        for plot in (
+            *plots,
+            compare_plots.spare_plot,
+            compare_plots.impedance_overlay,
+            compare_plots.parts_overlay,
+        )
     },
     "energy": lambda: record_plots.energy_plot(record("driven")),
     "transparency": lambda: theory_plots.transparency_plot(
