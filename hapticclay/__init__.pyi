@@ -98,6 +98,7 @@ from .theory.gain_limit import stiffness_limit as stiffness_limit
 from .theory.impedance import Impedance as Impedance
 from .theory.impedance import loop_impedance as loop_impedance
 from .theory.impedance import loop_response as loop_response
+from .theory.impedance import wall_impedance as wall_impedance
 from .theory.impedance import wall_response as wall_response
 from .theory.linear_loop import Loop as Loop
 from .theory.linear_loop import closed_loop_poles as closed_loop_poles
@@ -129,7 +130,6 @@ from .theory.wall_limits import jury_limit as jury_limit
 from .theory.wall_limits import passivity_index as passivity_index
 from .theory.wall_limits import stable_wall as stable_wall
 from .theory.wall_limits import stiffness_band as stiffness_band
-from .theory.wall_limits import wall_impedance as wall_impedance
 from .views.figure import Figure as Figure
 from .views.images import gray_image as gray_image
 

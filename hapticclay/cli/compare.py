@@ -36,7 +36,9 @@ class CompareCommand:
         from ..views.compare_plots import compare_figures
 
         writable(self.out)
-        found = compare_files(self.source, self.axis)
+        found = compare_files(
+            self.source, self.axis, lambda files: console.progress_bar(files, desc="files")
+        )
         rows = [[name, *cells] for name, cells in number_rows(found).items()]
         try:
             with atomic(self.out / "compare.html") as f:

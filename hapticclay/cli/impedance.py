@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,18 +12,10 @@ import tyro
 from ..errors import ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
-from . import console
+from . import console, walls
 
 if TYPE_CHECKING:
-    from ..model.virtual_wall import VirtualWall
     from ..studies.impedance import MeasuredImpedance, Subject
-
-DEVICE_WORDS = {  # short names of what a wall has below its first level
-    "mass": "device.mass",
-    "damper": "device.damper",
-    "friction": "device.friction",
-    "quantum": "device.quantum",
-}
 
 
 @dataclass(frozen=True)
@@ -32,36 +23,34 @@ class ImpedanceCommand:
     """Measure the impedance that a hand feels, and transparency, beside the computed ones.
 
     A multisine of the muscles drives the arm of an experiment, or a virtual wall on a bare device,
-    so gently that it stays linear. Any Ze of both is drawn as a thin line.
+    so gently that it stays linear. What is rendered is drawn as a thin line. With an option of a
+    wall, as --K 300 or --mass 0.2, it is a wall.
 
     Attributes:
-        source: Experiment, as in hapticclay run, or a scenario file; its clay is all around the
-            handle, which is at the nominal pose. By default the constant cut.
-        wall: A virtual wall instead, as in --wall K=300 B=2 M=0.05 mass=0.1 damper=0.5 Ts=1ms
-            delay=0.5ms window=2 velocity_filter=100; operator.mass=0.25 adds a hand.
+        source: File of a wall; or experiment, as in hapticclay run, or a scenario file: its clay is
+            then all around the handle, which is at the nominal pose. By default the constant cut.
         axis: Axis of the arm, x unless given.
         b: Clay [N.s/m]; by default that of the experiment with the least gain limit.
         k: Stiffness of the clay [N/m].
-        hand: Put the operator's arm Th (Eq. 19) at the handle.
         band: Lowest and highest frequency [Hz].
         lines: Number of frequencies.
         amplitude: Size of the motion, rms [m].
         seed: Seed of the multisine's phases.
         out: Folder for impedance.json, impedance.png and transparency.png.
+        wall: The wall, its device, sampling and hand; --hand is for the arm, too.
         figures: Format and style of the figures.
     """
 
     source: Annotated[str | None, tyro.conf.Positional] = None
-    wall: tuple[str, ...] = ()
     axis: Literal["x", "y"] | None = None
     b: float | None = None
     k: float | None = None
-    hand: bool = False
     band: tuple[float, float] = (0.5, 30.0)
     lines: int = 24
     amplitude: float = 1e-5
     seed: int = 0
     out: Path = Path("out/impedance")
+    wall: walls.WallOptions = walls.WallOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -70,7 +59,7 @@ class ImpedanceCommand:
         from ..views.figure import Figure
 
         writable(self.out)
-        subject = self._wall() if self.wall else self._loop()
+        subject = self._subject()
         found = measure_impedance(
             subject, band=self.band, lines=self.lines, amplitude=self.amplitude, seed=self.seed
         )
@@ -88,55 +77,39 @@ class ImpedanceCommand:
         print(f"written to {self.out}")
         return 0
 
-    def _wall(self) -> VirtualWall:
-        for name in ("source", "axis", "b", "k"):
-            if getattr(self, name) is not None:
-                bound = "is for the arm: leave it out with --wall"
-                raise ParameterError(name, getattr(self, name), bound)
-        wall = wall_of(self.wall)
-        if self.hand and wall.operator is None:
-            from dataclasses import replace
+    def _subject(self) -> Subject:
+        from ..model.scenario_file import is_scenario_file
+        from ..studies.comparison import is_wall_file
 
-            from ..model.operator import Operator
+        file = self.source if self.source and is_scenario_file(self.source) else None
+        if file and is_wall_file(file):
+            return self._wall(file)
+        if self.source is None and set(self.wall.given) - {"hand"}:
+            return self._wall(None)
+        self.wall.refuse("is for a wall: leave it out beside an experiment or scenario", ("hand",))
+        return self._loop(file)
 
-            wall = replace(wall, operator=Operator())
-        return wall
+    def _wall(self, file: str | None) -> Subject:
+        for name in ("axis", "b", "k"):
+            if (value := getattr(self, name)) is not None:
+                raise ParameterError(name, value, "is for the arm: leave it out with a wall")
+        return self.wall.wall(file)
 
-    def _loop(self) -> Subject:
-        from dataclasses import replace
-
+    def _loop(self, file: str | None) -> Subject:
         from ..model.experiments import EXPERIMENTS, SCENARIOS
-        from ..model.operator import Operator
-        from ..model.scenario_file import is_scenario_file, load_scenario
+        from ..model.scenario_file import load_scenario
         from ..studies.impedance import subject_of
 
         name = self.source or "constant"
-        if is_scenario_file(name):
-            scenario = load_scenario(name)
+        if file:
+            scenario = load_scenario(file)
         else:
             scenario = SCENARIOS[choice("experiment", name, tuple(EXPERIMENTS))]()
-        axis = self.axis or AXES[0]
-        loop = subject_of(scenario, axis, self.b)
+        loop = subject_of(scenario, self.axis or AXES[0], self.b)
         if self.k is not None:
             loop = replace(loop, k=self.k)
-        return replace(loop, operator=Operator()) if self.hand else loop
-
-
-def wall_of(words: Sequence[str]) -> VirtualWall:
-    """A virtual wall from words such as K=300 B=2 mass=0.1 Ts=1ms.
-
-    Args:
-        words: NAME=VALUE each, one text or several; names are those of the fields of `VirtualWall`,
-            or mass, damper, friction and quantum of its device.
-
-    Raises:
-        ParameterError: a word has another form, a name is unknown, or a value is out of its bounds.
-    """
-    from ..model.fields import named_values, with_fields
-    from ..model.virtual_wall import VirtualWall
-
-    given = named_values("--wall", " ".join(words).split())
-    return with_fields(VirtualWall(), {DEVICE_WORDS.get(k, k): v for k, v in given.items()})
+        hand = walls.operator_of(self.wall.hand)
+        return replace(loop, operator=hand) if hand else loop
 
 
 def impedance_table(found: MeasuredImpedance) -> str:

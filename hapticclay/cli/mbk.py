@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
 
 from ..errors import ParameterError
 from ..files import writable
 from ..model.constants import TS
-from . import console
-from .impedance import wall_of
+from . import console, walls
 
 if TYPE_CHECKING:
     from ..studies.mbk import ArmMBK, DeviceMBK
 
-ARM_ONLY = ("hand", "box", "Ts")
+DEFAULT_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
 
 
 @dataclass(frozen=True)
@@ -27,26 +28,25 @@ class MBKCommand:
     arm renders as the admittance of its compensator.
 
     Attributes:
-        wall: The device, and the K, B and M that the planes keep, as in --wall mass=0.1 damper=0.5
-            Ts=1ms K=1000 B=2 M=0, which are the defaults; operator.mass=0.25 adds a hand.
-        arm: Axis of the arm, in the place of a bare device.
-        hand: Mass, damper and spring of the hand at the arm [kg, N.s/m, N/m]; by default Th (19).
-        box: Hands: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
-        Ts: Control sample of the arm [s]; None for continuous time.
+        source: File of a wall, .toml or .json, which the options change.
+        arm: Axis of the arm, in the place of a bare device; --Ts none is continuous time, and the
+            hand by default Th (19).
+        box: Hands at the arm: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
         columns: Columns of a plane, or dampers of the arm, at which runs look for the border.
         quick: Draw lines of fewer points, with two such columns.
         out: Folder for mbk.json and the figures.
+        wall: The device and its sampling, and the K, B and M that the planes keep: by default
+            1000 N/m, 2 N.s/m and 0, on a damper of 0.5 N.s/m.
         figures: Format and style of the figures.
     """
 
-    wall: tuple[str, ...] = ()
+    source: Annotated[Path | None, tyro.conf.Positional] = None
     arm: Literal["x", "y"] | None = None
-    hand: tuple[float, float, float] | None = None
-    box: tuple[float, float, float, float, float, float] | None = None
-    Ts: float | None = TS
+    box: walls.Hands | None = None
     columns: int = 5
     quick: bool = False
     out: Path = Path("out/mbk")
+    wall: walls.WallOptions = walls.WallOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -54,9 +54,8 @@ class MBKCommand:
         columns = min(self.columns, 2) if self.quick else self.columns
         if self.arm:
             return self._arm(columns)
-        for name in ARM_ONLY:
-            if getattr(self, name) != getattr(type(self), name):
-                raise ParameterError(name, getattr(self, name), "is for the arm: give --arm too")
+        if self.box:
+            raise ParameterError("box", self.box, "is for the arm: give --arm too")
         return self._device(columns)
 
     def _device(self, columns: int) -> int:
@@ -64,7 +63,7 @@ class MBKCommand:
         from ..views import impedance_plots
         from ..views.figure import Figure
 
-        wall = wall_of(("device.damper=0.5", "K=1000", "B=2") if not self.wall else self.wall)
+        wall = self.wall.wall(self.source, **DEFAULT_WALL)
         found = device_mbk(wall, columns=columns, points=21 if self.quick else 61, progress=_bar)
         tables = found.tables()
         span = {"range": tables.pop("range")}
@@ -76,22 +75,23 @@ class MBKCommand:
         return 0
 
     def _arm(self, columns: int) -> int:
+        from ..model.fields import with_fields
         from ..model.operator import Operator
         from ..studies.boundary import PushedLoop
         from ..studies.mbk import HANDS, arm_mbk
-        from ..theory.margins import Box
         from ..views import impedance_plots
         from ..views.figure import Figure
 
-        if self.wall:
-            raise ParameterError("wall", self.wall, "is for a bare device: leave it out with --arm")
+        bound = "is for a bare device: leave it out with --arm"
+        self.wall.refuse(bound, but=("Ts", "delay", "hand"))
+        if self.source:
+            raise ParameterError("source", str(self.source), bound)
         assert self.arm is not None
-        box = HANDS
-        if self.box:
-            m0, m1, d0, d1, k0, k1 = self.box
-            box = Box((m0, m1), (d0, d1), (k0, k1))
-        operator = Operator(*self.hand) if self.hand else Operator()
-        loop = PushedLoop(self.arm, b=0.0, operator=operator, Ts=self.Ts)
+        box = walls.box_of(self.box) or HANDS
+        operator = walls.operator_of(self.wall.hand) or Operator()
+        loop = PushedLoop(self.arm, b=0.0, operator=operator, Ts=TS)
+        timing = {n: getattr(self.wall, n) for n in ("Ts", "delay")}
+        loop = with_fields(loop, walls.quantities(timing))
         points = 7 if self.quick else 17
         found = arm_mbk(
             loop, box, columns=columns, points=points, samples=0 if self.quick else 24,

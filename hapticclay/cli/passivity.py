@@ -10,19 +10,14 @@ import tyro
 
 from ..files import versions, writable
 from ..model.constants import AXES, TS
-from . import console
+from . import console, walls
 
 if TYPE_CHECKING:
     from ..model.scenario import Scenario
-    from ..model.virtual_wall import VirtualWall
     from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
     from ..views.figure import Figure
 
 PASSIVITY_SCHEMA = "hapticclay-passivity-1"
-WALL_HELP = (
-    "Fields of the wall: K, B, M, Ts, delay, window, velocity_filter, device.mass, device.damper, "
-    "as in --set K=500 device.damper=2."
-)
 DEFAULT_WALL = {"K": 500.0, "delay": 5e-4, "device.damper": 1.0}
 QUICK_RUNS = (1.0,)  # of Ts, at which limits are found by runs
 FULL_RUNS = (0.25, 1.0, 4.0)
@@ -36,27 +31,22 @@ class PassivityCommand:
     time, without and with the controller of Hannaford and Ryu), region (K over Ts and delay).
 
     Attributes:
-        wall: File of the wall; by default K = 500 N/m on 0.1 kg and 1 N.s/m, at 1 ms and
-            0.5 ms late.
-        changes: Its fields.
+        source: File of a wall, .toml or .json, which the options change.
         cut: Scenario file of the arm, and of its clay, held under sampled control; by default the
             constant cut, and for the clay over time one in clay of 8000 N.s/m.
         delays: Delays of the region, over Ts.
         out: Folder for passivity.json and the figures.
         quick: Find limits by runs at one Ts alone.
+        wall: The wall: by default K = 500 N/m on 0.1 kg and 1 N.s/m, at 1 ms and 0.5 ms late.
         figures: Formats and style of the figures.
     """
 
-    wall: Annotated[Path | None, tyro.conf.Positional] = None
-    changes: Annotated[
-        tuple[tuple[str, ...], ...],
-        tyro.conf.arg(name="set", metavar="NAME=VALUE", help=WALL_HELP),
-        tyro.conf.UseAppendAction,
-    ] = ()
+    source: Annotated[Path | None, tyro.conf.Positional] = None
     cut: Path | None = None
     delays: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
     out: Path = Path("out/passivity")
     quick: bool = False
+    wall: walls.WallOptions = walls.WallOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -64,7 +54,8 @@ class PassivityCommand:
         from ..studies.impedance import subject_of
 
         writable(self.out)
-        wall, (arm, cut) = self._wall(), self._scenarios()
+        wall = self.wall.wall(self.source, **DEFAULT_WALL)
+        arm, cut = self._scenarios()
 
         def bar(items: Any) -> Any:
             return console.progress_bar(items, desc="passivity")
@@ -81,15 +72,6 @@ class PassivityCommand:
             print(passivity_table(found, arms, energy, region))
         print(f"written to {self.out}")
         return 0
-
-    def _wall(self) -> VirtualWall:
-        from ..model.fields import with_fields
-        from ..model.virtual_wall import VirtualWall
-
-        wall = (
-            VirtualWall.load(self.wall) if self.wall else with_fields(VirtualWall(), DEFAULT_WALL)
-        )
-        return with_fields(wall, console.named_changes(self.changes))
 
     def _scenarios(self) -> tuple[Scenario, Scenario]:
         """Of the arm over frequency, and of the rendered clay over time."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,25 +12,12 @@ import tyro
 from ..errors import ParameterError
 from ..files import versions, writable
 from ..model.constants import GAIN, TS
-from . import console
+from . import console, walls
 
 if TYPE_CHECKING:
     from ..studies.zwidth import Wall, ZWidth
-    from ..theory.margins import Box
 
 ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
-Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
-DEVICE_OPTIONS = {  # dotted names of the options
-    "mass": "device.mass",
-    "damper": "device.damper",
-    "friction": "device.friction",
-    "quantum": "device.quantum",
-    "Ts": "Ts",
-    "delay": "delay",
-    "velocity": "velocity",
-    "window": "window",
-    "filter": "velocity_filter",
-}
 
 
 @dataclass(frozen=True)
@@ -42,17 +29,6 @@ class ZWidthCommand:
 
     Attributes:
         source: File of a wall, .toml or .json, which the options change; none for the defaults.
-        mass: Mass of the device [kg], by default 0.1.
-        damper: Its physical damping b [N.s/m], by default 0.
-        friction: Its Coulomb friction fc [N], by default 0.
-        quantum: Of the position that its encoder reads [m], by default 0.
-        Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
-        delay: From a sample to the force computed from it [s], by default 0.
-        velocity: How it is measured, by default the difference of positions.
-        window: Samples that the difference spans, by default 1.
-        filter: Low-pass behind the difference [Hz], or none.
-        hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
-        surface: The wall has a surface and never pulls.
         B: Virtual dampings to try [N.s/m]; by default 0 and others up to the largest stable one.
         vary: A family: Ts, delay, quantum, damper, friction, mass, filter or window, then its
             values, as in --vary damper 0.2 0.5 1; on the arm Ts, delay or gain.
@@ -66,31 +42,22 @@ class ZWidthCommand:
         gain: Of the compensator, with --arm; by default 1 on x and 0.5 on y.
         out: Folder for zwidth.json and the figure.
         quick: Try fewer dampings.
+        device: The device, its sampling and the hand.
         figures: Format and style of the figure.
     """
 
     source: Annotated[Path | None, tyro.conf.Positional] = None
-    mass: Quantity = None
-    damper: Quantity = None
-    friction: Quantity = None
-    quantum: Quantity = None
-    Ts: Quantity = None
-    delay: Quantity = None
-    velocity: Literal["difference", "exact"] | None = None
-    window: Quantity = None
-    filter: Quantity = None
-    hand: tuple[float, float, float] | None = None
-    surface: bool = False
     B: tuple[float, ...] = ()
     vary: tuple[str, ...] = ()
-    box: tuple[float, float, float, float, float, float] | None = None
-    force: Quantity = None
-    speed: Quantity = None
-    still: Quantity = None
+    box: walls.Hands | None = None
+    force: walls.Quantity = None
+    speed: walls.Quantity = None
+    still: walls.Quantity = None
     arm: Literal["x", "y"] | None = None
     gain: float | None = None
     out: Path = Path("out/zwidth")
     quick: bool = False
+    device: walls.DeviceOptions = walls.DeviceOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -100,8 +67,9 @@ class ZWidthCommand:
         from ..views.wall_plots import zwidth_plot
 
         writable(self.out)
-        press = with_fields(Press(), self._given({n: n for n in ("force", "speed", "still")}))
-        wall, box = self._wall(), self._box()
+        tried = walls.quantities({n: getattr(self, n) for n in ("force", "speed", "still")})
+        press = with_fields(Press(), tried)
+        wall, box = self._wall(), walls.box_of(self.box)
         with console.fraction_bar("runs") as show:
             found = zwidth(
                 wall,
@@ -125,45 +93,25 @@ class ZWidthCommand:
         print(f"written to {self.out}")
         return 0
 
-    def _given(self, names: dict[str, str]) -> dict[str, Any]:
-        """The options that were given, by dotted name, their numbers and units read."""
-        from ..model.fields import named_values
-
-        out: dict[str, Any] = {}
-        for option, name in names.items():
-            if (text := getattr(self, option)) is not None:
-                out |= named_values(f"--{option}", [f"{name}={text}"])
-        return out
-
     def _wall(self) -> Wall:
-        from ..model.fields import with_fields
-        from ..model.operator import Operator
-        from ..model.virtual_wall import VirtualWall
-
-        hand = None if self.hand is None else Operator(*self.hand)
         if self.arm:
-            return self._arm(hand)
+            return self._arm(self.arm)
         if self.gain is not None:
             raise ParameterError("gain", self.gain, "is for the arm: give --arm x or y")
-        wall = VirtualWall.load(self.source) if self.source else VirtualWall()
-        wall = with_fields(wall, self._given(DEVICE_OPTIONS))
-        if hand:
-            wall = replace(wall, operator=hand)
-        return replace(wall, surface=True) if self.surface else wall
+        return self.device.wall(self.source)
 
-    def _arm(self, hand: Any) -> Wall:
+    def _arm(self, axis: Literal["x", "y"]) -> Wall:
         from ..model.fields import with_fields
         from ..studies.boundary import PushedLoop
 
-        names = [n for n in DEVICE_OPTIONS if n not in ("Ts", "delay")]
-        for name in (*names, "surface", "source"):
-            if value := getattr(self, name):
-                bound = "is for a bare device: leave it out beside --arm"
-                raise ParameterError(name, str(value), bound)
-        axis = self.arm or "x"
+        bound = "is for a bare device: leave it out beside --arm"
+        self.device.refuse(bound, but=("Ts", "delay", "hand"))
+        if self.source:
+            raise ParameterError("source", str(self.source), bound)
         gain = GAIN["xy".index(axis)] if self.gain is None else self.gain
-        loop = PushedLoop(axis, K=gain, Ts=TS, operator=hand)
-        return with_fields(loop, self._given({"Ts": "Ts", "delay": "delay"}))
+        loop = PushedLoop(axis, K=gain, Ts=TS, operator=walls.operator_of(self.device.hand))
+        timing = {n: getattr(self.device, n) for n in ("Ts", "delay")}
+        return with_fields(loop, walls.quantities(timing))
 
     def _values(self, wall: Wall) -> list[Any]:
         """The values behind --vary."""
@@ -175,14 +123,6 @@ class ZWidthCommand:
             bound = "must be a name and its values, as in --vary damper 0.2 0.5"
             raise ParameterError("vary", self.vary[0], bound)
         return [named_values("--vary", [f"x={word}"])["x"] for word in self.vary[1:]]
-
-    def _box(self) -> Box | None:
-        from ..theory.margins import Box
-
-        if self.box is None:
-            return None
-        m, M, d, D, k, K = self.box
-        return Box((m, M), (d, D), (k, K))
 
 
 def zwidth_table(found: ZWidth) -> str:

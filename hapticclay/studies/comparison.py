@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,17 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import design, margins, wall_limits
 from ..theory.gain_limit import gain_limit
-from ..theory.impedance import loop_impedance
+from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.linear_loop import TIMING, Loop
+from ..theory.mbk import dynamic_range, least_mass
+from .zwidth import ZRegion, zwidth
 
 MOST_COMPARED = 5  # as many looks as curves have
 COMPARED_HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
 SLOW = 1e-4  # [rad/s] at which motion counts as steady
+FELT_AT = (1.0, 10.0)  # [Hz] at which the table has the impedance, below and above the loop's swing
+RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
+LEAST_DECAY = 10.0  # [1/s] B/M of the least mass: that of the paper's compensator
 PUSHED = 0.01  # [m/s] of a device in its run
 PUSHED_TIME = 0.5  # [s] of that run
 WALL_WORDS = frozenset(("device", "K", "B", "M", "window", "velocity_filter", "surface"))
@@ -42,6 +47,7 @@ class Compared:
         numbers: key numbers by name and unit; NaN where there is none.
         settings: every field by dotted name.
         record: its run.
+        region: of a wall, the stiffness and damping that its device renders stably, by runs.
     """
 
     name: str
@@ -50,29 +56,50 @@ class Compared:
     numbers: dict[str, float]
     settings: dict[str, Any]
     record: Record
+    region: ZRegion | None = None
+
+    def felt(self, omega: np.ndarray) -> Impedance:
+        """What a hand feels that is not in the loop; of a controller in continuous time.
+
+        Args:
+            omega: [rad/s], > 0, shape (n,).
+        """
+        if isinstance(self.subject, VirtualWall):
+            return wall_response(replace(self.subject, operator=None), omega)
+        assert self.loop is not None
+        return loop_response(replace(self.loop, operator=None, **TIMING), omega)
 
 
-def compare_files(paths: Sequence[str | os.PathLike[str]], axis: str = "x") -> tuple[Compared, ...]:
+def compare_files(
+    paths: Sequence[str | os.PathLike[str]],
+    axis: str = "x",
+    progress: Callable[[Iterable], Iterable] = iter,
+) -> tuple[Compared, ...]:
     """Loads, judges and runs controllers (scenario files) or bare devices (files of walls).
 
     Args:
-        paths: two to MOST_COMPARED files of one kind.
+        paths: two to MOST_COMPARED different files of one kind.
         axis: of the arm, for scenarios.
+        progress: wraps the iterable of the files.
 
     Raises:
-        ParameterError: fewer or more files, files of both kinds, or one that cannot be read.
+        ParameterError: fewer or more files, one of them twice, files of both kinds, or one that
+            cannot be read.
     """
+    given = [str(p) for p in paths]
     if not 2 <= len(paths) <= MOST_COMPARED:
-        bound = f"must be 2 to {MOST_COMPARED} files"
-        raise ParameterError("files", [str(p) for p in paths], bound)
+        bound = f"must be 2 to {MOST_COMPARED} files, as in hapticclay compare A.toml B.toml"
+        raise ParameterError("files", given, bound)
+    if len({os.path.realpath(p) for p in paths}) < len(paths):
+        raise ParameterError("files", given, "must be different files: one stands twice")
     kinds = {is_wall_file(p) for p in paths}
     if len(kinds) > 1:
         bound = "must be all scenarios or all walls: their numbers do not compare"
-        raise ParameterError("files", [str(p) for p in paths], bound)
+        raise ParameterError("files", given, bound)
     stems = [Path(p).stem for p in paths]
     names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]
     judge = compared_wall if kinds == {True} else compared_scenario
-    return tuple(judge(p, n, axis) for p, n in zip(paths, names, strict=True))
+    return tuple(judge(p, n, axis) for p, n in progress(list(zip(paths, names, strict=True))))
 
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
@@ -102,7 +129,7 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
     record, error = run_and_error(scenario)
     alone = replace(plain, operator=None)
     m = margins.margins(plain)
-    Z = loop_impedance(alone, np.array([SLOW]))[0]
+    Z = loop_response(alone, np.array([SLOW])).Z[0]
     steady = Z.real - loop.b if SLOW * abs(Z.imag) < 1e-3 * max(abs(Z.real), 1.0) else math.nan
     numbers = {
         "gain K [1/kg]": loop.gain,
@@ -116,11 +143,11 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
         "passivity margin [N.s/m]": _passivity_margin(alone),
         "steady damper [N.s/m]": steady,
         "error of transparency": design.transparency_error(plain) if loop.gain else math.nan,
-        **_run_numbers(record, error),
+        "least mass in free motion [kg]": least_mass(replace(loop, b=0.0, k=0.0), LEAST_DECAY)[0],
     }
-    return Compared(
-        name, scenario, loop, numbers, _by_dotted_name(plain_data(scenario, left_out=[])), record
-    )
+    settings = _by_dotted_name(plain_data(scenario, left_out=[]))
+    found = Compared(name, scenario, loop, numbers, settings, record)
+    return replace(found, numbers=numbers | _felt_numbers(found) | _run_numbers(record, error))
 
 
 def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> Compared:
@@ -135,6 +162,9 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
     record, error = run_and_error(wall.scenario(PUSHED_TIME, push=PUSHED))
     low, high = wall_limits.stiffness_band(wall)
     passive = wall_limits.colgate_schenkel_limit(wall)
+    region = zwidth(wall, quick=True).regions[0]
+    linear = replace(wall, device=replace(wall.device, friction=0.0, quantum=0.0), surface=False)
+    spread = dynamic_range(linear, 2.0 * math.pi * RANGE_AT[RANGE_AT < 0.5 / wall.Ts])
     edge = math.pi / wall.Ts
     omega = np.geomspace(1e-4 * edge, edge * (1.0 - 1e-9), 2000)
     numbers = {
@@ -146,9 +176,13 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
         "passive K, at most [N/m]": passive,
         "passivity margin [N.s/m]": float(np.min(wall_limits.passivity_index(wall, omega))),
         "stable K over passive K": high / passive if passive else math.nan,
-        **_run_numbers(record, error),
+        "Z-width by runs: largest K [N/m]": region.largest_K,
+        "Z-width by runs: largest B [N.s/m]": region.largest_B,
+        "runs off the exact linear loop [%]": 100.0 * region.gap(),
+        "dynamic range, mean [dB]": spread.mean,
     }
-    return Compared(name, wall, None, numbers, _by_dotted_name(plain_data(wall)), record)
+    found = Compared(name, wall, None, numbers, _by_dotted_name(plain_data(wall)), record, region)
+    return replace(found, numbers=numbers | _felt_numbers(found) | _run_numbers(record, error))
 
 
 def worst_limit(loop: Loop) -> float:
@@ -176,16 +210,28 @@ def run_and_error(scenario: Scenario) -> tuple[Record, float]:
         The record; the largest change of position at the samples that both have [m], NaN where
         they end differently. It is about the error of the second run times 3.
     """
-    record = simulate(scenario)
     sampled = scenario.control == "sampled"
     finer = replace(
         scenario, dt=0.5 * scenario.dt, Ts=(scenario.Ts or scenario.dt) if sampled else None
     )
-    fine = simulate(finer)
+    fine = simulate(finer)  # first: the time of the other has no loading of compiled code in it
+    record = simulate(scenario)
     n = min(len(record.t), (len(fine.t) + 1) // 2) - 1
     if n < 1 or record.outcome.code != fine.outcome.code:
         return record, math.nan
     return record, float(np.abs(record.p[:n] - fine.p[::2][:n]).max())
+
+
+def _felt_numbers(found: Compared) -> dict[str, float]:
+    """Effective stiffness, damping and mass at FELT_AT; NaN where a wall has no such frequency."""
+    out: dict[str, float] = {}
+    for f in FELT_AT:
+        known = not isinstance(found.subject, VirtualWall) or f < 0.5 / found.subject.Ts
+        Z = found.felt(np.array([2.0 * math.pi * f])) if known else None
+        for part, unit in (("stiffness", "N/m"), ("damping", "N.s/m"), ("mass", "kg")):
+            value = float(getattr(Z, part)[0]) if Z else math.nan
+            out[f"effective {part} at {f:g} Hz [{unit}]"] = value
+    return out
 
 
 def _run_numbers(record: Record, error: float) -> dict[str, float]:

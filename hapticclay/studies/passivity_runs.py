@@ -17,6 +17,7 @@ from ..simulation.record import Record, port_energy
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
 from ..theory.gain_limit import is_stable
+from ..theory.impedance import wall_impedance
 from .boundary import PushedLoop
 from .impedance import computed_impedance, measure_impedance
 from .port_energy import passivity_limit, polygon, taken_energy
@@ -172,7 +173,7 @@ def wall_index(wall: VirtualWall, progress: Jobs = iter) -> IndexOverFrequency:
     return IndexOverFrequency(
         f"wall of K = {wall.K:g} N/m, B = {wall.B:g} N.s/m",
         omega,
-        wall_limits.wall_impedance(wall, omega).real,
+        wall_impedance(wall, omega).real,
         wall_limits.passivity_index(wall, omega),
         measured_omega,
         measured,

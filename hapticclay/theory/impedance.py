@@ -274,3 +274,23 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     v = arm.speed * (1.0 + arm.hold * asked)
     fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
     return Impedance(omega, fh / v, -arm.hold * asked / fh, wall.K / s + wall.B + wall.M * s)
+
+
+def wall_impedance(wall: VirtualWall, omega: np.ndarray) -> np.ndarray:
+    """Force of the hand over velocity of the device with the wall, fh/v, without a hand: exact.
+
+    The Z of `wall_response`. At multiples of pi/Ts a real force meets its own mirror image in the
+    samples, and what it feels depends on its phase.
+
+    Args:
+        wall: the wall with its K; friction, quantum, surface and hand are left out. If it is
+            unstable without a hand, the motion lasts as long as a hand keeps it.
+        omega: frequencies, > 0 [rad/s], shape (n,).
+
+    Returns:
+        [N.s/m], shape (n,), complex.
+
+    Raises:
+        ParameterError: a frequency is not above 0.
+    """
+    return wall_response(replace(wall, operator=None), omega).Z

@@ -554,39 +554,6 @@ def hulin_boundary(
     return np.append(-damper, B[kept]), np.append(0.0, np.maximum(K[kept], 0.0))
 
 
-# ---- what the hand feels -------------------------------------------------------------------------
-
-
-def wall_impedance(wall: VirtualWall, omega: Any) -> np.ndarray:
-    """Force of the hand over velocity of the device with the wall, fh/v: exact.
-
-    Under fh = exp(j omega t) the sampled loop comes to a steady motion. With place and velocity at
-    the samples known, the held force is, and so is its component at omega; v is the component of
-    the velocity at omega. Components at omega + 2 pi n/Ts, which the hold adds, are part of the
-    motion and of its samples, not of v. At multiples of pi/Ts a real force meets its own mirror
-    image in the samples, and what it feels depends on its phase.
-
-    Args:
-        wall: the wall with its K; friction, quantum and surface are left out, and the hand is what
-            pushes. If it is unstable without a hand, the motion lasts as long as a hand keeps it.
-        omega: frequencies, > 0 and up to 1e7 [rad/s], shape (n,).
-
-    Returns:
-        [N.s/m], shape (n,), complex.
-    """
-    omega = _frequencies(omega)
-    Ts, s = wall.Ts, 1j * omega
-    bare = replace(wall, operator=None)
-    turn = omega * Ts
-    place, speed = _at_samples(bare, turn)
-    by_place, by_speed = _object(bare, turn)
-    by_place = by_place + wall.K
-    back = 1.0 + by_place * place + by_speed * speed
-    hold = -np.expm1(-1j * turn) / (1j * turn) * np.exp(-s * wall.delay)
-    own = wall.device.mass * s + wall.device.damper
-    return own * back / (back - hold * (by_place + s * by_speed) / (s * own))
-
-
 def _frequencies(omega: Any) -> np.ndarray:
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= TOP_OMEGA)):

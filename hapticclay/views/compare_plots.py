@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
@@ -17,7 +16,6 @@ from ..model.virtual_wall import VirtualWall
 from ..studies.comparison import Compared
 from ..theory import margins, wall_limits
 from ..theory.gain_limit import gain_limit
-from ..theory.impedance import loop_impedance
 from ..theory.linear_loop import TIMING
 from . import figure as shown
 from .style import (
@@ -27,13 +25,14 @@ from .style import (
     add_legend,
     figure_size,
     figure_style,
+    plain_ticks,
     stroke,
     unit_text,
 )
+from .wall_plots import regions_plot
 
 CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s/m]
 BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
-WALL_DAMPINGS = 61  # of the plane of K and B
 
 
 def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Figure]]:
@@ -44,17 +43,19 @@ def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Fig
     """
     if isinstance(found[0].subject, VirtualWall):
         plots: dict[str, tuple[str, Callable[[Sequence[Compared]], Figure]]] = {
-            "zwidth": ("Largest stable stiffness over virtual damping", wall_region_plot),
-            "passivity": ("Damping to spare over frequency", partial(spare_plot)),
+            "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
+            "passivity": ("Damping to spare over frequency", spare_plot),
             "impedance": ("Impedance that the hand feels", impedance_overlay),
+            "parts": ("Effective stiffness, damping and mass", parts_overlay),
             "push": (f"After a push of {1e3 * 0.01:g} mm/s", push_plot),
         }
     else:
         plots = {
             "velocity": ("Velocity over position", velocity_overlay),
             "stability": ("Gain limit over the damping of the clay", gain_overlay),
-            "passivity": ("Damping to spare over frequency", partial(spare_plot)),
+            "passivity": ("Damping to spare over frequency", spare_plot),
             "impedance": ("Impedance that the hand feels", impedance_overlay),
+            "parts": ("Effective stiffness, damping and mass", parts_overlay),
             "transparency": ("Share of the clay in the hand's force", transparency_overlay),
         }
     return {
@@ -72,6 +73,9 @@ def _overlay(
         for x, look in _looks(found):
             ax.plot(*curve(x), label=x.name, **look)
         ax.set(**axes)
+        for axis in (ax.xaxis, ax.yaxis):
+            if axis.get_scale() == "log":
+                plain_ticks(axis)
         add_legend(figure, ax, 3)
     return figure
 
@@ -119,13 +123,11 @@ def gain_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def _felt_by_hand(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency [rad/s] and fh/v [N.s/m] without the hand; of a controller in continuous time."""
+def _shown_band(x: Compared) -> np.ndarray:
+    """Frequencies [rad/s], of a wall below half of its sampling frequency."""
     if isinstance(x.subject, VirtualWall):
-        omega = BAND[BAND < 0.95 * math.pi / x.subject.Ts]
-        return omega, wall_limits.wall_impedance(replace(x.subject, operator=None), omega)
-    assert x.loop is not None
-    return BAND, loop_impedance(replace(x.loop, operator=None, **TIMING), BAND)
+        return BAND[BAND < 0.95 * math.pi / x.subject.Ts]
+    return BAND
 
 
 def spare_plot(found: Sequence[Compared]) -> Figure:
@@ -140,8 +142,8 @@ def spare_plot(found: Sequence[Compared]) -> Figure:
             edge = math.pi / x.subject.Ts
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
             return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
-        omega, Z = _felt_by_hand(x)
-        return omega / (2.0 * math.pi), Z.real
+        omega = _shown_band(x)
+        return omega / (2.0 * math.pi), x.felt(omega).damping
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
     return _zero(_overlay(found, spare, xscale="log", **labels))
@@ -155,11 +157,40 @@ def impedance_overlay(found: Sequence[Compared]) -> Figure:
     """
 
     def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        omega, Z = _felt_by_hand(x)
-        return omega / (2.0 * math.pi), np.abs(Z)
+        omega = _shown_band(x)
+        return omega / (2.0 * math.pi), np.abs(x.felt(omega).Z)
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("|f$_h$/v| [N.s/m]"))
     return _overlay(found, size, xscale="log", yscale="log", **labels)
+
+
+def parts_overlay(found: Sequence[Compared]) -> Figure:
+    """Plots effective stiffness, damping and mass over frequency; a panel with none is left out.
+
+    Args:
+        found: all of one kind.
+    """
+    panels = {"stiffness": "[N/m]", "damping": "[N.s/m]", "mass": "[kg]"}
+    curves = [(look, _shown_band(x), x) for x, look in _looks(found)]
+    felt = [(look, omega, x.felt(omega), x.name) for look, omega, x in curves]
+    panels = {
+        p: u
+        for p, u in panels.items()
+        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in felt)
+    }
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(panels)))
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, (part, unit) in zip(axes, panels.items(), strict=True):
+            for look, omega, Z, name in felt:
+                ax.plot(omega / (2.0 * math.pi), getattr(Z, part), label=name, **look)
+            ax.axhline(0.0, color=BLACK, lw=stroke(0.8), zorder=1)
+            ax.set(xscale="log", ylabel=unit_text(f"{part} {unit}"))
+        axes[-1].set_xlabel("frequency [Hz]")
+        plain_ticks(axes[-1].xaxis)
+        figure.align_ylabels(list(axes))
+        add_legend(figure, axes[0], 3)
+    return figure
 
 
 def transparency_overlay(found: Sequence[Compared]) -> Figure:
@@ -181,29 +212,13 @@ def transparency_overlay(found: Sequence[Compared]) -> Figure:
 
 
 def wall_region_plot(found: Sequence[Compared]) -> Figure:
-    """Plots the largest stable K over B, exact, and a mark at the wall of each file.
+    """Plots the walls that each device renders stably, by runs and exact, and the wall itself.
 
     Args:
         found: walls.
     """
     walls = [x.subject for x in found if isinstance(x.subject, VirtualWall)]
-    most = max(2.0 * (w.device.mass + w.hand.mass) / w.Ts for w in walls)
-    B = np.linspace(0.0, most, WALL_DAMPINGS)
-
-    def band(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        high = [wall_limits.stiffness_band(replace(x.subject, B=float(b)))[1] for b in B]  # type: ignore[arg-type]
-        return B, np.array(high)
-
-    labels = dict(xlabel=unit_text("virtual damping B [N.s/m]"), ylabel="stiffness K [N/m]")
-    figure = _overlay(found, band, **labels)
-    ax: Axes = figure.axes[0]
-    with figure_style():
-        for wall, (color, _) in zip(walls, CURVE_STYLES, strict=False):
-            mark: Any = dict(ms=stroke(7.0), mfc=WHITE, mec=color, mew=stroke(1.4))
-            ax.plot(wall.B, wall.K, "o", clip_on=False, zorder=5, **mark)
-    last = max((float(b) for x in found for b, K in zip(*band(x), strict=True) if K), default=most)
-    ax.set(xlim=(0.0, 1.1 * last or most), ylim=(0.0, None))
-    return figure
+    return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
 
 
 def push_plot(found: Sequence[Compared]) -> Figure:

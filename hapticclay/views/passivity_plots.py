@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
 from .style import (
@@ -21,6 +20,7 @@ from .style import (
     add_legend,
     figure_size,
     figure_style,
+    plain_ticks,
     set_title,
     stroke,
     unit_text,
@@ -62,7 +62,7 @@ def index_plot(found: IndexOverFrequency) -> Figure:
         _shade_active(ax)
         ax.set(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
         ax.set_xlim(found.omega[0] / HERTZ, found.omega[-1] / HERTZ * 1.05)
-        _plain_ticks(ax.xaxis)
+        plain_ticks(ax.xaxis)
         add_legend(figure, ax, 2)
         verdict = "passive" if found.margin >= 0.0 else "not passive"
         set_title(ax, unit_text(found.name), f"least {found.margin:.4g}: {verdict}")
@@ -79,14 +79,6 @@ def _shade_active(ax: Axes) -> None:
     at: Any = dict(transform=ax.get_yaxis_transform(), ha="left", va="center", color=GREY)
     ax.text(0.02, low + min(0.5 * -low, 0.06 * (high - low)), ACTIVE_LABEL, **at)
     ax.set_ylim(low, high)
-
-
-def _plain_ticks(axis: Any) -> None:
-    low, high = axis.get_view_interval()
-    some = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
-    axis.set_major_locator(LogLocator(subs=some))
-    axis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def port_energy_plot(found: EnergyOverTime) -> Figure:
@@ -140,7 +132,7 @@ def region_plot(found: PassiveRegion) -> Figure:
         ax.set(xlabel="control sample Ts [ms]", ylabel="largest passive stiffness K [N/m]")
         ax.set_xlim(1e3 * found.Ts[0], 1e3 * found.Ts[-1])
         for axis in (ax.xaxis, ax.yaxis):
-            _plain_ticks(axis)
+            plain_ticks(axis)
         add_legend(figure, ax, 4)
         w = found.wall
         told = [unit_text(f"b = {w.device.damper:g} N.s/m"), unit_text(f"B = {w.B:g} N.s/m")]

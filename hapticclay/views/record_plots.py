@@ -10,9 +10,18 @@ from matplotlib.figure import Figure
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
 from ..simulation.record import Record, port_energy
-from ..stepping.energy import stored_energy
 from . import run_plots
-from .style import BLUE, GREEN, ORANGE, VERMILION, add_legend, figure_style, set_title
+from .style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    VERMILION,
+    add_legend,
+    figure_size,
+    figure_style,
+    set_title,
+    stroke,
+)
 
 AXIS_CHOICES = (*AXES, "xy")
 OVER_CHOICES = ("time", "position")
@@ -122,16 +131,13 @@ def energies(record: Record) -> dict[str, np.ndarray]:
         steps = 0.5 * np.diff(record.t) * (power[1:] + power[:-1])
         return np.concatenate(([0.0], np.cumsum(steps)))
 
+    I1, I2 = record.scenario.arm.links[2:4]
     rates = record.qd[:, 0], record.qd.sum(axis=1)  # of the links
-    moving = [
-        stored_energy(record.scenario, r1, r2, (0.0, 0.0), (0.0, 0.0))[0]
-        for r1, r2 in zip(*(r.tolist() for r in rates), strict=True)
-    ]
     return {
         "hand": port_energy(record).sum(axis=1),
         "motors": work((record.tau * record.qd).sum(axis=1)),
         "clay": work((record.fe * record.v).sum(axis=1)),
-        "kinetic": np.array(moving),
+        "kinetic": 0.5 * (I1 * rates[0] ** 2 + I2 * rates[1] ** 2),
     }
 
 
@@ -152,14 +158,14 @@ def energy_plot(record: Record) -> Figure:
     }
     found = energies(record)
     with figure_style():
-        figure = Figure(figsize=(6.4, 3.6))
+        figure = Figure(figsize=figure_size(1, 3.6))
         ax = figure.add_subplot()
         for name, (color, style, label) in looks.items():
             ax.plot(record.t, found[name], color=color, ls=style, label=label)
         if total := _added_up(record):
             label = "added up by the run"
             for name, value in total.items():
-                ax.plot(record.t[-1], value, "o", color=looks[name][0], ms=5, label=label)
+                ax.plot(record.t[-1], value, "o", color=looks[name][0], ms=stroke(5.0), label=label)
                 label = "_"
         ax.set(xlabel="time [s]", ylabel="energy [J]")
         add_legend(figure, ax, ncols=3)

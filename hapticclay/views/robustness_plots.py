@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ..studies.monte_carlo import Instability, RiskMap
 from ..studies.population import Band
@@ -102,8 +102,7 @@ def instability_plot(result: Instability) -> Figure:
     charts = [result.map()] if grid else _panels(result)
     with figure_style():
         count = len(charts)
-        rows = count if narrow() else math.ceil(count / 2)
-        columns = min(count, 1 if narrow() else 2)
+        rows, columns = math.ceil(count / 2), min(count, 2)
         figure = Figure(figsize=figure_size(columns, 0.6 + 2.9 * rows))
         axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
         for ax, chart in zip(axes.flat, charts, strict=False):
@@ -137,6 +136,8 @@ def _risk_curve(ax: Axes, chart: RiskMap) -> None:
     )  # fmt: skip
     if _spans_decades(chart.x):
         ax.set_xscale("log")
+    elif narrow():
+        ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     ax.set_xlabel(_name(chart.x_name))
     ax.set_ylim(bottom=0.0)

@@ -371,6 +371,21 @@ def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> 
         legend.remove()
 
 
+def plain_ticks(axis: Any) -> None:
+    """Labels a logarithmic axis with plain numbers, at 1, 2 and 5 where it spans little.
+
+    Args:
+        axis: of matplotlib, its limits set.
+    """
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    some = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=some))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def hand_name(operator: Operator | None | tuple[Operator | None, Operator | None]) -> str:
     """Names the hand in a title.
 

@@ -28,6 +28,7 @@ from .style import (
     figure_size,
     figure_style,
     hand_name,
+    narrow,
     points,
     set_title,
     stroke,
@@ -53,7 +54,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
     """Plots the region of stable walls, or a family of regions.
 
     Runs are markers and theory is lines. Of a family each region has its runs, the exact line of
-    its linear loop, and its name beside it.
+    its linear loop, and, where there is room, its name beside it.
 
     Args:
         chart: from `zwidth`.
@@ -66,13 +67,40 @@ def zwidth_plot(chart: ZWidth) -> Figure:
             _draw_region(ax, chart.regions[0])
         else:
             _draw_family(ax, chart.regions)
-        ax.set(
-            xlabel=unit_text("virtual damping B [N.s/m]"),
-            ylabel=unit_text("virtual stiffness K [N/m]"),
-        )
-        add_legend(figure, ax, 2)
+            if not narrow():
+                _name_regions(ax, chart.regions)
+        _finish(figure, ax)
         set_title(ax, *_device_parts(chart))
     return figure
+
+
+def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Figure:
+    """Plots the regions of several devices over one another, and one wall of each.
+
+    Args:
+        regions: from `zwidth`, with names.
+        walls: the wall of each, a large ring.
+    """
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 5.0))
+        ax = figure.add_subplot()
+        _set_axes(ax, regions, walls)
+        _draw_family(ax, regions)
+        for i, wall in enumerate(walls):
+            color, _ = CURVE_STYLES[i % len(CURVE_STYLES)]
+            look: Any = dict(ms=stroke(10.0), mfc="none", mec=color, mew=stroke(2.0))
+            ax.plot(wall.B, wall.K, "o", clip_on=False, zorder=6, **look)
+        _finish(figure, ax)
+        set_title(ax, "lines: exact linear loop", "marks: runs", "rings: the walls themselves")
+    return figure
+
+
+def _finish(figure: Figure, ax: Axes) -> None:
+    ax.set(
+        xlabel=unit_text("virtual damping B [N.s/m]"),
+        ylabel=unit_text("virtual stiffness K [N/m]"),
+    )
+    add_legend(figure, ax, 2)
 
 
 def _draw_region(ax: Axes, r: ZRegion) -> None:
@@ -83,8 +111,9 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
         look = dict(LIMIT_LOOKS[limit.name.split(" ")[0]])
         if limit.name.startswith("exact"):
             label = limit.name if r.linear else f"linear loop, {_left_out(r)} left out"
-        else:
-            label = limit.name + KIND_WORDS[limit.kind]
+            label = label.partition(",")[0] + " alone" if narrow() and not r.linear else label
+        else:  # one column has no room for the kind beside two names
+            label = limit.name + ("" if narrow() else KIND_WORDS[limit.kind])
         if look.get("marker"):
             look |= dict(ms=stroke(8), mfc=WHITE, mew=stroke(1.8), zorder=6, clip_on=False)
         ax.plot(limit.B, _where_stable(limit.K), label=label, **look)
@@ -97,12 +126,11 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
 
 
 def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
-    """Runs and exact line of each region, with its name at its largest K."""
+    """Runs and exact line of each region."""
     bottom = ax.get_ylim()[0]
     for i, r in enumerate(regions):
         color, style = CURVE_STYLES[i % len(CURVE_STYLES)]
         marker = FAMILY_MARKS[i % len(FAMILY_MARKS)]
-        ax.fill_between(*_region_edge(r), bottom, color=color, alpha=0.05, lw=0, zorder=0.5)
         if r.linear:
             limit = r.limits[0]
             ax.plot(limit.B, _where_stable(limit.K), color=color, ls=style)
@@ -112,7 +140,6 @@ def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
         if i % 2:
             look["mfc"] = WHITE
         ax.plot(r.B, _marked(r.K, bottom), label=unit_text(r.name), zorder=5, **look)
-    _name_regions(ax, regions)
 
 
 def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
@@ -169,13 +196,13 @@ def _marked(K: Sequence[float], bottom: float) -> np.ndarray:
     return np.where(a >= bottom, a, np.nan)
 
 
-def _set_axes(ax: Axes, regions: Sequence[ZRegion]) -> None:
+def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall] = ()) -> None:
     """Scales and limits that hold every run: logarithmic where they span much, with B = 0."""
     B = sorted({x for r in regions for x in r.B if x > 0.0})
-    K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0]
-    least = [x for r in regions for x in r.K[:1] if x > 0.0]
+    K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0] + [w.K for w in walls]
+    least = [x for r in regions for x in r.K[:1] if x > 0.0] + [w.K for w in walls if w.K]
     least += [x for r in regions if len(regions) == 1 for limit in r.limits for x in limit.K[:1]]
-    top = max([*B, *(r.largest_B for r in regions)], default=1.0)
+    top = max([*B, *(w.B for w in walls), *(r.largest_B for r in regions)], default=1.0)
     most = max(K, default=1.0)
     if not B or B[-1] < SPREAD * B[0] or min(x for r in regions for x in r.B) < 0.0:
         left = min(0.0, *(r.B[0] for r in regions))
@@ -199,7 +226,7 @@ def _left_out(r: ZRegion) -> str:
     assert isinstance(r.wall, VirtualWall)
     d = r.wall.device
     parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
-    return " and ".join(parts + ["surface"] * r.wall.surface)
+    return ", ".join(parts + ["surface"] * r.wall.surface)
 
 
 def _device_parts(chart: ZWidth) -> list[str]:
@@ -219,6 +246,8 @@ def _device_parts(chart: ZWidth) -> list[str]:
             told["window"] = f"window {w.window}"
         if w.velocity_filter:
             told["filter"] = f"filter {w.velocity_filter:g} Hz"
+        if w.surface:
+            told["surface"] = "surface"
     else:
         told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told
     parts = [unit_text(text) for name, text in told.items() if name != chart.vary]

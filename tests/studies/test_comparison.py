@@ -49,6 +49,13 @@ def test_numbers_are_those_of_the_analysis(controllers):
         assert n["gain margin"] == pytest.approx(m.gain[1], rel=0.05)
         assert n["steady damper [N.s/m]"] == pytest.approx(10.0 / K, rel=1e-4)  # 10/K, the paper's
         assert n["engine steps"] == x.record.steps
+        Z = hc.loop_impedance("x", K, b, [2.0 * np.pi], operator=None)[0]
+        assert n["effective damping at 1 Hz [N.s/m]"] == pytest.approx(Z.real, rel=0.05)
+        # the compensator is 1/(M (s^2 + 10 s)), so the least M is that of the largest gain
+        limit = hc.gain_limit(hc.Loop.of(x.subject, "x", 0.0))
+        assert n["least mass in free motion [kg]"] == pytest.approx(
+            1.0 / limit if limit else np.inf
+        )
         assert 0.0 < n["change of position at half the step [m]"] < 1e-6
         assert n["gain limit, worst hand [1/kg]"] <= n["gain limit, as sampled [1/kg]"] * (1 + 1e-9)
 
@@ -58,6 +65,11 @@ def test_numbers_of_walls_are_the_closed_forms(walls):
         assert x.numbers["passive K, at most [N/m]"] == pytest.approx(2.0 * b / Ts)
         assert x.numbers["passivity margin [N.s/m]"] == pytest.approx(b - 0.5 * K * Ts)
         assert x.numbers["stable K, at most [N/m]"] >= 2.0 * b / Ts
+        assert x.region.gap() < 3e-3  # runs against eigenvalues, as docs/zwidth.md says
+        assert x.numbers["Z-width by runs: largest K [N/m]"] == max(x.region.K)
+        assert 20.0 < x.numbers["dynamic range, mean [dB]"] < 100.0
+        # at 1 Hz a wall is its spring and damper, but for device and hold: K of 1 %
+        assert x.numbers["effective stiffness at 1 Hz [N/m]"] == pytest.approx(K, rel=0.03)
         # a passive hand cannot make a passive wall unstable
         assert x.numbers["stable K, worst hand [N/m]"] >= 2.0 * b / Ts * (1.0 - 1e-6)
 
@@ -90,7 +102,7 @@ def test_the_page_needs_no_other_file(kind, request):
     found = request.getfixturevalue(kind)
     text = comparison_page(found)
     page = Page(text)
-    assert page.tags.count("svg") == {"controllers": 5, "walls": 4}[kind]
+    assert page.tags.count("svg") == {"controllers": 6, "walls": 5}[kind]
     assert all(link.startswith("#") for link in page.links)
     assert len(page.ids) == len(set(page.ids))
     assert {link[1:] for link in page.links} <= set(page.ids)
@@ -125,8 +137,35 @@ def test_what_does_not_compare_is_refused(tmp_path):
         comparison.compare_files([scene, wall])
     with pytest.raises(ParameterError, match="2 to 5"):
         comparison.compare_files([wall])
-    with pytest.raises(ParameterError):
-        comparison.compare_files([wall, tmp_path / "none.toml"])
+    with pytest.raises(ParameterError, match="stands twice"):
+        comparison.compare_files([wall, tmp_path / "." / wall.name])
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        ("", "2 to 5 files"),
+        ("a.toml", "2 to 5 files"),
+        ("a.toml a.toml", "one stands twice"),
+        ("a.toml none.toml", "scenario = 'none.toml': must be a file that can be read"),
+        ("a.toml wall.toml", "all scenarios or all walls"),
+    ],
+)
+def test_the_command_refuses_in_one_line(words, told, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files(tmp_path, {"a": SCENES["printed"], "wall": WALLS["near"]})
+    assert app.main(["compare", *words.split(), "--out", "o"]) == 2
+    err = capsys.readouterr().err
+    assert told in err and err.count("\n") == 1
+
+
+def test_what_is_unstable_is_shown_as_such(tmp_path, capsys):
+    scenes = {"stable": SCENES["printed"], "wild": SCENES["printed"] + "gain = [30.0, 0.5]\n"}
+    words = map(str, files(tmp_path, scenes))
+    assert app.main(["compare", *words, "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    rows = {line[:38].strip(): line[38:].split() for line in out.splitlines()}
+    assert rows["phase margin [degrees]"][1] == "-" and "diverged" in out
 
 
 def test_the_run_changes_with_the_square_of_the_step():

@@ -128,7 +128,7 @@ def test_figures_and_tables_of_a_wall_and_of_the_arm():
 
 
 def test_the_command_prints_and_writes(tmp_path, capsys):
-    words = ["impedance", "--wall", "K=300", "B=2", "mass=0.1", "damper=0.5", "Ts=1ms"]
+    words = ["impedance", "--K", "300", "--B", "2", "--damper", "0.5", "--Ts", "1ms"]
     assert app.main([*words, "--lines", "5", "--out", str(tmp_path), "--data"]) == 0
     out = capsys.readouterr().out
     assert "stiffness [N/m]" in out and "measured against computed: Z within 0.00" in out
@@ -141,9 +141,9 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
 @pytest.mark.parametrize(
     "words, told",
     [
-        (["--wall", "K=300", "mas=2"], "no such field"),
-        (["--wall", "K"], "must be name=value"),
-        (["--wall", "K=300", "--axis", "y"], "leave it out with --wall"),
+        (["constant", "--K", "300"], "leave it out beside"),
+        (["--K", "soft"], "K"),
+        (["--K", "300", "--axis", "y"], "leave it out with a wall"),
         (["constnat"], "did you mean 'constant'"),
         (["constant", "--b", "-1"], "b = -1.0"),
         (["constant", "--band", "0", "3"], "band"),

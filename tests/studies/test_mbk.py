@@ -81,8 +81,8 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
     "words, told",
     [
         (["--box", "0", "1", "0", "1", "0", "1"], "give --arm too"),
-        (["--arm", "x", "--wall", "K=3"], "leave it out with --arm"),
-        (["--wall", "mass=-1"], "device.mass"),
+        (["--arm", "x", "--K", "3"], "leave it out with --arm"),
+        (["--mass", "-1"], "device.mass"),
     ],
 )
 def test_the_command_refuses(words, told, tmp_path, capsys):

@@ -114,13 +114,13 @@ def test_continuous_runs_have_no_controller():
 
 
 def test_the_command_writes_all_figures(tmp_path, capsys):
-    words = ["passivity", "--quick", "--delays", "0", "--set", "K=800", "device.damper=1.5",
-             "delay=0", "--format", "svg", "--data", "--out", str(tmp_path)]  # fmt: skip
+    words = ["passivity", "--quick", "--delays", "0", "--K", "800", "--damper", "1.5",
+             "--delay", "0", "--format", "svg", "--data", "--out", str(tmp_path)]  # fmt: skip
     assert app.main(words) == 0
     names = {p.stem for p in tmp_path.glob("*.svg")}
     assert names == {"index", "arm_x", "arm_y", "energy", "region"}
     assert (tmp_path / "passivity.json").exists() and (tmp_path / "index.csv").exists()
     told = capsys.readouterr().out
     assert "1.1" in told and "3000" in told  # b - K Ts/2, 2 b/Ts
-    assert app.main(["passivity", "--set", "device.dampr=2", "--out", str(tmp_path)]) == 2
+    assert app.main(["passivity", "--dampr", "2", "--out", str(tmp_path)]) == 2
     assert "damper" in capsys.readouterr().err

@@ -13,14 +13,32 @@ from matplotlib.text import Text
 
 import hapticclay as hc
 from benchmarks import fit_coverage
-from hapticclay.studies import passivity_runs
+from hapticclay.studies import comparison, passivity_runs
 from hapticclay.studies.accuracy import Ladder, Setting
 from hapticclay.studies.boundary import PushedLoop
+from hapticclay.studies.impedance import MeasuredImpedance, computed_impedance
+from hapticclay.studies.mbk import ArmMBK, Border, DeviceMBK, arm_mbk, device_mbk
+from hapticclay.studies.monte_carlo import Instability
+from hapticclay.studies.population import Draw, gain_band
+from hapticclay.studies.sampling import Range
 from hapticclay.studies.stability_map import MapCell, StabilityMap
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
+from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, Limit, ZRegion, ZWidth
 from hapticclay.theory.linear_loop import Loop
-from hapticclay.views import fit_plots, passivity_plots, run_plots, study_plots, theory_plots
+from hapticclay.theory.margins import Box
+from hapticclay.views import (
+    compare_plots,
+    fit_plots,
+    impedance_plots,
+    passivity_plots,
+    record_plots,
+    robustness_plots,
+    run_plots,
+    study_plots,
+    theory_plots,
+    wall_plots,
+)
 from hapticclay.views.style import LEAST_TEXT
 
 HAND = hc.Operator()
@@ -142,6 +160,121 @@ def passive(what):
     return passivity_runs.PassiveRegion(wall, delays, Ts, limits, Ts[::6], limits[:, ::6])
 
 
+def z_region(name, wall, rest=False, box=False):
+    """A region with every line that a region may have; its runs are made up."""
+    b, Ts = wall.device.damper, wall.Ts
+    B = (0.0, *np.geomspace(0.25, 100.0, 8).tolist(), 144.0, 176.0, 194.0)
+    exact = [hc.stiffness_band(dataclasses.replace(wall, B=x))[1] for x in B]
+    K = [1.004 * x * (0.6 if rest and x > 1e4 else 1.0) for x in exact]
+    boxed = (Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0)), tuple(K), tuple(exact)) if box else ()
+    passive = tuple(max(0.0, 2.0 * (b - x) / Ts) for x in B)
+    limits = [
+        Limit("exact, linear loop", "exact", B, tuple(exact)),
+        Limit("Colgate, Schenkel 1997", "sufficient", B, passive),
+        Limit("Hulin et al. 2006", "rule", B, tuple(2.0 * (b + x) / Ts for x in B)),
+        Limit("Abbott, Okamura 2005", "sufficient", (0.0,), (2.0 * b / Ts,)),
+        Limit("any hand of the box", "exact", B, tuple(exact)),
+    ]
+    verdict = BY_REST if rest else BY_GROWTH
+    numbers = (verdict, B, tuple(K), tuple(exact), 200.0, tuple(limits))
+    return ZRegion(name, wall, *numbers, *boxed)
+
+
+@functools.cache
+def z_width(kind):
+    """The regions of one device, of one with friction, encoder and a surface, and of a family."""
+    wall = hc.VirtualWall(device=hc.Device(0.1, 0.5))
+    if kind == "region":
+        return ZWidth((z_region("", wall, box=True),))
+    if kind == "rest":
+        device = hc.Device(0.1, 0.5, friction=0.02, quantum=2e-5)
+        wall = dataclasses.replace(wall, device=device, surface=True, operator=HAND, window=4)
+        return ZWidth((z_region("", wall, rest=True, box=True),))
+    dampers = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
+    walls = [dataclasses.replace(wall, device=hc.Device(0.1, b)) for b in dampers]
+    named = [z_region(f"b = {w.device.damper:g} N.s/m", w) for w in walls]
+    return ZWidth(tuple(named), "damper")
+
+
+@functools.cache
+def felt(kind):
+    """Impedances of the arm, and of a wall, as if measured with an error."""
+    wall = hc.VirtualWall(300.0, 2.0, 0.05, hc.Device(0.1, 0.5), HAND, delay=5e-4)
+    subject = wall if kind == "wall" else PushedLoop("x", b=90.0, k=40.0, operator=HAND, Ts=1e-3)
+    there = computed_impedance(subject, 2.0 * math.pi * np.geomspace(0.5, 30.0, 24))
+    off = np.linspace(0.99, 1.01, 24)
+    seen = dataclasses.replace(there, Z=off * there.Z, felt=off * there.felt)
+    return MeasuredImpedance(subject, seen, there, np.zeros(24), hc.constant_cut())
+
+
+@functools.cache
+def parts_rendered():
+    """Of a device, with runs that are made up."""
+    wall = hc.VirtualWall(1000.0, 2.0, device=hc.Device(0.1, 0.5))
+    found = device_mbk(wall, columns=0, points=41)
+    runs = {
+        plane: tuple(
+            Border(float(r.x[i]), float(r.high[i]), float(r.high[i]), "high") for i in (8, 20, 32)
+        )
+        for plane, r in found.regions.items()
+    }
+    return DeviceMBK(found.wall, found.regions, runs, found.range)
+
+
+@functools.cache
+def least_masses():
+    loop = PushedLoop(b=0.0, operator=HAND, Ts=3.6e-4)
+    found = arm_mbk(loop, columns=0, points=5, samples=0)
+    (M, B), runs = found.nominal, []
+    runs = [Border(float(B[i]), float(M[i]), float(M[i]), "low") for i in (0, 2, 4)]
+    return ArmMBK(loop, found.box, found.nominal, found.worst, tuple(runs))
+
+
+@functools.cache
+def hands_band():
+    hands = hc.POPULATIONS["published range"]
+    return gain_band(Loop("x"), hands, np.geomspace(1.0, 3000.0, 9).tolist(), Draw(40))
+
+
+@functools.cache
+def risk(kind):
+    """Runs that are unstable by chance where K, and the clay's b, are large."""
+    K, b = Range(1.0, 8.0, 15), Range(10.0, 1000.0, 11, log=True)
+    given = {
+        "map": dict(grid={"K": K, "b": b}, runs=100),
+        "line": dict(grid={"K": K}, runs=100),
+        "parameters": dict(vary={"K": hc.Distribution("log-normal", 4.0, 1.0)}, runs=2000),
+    }
+    trials = hc.Trials(PushedLoop("x", b=90.0, operator=None), hands="published range",
+                       **given[kind])  # fmt: skip
+    points = np.concatenate([trials.points(n) for n in range(trials.chunks)])
+    gain = points[:, trials.names.index("K")]
+    odds = np.random.default_rng(0).normal(size=len(gain))
+    return Instability(trials, points, (gain + odds > 4.0).astype(int), np.zeros(len(gain), bool))
+
+
+@functools.cache
+def compared(kind):
+    """As many files as there may be, of long names, and without what the figures do not show."""
+    names = ("as printed", "half the gain", "controller of 2007", "no_shaping_at_all", "slow, late")
+    looks = list(enumerate(names))
+    if kind == "walls":
+        walls = [
+            hc.VirtualWall(300.0 + 200.0 * i, 0.2 * i, device=hc.Device(0.1, 1.0)) for i, _ in looks
+        ]
+        runs = [hc.simulate(w.scenario(0.1, push=0.01)) for w in walls]
+        found = zip(names, walls, [None] * 5, runs, strict=True)
+    else:
+        gains = [(1.0 - 0.15 * i, 0.5) for i, _ in looks]
+        scenes = [hc.constant_cut(gain=gain, operator=HAND, t_max=4.0) for gain in gains]
+        loops = [Loop.of(x, "x") for x in scenes]
+        found = zip(names, scenes, loops, [hc.simulate(x) for x in scenes], strict=True)
+    region = z_region("", hc.VirtualWall(device=hc.Device(0.1, 1.0)))
+    return tuple(
+        comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found
+    )
+
+
 def run_case(name, figure):
     return lambda: run_plots.FIGURES[figure](record(name))
 
@@ -184,6 +317,44 @@ CASES = {
     "passivity index": lambda: passivity_plots.index_plot(passive("index")),
     "passivity energy": lambda: passivity_plots.port_energy_plot(passive("energy")),
     "passivity region": lambda: passivity_plots.region_plot(passive("region")),
+    **{
+        f"zwidth {kind}": lambda kind=kind: wall_plots.zwidth_plot(z_width(kind))
+        for kind in ("region", "rest", "family")
+    },
+    **{
+        f"{name} of {kind}": lambda kind=kind, plot=plot: plot(felt(kind))
+        for kind in ("arm", "wall")
+        for name, plot in {
+            "impedance": impedance_plots.impedance_plot,
+            "transparency": impedance_plots.transparency_bode_plot,
+        }.items()
+    },
+    "mbk": lambda: impedance_plots.mbk_plot(parts_rendered()),
+    "dynamic range": lambda: impedance_plots.dynamic_range_plot(parts_rendered()),
+    "least mass": lambda: impedance_plots.least_mass_plot(least_masses()),
+    "gain band": lambda: robustness_plots.band_plot(hands_band()),
+    **{
+        f"instability {kind}": lambda kind=kind: robustness_plots.instability_plot(risk(kind))
+        for kind in ("map", "line", "parameters")
+    },
+    **{
+        f"compared {kind}: {plot.__name__}": lambda kind=kind, plot=plot: plot(compared(kind))
+        for kind, plots in {
+            "controllers": (
+                compare_plots.velocity_overlay,
+                compare_plots.gain_overlay,
+                compare_plots.transparency_overlay,
+            ),
+            "walls": (compare_plots.wall_region_plot, compare_plots.push_plot),
+        }.items()
+        for plot in (
+            *plots,
+            compare_plots.spare_plot,
+            compare_plots.impedance_overlay,
+            compare_plots.parts_overlay,
+        )
+    },
+    "energy": lambda: record_plots.energy_plot(record("driven")),
     "transparency": lambda: theory_plots.transparency_plot(
         LOOP, [("as printed", 1.0, hc.Compensator()), ("designed", 2.0, hc.Compensator())]
     ),
