@@ -18,7 +18,7 @@ plt.style.use("hapticclay.views.figure")
 
 wall = hc.VirtualWall(B=0.8, device=hc.Device(mass=0.1, damper=1.0), Ts=1e-3)  # N.s/m, kg, s
 box = hc.Box(mass=(0.0, 1.0), damper=(0.0, 5.0), spring=(0.0, 0.0))  # hands at the wall
-delays = np.linspace(0.0, 5e-3, 21)  # s
+delays = np.linspace(0.0, 5e-3, 11)  # s
 late = [replace(wall, delay=float(x)) for x in delays]
 
 fig, ax = plt.subplots()
