@@ -17,7 +17,7 @@ from . import console, walls
 if TYPE_CHECKING:
     from ..studies.mbk import ArmMBK, DeviceMBK
 
-DEFAULT_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
+RENDERED_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class MBKCommand:
 
     source: Annotated[Path | None, tyro.conf.Positional] = None
     arm: Literal["x", "y"] | None = None
-    box: walls.Hands | None = None
+    box: walls.HandEnds | None = None
     columns: int = 5
     quick: bool = False
     out: Path = Path("out/mbk")
@@ -63,7 +63,7 @@ class MBKCommand:
         from ..views import impedance_plots
         from ..views.figure import Figure
 
-        wall = self.wall.wall(self.source, **DEFAULT_WALL)
+        wall = self.wall.wall(self.source, **RENDERED_WALL)
         found = device_mbk(wall, columns=columns, points=21 if self.quick else 61, progress=_bar)
         tables = found.tables()
         span = {"range": tables.pop("range")}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..views.figure import Figure
 
 PASSIVITY_SCHEMA = "hapticclay-passivity-1"
-DEFAULT_WALL = {"K": 500.0, "delay": 5e-4, "device.damper": 1.0}
+PASSIVE_WALL = {"K": 500.0, "delay": 5e-4, "device.damper": 1.0}
 QUICK_RUNS = (1.0,)  # of Ts, at which limits are found by runs
 FULL_RUNS = (0.25, 1.0, 4.0)
 
@@ -54,7 +54,7 @@ class PassivityCommand:
         from ..studies.impedance import subject_of
 
         writable(self.out)
-        wall = self.wall.wall(self.source, **DEFAULT_WALL)
+        wall = self.wall.wall(self.source, **PASSIVE_WALL)
         arm, cut = self._scenarios()
 
         def bar(items: Any) -> Any:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
 Hand = tuple[float, float, float]
-Hands = tuple[float, float, float, float, float, float]
+HandEnds = tuple[float, float, float, float, float, float]
 WALL_FIELDS = {  # dotted names of options, where the two differ
     "mass": "device.mass",
     "damper": "device.damper",
@@ -136,7 +136,7 @@ def operator_of(hand: Hand | None) -> Any:
     return Operator(*hand) if hand else None
 
 
-def box_of(hands: Hands | None) -> Box | None:
+def box_of(hands: HandEnds | None) -> Box | None:
     """The hands of --box, None for none.
 
     Args:

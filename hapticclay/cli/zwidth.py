@@ -49,7 +49,7 @@ class ZWidthCommand:
     source: Annotated[Path | None, tyro.conf.Positional] = None
     B: tuple[float, ...] = ()
     vary: tuple[str, ...] = ()
-    box: walls.Hands | None = None
+    box: walls.HandEnds | None = None
     force: walls.Quantity = None
     speed: walls.Quantity = None
     still: walls.Quantity = None

@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import ParameterError, integer, numbers_of
 from ..files import versions
 from ..model.virtual_wall import VirtualWall
-from ..simulation.simulate import simulate
 from ..theory.margins import Box
 from ..theory.mbk import (
     PLANES,
@@ -23,14 +22,11 @@ from ..theory.mbk import (
     renderable,
     stable_band,
 )
-from .boundary import PushedLoop, find_crossing, growth_rate, simulated_gain
+from .boundary import PushedLoop, find_crossing, simulated_gain
+from .zwidth import growth_rates
 
 MBK_SCHEMA = "hapticclay-mbk-1"
 MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}
-WALL_PUSH = 1e-4  # [m/s] initial velocity of the device
-GROWTH_SAMPLES = 800  # of a run whose growth is read
-BORDER_STEPS = 2  # of the engine a sample: under a held force each is exact but for the damping
-FADED_SHARE = 1e-6  # of the push: what is left may be rounding
 MOST_SOUGHT = 100.0  # times the exact border: end of a search
 HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
 DECAYS = (1.0, 1000.0)  # [1/s] B/M of admittances
@@ -222,30 +218,17 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
     wall = replace(wall, **{across: x})
     low, high = stable_band(wall, up)
     out = []
+
+    def growth(y: float) -> float:
+        return growth_rates([replace(wall, **{up: y})])[0]
+
     if math.isfinite(high) and high > 0.0:
-        y = find_crossing(lambda y: wall_growth(replace(wall, **{up: y})), high, MOST_SOUGHT * high)
+        y = find_crossing(growth, high, MOST_SOUGHT * high)
         out.append(Border(x, y, high, "high"))
     if low > 0.0:
-        y = find_crossing(
-            lambda y: wall_growth(replace(wall, **{up: 1.0 / y})), 1.0 / low, MOST_SOUGHT / low
-        )
+        y = find_crossing(lambda y: growth(1.0 / y), 1.0 / low, MOST_SOUGHT / low)
         out.append(Border(x, 1.0 / y if y else math.inf, low, "low"))
     return out
-
-
-def wall_growth(wall: VirtualWall) -> float:
-    """Rate at which the oscillation of a pushed device grows or dies, by a run [1/s].
-
-    Args:
-        wall: with its K, B and M.
-    """
-    t_max = GROWTH_SAMPLES * wall.Ts
-    record = simulate(wall.scenario(t_max, push=WALL_PUSH, steps=BORDER_STEPS))
-    v = np.abs(record.v[:, 0])
-    end = float(v[int(0.9 * len(v)) :].max())
-    if end < FADED_SHARE * WALL_PUSH:
-        return math.log(max(end, 1e-300) / WALL_PUSH) / t_max
-    return growth_rate(record, "x")
 
 
 def arm_mbk(

@@ -69,7 +69,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
             _draw_family(ax, chart.regions)
             if not narrow():
                 _name_regions(ax, chart.regions)
-        _finish(figure, ax)
+        _label_plane(figure, ax)
         set_title(ax, *_device_parts(chart))
     return figure
 
@@ -90,12 +90,12 @@ def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Fi
             color, _ = CURVE_STYLES[i % len(CURVE_STYLES)]
             look: Any = dict(ms=stroke(10.0), mfc="none", mec=color, mew=stroke(2.0))
             ax.plot(wall.B, wall.K, "o", clip_on=False, zorder=6, **look)
-        _finish(figure, ax)
+        _label_plane(figure, ax)
         set_title(ax, "lines: exact linear loop", "marks: runs", "rings: the walls themselves")
     return figure
 
 
-def _finish(figure: Figure, ax: Axes) -> None:
+def _label_plane(figure: Figure, ax: Axes) -> None:
     ax.set(
         xlabel=unit_text("virtual damping B [N.s/m]"),
         ylabel=unit_text("virtual stiffness K [N/m]"),
