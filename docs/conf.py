@@ -5,6 +5,7 @@ docs/gallery is made from examples/, and no part of the checkout.
 
 import collections
 import functools
+import logging
 import os
 import re
 import sys
@@ -13,6 +14,7 @@ import zlib
 from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "agg")
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells of each table of a font
 DOCS = Path(__file__).parent
 COLON = "\N{RATIO}"  # stands for a colon while napoleon looks for one
 sys.path.insert(0, str(DOCS.parent))  # the checkout, not an installed release

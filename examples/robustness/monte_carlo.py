@@ -21,7 +21,7 @@ trials = hc.Trials(
     vary={"delay": hc.Distribution("uniform", 0.0, 2e-3)},  # s
     hands=hc.Hands.around(hc.Operator(), variation=0.5),
     grid={"K": Range(1.0, 5.0, 4)},
-    runs=40,  # of each K
+    runs=30,  # of each K
 )
 with tempfile.TemporaryDirectory() as folder:
     hc.monte_carlo(trials, out=folder)
@@ -32,7 +32,7 @@ chart = result.map()
 fig, ax = plt.subplots()
 share = 100.0 * chart.probability[:, 0]  # %
 low, high = (100.0 * x[:, 0] for x in chart.interval())
-ax.errorbar(chart.x, share, (share - low, high - share), fmt="o", capsize=4, label="40 runs each")
+ax.errorbar(chart.x, share, (share - low, high - share), fmt="o", capsize=4, label="30 runs each")
 ax.set(xlabel="gain K [1/kg]", ylabel="unstable runs, 95 % interval [%]", ylim=(-3.0, 103.0))
 ax.legend()
 plt.show()
