@@ -195,7 +195,8 @@ class Trials:
         made = with_fields(scenario, others) if others else scenario
         if isinstance(base, VirtualWall):
             hardware = made.interface
-            if base.surface or hardware.encoder or any(hardware.friction):
+            rough = hardware and (hardware.encoder or any(hardware.friction))
+            if base.surface or rough:
                 bound = "must be a wall without surface, friction and encoder; see hc.zwidth"
                 raise ParameterError("base", base, bound)
         return made

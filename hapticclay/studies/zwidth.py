@@ -631,7 +631,10 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
         ),
         every=steps,
     )
-    return [growth_of_run(r, *how) for r, (_, *how) in zip(records, read, strict=True)]
+    return [
+        growth_of_run(r, sample, slowest)
+        for r, (_, sample, slowest) in zip(records, read, strict=True)
+    ]
 
 
 def growth_steps(wall: VirtualWall) -> int:
