@@ -30,7 +30,7 @@ from ..model.scenario import Scenario
 from ..model.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
-from . import boundary, growth, sweep
+from . import boundary, growth, sweep, zwidth
 from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
@@ -38,8 +38,13 @@ from .sampling import MOST_RUNS, Range
 
 SCHEMA = "hapticclay-trials-1"
 TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
+SAMPLE_PUSH = 1e-7  # [m] a sample: of a wall, far above rounding and far below the arm's length
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
+LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
 SPAN_STEPS = 200.0  # of a repeated run, at least
+WALL_SPANS = (1.0, 4.0)  # of a wall's run, then of the one that repeats it
+WALL_TOLD = 0.01  # a wall's run that changes by a smaller share of itself is repeated
+WALL_BATCH = 100  # walls that run together, for their samples take room in memory
 PROBED = 200  # runs that an estimate of the cost is made from
 NOT_RUN = -1  # in place of 0, stable, and 1, unstable
 LEVEL = 0.95  # of a confidence interval
@@ -49,6 +54,8 @@ CURVE_POINTS = 61  # of a boundary
 @dataclass(frozen=True)
 class Trials:
     """Random runs of a loop, or of a virtual wall: what is fixed, what varies, and how.
+
+    A wall must be linear: no surface, friction or encoder. `zwidth` judges the others, by rest.
 
     Parameters have dotted names: those of the base ("b", "K", "delay", "pose.x", "operator.mass",
     "servo.G.damping"; of a wall "K", "B", "device.damper"), else those of the scenario of its runs
@@ -61,8 +68,9 @@ class Trials:
         grid: one or two parameters with a range of values each, lists or with a count; each
             combination is a cell.
         runs: number of runs, of each cell where there is a grid.
-        push: velocity of the handle at the start [m/s], 1e-9 to 1. The default leaves the arm
-            linear. Larger ones show what friction, encoder and torque limits do, and take longer.
+        push: velocity of the handle at the start [m/s], 1e-9 to 1; None for one that leaves the
+            motion linear: TRIAL_PUSH, of a wall SAMPLE_PUSH a sample. Larger ones show what
+            friction, encoder and torque limits of an arm do, and take longer.
         seed: of the generator, 0 to 2^32 - 1.
         chunk: runs that are stored together, the most that a killed process loses.
     """
@@ -72,7 +80,7 @@ class Trials:
     hands: str | Hands | None = None
     grid: dict[str, Range] = field(default_factory=dict)
     runs: int = 1000
-    push: float = TRIAL_PUSH
+    push: float | None = None
     seed: int = 0
     chunk: int = 1000
 
@@ -93,7 +101,8 @@ class Trials:
             raise ParameterError("names", self.names, "must each be given once")
         if not self.vary and self.hands is None:
             raise ParameterError("vary", self.vary, "must hold a distribution, or give hands")
-        number("push", self.push, 1e-9, 1.0, unit="m/s")
+        if self.push is not None:
+            number("push", self.push, 1e-9, 1.0, unit="m/s")
         integer("seed", self.seed, 0, 2**32 - 1)
         integer("chunk", self.chunk, 1, 100_000)
         integer("runs", self.runs, 1, MOST_RUNS)
@@ -173,15 +182,24 @@ class Trials:
             t_max: its length [s].
 
         Raises:
-            ParameterError: there is no such parameter, or a value is out of its bounds.
+            ParameterError: there is no such parameter, a value is out of its bounds, or a wall is
+                not linear.
         """
         own, others = self._split(values)
         base = with_fields(self.base, own)
         if isinstance(base, PushedLoop):
-            scenario = replace(base, push=self.push).scenario(t_max, stop=False)
+            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(t_max, stop=False)
         else:
-            scenario = base.scenario(t_max, push=self.push)
-        return with_fields(scenario, others) if others else scenario
+            push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
+            scenario = base.scenario(t_max, push=push, steps=zwidth.growth_steps(base))
+        made = with_fields(scenario, others) if others else scenario
+        if isinstance(base, VirtualWall):
+            hardware = made.interface
+            rough = hardware and (hardware.encoder or any(hardware.friction))
+            if base.surface or rough:
+                bound = "must be a wall without surface, friction and encoder; see hc.zwidth"
+                raise ParameterError("base", base, bound)
+        return made
 
     def _split(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the base, and of the scenario."""
@@ -233,9 +251,11 @@ def judge(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Makes runs and tells which are unstable.
 
-    A run is unstable if its oscillation grows. Where `growth.short_growth` leaves it undecided, it
-    is repeated for `boundary.GROWTH_SPAN` and judged by `boundary.growth_rate`; a run that ends
-    early, or drives the motors into their limits from so small a push, is unstable.
+    A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
+    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `boundary.growth_rate`. That
+    of a wall is as long, and is read, as `zwidth.growth_rates` does, at the wall's own samples;
+    where it hardly changes in size it is repeated, four times as long. A run that ends early, or
+    drives the motors into their limits from so small a push, is unstable.
 
     Args:
         trials: what the runs are of.
@@ -246,6 +266,8 @@ def judge(
         Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of reach),
         shape (runs,); whether it was repeated, shape (runs,).
     """
+    if isinstance(trials.base, VirtualWall):
+        return _judge_walls(trials, points, threads)
     unstable = np.full(len(points), NOT_RUN)
     rate = np.full(len(points), np.nan)
     short: dict[int, Scenario] = {}
@@ -282,6 +304,44 @@ def judge(
     for i, record in zip(again, simulate_batch(runs, threads=threads), strict=True):
         ended = record.outcome.code in ENDED
         unstable[i] = ended or boundary.growth_rate(record, trials.axis) > 0.0
+    return unstable, longer
+
+
+def _judge_walls(
+    trials: Trials, points: np.ndarray, threads: int | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `judge`, of walls."""
+    unstable, longer = np.full(len(points), NOT_RUN), np.zeros(len(points), dtype=bool)
+    walls: dict[int, VirtualWall] = {}
+    runs: dict[int, Scenario] = {}
+    for i, row in enumerate(points.tolist()):
+        values = dict(zip(trials.names, row, strict=True))
+        with contextlib.suppress(ParameterError):
+            runs[i], wall = trials.scenario(values, 1.0), trials.loop(values)
+            assert isinstance(wall, VirtualWall)
+            walls[i] = wall
+    # Those with as many steps a sample run together: their records keep one step of so many.
+    steps = {i: round(walls[i].Ts / run.dt) for i, run in runs.items()}
+    for every in sorted(set(steps.values())):
+        members = [i for i in runs if steps[i] == every]
+        for first in range(0, len(members), WALL_BATCH):
+            left = members[first : first + WALL_BATCH]
+            for span in WALL_SPANS:
+                read = {i: zwidth.growth_reading(walls[i], span) for i in left}
+                jobs = [replace(runs[i], t_max=read[i][0] * walls[i].Ts) for i in left]
+                undecided = []
+                records = simulate_batch(jobs, threads=threads, every=every)
+                for i, job, record in zip(left, jobs, records, strict=True):
+                    if record.outcome.code in (*ENDED, *LOST):
+                        unstable[i] = True
+                        continue
+                    rate = zwidth.growth_of_run(record, *read[i][1:])
+                    unstable[i] = rate > 0.0
+                    if abs(rate) * job.t_max < WALL_TOLD:
+                        undecided.append(i)
+                left = undecided
+                if span == WALL_SPANS[0]:
+                    longer[left] = True
     return unstable, longer
 
 

@@ -620,27 +620,63 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
     if arms:
         records = simulate_batch(w.scenario() for w in arms)
         how = boundary.GROWTH_SAMPLE, boundary.SLOWEST_MODE
-        return [_growth(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
+        return [growth_of_run(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
     bare = [w for w in walls if isinstance(w, VirtualWall)]
-    jobs, read = [], []
-    steps = _engine_steps(bare, GROWTH_STEPS)
-    for w in bare:
-        omega = math.sqrt((w.K + w.hand.spring) / _mass(w))
-        order = w.window + w.delay / w.Ts
-        n = max(
-            FEWEST_SAMPLES + 12.0 * order,
-            READ_SWINGS * math.tau / max(omega * w.Ts, 1e-9) if omega else 0.0,
-        )
-        n = math.ceil(min(n, MOST_SAMPLES + 12.0 * order))
-        kept = max(READ, 6.0 * order)
-        read.append((w.Ts * max(1.0, n / kept), SLOWEST * omega))
-        jobs.append(w.scenario(n * w.Ts, push=boundary.SMALL_PUSH, steps=steps))
-    records = simulate_batch(jobs, every=steps)
-    return [_growth(r, *how) for r, how in zip(records, read, strict=True)]
+    steps = growth_steps(bare[0]) if bare else 1
+    read = [growth_reading(w) for w in bare]
+    records = simulate_batch(
+        (
+            w.scenario(n * w.Ts, push=boundary.SMALL_PUSH, steps=steps)
+            for w, (n, *_) in zip(bare, read, strict=True)
+        ),
+        every=steps,
+    )
+    return [
+        growth_of_run(r, sample, slowest)
+        for r, (_, sample, slowest) in zip(records, read, strict=True)
+    ]
 
 
-def _growth(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
-    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean."""
+def growth_steps(wall: VirtualWall) -> int:
+    """Engine steps a sample of a run whose growth is read.
+
+    Args:
+        wall: the wall.
+    """
+    return _engine_steps([wall], GROWTH_STEPS)
+
+
+def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, float]:
+    """How the growth of a wall's oscillation is read from a run, on the scale of its own samples.
+
+    Args:
+        wall: the wall.
+        span: length of the run, in those of the shortest that tells most walls.
+
+    Returns:
+        Samples of the run; about the time between those that are read [s]; modes slower than the
+        third do not count [rad/s, 1/s].
+    """
+    omega = math.sqrt((wall.K + wall.hand.spring) / _mass(wall))
+    order = wall.window + wall.delay / wall.Ts
+    n = max(
+        FEWEST_SAMPLES + 12.0 * order,
+        READ_SWINGS * math.tau / max(omega * wall.Ts, 1e-9) if omega else 0.0,
+    )
+    n = math.ceil(span * min(n, MOST_SAMPLES + 12.0 * order))
+    kept = max(READ, 6.0 * order)
+    return n, wall.Ts * max(1.0, n / kept), SLOWEST * omega
+
+
+def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
+    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean.
+
+    Args:
+        record: of a free motion.
+        sample: as in `boundary.growth_rate` [s].
+        slowest: as there [rad/s, 1/s].
+        axis: "x" or "y".
+    """
     speed = np.abs(record.v[:, AXES.index(axis)])
     n = len(speed)
     share = math.ceil(0.1 * n)

@@ -17,6 +17,7 @@ from hapticclay.cli import app
 from hapticclay.studies import growth, monte_carlo, sweep
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from hapticclay.studies.sampling import Range
+from tests.oracles.sampled_wall import sample_map
 
 HANDS = hc.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
 GAIN = hc.Distribution("log-normal", 4.0, 1.0)
@@ -87,16 +88,47 @@ def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
     assert result.longer.mean() < 0.3  # most are told by their first samples
 
 
-def test_a_wall_is_judged_as_its_eigenvalues_are():
-    wall = hc.VirtualWall(B=5.0, device=hc.Device(0.5, 2.0), Ts=1e-3)
-    stiff = hc.Distribution("log-uniform", 1e3, 2e4)
-    trials = hc.Trials(wall, {"K": stiff}, HANDS, runs=40)
-    result = hc.monte_carlo(trials)
-    for point, unstable in zip(result.points.tolist(), result.unstable, strict=True):
-        row = dict(zip(trials.names, point, strict=True))
-        limit = monte_carlo._exact_limit(trials.loop(row))
-        if abs(row["K"] / limit - 1.0) > 1e-3:  # steps of a run, and the arc link 1 moves on
-            assert unstable == (row["K"] > limit)
+@pytest.mark.parametrize(
+    "wall, hands",
+    [
+        (hc.VirtualWall(B=35.7, device=hc.Device(0.03, 0.05), Ts=3e-4, delay=0.4 * 3e-4), None),
+        (hc.VirtualWall(B=20.0, device=hc.Device(0.1, 0.5), Ts=1e-3), None),
+        (hc.VirtualWall(B=5.0, device=hc.Device(0.5, 2.0), Ts=1e-3), HANDS),
+        (hc.VirtualWall(B=20.0, device=hc.Device(2.0, 5.0), Ts=1e-2, delay=1.5e-2), HANDS),
+        (hc.VirtualWall(B=2.0, device=hc.Device(0.1, 1.0), Ts=1e-4, window=4), None),
+    ],
+    ids=["light, late", "light", "with hands", "slow", "fast, window"],
+)
+def test_a_wall_is_judged_as_its_eigenvalues_are(wall, hands):
+    limit = hc.stiffness_band(wall if hands is None else replace(wall, operator=HANDS.median))[1]
+    near = hc.Distribution("uniform", 0.96 * limit, 1.04 * limit)
+    for law in (near, hc.Distribution("log-uniform", 0.1 * limit, 10.0 * limit)):
+        trials = hc.Trials(wall, {"K": law}, hands, runs=30)
+        result = hc.monte_carlo(trials)
+        assert 0 < result.total.events < result.total.runs == 30
+        for point, unstable in zip(result.points.tolist(), result.unstable, strict=True):
+            drawn = trials.loop(dict(zip(trials.names, point, strict=True)))
+            assert isinstance(drawn, hc.VirtualWall)
+            # 0.3 % of K: what the steps of a run change in it, with some room
+            soft, hard = (
+                np.abs(np.linalg.eigvals(sample_map(replace(drawn, K=x * drawn.K)))).max() < 1.0
+                for x in (0.997, 1.003)
+            )
+            if soft == hard:
+                assert unstable == (not soft), drawn
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        dict(surface=True),
+        dict(device=hc.Device(friction=0.1)),
+        dict(device=hc.Device(quantum=1e-6)),
+    ],
+)
+def test_a_wall_that_is_not_linear_is_refused(change):
+    with pytest.raises(hc.ParameterError, match="without surface, friction and encoder"):
+        hc.Trials(hc.VirtualWall(**change), {"K": CLAY})
 
 
 # ---- estimates -----------------------------------------------------------------------------------
