@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test coverage check docs linkcheck bench build clean
+.PHONY: demo test coverage check docs pages linkcheck bench build clean
 .DELETE_ON_ERROR:
 
 .venv/run.done: pyproject.toml
@@ -38,6 +38,9 @@ check: .venv/dev.done  ## lint, types, layers
 
 docs: .venv/docs.done  ## the site, examples run, warnings are errors: out/docs/index.html
 	$(BIN)/python -m sphinx -E -W --keep-going -q docs out/docs
+
+pages: .venv/docs.done  ## the same without the pictures of the examples, which the tests run
+	$(BIN)/python -m sphinx -E -W --keep-going -q -D plot_gallery=0 docs out/pages
 
 linkcheck: .venv/docs.done  ## follow the links of the site to other sites
 	$(BIN)/python -m sphinx -W --keep-going -q -b linkcheck docs out/linkcheck
