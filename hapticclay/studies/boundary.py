@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, choice, number
 from ..model import arm
 from ..model.arm import Arm
 from ..model.clay import Clay, Profile
@@ -19,10 +19,9 @@ from ..model.controller import SERVO
 from ..model.hardware import Interface
 from ..model.scenario import Position, Scenario, TorqueLimit
 from ..model.spring import Spring
-from ..model.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit, linear_loop, wall_limits
+from ..theory import gain_limit, linear_loop
 from ..theory.linear_loop import TIMING, Loop
 from ..theory.roots import first_failure
 
@@ -281,33 +280,6 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
     """
     guess = gain_limit.stiffness_limit(loop.linear) if guess is None else guess
     return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
-
-
-def simulated_wall(wall: VirtualWall, guess: float | None = None, most: float = 1e8) -> float:
-    """K [N/m] above which the oscillation of a run on a virtual wall grows.
-
-    Args:
-        wall: all but K; linear, so without friction, quantum and surface.
-        guess: start of the search [N/m]; None for the limit of the linear wall.
-        most: end of the search [N/m].
-
-    Raises:
-        ParameterError: the wall is not linear.
-    """
-    for field, value in (
-        ("wall.surface", wall.surface),
-        ("device.friction", wall.device.friction),
-        ("device.quantum", wall.device.quantum),
-    ):
-        if value:
-            raise ParameterError(field, value, "must be none of it: growth is that of linear walls")
-    guess = wall_limits.stiffness_band(wall)[1] if guess is None else guess
-
-    def rate(K: float) -> float:
-        run = replace(wall, K=K).scenario(GROWTH_SPAN, push=SMALL_PUSH)
-        return growth_rate(simulate(run), "x")
-
-    return find_crossing(rate, min(guess, most) if guess > 0.0 else 1.0, most)
 
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:

@@ -21,7 +21,7 @@ from ..model import hardware
 from ..model.samples import Samples
 from ..model.scenario import Scenario
 from ..model.spring import STIFFNESS_MAX
-from ..model.virtual_wall import UPRIGHT, VirtualWall, wall_law
+from ..model.virtual_wall import LEVER, UPRIGHT, VirtualWall, wall_law
 from ..simulation import record
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
@@ -30,6 +30,8 @@ PATH_STEPS = 32  # engine steps a sample: a corner takes one, which loses its sh
 LEAST_STEP = 1e-6  # [s] of a scenario
 LARGE = 5e-3  # [m] of a path that hides friction and quantum
 TOP_SPEED = 9.0  # [m/s] along it
+ARC_LOSS = 55.0  # measured: link 1's arc costs this (A/lever)^4 m/(b Ts) of the damper's energy
+ARC_SHARE = 1e-3  # most of that, which decides how large such a path may be
 SMALL = 0.01  # of the quantum: of a path that shows one edge of the encoder alone
 LEAST_SPEED = 1.5e-5  # [m/s] along it: a run slower than 1e-5 m/s counts as stalled
 LEAST_SHARE = 2e-3  # of the damper's loss in that of friction, along such a path
@@ -245,7 +247,9 @@ def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
 
 def _large(wall: VirtualWall) -> float:
     """A of a zigzag that shows the damper rather than friction and quantum [m]."""
-    quantum, large = wall.device.quantum, min(LARGE, 0.5 * TOP_SPEED * wall.Ts)
+    d, quantum, large = wall.device, wall.device.quantum, min(LARGE, 0.5 * TOP_SPEED * wall.Ts)
+    if d.damper:
+        large = min(large, LEVER * (ARC_SHARE * d.damper * wall.Ts / (ARC_LOSS * d.mass)) ** 0.25)
     return round(large / quantum) * quantum if 0.0 < quantum < large else large
 
 

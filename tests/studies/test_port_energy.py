@@ -53,6 +53,16 @@ def test_runs_are_passive_up_to_the_line_of_abbott_and_okamura(friction, quantum
     assert passivity_limit(wall) == pytest.approx(hc.abbott_okamura_limit(wall), rel=0.01)
 
 
+@pytest.mark.parametrize("mass", [0.7, 2.0])
+def test_a_heavy_device_with_a_small_damper_is_no_less_passive(mass):
+    # its arc weighs most beside the damper; friction along the large path leaves 2 % to spare
+    wall = hc.VirtualWall(device=hc.Device(mass, 0.05, 0.001, 8e-5), Ts=2e-3)
+    asked = min(2.0 * 0.05 / 2e-3, 2.0 * 0.001 / 8e-5)
+    assert passivity_limit(wall) >= (1.0 - 2e-3) * asked
+    slow = replace(wall, device=hc.Device(mass, 0.05, 0.01, 8e-5))
+    assert passivity_limit(slow) >= (1.0 - 2e-3) * 2.0 * 0.05 / 2e-3
+
+
 def test_no_passive_motion_takes_energy_from_a_wall_below_the_lines():
     rng = np.random.default_rng(5)
     plain = hc.VirtualWall(B=1.0, device=hc.Device(0.1, 3.0))
