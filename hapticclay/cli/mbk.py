@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from ..errors import ParameterError
+from ..errors import ParameterError, integer
 from ..files import writable
 from ..model.constants import TS
 from . import console, walls
@@ -32,7 +32,8 @@ class MBKCommand:
         arm: Axis of the arm, in the place of a bare device; --Ts none is continuous time, and the
             hand by default Th (19).
         box: Hands at the arm: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
-        columns: Columns of a plane, or dampers of the arm, at which runs look for the border.
+        columns: Columns of a plane, or dampers of the arm, at which runs look for the border,
+            1 to 100.
         quick: Draw lines of fewer points, with two such columns.
         out: Folder for mbk.json and the figures.
         wall: The device and its sampling, and the K, B and M that the planes keep: by default
@@ -51,6 +52,7 @@ class MBKCommand:
 
     def __call__(self) -> int:
         writable(self.out)
+        integer("columns", self.columns, 1, 100)
         columns = min(self.columns, 2) if self.quick else self.columns
         if self.arm:
             return self._arm(columns)

@@ -175,7 +175,7 @@ def device_mbk(
     Args:
         wall: device, hand and sampling. The plane of M and B keeps its K, that of M and K its B,
             and that of B and K its M; a surface and the device's friction and quantum are left out.
-        columns: of each plane at which runs look for the border, 0 to 100.
+        columns: of each plane at which runs look for the border, 0 (theory alone) to 100.
         points: of each line, 3 to 1001.
         band: lowest and highest frequency of the dynamic range [Hz].
         progress: wraps the iterable of the columns.
@@ -245,7 +245,7 @@ def arm_mbk(
     Args:
         loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
         box: hands.
-        columns: number of B/M at which runs look for the border, 0 to 100.
+        columns: number of B/M at which runs look for the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
         samples: random members of the box tried in a sampled or late loop.
         progress: wraps the iterable of the points.

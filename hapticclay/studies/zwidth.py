@@ -9,6 +9,7 @@ import functools
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Annotated, Any
 
 import numpy as np
@@ -339,14 +340,14 @@ def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[
     field, unit, factor = varied[choice("vary", vary, tuple(varied))]
     if not values:
         raise ParameterError("values", values, f"must hold a value of {vary} at least")
-    return [(_value_name(vary, x, unit, factor), with_fields(wall, {field: x})) for x in values]
+    walls = [with_fields(wall, {field: x}) for x in values]
+    return [(_value_name(vary, attrgetter(field)(w), unit, factor), w) for w in walls]
 
 
-def _value_name(vary: str, value: Any, unit: str, factor: float) -> str:
-    if value is None or value == "none":
+def _value_name(vary: str, value: float | None, unit: str, factor: float) -> str:
+    if value is None:
         return f"no {vary}"
-    x = value * factor if isinstance(value, int | float) else value
-    return f"{LETTERS.get(vary, vary)} = {x:g} {unit}" if x is not value else f"{vary} = {x}"
+    return f"{LETTERS.get(vary, vary)} = {factor * value:g} {unit}"
 
 
 def _region(

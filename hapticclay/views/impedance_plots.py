@@ -25,6 +25,7 @@ from .style import (
     figure_style,
     hand_name,
     narrow,
+    plain_ticks,
     points,
     set_title,
     stroke,
@@ -134,6 +135,7 @@ def mbk_plot(found: DeviceMBK) -> Figure:
             ax.set(xlabel=unit_text(PART_LABELS[across]), ylabel=unit_text(PART_LABELS[up]))
             if log:
                 ax.set(yscale="log", ylim=(2e-4 * np.nanmax(high), 2.0 * np.nanmax(high)))
+                plain_ticks(ax.yaxis)
             elif up == "K":
                 ax.set_ylim(0.0, None)
             if across == "M":
@@ -164,6 +166,7 @@ def dynamic_range_plot(found: DeviceMBK) -> Figure:
         ax.plot(f, r.free, color=BLUE, label="free device")
         ax.plot(f, r.least, color=GREEN, ls="-.", label="least stable virtual mass")
         ax.set(xscale="log", yscale="log", ylabel=unit_text("|Z| [N.s/m]"))
+        plain_ticks(ax.yaxis)
         _frequency_axis(ax, f)
         i = len(f) // 2
         middle = math.sqrt(r.free[i] * r.most[i])
@@ -197,6 +200,8 @@ def least_mass_plot(found: ArmMBK) -> Figure:
             ax.plot(x, y, label="border by runs", **_dots(BLUE))
         ax.set(xscale="log", yscale="log")
         ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
+        for side in (ax.xaxis, ax.yaxis):
+            plain_ticks(side)
         add_legend(figure, ax, 3 if not narrow() else 1)
         how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
         set_title(ax, f"arm, {loop.axis} axis", how, "stable above and to the right")

@@ -28,6 +28,8 @@ from .style import (
 
 HERTZ = 2.0 * np.pi
 ACTIVE_LABEL = "active"
+ACTIVE_ROOM = 0.15  # share of the height that the half plane takes, at least, to be named
+BELOW_ZERO = 0.03  # share of the height shown below 0 where no curve is active
 REGION_MARKS = ("o", "s", "^", "D", "v")
 
 
@@ -59,9 +61,9 @@ def index_plot(found: IndexOverFrequency) -> Figure:
                 label=label,
                 **mark,
             )
-        _shade_active(ax)
         ax.set(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
         ax.set_xlim(found.omega[0] / HERTZ, found.omega[-1] / HERTZ * 1.05)
+        _shade_active(ax)
         plain_ticks(ax.xaxis)
         add_legend(figure, ax, 2)
         verdict = "passive" if found.margin >= 0.0 else "not passive"
@@ -70,15 +72,28 @@ def index_plot(found: IndexOverFrequency) -> Figure:
 
 
 def _shade_active(ax: Axes) -> None:
-    """Shades the half plane in which a hand can draw energy."""
+    """Shades the half plane in which a hand can draw energy; names it at the emptier corner."""
+    points = np.concatenate([line.get_xydata() for line in ax.lines])
+    points = points[np.isfinite(points).all(axis=1)]
+    least = float(points[:, 1].min(initial=0.0))
     low, high = ax.get_ylim()
-    room = 0.12 * (high - low)
-    low, high = min(low, -room), max(high, room)
+    if least >= 0.0:
+        low = -BELOW_ZERO * high
+    high = max(high, -ACTIVE_ROOM * low)
     ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
-    ax.axhspan(low, 0.0, color=GREY, alpha=0.15, lw=0, zorder=0)
-    at: Any = dict(transform=ax.get_yaxis_transform(), ha="left", va="center", color=GREY)
-    ax.text(0.02, low + min(0.5 * -low, 0.06 * (high - low)), ACTIVE_LABEL, **at)
     ax.set_ylim(low, high)
+    if least >= 0.0:
+        return
+    ax.axhspan(low, 0.0, color=GREY, alpha=0.15, lw=0, zorder=0)
+    if -low < ACTIVE_ROOM * (high - low):
+        return
+    shares = ax.transAxes.inverted().transform(ax.transData.transform(points))
+    corners = [(x, y) for y in (0.05, -low / (high - low) - 0.05) for x in (0.08, 0.92)]
+    x, y = max(corners, key=lambda c: np.hypot(*(shares - c).T).min())
+    side: Any = "left" if x < 0.5 else "right"
+    up: Any = "bottom" if y == corners[0][1] else "top"
+    where = (0.02 if side == "left" else 0.98, y - 0.02 if up == "bottom" else y + 0.02)
+    ax.text(*where, ACTIVE_LABEL, transform=ax.transAxes, ha=side, va=up, color=GREY)
 
 
 def port_energy_plot(found: EnergyOverTime) -> Figure:

@@ -372,16 +372,22 @@ def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> 
 
 
 def plain_ticks(axis: Any) -> None:
-    """Labels a logarithmic axis with plain numbers, at 1, 2 and 5 where it spans little.
+    """Labels a logarithmic axis with plain numbers, two of them at least.
+
+    They are powers of ten, those times 1, 2 and 5 where the axis spans less than two decades, or
+    evenly spaced numbers where it holds fewer than two of these.
 
     Args:
         axis: of matplotlib, its limits set.
     """
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-    low, high = axis.get_view_interval()
+    low, high = sorted(axis.get_view_interval())
     some = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
-    axis.set_major_locator(LogLocator(subs=some))
+    locator: Any = LogLocator(subs=some)
+    if sum(low <= x <= high for x in locator.tick_values(low, high)) < 2:
+        locator = MaxNLocator(5)
+    axis.set_major_locator(locator)
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -29,6 +29,7 @@ from .style import (
     figure_style,
     hand_name,
     narrow,
+    plain_ticks,
     points,
     set_title,
     stroke,
@@ -48,6 +49,8 @@ REGION_ALPHA = 0.22
 LABEL_ROOM = 0.05  # share of the height that the name of a region takes
 SPREAD = 20.0  # ratio of B from which an axis is logarithmic
 SHOWN_SHARE = 1e-4  # of the largest K, down to which a logarithmic axis goes
+NEAR_ORIGIN = 0.05  # share of an axis below which a wall cannot be read on a linear one
+LABEL_SIDE = 0.15  # share of the width beside its ends, where a centred label would cross the axis
 
 
 def zwidth_plot(chart: ZWidth) -> Figure:
@@ -79,7 +82,7 @@ def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Fi
 
     Args:
         regions: from `zwidth`, with names.
-        walls: the wall of each, a large ring.
+        walls: the wall of each, a large ring; a triangle at the foot where it is softer than shown.
     """
     with figure_style():
         figure = Figure(figsize=figure_size(1, 5.0))
@@ -89,7 +92,9 @@ def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Fi
         for i, wall in enumerate(walls):
             color, _ = CURVE_STYLES[i % len(CURVE_STYLES)]
             look: Any = dict(ms=stroke(10.0), mfc="none", mec=color, mew=stroke(2.0))
-            ax.plot(wall.B, wall.K, "o", clip_on=False, zorder=6, **look)
+            bottom = ax.get_ylim()[0]
+            mark = "o" if wall.K >= bottom else "v"
+            ax.plot(wall.B, max(wall.K, bottom), mark, clip_on=False, zorder=6, **look)
         _label_plane(figure, ax)
         set_title(ax, "lines: exact linear loop", "marks: runs", "rings: the walls themselves")
     return figure
@@ -162,14 +167,17 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
         return  # the legend names them
     for i, (r, place) in enumerate(zip(regions, places[side], strict=True)):
         left = side == "left"
+        share = ax.transAxes.inverted().transform(ax.transData.transform(place))[0]
+        beside = left or share < LABEL_SIDE
+        ends = "left" if beside else "right" if share > 1.0 - LABEL_SIDE else "center"
         ax.annotate(
             unit_text(r.name),
             place,
-            xytext=(stroke(7.0) if left else 0.0, stroke(-5.0 if left else 6.0)),
+            xytext=(stroke(7.0) if beside else 0.0, stroke(-5.0 if left else 6.0)),
             textcoords="offset points",
             color=CURVE_STYLES[i % len(CURVE_STYLES)][0],
             fontsize=points(9.0),
-            ha="left" if left else "center",
+            ha=ends,
             va="top" if left else "bottom",
             zorder=7,
             path_effects=[withStroke(linewidth=stroke(3.0), foreground=WHITE)],
@@ -198,27 +206,28 @@ def _marked(K: Sequence[float], bottom: float) -> np.ndarray:
 
 def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall] = ()) -> None:
     """Scales and limits that hold every run: logarithmic where they span much, with B = 0."""
-    B = sorted({x for r in regions for x in r.B if x > 0.0})
+    B = sorted({x for r in regions for x in r.B if x > 0.0} | {w.B for w in walls if w.B > 0.0})
     K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0] + [w.K for w in walls]
     least = [x for r in regions for x in r.K[:1] if x > 0.0] + [w.K for w in walls if w.K]
     least += [x for r in regions if len(regions) == 1 for limit in r.limits for x in limit.K[:1]]
     top = max([*B, *(w.B for w in walls), *(r.largest_B for r in regions)], default=1.0)
     most = max(K, default=1.0)
-    if not B or B[-1] < SPREAD * B[0] or min(x for r in regions for x in r.B) < 0.0:
-        left = min(0.0, *(r.B[0] for r in regions))
+    left = min(0.0, *(r.B[0] for r in regions), *(w.B for w in walls))
+    near = any(0.0 < w.K < NEAR_ORIGIN * most for w in walls)
+    if not B or left < 0.0 or (B[-1] < SPREAD * B[0] and not near):
         ax.set(xlim=(left, 1.05 * top if top > left else 1.0), ylim=(0.0, 1.1 * most))
         return
-    first = B[0]
+    first = max(B[0], SHOWN_SHARE * top)
     ax.set_xscale("symlog", linthresh=first, linscale=0.45)
     ax.set_xlim(0.0, 1.35 * top)
     powers = [10.0**n for n in range(math.ceil(math.log10(first)), math.floor(math.log10(top)) + 1)]
-    ax.set_xticks([0.0, *powers])
+    ax.set_xticks([0.0, *(powers or [first])])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yscale("log")
     ax.set_ylim(max(0.4 * min([*least, most]), SHOWN_SHARE * most), 2.0 * most)
-    for side in (ax.xaxis, ax.yaxis):
-        side.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-        side.set_minor_formatter(NullFormatter())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    plain_ticks(ax.yaxis)
 
 
 def _left_out(r: ZRegion) -> str:
@@ -234,18 +243,18 @@ def _device_parts(chart: ZWidth) -> list[str]:
     w = chart.regions[0].wall
     told = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
     if w.delay:
-        told["delay"] = f"delay {1e3 * w.delay:g} ms"
+        told["delay"] = f"delay = {1e3 * w.delay:g} ms"
     if isinstance(w, VirtualWall):
         d = w.device
         told = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"} | told
         if d.friction:
             told["friction"] = f"fc = {d.friction:g} N"
         if d.quantum:
-            told["quantum"] = f"quantum {1e6 * d.quantum:g} um"
+            told["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
         if w.window > 1:
-            told["window"] = f"window {w.window}"
+            told["window"] = f"window = {w.window} samples"
         if w.velocity_filter:
-            told["filter"] = f"filter {w.velocity_filter:g} Hz"
+            told["filter"] = f"filter = {w.velocity_filter:g} Hz"
         if w.surface:
             told["surface"] = "surface"
     else:

@@ -83,6 +83,8 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
         (["--box", "0", "1", "0", "1", "0", "1"], "give --arm too"),
         (["--arm", "x", "--K", "3"], "leave it out with --arm"),
         (["--mass", "-1"], "device.mass"),
+        (["--columns", "0"], "columns"),
+        (["--quick", "--columns", "101"], "columns"),
     ],
 )
 def test_the_command_refuses(words, told, tmp_path, capsys):

@@ -97,6 +97,15 @@ def test_figures_show_runs_beside_theory(index, energy, region):
     assert len(plots.region_plot(region).axes[0].lines) == 4
 
 
+def test_the_active_half_is_named_where_there_is_room(index):
+    """A passive wall needs no half plane; of an active one its name lies within the shade."""
+    assert not plots.index_plot(index).axes[0].texts
+    ax = plots.index_plot(replace(index, index=index.index - 5.0)).axes[0]
+    (name,) = ax.texts
+    zero = ax.transAxes.inverted().transform(ax.transData.transform((1.0, 0.0)))[1]
+    assert name.get_text() == "active" and 0.0 < name.get_position()[1] < zero
+
+
 @pytest.mark.parametrize("wrong,field", [
     (dict(surface=True), "wall.surface"), (dict(velocity="exact", B=1.0), "wall.velocity"),
 ])  # fmt: skip

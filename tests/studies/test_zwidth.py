@@ -265,6 +265,19 @@ def test_a_wall_is_saved_and_loaded(tmp_path, ending):
         assert caught.value.field == "wall"
 
 
+@pytest.mark.parametrize(
+    "vary, values, names",
+    [
+        ("quantum", (0.0, "10um", 6e-5), ["Delta = 0 um", "Delta = 10 um", "Delta = 60 um"]),
+        ("Ts", ("0.5 ms", 1e-3), ["Ts = 0.5 ms", "Ts = 1 ms"]),
+        ("filter", (None, "none", 150.0), ["no filter", "no filter", "filter = 150 Hz"]),
+        ("window", (1, 4.0), ["window = 1 samples", "window = 4 samples"]),
+    ],
+)
+def test_a_family_is_named_by_symbol_and_unit(vary, values, names):
+    assert [name for name, _ in study._family_walls(BARE, vary, values)] == names
+
+
 def test_tables_hold_what_the_figure_shows():
     z = zwidth(BARE, "damper", (0.5, 1.0), B=(0.0, 1.0, 50.0))
     tables = z.tables()

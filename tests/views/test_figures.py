@@ -404,6 +404,66 @@ def test_text_can_be_read_in_print(name, style, monkeypatch):
         assert not any(box.overlaps(b) for t, b in titles if t is not title), title
 
 
+def narrow_family():
+    """A family whose stiffnesses lie within one decade, and one of whose edges tops at B = 0."""
+    family = z_width("family")
+    edges = [(3000.0, 2500.0), (1800.0, 2200.0)]
+    regions = [
+        dataclasses.replace(r, verdict=BY_REST, K=(k0, *[k] * (len(r.B) - 1)))
+        for r, (k0, k) in zip(family.regions, edges, strict=False)
+    ]
+    return wall_plots.zwidth_plot(ZWidth(tuple(regions), "damper"))
+
+
+LABELLED = {
+    "narrow family": narrow_family,
+    **{n: f for n, f in CASES.items() if n.startswith(("zwidth", "mbk", "compared"))},
+    **{n: CASES[n] for n in ("dynamic range", "least mass")},
+}
+
+
+@pytest.mark.parametrize("style", ["screen", "print"])
+@pytest.mark.parametrize("name", LABELLED)
+def test_each_axis_has_two_numbers(name, style):
+    figure = hc.Figure(LABELLED[name]).draw(style)
+    FigureCanvasAgg(figure).draw()
+    for ax in figure.axes:
+        shared = ax.get_subplotspec() and not ax.get_subplotspec().is_last_row()
+        for axis in [ax.yaxis] if shared else [ax.xaxis, ax.yaxis]:
+            low, high = sorted(axis.get_view_interval())
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            some = {
+                t.label1.get_text()
+                for t in ticks
+                if t.label1.get_visible() and t.label1.get_text() and low <= t.get_loc() <= high
+            }
+            assert len(some) >= 2, (ax, axis, some)
+
+
+def test_names_of_regions_lie_beside_the_axis():
+    figure = narrow_family()
+    FigureCanvasAgg(figure).draw()
+    ax = figure.axes[0]
+    assert len(ax.texts) == 2
+    for text in ax.texts:
+        assert text.get_window_extent().x0 >= ax.bbox.x0
+
+
+def test_walls_that_are_compared_lie_apart():
+    """Also where their devices' regions would be shown on linear axes."""
+    soft, stiff = (hc.VirtualWall(K, B) for K, B in ((300.0, 1.0), (900.0, 4.0)))
+    B = (0.0, 50.0, 100.0)
+    region = ZRegion("a device", soft, BY_GROWTH, B, (1e4, 8e4, 1e4), (1e4, 8e4, 1e4), 120.0,
+                     (Limit("exact, linear loop", "exact", B, (1e4, 8e4, 1e4)),))  # fmt: skip
+    figure = wall_plots.regions_plot([region, region], [soft, stiff])
+    FigureCanvasAgg(figure).draw()
+    ax = figure.axes[0]
+    a, b = (
+        ax.transAxes.inverted().transform(ax.transData.transform((w.B, w.K))) for w in (soft, stiff)
+    )
+    assert np.all(np.abs(a - b) > 0.05) and min(*a, *b) > 0.05
+
+
 def test_the_check_sees_what_is_clipped(monkeypatch):
     figure = Figure(figsize=(2.0, 2.0))
     figure.text(0.9, 0.5, "clipped at the right")

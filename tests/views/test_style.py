@@ -8,6 +8,8 @@ from pathlib import Path
 import matplotlib.colors
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hapticclay.views import style
 
@@ -21,6 +23,17 @@ def test_conversions_are_those_of_matplotlib(name):
     assert style.rgb_bytes(PALETTE[name]) == tuple(
         round(255 * x) for x in matplotlib.colors.to_rgb(PALETTE[name])
     )
+
+
+@given(low=st.floats(1e-6, 1e6), ratio=st.floats(1.02, 1e5))
+def test_a_logarithmic_axis_has_two_numbers(low, ratio):
+    from matplotlib.figure import Figure
+
+    ax = Figure().add_subplot()
+    ax.set(yscale="log", ylim=(low, low * ratio))
+    style.plain_ticks(ax.yaxis)
+    ticks = [x for x in ax.get_yticks() if low <= x <= low * ratio]
+    assert len({f"{x:g}" for x in ticks}) >= 2
 
 
 def test_colours_are_stated_in_style_alone():
