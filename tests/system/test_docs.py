@@ -195,7 +195,7 @@ def test_every_public_name_has_a_docstring():
 
 
 def test_changelog_has_the_present_version():
-    assert f"## {hc.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+    assert f"## [{hc.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
 
 
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
