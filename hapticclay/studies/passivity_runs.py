@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..theory.impedance import wall_impedance
 from .boundary import PushedLoop
 from .impedance import computed_impedance, measure_impedance
 from .port_energy import passivity_limit, polygon, taken_energy
+from .stability_map import Progress
 
 INDEX_TURNS = ((1, 8), (1, 4), (3, 8), (1, 2), (2, 3), (4, 5), (1, 1))  # omega Ts over pi
 INDEX_BAND = (0.02, 0.9)  # of pi/Ts, of the sines of the impedance
@@ -30,8 +31,6 @@ INDEX_POINTS = 2000  # of a computed line
 REGION_SPAN = 10.0  # Ts is shown down to that of the wall over this, and up to so many times it
 REGION_POINTS = 61
 WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
-
-Jobs = Callable[[Iterable[Any]], Iterable[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +147,7 @@ class PassiveRegion:
         return out
 
 
-def wall_index(wall: VirtualWall, progress: Jobs = iter) -> IndexOverFrequency:
+def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequency:
     """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
 
     Args:
@@ -231,7 +230,7 @@ def passive_region(
     wall: VirtualWall,
     delays: Sequence[float] = (0.0, 0.5, 1.0, 2.0),
     run_Ts: Sequence[float] | None = None,
-    progress: Jobs = iter,
+    progress: Progress = iter,
 ) -> PassiveRegion:
     """Largest passive K of a wall over Ts for some delays, by theory and by runs.
 

@@ -17,6 +17,7 @@ from .style import (
     BLACK,
     BLUE,
     GREEN,
+    LOG_SPAN,
     MID_GREY,
     PALE_GREY,
     VERMILION,
@@ -35,7 +36,6 @@ from .style import (
 FINE = 400  # points of a computed line
 FREQUENCY = "frequency [Hz]"
 PART_LABELS = {"M": "virtual mass M [kg]", "B": "virtual damper B [N.s/m]", "K": "spring K [N/m]"}
-LOG_SPAN = 30.0  # a scale is logarithmic where its values span more
 
 
 def impedance_plot(found: MeasuredImpedance) -> Figure:

@@ -16,6 +16,7 @@ from .style import (
     BLACK,
     BLUE,
     GREY,
+    LOG_SPAN,
     MID_GREY,
     SKY_BLUE,
     VERMILION,
@@ -23,6 +24,7 @@ from .style import (
     add_legend,
     figure_size,
     figure_style,
+    map_edges,
     narrow,
     points,
     set_title,
@@ -34,7 +36,6 @@ CONTOURS = (0.01, 0.1, 0.5)  # probabilities whose contours are drawn ...
 BOUNDED = 0.1  # ... and the one whose interval is
 LEAST_EVENTS = 2.0  # expected in a cell of that probability, or its contour is left out
 CONTOUR_STYLES = (":", "--", "-")
-WIDE_RATIO = 30.0  # values over such a ratio are drawn on a logarithmic axis
 MOST_RATIO = 100.0  # of limits that a band shows
 MOST_PANELS = 4
 PANEL_BINS = 10  # of a panel
@@ -78,7 +79,7 @@ def band_plot(band: Band) -> Figure:
         ax.plot(band.x, drawn(band.nominal), color=BLACK, ls=":", label="hand of medians")
         if _spans_decades(band.x):
             ax.set_xscale("log")
-        if top > WIDE_RATIO * least:  # limits of 0 leave it downwards
+        if top > LOG_SPAN * least:  # limits of 0 leave it downwards
             ax.set_yscale("log", nonpositive="clip")
             ax.set_ylim(0.5 * least, top)
         else:
@@ -211,14 +212,11 @@ def _name(name: str) -> str:
 
 
 def _spans_decades(values: np.ndarray) -> bool:
-    return bool(len(values) > 1 and values.min() > 0.0 and values.max() > WIDE_RATIO * values.min())
+    return bool(len(values) > 1 and values.min() > 0.0 and values.max() > LOG_SPAN * values.min())
 
 
 def _cell_borders(values: np.ndarray) -> np.ndarray:
     """Borders half way between the values, on the scale they are drawn on."""
     if len(values) == 1:
         return values[0] + np.array([-0.5, 0.5])
-    v = np.log(values) if _spans_decades(values) else values
-    middle = 0.5 * (v[1:] + v[:-1])
-    borders = np.concatenate(([2.0 * v[0] - middle[0]], middle, [2.0 * v[-1] - middle[-1]]))
-    return np.exp(borders) if _spans_decades(values) else borders
+    return map_edges(values, _spans_decades(values))

@@ -49,6 +49,7 @@ from .style import (
     figure_size,
     figure_style,
     hand_name,
+    map_edges,
     narrow,
     panel_grid,
     points,
@@ -639,11 +640,7 @@ def _cell_edges(values: np.ndarray) -> np.ndarray:
     """Borders of the cells around values, in the scale in which they are even."""
     if len(values) == 1:
         return values[0] + np.array([-0.5, 0.5]) * (abs(values[0]) or 1.0) * 0.1
-    log = _logarithmic(values)
-    v = np.log(values) if log else values
-    middle = 0.5 * (v[1:] + v[:-1])
-    out = np.concatenate(([2.0 * v[0] - middle[0]], middle, [2.0 * v[-1] - middle[-1]]))
-    return np.exp(out) if log else out
+    return map_edges(values, _logarithmic(values))
 
 
 def _cell_values(data: Mapped, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:

@@ -80,6 +80,7 @@ PRINT: Any = STYLE | {
     "figure.constrained_layout.w_pad": 0.03,
 }
 SCREEN_WIDTHS = {1: 6.4, 2: 9.6}  # [inch] of figures of one and of two columns
+LOG_SPAN = 30.0  # a scale is logarithmic where its values span more
 LEAST_TEXT = 6.0  # [points] that print can be read at
 TITLE_SIZE = 9.0  # [points] on a screen
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
@@ -193,6 +194,22 @@ def stroke(size: float) -> float:
         size: on a screen [points].
     """
     return look().scale * size
+
+
+def map_edges(values: np.ndarray, log: bool) -> np.ndarray:
+    """Borders of the cells of a map around values: half way between them.
+
+    Args:
+        values: ascending, two at least, shape (n,).
+        log: whether the scale is logarithmic.
+
+    Returns:
+        Shape (n + 1,).
+    """
+    v = np.log(values) if log else values
+    middle = 0.5 * (v[1:] + v[:-1])
+    edges = np.concatenate(([2.0 * v[0] - middle[0]], middle, [2.0 * v[-1] - middle[-1]]))
+    return np.exp(edges) if log else edges
 
 
 def rgb(color: str) -> tuple[float, float, float]:
