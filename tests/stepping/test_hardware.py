@@ -71,14 +71,19 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
         np.testing.assert_allclose(a.fe[:-1], b.fe[:-1], atol=8 * EPS)
 
 
-def test_without_an_interface_nothing_of_it_is_loaded():
+def test_a_run_loads_the_method_that_it_takes_alone():
     code = (
-        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, "
-        "control='sampled')); "
-        "print([m for m in ('interface', 'wired') if 'hapticclay.' + m in sys.modules])"
+        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, control={!r}), "
+        "engine='python'); print(*sorted(m.rpartition('.')[2] for m in sys.modules "
+        "if m.startswith('hapticclay.stepping.')))"
     )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "[]"
+    loaded = {}
+    for control in ("continuous", "sampled"):
+        run = [sys.executable, "-c", code.format(control)]
+        out = subprocess.run(run, capture_output=True, text=True, check=True)
+        loaded[control] = set(out.stdout.split())
+    assert loaded["sampled"] - loaded["continuous"] == {"sampled"}
+    assert not loaded["sampled"] & {"runge_kutta", "modes", "many", "compiled", "drive"}
 
 
 def test_seeds_repeat_and_differ():
