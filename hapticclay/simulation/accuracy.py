@@ -6,6 +6,7 @@ border times at h, or that of the positions at 4h. Only a run that asks for an e
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import re
@@ -193,11 +194,15 @@ def simulate_within(
         raise ParameterError("error", error, bound)
     if scenario.control == "sampled":
         scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)
-    integrator, dt = first_choice(scenario, asked, unit)
-    trial = Trial(dataclasses.replace(scenario, integrator=integrator), unit, every)
+    trial, dt = Trial(scenario, unit, every), 0.0
     trial.progress, trial.engine = progress, engine
-    order, most, doubts = METHODS[integrator].order, MARGIN * asked, 0
-    record, found = trial.compare(dt)
+    record, found = None, None
+    for integrator, dt in choices(scenario, asked, unit):
+        with contextlib.suppress(IntegratorRefused):
+            record, found = trial.take(integrator, dt)
+            break
+    assert record is not None and found is not None  # every scene takes the last one
+    order, most, doubts = METHODS[trial.scenario.integrator].order, MARGIN * asked, 0
     for rounds in range(1, ROUNDS + 1):
         doubts += not found.confirmed
         # an order that is not seen at so many steps will not be; the estimate then is a bound
@@ -247,8 +252,8 @@ def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
     return dt / 2.0 ** max(min(halvings, possible), 1)
 
 
-def first_choice(scenario: Scenario, asked: float, unit: str) -> tuple[str, float]:
-    """The cheapest integrator for an asked error by METHODS, and the step of its finest run.
+def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, float]]:
+    """Integrators for an asked error, the cheapest by METHODS first, and steps of a finest run.
 
     Args:
         scenario: what to run; Ts is a number where control is sampled.
@@ -256,7 +261,7 @@ def first_choice(scenario: Scenario, asked: float, unit: str) -> tuple[str, floa
         unit: "s" or "m".
 
     Returns:
-        "fast" or "accurate"; step [s].
+        Pairs of "fast" or "accurate" and a step [s]; the last is of "fast", which takes all scenes.
 
     Raises:
         ParameterError: Ts is too short to be divided.
@@ -267,17 +272,18 @@ def first_choice(scenario: Scenario, asked: float, unit: str) -> tuple[str, floa
         wanted /= 1 if unit == "s" else RATIO
         steps[name] = min(max(wanted, SMALLEST), LARGEST)
     if scenario.control == "sampled":
-        return "fast", _divided(scenario.Ts or scenario.dt, steps["fast"])
+        return [("fast", _divided(scenario.Ts or scenario.dt, steps["fast"]))]
+    fast = "fast", steps["fast"]
     if not has_numba():  # the accurate run in Python takes too long to pay
-        return "fast", steps["fast"]
+        return [fast]
     # beyond, the explicit method divides its steps, and other steps are no other runs
     steps["accurate"] = min(
         steps["accurate"], STABLE_STEP / max(fastest_rate(scenario), STABLE_STEP) / RATIO
     )
     cost = {name: METHODS[name].cost / step for name, step in steps.items()}
     if steps["accurate"] < SMALLEST or cost["fast"] <= cost["accurate"]:
-        return "fast", steps["fast"]
-    return "accurate", steps["accurate"]
+        return [fast]
+    return [("accurate", steps["accurate"]), fast]
 
 
 def _divided(Ts: float, dt: float) -> float:
@@ -290,6 +296,10 @@ def _divided(Ts: float, dt: float) -> float:
         bound = f"must be at least {RATIO * SMALLEST:g} s where an error is asked for"
         raise ParameterError("Ts", Ts, bound)
     return Ts / n
+
+
+class IntegratorRefused(Exception):
+    """An integrator does not take a scene."""
 
 
 class Trial:
@@ -313,6 +323,24 @@ class Trial:
         self.engine = "auto"
         self.runs, self.wall = 0, 0.0
         self.traces: dict[float, Trace] = {}
+
+    def take(self, integrator: str, dt: float) -> tuple[Record, Comparison]:
+        """As `compare`, by another integrator.
+
+        Args:
+            integrator: its name.
+            dt: step of the finest run [s].
+
+        Raises:
+            IntegratorRefused: it does not take the scene.
+        """
+        try:
+            self.scenario = dataclasses.replace(self.scenario, integrator=integrator)
+            return self.compare(dt)
+        except ParameterError as refusal:
+            if refusal.field != "integrator":
+                raise
+            raise IntegratorRefused from refusal
 
     def compare(self, dt: float) -> tuple[Record, Comparison]:
         """Runs at 4 dt, 2 dt and dt, unless it has, and compares.

@@ -821,7 +821,6 @@ class Leapfrog(NamedTuple):
             s["steps"] += made
             s["i"] = i + made
             s["t"] = s["i"] * dt
-            s["landings"] = 0
         return made
 
     def block(self, s, e, n):

@@ -151,7 +151,7 @@ def carry(m, e, runs):
                     crossings[i, 0], crossings[i, 1], crossings[i, 2] = row[0], row[2], row[3]
                 kept.crossed[k] = i + 1
             n, limit = s["filled"], s["torque_limit"]
-            if s["code"] == path.NOT_FINITE:
+            if s["code"] in (path.NOT_FINITE, path.UNRESOLVED):
                 kept.good[k] = 0
             elif n >= room or s["code"] != path.OPEN:
                 if n > 0 and not monitor.is_quiet(

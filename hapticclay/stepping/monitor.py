@@ -139,6 +139,8 @@ class StabilityMonitor:
                 f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
             )
             return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
+        if outcome.code == "unresolved":
+            return outcome
         if outcome.code == "time limit":
             saturated, stalled = at_rest(self.seen, self.moved, self.unbound, s.dt)
             if saturated:
@@ -402,7 +404,7 @@ class Outcome:
         code: "finished", "time limit"; "stalled" (at rest at the time limit), "saturated" (at rest
             with a motor at its limit); "diverged", "limit cycle" (an unstable axis, bounded by the
             torque limits); "out of reach" (the arm is stretched), "singular" (it is folded);
-            "interrupted" (on request of progress).
+            "unresolved" (one sample takes too many steps); "interrupted" (on request of progress).
         time: simulated time of the end, or of the verdict on an unstable run that went on [s].
         step: index of the last good sample.
         axis: the unstable axis, "" if none.

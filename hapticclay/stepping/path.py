@@ -22,13 +22,16 @@ from ..model import spring as springs
 from . import loop
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
-OPEN, FINISHED, TIME_LIMIT, NOT_FINITE = range(4)  # how a run stands
+OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # how a run stands
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 FELT = 14  # see loop.yield_in_kick
 SUMS = 8  # of energy.kick_work, and energy.HARDWARE_WORK
 INF = np.inf
 NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
-LANDINGS = 4  # on borders in one step; a handle that slides along one then completes the step
+# times that the handle comes back to a region within one sample; a handle that slides along a
+# border then completes the step
+LANDINGS = 4
+MOST_STEPS = 20_000  # from one sample to the next; a run that needs more ends as unresolved
 
 SCENARIO = [  # in numbers, see model.scenario
     ("dt", "f8"),
@@ -61,7 +64,6 @@ SCENARIO = [  # in numbers, see model.scenario
     ("beyond", "i8"),  # whether clay has a force that b v does not tell
     ("yields", "i8"),  # whether clay yields anywhere: 1 each axis by itself, 2 along the motion
     ("ramp", "f8", 5),  # muscle force that changes evenly: since [s], x, y [N], rate x, y [N/s]
-    ("landings_most", "i8"),  # landings on borders in one step
 ]
 STATE = [
     ("t", "f8"),  # now [s]
@@ -71,7 +73,10 @@ STATE = [
     ("before", "f8"),  # length of the step that led here [s]
     ("fine", "f8"),  # longest step on the way from a hit [s]
     ("struck", "i8"),  # whether the handle has just come into this clay
-    ("landings", "i8"),  # on borders since the last sample
+    ("landings", "i8"),  # times that the handle has come back to a region since the last sample
+    ("least_index", "i8", 2),  # of the regions since then
+    ("most_index", "i8", 2),
+    ("careful", "i8"),  # steps since then
     ("closing", "i8"),  # why the next row is the last, OPEN where it is not
     ("code", "i8"),  # how the run stands
     ("steps", "i8"),  # engine steps made
@@ -775,7 +780,11 @@ def move_on(s, table, i, up):
         i: coordinate, 0 for x, 1 for y.
         up: 1 for the upper border, -1 for the lower one.
     """
-    s["index"][i] += up
+    index, least, most = s["index"], s["least_index"], s["most_index"]
+    index[i] += up
+    if least[i] <= index[i] <= most[i]:
+        s["landings"] += 1
+    least[i], most[i] = min(least[i], index[i]), max(most[i], index[i])
     settle(s, table)
 
 
@@ -872,6 +881,17 @@ def locate_event(m, s, e, after, place, sides):
     return span, axis, up
 
 
+def begin_sample(s):
+    """Counts steps and regions from now on, a sample.
+
+    Args:
+        s: state of the run.
+    """
+    s["landings"], s["careful"] = 0, 0
+    for i in range(2):
+        s["least_index"][i] = s["most_index"][i] = s["index"][i]
+
+
 def careful(m, s, e):
     """One step with a look at its end, which lies on a border if one is in the way.
 
@@ -883,8 +903,12 @@ def careful(m, s, e):
     target, after, on_grid = m.stop(s)
     if s["closing"] == OPEN and after == 0.0:
         s["closing"] = TIME_LIMIT
+    s["careful"] += 1
     if on_grid:
-        s["landings"] = 0
+        begin_sample(s)
+    elif s["careful"] > MOST_STEPS:
+        s["code"] = UNRESOLVED
+        return
     axis, up = -1, 0  # border that the step ends on
     overx, overy = 0, 0  # borders stepped over without a step
     act = True
@@ -916,7 +940,7 @@ def careful(m, s, e):
             i, over, overx = 0, sx, sx
         elif sy and side(herey, s["low"][1], s["high"][1]):
             i, over, overy = 1, sy, sy
-        elif s["landings"] >= s["landings_most"]:
+        elif s["landings"] >= LANDINGS:
             break
         else:
             length, i, over = locate_event(m, s, e, after, (x, y), (sx, sy))
@@ -953,7 +977,6 @@ def careful(m, s, e):
         if target - s["t"] <= 1e-9 * s["dt"]:
             m.arrive(s, target)
         if axis >= 0:
-            s["landings"] += 1
             cross(m, s, e, axis, up)
 
 

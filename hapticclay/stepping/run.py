@@ -362,7 +362,6 @@ class Run:
         self._tell_compensator(s.compensators)
         now["held"], now["shaping"] = int(any(s.operators)), int(s.shaping)
         now["dampers"], now["last"] = int(s.clay is not None), self.last
-        now["landings_most"] = path.LANDINGS
         angle = s.clay.angle if s.clay else 0.0
         now["turned_clay"] = int(angle != 0.0)
         now["smooth"] = s.clay.smooth if s.clay else 0
@@ -439,7 +438,9 @@ class Run:
         code = int(self.s["code"])
         if code == path.NOT_FINITE:
             raise ArithmeticError
-        if code:
+        if code == path.UNRESOLVED:
+            self.give_up()
+        elif code:
             self.finish("finished" if code == path.FINISHED else "time limit")
 
     def _note_stop(self, axis: str, stops: bool, t: float) -> None:
@@ -583,6 +584,15 @@ class Run:
         """
         self.end_time = self.t
         self.outcome = monitor.Outcome(code, self.t, self.i)
+
+    def give_up(self) -> None:
+        """Ends the run at its last sample: the steps behind it become too short."""
+        cause = f"more than {path.MOST_STEPS} steps in one sample"
+        other = "fast" if self.scenario.integrator == "accurate" else "accurate"
+        advice = f"change dt, or choose integrator {other!r}"
+        at = self.i * self.scenario.dt
+        self.outcome = monitor.Outcome("unresolved", at, self.i, cause=cause, advice=advice)
+        self._cut_events(at)
 
     def flush(self) -> None:
         """Judges the rows since the last look."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..model import arm, clay, compensator, controller, regions
+from ..model.constants import B_MAX
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from . import energy, loop, modes, path
@@ -26,6 +27,7 @@ from .run import Run
 REFERENCE_SPEED = 0.1  # [m/s] of a usual cut: at which the consistency counts as a damper
 CREEP_MOST = 1e-5  # [m/s] a slower creep may count as rest
 POWERS = 5  # of energy.kick_work
+GROWTH_BLOCK = 64  # samples for which the steps of clay that grows are chosen at once
 COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the run
 ROW_BYTES = 8 * ROW
 # the cheapest way for CPython to write floats: (array, offset [bytes], floats)
@@ -134,11 +136,8 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
                     shiftx, shifty = coming[j, 2], coming[j, 3]
                     j += 1
                 elif n == 0:  # a signal that jumps counts as it is within the step
-                    near = now
-                    if stage == 0:
-                        near = t + path.NEAR * dt
-                    elif stage == 3:
-                        near = max(t + 0.5 * h, now - path.NEAR * dt)
+                    near = now - path.NEAR * dt if stage == 3 else now
+                    near = max(near, t + path.NEAR * dt)
                     uhx, uhy = path.force_at(s, e, now, near)
                     if commanded:
                         shiftx, shifty = path.command_at(e, now, near)
@@ -712,7 +711,8 @@ def next_end(m, s, e, after):
     """
     event, mode, along = s["event"], s["mode"], s["yields"] == 2
     shortest, moved = modes.shortest_step(s), False
-    while along and after > shortest and strays(s, e, after):
+    follows = along and modes.is_active(s, 0)  # elsewhere the handle has no way to keep to
+    while follows and after > shortest and strays(s, e, after):
         after = max(0.5 * after, shortest)
         m.propose(s, e, after)
     span, axis, x = after, -1, s["next"]
@@ -870,7 +870,7 @@ class RungeKutta(NamedTuple):
         return vy if i else vx
 
 
-def fastest_rate(scenario: Scenario) -> float:
+def fastest_rate(scenario: Scenario, grown: float = 0.0) -> float:
     """Fastest rate of a scene, by which the explicit method divides its steps [1/s].
 
     It is that of clay and hand against the handle; or of a servo or a pole of a compensator that
@@ -878,22 +878,24 @@ def fastest_rate(scenario: Scenario) -> float:
 
     Args:
         scenario: the scene.
+        grown: time for which clay that grows has grown [s].
     """
     hands = [th or NO_HAND for th in scenario.operators]
     damper, spring = max(th.damper for th in hands), max(th.spring for th in hands)
-    b, W = steepest_clay(scenario), largest_lightness(scenario)
+    b, W = steepest_clay(scenario, grown), largest_lightness(scenario)
     return max((b + damper) * W + math.sqrt(spring * W), 0.5 * own_rate(scenario))
 
 
-def steepest_clay(scenario: Scenario) -> float:
+def steepest_clay(scenario: Scenario, grown: float) -> float:
     """Largest damping of the clay, with that of its consistency at REFERENCE_SPEED [N.s/m].
 
     Args:
         scenario: the scene.
+        grown: as in `fastest_rate` [s].
     """
     most, clay = 0.0, scenario.clay
     for law in clay.laws if clay else ():
-        b = law.damping
+        b = np.minimum(law.damping + grown * law.rates, B_MAX)
         if clay and clay.yields:
             _, K, n = law.flows
             b = b + n * K * REFERENCE_SPEED ** (n - 1.0)
@@ -952,7 +954,7 @@ class RungeKuttaRun(Run):
     def _start(self) -> None:
         super()._start()
         s, now = self.scenario, self.s
-        parts = max(1, math.ceil(s.dt * fastest_rate(s) / STABLE_STEP))
+        parts = self._parts(0)
         if parts > SUBSTEPS:
             bound = f"explicit: would take {parts:.4g} steps a sample in so stiff a scene"
             raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
@@ -963,7 +965,7 @@ class RungeKuttaRun(Run):
                 raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
             now["lightness"] = largest_lightness(s)
             self._put(mode=(1, 1))
-        now["substeps"], now["landings_most"], now["break"] = parts, 2**62, math.inf
+        now["substeps"], now["break"] = parts, math.inf
         control = loop.initial_state(s.start, s.velocity, s.servo)[:8]
         if now["formed"]:
             control = (*control[:2], 0.0, 0.0, *control[4:])
@@ -974,11 +976,26 @@ class RungeKuttaRun(Run):
                 )
         self._put(control=control)
 
+    def _parts(self, i: int) -> int:
+        """Engine steps a sample in the samples of the same block as sample i."""
+        s, grown = self.scenario, 0.0
+        if s.clay and s.clay.grows:  # at the end of the block: longer than any clay has grown
+            grown = min((i // GROWTH_BLOCK + 1) * GROWTH_BLOCK * s.dt, s.t_max)
+        return max(1, math.ceil(s.dt * fastest_rate(s, grown) / STABLE_STEP))
+
     def _make(self, room: int) -> None:
         if not self.varies:
             super()._make(room)
             return
-        now, parts = self.s, self.s["substeps"]
+        now = self.s
+        if self.scenario.clay and self.scenario.clay.grows:
+            if now["part"] == 0:
+                now["substeps"] = min(self._parts(self.i), SUBSTEPS + 1)
+            if now["substeps"] > SUBSTEPS:
+                self.give_up()
+                return
+            room = min(room, now["filled"] + GROWTH_BLOCK - self.i % GROWTH_BLOCK)
+        parts = now["substeps"]
         cosines = max((d.cosines for d in self.drives.values()), default=0)
         most = max(1, COSINES // (2 * parts * max(1, cosines)))
         n = max(0, min(room - now["filled"], self.last - self.i, most))

@@ -1512,7 +1512,6 @@ class Sampled(NamedTuple):
             observe(s, e.q, e.w, e.table, dt)
             s["i"] = i + made + 1
             s["t"] = s["i"] * dt
-            s["landings"] = 0
         return n
 
     def stop(self, s):

@@ -22,9 +22,9 @@ from ..simulation.accuracy import (
     METHODS,
     ROUNDING_LEFT,
     Trace,
+    choices,
     compare_positions,
     compare_times,
-    first_choice,
 )
 from ..simulation.record import Record
 from ..simulation.simulate import has_numba, simulate
@@ -192,7 +192,7 @@ def accuracy_ladder(
     grid = top / 2.0 ** max(0, math.floor(math.log2(top / SAMPLES_APART)))
     finest = min(s.dt for _, s in rungs if s.integrator == "fast") / FINER
     best = dataclasses.replace(scenario, dt=finest)
-    if first_choice(scenario, SHARP, "s")[0] == "accurate":
+    if choices(scenario, SHARP, "s")[0][0] == "accurate":
         best = dataclasses.replace(scenario, dt=FINER * finest / 2.0, integrator="accurate")
     timed = 1 if quick else REPEATS
     exact: Reference | None = None

@@ -447,6 +447,7 @@ OUTCOME_COLORS = {  # from good to bad
     "diverged": VERMILION,
     "out of reach": PURPLE,
     "singular": GREEN,
+    "unresolved": MID_GREY,
     "refused": BLACK,
 }
 MISSING = {  # why a run has no figure: look of its cell and of its point
