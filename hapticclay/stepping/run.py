@@ -433,17 +433,23 @@ class Run:
         """
         if not self.filled and not (self.without_samples and self.looked):
             self._snapshot = self._save()  # of what has been judged
-        self._make(room)
-        for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
-            self.crossings.append(Crossing(AXES[int(axis)], *crossing))
-        if self.s["stopped"]:
-            for axis, stops, t in self.stop_rows[: int(self.s["stopped"])].tolist():
-                self._note_stop(("x", "y", "xy")[int(axis)], stops > 0.0, t)
+        try:
+            self._make(room)
+        finally:  # in CPython a step may raise, where the arm is exactly straight
+            self._note_events()
         code = int(self.s["code"])
         if code == path.NOT_FINITE:
             raise ArithmeticError
         if code:
             self.finish("finished" if code == path.FINISHED else "time limit")
+
+    def _note_events(self) -> None:
+        """Takes the crossings and stops of the steps just made."""
+        for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
+            self.crossings.append(Crossing(AXES[int(axis)], *crossing))
+        if self.s["stopped"]:
+            for axis, stops, t in self.stop_rows[: int(self.s["stopped"])].tolist():
+                self._note_stop(("x", "y", "xy")[int(axis)], stops > 0.0, t)
 
     def _note_stop(self, axis: str, stops: bool, t: float) -> None:
         if stops:
@@ -807,8 +813,8 @@ def spring_step(scenario: Scenario) -> float:
     """Longest step that resolves the springs of the clay, inf without any [s].
 
     The force of a spring enters a kick from the place before it, so a step must resolve the fastest
-    motion that the spring can drive. Where control is continuous, that is one of the whole loop: the
-    compensator may pass a force on at once, and the servo may impose a lighter handle.
+    motion that the spring can drive. Where control is continuous, that is one of the whole loop:
+    the compensator may pass a force on at once, and the servo may impose a lighter handle.
 
     Args:
         scenario: the run.
@@ -827,8 +833,8 @@ def spring_step(scenario: Scenario) -> float:
     longest = RESOLVED / omega if omega else math.inf
     if longest * SPRING_STEPS < scenario.dt:
         bound = (
-            f"must be at most {longest * SPRING_STEPS:.3g} s: in clay of {max(most):g} N/m this loop "
-            f"moves at up to {omega:.3g} rad/s, and needs steps of {longest:.2g} s"
+            f"must be at most {longest * SPRING_STEPS:.3g} s: in clay of {max(most):g} N/m this "
+            f"loop moves at up to {omega:.3g} rad/s, and needs steps of {longest:.2g} s"
         )
         raise ParameterError("dt", scenario.dt, bound)
     return longest
