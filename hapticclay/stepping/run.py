@@ -25,7 +25,7 @@ from ..model.controller import Servo
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from ..model.spring import RESOLVED
-from ..theory import linear_loop
+from ..theory import gain_limit
 from . import energy, engine, leapfrog, loop, monitor, path
 from .engine import mujoco
 
@@ -829,7 +829,7 @@ def spring_step(scenario: Scenario) -> float:
     if scenario.control == "sampled":
         omega = math.sqrt(max(most) * scenario.mobility)
     else:
-        omega = max(linear_loop.spring_crossover(scenario, i, k) for i, k in enumerate(most))
+        omega = max(gain_limit.spring_crossover(scenario, i, k) for i, k in enumerate(most))
     longest = RESOLVED / omega if omega else math.inf
     if longest * SPRING_STEPS < scenario.dt:
         bound = (

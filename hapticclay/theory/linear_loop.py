@@ -420,30 +420,6 @@ def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     return passive + loop.gain * driven, denominator
 
 
-def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
-    """Highest frequency at which a spring has a loop gain of 1, beyond which it moves no pole.
-
-    At k |P| = 1, P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the hand.
-    Without shaping Sh has the gain trace W, which no pose and no direction exceeds.
-
-    Args:
-        scenario: the run, with continuous control.
-        i: axis, 0 for x, 1 for y.
-        k: stiffness [N/m].
-
-    Returns:
-        [rad/s]; 0 for none.
-    """
-    loop = Loop.of(scenario, AXES[i], 0.0)
-    if not scenario.shaping:
-        S = replace(loop.servo.S, gain=scenario.arm.links[4])
-        loop = replace(loop, servo=replace(loop.servo, S=S))
-    num, den = device_admittance(loop)
-    num, den = num * k, den + num * Polynomial([0.0, 0.0, loop.hand.mass])
-    found = roots.positive_roots(roots.squared_magnitude(num) - roots.squared_magnitude(den))
-    return math.sqrt(max(found, default=0.0))
-
-
 def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
 
