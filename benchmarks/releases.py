@@ -1033,6 +1033,7 @@ growth = "0:600"
 "operator.spring" = [0.0, 6.0, 60.0]
 
 [fixed]
+impedance = true
 t_max = 2.0
 force = [1.0, 0.7]
 shaping = true

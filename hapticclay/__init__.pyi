@@ -2,6 +2,7 @@
 
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
+from .errors import Warning as Warning
 from .model.arm import Arm as Arm
 from .model.clay import Clay as Clay
 from .model.clay import Grid as Grid

@@ -30,6 +30,10 @@ class ParameterError(ValueError):
         return type(self), (self.field, self.value, self.bound), self.__dict__
 
 
+class Warning(UserWarning):  # as in `hc.Warning`
+    """A scenario is run whose values are hardly meant, as clay out of reach."""
+
+
 def _short(value: object) -> str:
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."

@@ -14,6 +14,7 @@ import pkgutil
 import re
 import sys
 import types
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import tyro
 
-from ..errors import ParameterError, choice
+from ..errors import ParameterError, Warning, choice
 from ..files import versions
 from .console import scenario_words
 
@@ -65,6 +66,14 @@ class VersionCommand:
         return 0
 
 
+def _show_line(usual: Callable[..., None], message: Any, category: type, *where: Any) -> None:
+    """Prints a warning of ours as a line, others as usual."""
+    if issubclass(category, Warning):
+        print(f"hapticclay: {message}", file=sys.stderr)
+    else:
+        usual(message, category, *where)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
@@ -81,10 +90,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # terminals without frames or bullets
     try:
         command = parse_words(list(sys.argv[1:] if argv is None else argv))
-        code = command() if command else 0
+        with warnings.catch_warnings():
+            warnings.showwarning = functools.partial(_show_line, warnings.showwarning)
+            code = command() if command else 0
         if sys.stdout:  # None where it was closed before we came
             sys.stdout.flush()
         return code
+    except Warning as error:  # by python -W error
+        print(f"hapticclay: {error}", file=sys.stderr)
+        return 2
     except ParameterError as error:
         text = error.bound if error.field == "arguments" else str(error)
         print(f"hapticclay: {text}", file=sys.stderr)

@@ -42,6 +42,7 @@ from .fields import (
     ENTIRE,
     Field,
     bounds_at,
+    check_added_hand,
     dotted_names,
     field_descriptions,
     laid_over,
@@ -65,6 +66,7 @@ from .scenario import (
     Scenario,
     StepLength,
     TorqueLimit,
+    choose_step,
 )
 from .signals import Multisine
 
@@ -87,7 +89,7 @@ class Experiment:
     Attributes:
         operator: the operator's arm Th in the loop (Eq. 19); None for a pure force.
         shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.02.
+        dt: physics and control step [s], 1e-6 to 0.02; where it is not given, a part of Ts.
         t_max: longest simulated time [s], > 0, at most 1e5.
         origin: world position of p = 0 [m].
         torque_limit: largest torque of the shoulder and elbow motor [N.m], > 0.
@@ -109,6 +111,7 @@ class Experiment:
     _changes: ClassVar[tuple[Mapping[Any, Any], ...]] = ()
 
     def __post_init__(self):
+        choose_step(self)
         check_fields(self)
 
     def scenario(self) -> Scenario:
@@ -144,6 +147,7 @@ class Experiment:
         Raises:
             ParameterError: as `scenario`; or there is no such field.
         """
+        check_added_hand(self.operator, *changes)
         other = copy.copy(self)
         object.__setattr__(other, "_changes", changes)
         scenario = other.scenario()
@@ -362,8 +366,10 @@ def from_words(
     values, others = dict(words), []
     if "impedance" in values:
         values["operator"] = _impedance(values.pop("impedance"))
-    for given in changes:
-        own, other = _split_names(kind, nested(given))
+    split = [_split_names(kind, nested(given)) for given in changes]
+    before = values.get("operator", parameters(kind)["impedance"].default or None)
+    check_added_hand(before, *(own for own, _ in split))
+    for own, other in split:
         values = merged_values(kind, own, values)
         others += [other] if other else []
     experiment = kind(**values)

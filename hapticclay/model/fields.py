@@ -35,6 +35,7 @@ KIND = "kind"  # key of the class, where a field takes several
 USUAL_KIND = "multisine"  # the class without that key, where none of its own is usual
 UNSET = dataclasses.MISSING
 MOST_TOLD = 8  # names that an error lists beside the nearest one
+HAND = ["mass", "damper", "spring"]  # what a hand is added by
 ENTIRE = None  # key of the value of a whole field, beside those of its entries
 
 
@@ -48,12 +49,46 @@ def with_fields(part: T, changes: Mapping[str, Any]) -> T:
 
     Returns:
         A part of the same class. One number for a pair, and one part for a pair of parts, is that
-        of both axes. A part that was None begins as its defaults.
+        of both axes. A part that was None begins as its defaults; but a hand is added whole, by
+        its mass, damper and spring.
 
     Raises:
-        ParameterError: there is no such field, or a value was refused.
+        ParameterError: there is no such field, a value was refused, or a hand is added in part.
     """
-    return make_part(type(part), nested(changes), values_of(part))
+    data, values = nested(changes), values_of(part)
+    check_added_hand(values.get("operator"), data)
+    return make_part(type(part), data, values)
+
+
+def check_added_hand(old: Any, *changes: Mapping[Any, Any]) -> None:
+    """Refuses a mass, damper or spring alone where there is no hand, which would add the others.
+
+    Args:
+        old: the operator before.
+        *changes: plain data from `nested`, the later ones on top.
+
+    Raises:
+        ParameterError: a hand is added in part.
+    """
+    given = functools.reduce(laid_over, changes, {}).get("operator")
+    _check_hand(given, old, "operator")
+
+
+def _check_hand(given: Any, old: Any, path: str) -> None:
+    if not isinstance(given, Mapping):
+        return
+    if ENTIRE in given:
+        old = given[ENTIRE]
+    both = {n: given[n] for n in HAND if n in given}
+    for i, axis in enumerate(AXES):
+        if isinstance(given.get(axis), Mapping):
+            before = old[i] if isinstance(old, tuple) else old
+            _check_hand(both | given[axis], before, f"{path}.{axis}")
+    named = list(both)
+    if named and (old is None or isinstance(old, tuple) and None in old) and named != HAND:
+        more = " and ".join(join_names(path, n) for n in HAND if n not in named)
+        bound = f"adds a hand to a scene without one: give {more} as well, 0 for none"
+        raise ParameterError(join_names(path, named[0]), given[named[0]], bound)
 
 
 def make_part(

@@ -23,12 +23,14 @@ from .scenario_text import scenario_rows
 from .signals import Signal
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
+WHOLE = 1e-6  # by which Ts/dt may differ from a whole number
 REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no force can be rendered
 FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
 
 # Types of the fields that experiments share with scenarios.
 Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
-StepLength = Annotated[float, Bound(1e-6, 0.02, "s")]
+STEP_LEAST = 1e-6  # [s]
+StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
 Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
 Length = Annotated[float, Bound(-10.0, 10.0, "m")]
 Position = Annotated[tuple[float, float], Bound(unit="m")]
@@ -55,7 +57,8 @@ class Scenario:
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
             pure force (Th = 0).
         shaping: whether the servo shapes the handle's inertia, so that Sh holds at every pose.
-        dt: physics and control step [s], 1e-6 to 0.02.
+        dt: physics and control step [s], 1e-6 to 0.02; where it is not given, 0.36 ms, or the
+            longest whole part of Ts that is no longer.
         t_max: the run ends at this time [s], > 0, at most 1e5 ...
         length: ... or when p_x reaches this [m]; None to run for t_max.
         start: handle position p at t = 0 [m].
@@ -113,6 +116,7 @@ class Scenario:
     def __post_init__(self):
         if not isinstance(self.compensator, Compensator):
             object.__setattr__(self, "compensator", _compensators(self.compensator))
+        choose_step(self)
         check_fields(self)
         if self.control == "sampled" and self.integrator != "fast":
             raise ParameterError(
@@ -121,10 +125,13 @@ class Scenario:
         if self.Ts is not None:
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
-            if abs(self.Ts / self.dt - round(self.Ts / self.dt)) > 1e-6:
-                raise ParameterError(
-                    "Ts", self.Ts, f"must be a whole multiple of dt = {self.dt:g} s"
+            n = self.Ts / self.dt
+            if abs(n - round(n)) > WHOLE:
+                bound = (
+                    f"must be a whole multiple of dt = {self.dt:g} s: the nearest is "
+                    f"{round(n) * self.dt:.10g} s; or dt = {self.Ts / round(n):.10g} s"
                 )
+                raise ParameterError("Ts", self.Ts, bound)
         if self.controller is not None and self.control != "sampled":
             raise ParameterError(
                 "control", self.control, "must be 'sampled' with a controller of one's own"
@@ -326,6 +333,18 @@ class Scenario:
                 f"unreachable: {r:.4g} m from the shoulder, must be {low:.4g} to {high:.4g} m "
                 f"(origin {self.origin[0]:g}, {self.origin[1]:g} m)",
             )
+
+
+def choose_step(part: Any) -> None:
+    """Makes a dt that was not given a whole part of Ts: that of a class is told by its identity.
+
+    Args:
+        part: a scenario, or an experiment, before its fields are checked.
+    """
+    Ts = part.Ts
+    given = part.control == "sampled" and isinstance(Ts, float | int) and STEP_LEAST <= Ts <= 1.0
+    if given and part.dt is TS:
+        object.__setattr__(part, "dt", Ts / math.ceil(Ts / TS - WHOLE))
 
 
 def _compensators(given: Any) -> Any:

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import ParameterError, choice
 from ..files import atomic
 from .experiments import EXPERIMENTS, from_words, parameter_names
-from .fields import merged_values, nested, no_field, plain_data, values_of
+from .fields import check_added_hand, merged_values, nested, no_field, plain_data, values_of
 from .scenario import Scenario
 
 SCENARIO_SCHEMA = "hapticclay-scenario-1"
@@ -111,7 +111,10 @@ def scenario_of(settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Sce
     for name in data:
         if name not in values:
             raise no_field(name, data[name], [*parameter_names(None), "experiment", "schema"])
-    for given in (data, *map(nested, changes)):
+    values = merged_values(Scenario, data, values)
+    later = [nested(x) for x in changes]
+    check_added_hand(values["operator"], *later)
+    for given in later:
         values = merged_values(Scenario, given, values)
     return Scenario(**values)
 

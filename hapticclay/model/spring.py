@@ -9,15 +9,16 @@ from typing import Annotated
 from ..errors import Bound, ParameterError, check_fields
 
 STIFFNESS_MAX = 1e9  # [N/m]
-RESOLVED = 0.2  # longest step over the time in which a spring moves the handle by one radian
+RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
 
 
 @dataclass(frozen=True)
 class Spring:
     """How clay springs back along one axis, beside its damping.
 
-    Its rest is where the handle comes into the region, on the border or at the start. The second
-    spring is Zener's: it takes the load of a fast motion and gives it up with time.
+    Its rest is where the handle comes into the region: the border that it crosses, or the place at
+    which it starts or comes in across a border of the other coordinate. The second spring is
+    Zener's: it takes the load of a fast motion and gives it up with time.
 
     Attributes:
         k: stiffness [N/m], 0 to 1e9.
@@ -25,7 +26,8 @@ class Spring:
         k1: stiffness of a second spring beside it, which relaxes [N/m], 0 to 1e9.
         tau: relaxation time of the second spring [s], > 0, at most 1e5; 1 without k1.
         surface: whether the clay is a wall behind the border, which pushes and never pulls; what
-            gave way is a dent that stays. Else the tool sticks in it and is pulled back as well.
+            gave way, and where the tool was at the start, is a dent that stays. Else the tool
+            sticks in it and is pulled back as well.
     """
 
     k: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0

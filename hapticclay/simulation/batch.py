@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
+from ..model.plausible import warn_of
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.many import SUMMARY_CROSSINGS
@@ -58,6 +59,7 @@ SUMMARY = np.dtype(
         *((name, "f8") for name in WORKS),  # record.Record.energy [J]
     ]
 )
+WARNED = 1000  # kinds of scene of a batch that are looked at for values that are hardly meant
 
 
 def simulate_batch(
@@ -89,10 +91,11 @@ def simulate_batch(
     threads = integer("threads", cores() if threads is None else threads, 1, 1024)
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
+    seen: set[Any] = set()
     if isinstance(scenarios, Sequence):  # refused before the first run, if they can be
-        for _ in _checked(scenarios):
+        for _ in _checked(scenarios, seen):
             pass
-    todo = _checked(scenarios)
+    todo = _checked(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
     out = _Summaries() if summaries else _Records()
     module = load_compiled() if first and has_numba() else None
@@ -171,12 +174,17 @@ class _Summaries:
         return self.found
 
 
-def _checked(scenarios: Iterable[Any]) -> Iterator[Scenario]:
+def _checked(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
+    """The scenarios; a `Warning` names what is hardly meant in the first WARNED kinds of scene."""
     for i, s in enumerate(scenarios):
         if not isinstance(s, Scenario):
             raise ParameterError(
                 f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns"
             )
+        scene = id(s.clay), s.origin, s.arm, s.operator
+        if len(seen) < WARNED and scene not in seen:
+            seen.add(scene)
+            warn_of(s, 4)
         yield s
 
 

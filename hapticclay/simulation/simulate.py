@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError, choice, integer
+from ..model.plausible import warn_of
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.run import PLAIN, Kernel, borrowed_store, cache_folder, completed, kind_of
@@ -60,6 +61,7 @@ def simulate(
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
+    warn_of(scenario)
     if error is not None:
         from .accuracy import simulate_within  # only a run that asks for an error pays for it
 

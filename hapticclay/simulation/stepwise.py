@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ParameterError, numbers_of, pair
 from ..model.hardware import JOINTS
+from ..model.plausible import warn_of
 from ..model.sampled_controller import Controller
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
@@ -72,6 +73,7 @@ class Simulation:
         if not isinstance(scenario, Scenario):
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
+        warn_of(scenario)
         self.scenario = scenario
         self._store = borrowed_store(STEPWISE)
         self._run = kind_of(scenario)(scenario, 1, STEPWISE, self._store.__enter__())

@@ -133,7 +133,7 @@ def carry(m, e, runs):
         runs.reset(e.model, e.data)
         x, y, vx, vy = starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3]
         path.put_handle(s, e, x, y, vx, vy)
-        path.settle(s, e.table)
+        path.settle(s, e.table, -1)
         for j in range(2):
             s["old"][j], s["old"][2 + j] = s["base"][j], s["rate"][j]
         w1, w2 = s["w"][0], s["w"][1]

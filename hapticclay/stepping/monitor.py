@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
@@ -27,9 +28,7 @@ MEMORY = 200  # swings that are remembered
 STILL = 1e-5  # [m/s] a handle slower than this ...
 WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
 QUIET = 9 + SWINGS + 1  # numbers of an axis that `is_quiet` goes on with
-MOST_CLAYS = (
-    33  # of a grid whose gain limits are worked out; of more, so many between least and most
-)
+MOST_CLAYS = 33  # whose gain limits are worked out, of each axis; of more, the nearest of so many
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -64,6 +63,7 @@ class StabilityMonitor:
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
         self.largest = [0.0, 0.0]  # swing so far [m/s]
+        self._limits: dict[tuple[int, float], float] = {}  # of axis and clay, worked out so far
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
@@ -276,25 +276,27 @@ class StabilityMonitor:
 
     def _limit(self, i: int, values: list[float]) -> tuple[float, float]:
         """The clay with the least gain limit of the linear loop of axis i, and this limit."""
-        return min(
-            ((b, gain_limit.continuous_limit(self.scenario, AXES[i], b)) for b in values),
-            key=lambda x: x[1],
-        )
+        for b in values:
+            if (i, b) not in self._limits:
+                self._limits[i, b] = gain_limit.continuous_limit(self.scenario, AXES[i], b)
+        return min(((b, self._limits[i, b]) for b in values), key=lambda x: x[1])
 
     def _dampings(self, i: int, visited: bool) -> list[float]:
-        """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited."""
+        """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited.
+
+        Of more than MOST_CLAYS in all, the nearest of so many between least and most: where the
+        handle has been grows with each look, and must not bring new ones for ever.
+        """
         clay = self.scenario.clay
         if clay is None:
             return [0.0]
-        ends = (self.least, self.most) if visited else ([-math.inf] * 2, [math.inf] * 2)
-        low, high = ((e[0], e[1]) for e in ends)
-        laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
-        values = [b for law in laws for b in law.within(low, high)]
-        if len(values) > MOST_CLAYS:
-            values = np.unique(values).tolist()
-        if len(values) > MOST_CLAYS:
-            values = np.linspace(values[0], values[-1], MOST_CLAYS).tolist()
-        return values
+        everywhere = [-math.inf] * 2, [math.inf] * 2
+        levels = _within(clay, i, *everywhere)
+        values = _within(clay, i, self.least, self.most) if visited else levels
+        if len(levels) <= MOST_CLAYS:
+            return values.tolist()
+        few = np.linspace(levels[0], levels[-1], MOST_CLAYS)
+        return np.unique(few[np.abs(values[:, None] - few).argmin(axis=1)]).tolist()
 
     def _above_limit(self, i: int) -> bool:
         return self.scenario.gain[i] > self._limit(i, self._dampings(i, True))[1]
@@ -320,6 +322,13 @@ class StabilityMonitor:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
+    """Dampings that may resist axis i in a box [N.s/m], ascending."""
+    laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+    corners = (low[0], low[1]), (high[0], high[1])
+    return np.unique([b for law in laws for b in law.within(*corners)])
 
 
 def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:

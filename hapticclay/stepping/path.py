@@ -52,6 +52,7 @@ SCENARIO = [  # in numbers, see model.scenario
     ("handy", "f8", 3),
     ("held", "i8"),  # whether there is an operator's arm
     ("mobility", "f8"),  # largest acceleration of both per unit of force [1/kg]
+    ("sprung_step", "f8"),  # longest step in clay that springs back [s]
     ("shaping", "i8"),
     ("dampers", "i8"),  # whether there is clay
     ("turned_clay", "i8"),  # whether its axes are not x and y
@@ -552,12 +553,13 @@ def put_handle(s, e, x, y, vx, vy):
     s["index"][0], s["index"][1] = ix, iy
 
 
-def settle(s, table):
+def settle(s, table, crossed):
     """Takes borders and clay of the region in which the run continues.
 
     Args:
         s: state of the run.
         table: from regions.region_table.
+        crossed: coordinate whose border the handle has crossed, 0 for x, 1 for y, -1 for none.
     """
     low, high, base, rate = regions.enter_region(table, s["index"][0], s["index"][1], s["t"])
     for j in range(2):
@@ -568,7 +570,7 @@ def settle(s, table):
             flow = s["flow"]
             flow[3 * axis], flow[3 * axis + 1], flow[3 * axis + 2] = Fy, K, n
     if s["springs"]:
-        enter_spring(s, table)
+        enter_spring(s, table, crossed)
     if s["smooth"]:
         feel_place(s, table)
     if s["grooved"]:
@@ -588,12 +590,13 @@ def handle_place(s):
     return u1y + u2y - ox, -oy - u1x - u2x
 
 
-def enter_spring(s, table):
+def enter_spring(s, table, crossed):
     """Takes the springs of the region in which the run continues; those left behind lose theirs.
 
     Args:
         s: state of the run.
         table: from regions.region_table.
+        crossed: as in `settle`.
     """
     spring, stretch, sprung, n = s["spring"], s["stretch"], s["sprung"], regions.SPRING
     at, stiffest = s["sprung_at"], 0.0
@@ -609,18 +612,20 @@ def enter_spring(s, table):
         way, rest = 0.0, at[i]
         if spring[n * i + 4] > 0.0:  # pushed from the border that is nearer
             up = at[i] - s["low"][i] <= s["high"][i] - at[i]
-            way, rest = (1.0, s["low"][i]) if up else (-1.0, s["high"][i])
+            way, border = (1.0, s["low"][i]) if up else (-1.0, s["high"][i])
+            if i == crossed:  # else the tool is in it already, at rest
+                rest = border
             dent = table[place + n - 1]
             if dent == dent and way * (dent - rest) > 0.0:
                 rest = dent
-            if abs(rest) == INF:
-                rest = at[i]
+            if crossed < 0 and way * (rest - border) > 0.0:
+                table[place + n - 1] = rest
         spring[n * i + n - 1] = way
         stretch[2 * i], stretch[2 * i + 1], sprung[i] = rest, 0.0, 0.0
     s["resolved"] = INF
     if stiffest > 0.0:
         if s["springs"] == 1:
-            s["resolved"] = springs.RESOLVED / math.sqrt(stiffest * s["mobility"])
+            s["resolved"] = s["sprung_step"]
         feel_spring(s, table, 0.0)
 
 
@@ -785,7 +790,7 @@ def move_on(s, table, i, up):
     if least[i] <= index[i] <= most[i]:
         s["landings"] += 1
     least[i], most[i] = min(least[i], index[i]), max(most[i], index[i])
-    settle(s, table)
+    settle(s, table, i)
 
 
 def sides_of(s, table, x, y):
@@ -913,7 +918,8 @@ def careful(m, s, e):
     overx, overy = 0, 0  # borders stepped over without a step
     act = True
     while True:
-        after = min(after, s["resolved"])
+        if after > s["resolved"]:  # in equal parts
+            after /= math.ceil(after / s["resolved"] - NEAR)
         if s["closing"] != OPEN:
             after = 0.0
         elif act:  # once; anew in other clay

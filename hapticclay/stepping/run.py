@@ -24,12 +24,15 @@ from ..model.constants import AXES
 from ..model.controller import Servo
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
+from ..model.spring import RESOLVED
+from ..theory import gain_limit
 from . import energy, engine, leapfrog, loop, monitor, path
 from .engine import mujoco
 
 CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
 STORED = 8  # that one store keeps: two of an arm, with clay and without
 CROSSINGS_ROOM = 64  # crossings between two looks
+SPRING_STEPS = 10_000  # parts of a step that springs may need; at most a second or two each
 
 
 @dataclass(frozen=True)
@@ -336,7 +339,7 @@ class Run:
             self._put(block=block.numbers, cut_at=(math.nan, math.nan))
             now["drag"], self.ground = block.damping, block.shares.copy()
             self._arrays(ground=self.ground, relief=block.relief)
-        path.settle(now, self.e.table)
+        path.settle(now, self.e.table, -1)
         if now["grooved"]:
             self._put(bare=(*now["base"], *now["base"]))
             path.cut_place(now, self.e)
@@ -357,7 +360,7 @@ class Run:
         names = "gain", "origin", "torque_limit"
         self._put(force=_steady_force(s), **{x: getattr(s, x) for x in names})
         self._put(handx=(x.mass, x.damper, x.spring), handy=(y.mass, y.damper, y.spring))
-        now["mobility"] = s.mobility
+        now["mobility"], now["sprung_step"] = s.mobility, spring_step(s)
         self._put(arm=s.arm.links, servox=s.servo[0].numbers, servoy=s.servo[1].numbers)
         self._tell_compensator(s.compensators)
         now["held"], now["shaping"] = int(any(s.operators)), int(s.shaping)
@@ -429,12 +432,10 @@ class Run:
         """
         if not self.filled and not (self.without_samples and self.looked):
             self._snapshot = self._save()  # of what has been judged
-        self._make(room)
-        for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
-            self.crossings.append(Crossing(AXES[int(axis)], *crossing))
-        if self.s["stopped"]:
-            for axis, stops, t in self.stop_rows[: int(self.s["stopped"])].tolist():
-                self._note_stop(("x", "y", "xy")[int(axis)], stops > 0.0, t)
+        try:
+            self._make(room)
+        finally:  # in CPython a step may raise, where the arm is exactly straight
+            self._note_events()
         code = int(self.s["code"])
         if code == path.NOT_FINITE:
             raise ArithmeticError
@@ -442,6 +443,14 @@ class Run:
             self.give_up()
         elif code:
             self.finish("finished" if code == path.FINISHED else "time limit")
+
+    def _note_events(self) -> None:
+        """Takes the crossings and stops of the steps just made."""
+        for axis, *crossing in self.store.crossings[: int(self.s["crossed"])].tolist():
+            self.crossings.append(Crossing(AXES[int(axis)], *crossing))
+        if self.s["stopped"]:
+            for axis, stops, t in self.stop_rows[: int(self.s["stopped"])].tolist():
+                self._note_stop(("x", "y", "xy")[int(axis)], stops > 0.0, t)
 
     def _note_stop(self, axis: str, stops: bool, t: float) -> None:
         if stops:
@@ -808,6 +817,37 @@ class LeapfrogRun(Run):
             self._prepare_drives(n)
             self._arrays(ahead=leapfrog.steps_ahead(self, self.i, n))
         super()._make(room)
+
+
+def spring_step(scenario: Scenario) -> float:
+    """Longest step that resolves the springs of the clay, inf without any [s].
+
+    The force of a spring enters a kick from the place before it, so a step must resolve the fastest
+    motion that the spring can drive. Where control is continuous, that is one of the whole loop:
+    the compensator may pass a force on at once, and the servo may impose a lighter handle.
+
+    Args:
+        scenario: the run.
+
+    Raises:
+        ParameterError: dt would be divided into more than SPRING_STEPS.
+    """
+    laws = scenario.clay.laws if scenario.clay and scenario.clay.springs else ()
+    most = [max((x.k + x.k1 for x in law.springs), default=0.0) for law in laws]
+    if not any(most):
+        return math.inf
+    if scenario.control == "sampled":
+        omega = math.sqrt(max(most) * scenario.mobility)
+    else:
+        omega = max(gain_limit.spring_crossover(scenario, i, k) for i, k in enumerate(most))
+    longest = RESOLVED / omega if omega else math.inf
+    if longest * SPRING_STEPS < scenario.dt:
+        bound = (
+            f"must be at most {longest * SPRING_STEPS:.3g} s: in clay of {max(most):g} N/m this "
+            f"loop moves at up to {omega:.3g} rad/s, and needs steps of {longest:.2g} s"
+        )
+        raise ParameterError("dt", scenario.dt, bound)
+    return longest
 
 
 def kind_of(scenario: Scenario) -> type[Run]:

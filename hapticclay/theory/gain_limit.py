@@ -21,6 +21,7 @@ from numpy.polynomial import Polynomial
 
 from ..errors import number
 from ..model.compensator import Compensator
+from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..model.spring import STIFFNESS_MAX
 from . import linear_loop, roots
@@ -90,6 +91,30 @@ def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
     if scenario.controller is not None:
         return math.inf
     return gain_limit(replace(Loop.of(scenario, axis, b), **linear_loop.TIMING))
+
+
+def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
+    """Highest frequency at which a spring has a loop gain of 1, beyond which it moves no pole.
+
+    At k |P| = 1, P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the hand.
+    Without shaping Sh has the gain trace W, which no pose and no direction exceeds.
+
+    Args:
+        scenario: the run, with continuous control.
+        i: axis, 0 for x, 1 for y.
+        k: stiffness [N/m].
+
+    Returns:
+        [rad/s]; 0 for none.
+    """
+    loop = Loop.of(scenario, AXES[i], 0.0)
+    if not scenario.shaping:
+        S = replace(loop.servo.S, gain=scenario.arm.links[4])
+        loop = replace(loop, servo=replace(loop.servo, S=S))
+    num, den = linear_loop.device_admittance(loop)
+    num, den = num * k, den + num * Polynomial([0.0, 0.0, loop.hand.mass])
+    found = roots.positive_roots(roots.squared_magnitude(num) - roots.squared_magnitude(den))
+    return math.sqrt(max(found, default=0.0))
 
 
 def critical_gain(loop: Loop) -> tuple[float, float]:

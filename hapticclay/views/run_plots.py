@@ -224,7 +224,7 @@ def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
     """Plots the operator's force during a maneuver, a panel for each run (Fig. 11).
 
-    In clay that yields also the force of the clay, and the time for which it held the handle.
+    In clay also the force of the clay, and the time for which clay that yields held the handle.
 
     Args:
         records: the runs.
@@ -238,9 +238,10 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
         for ax, r in zip(panels, records, strict=True):
             where = r.t if over == "time" else 100.0 * r.p[:, i]
             hand = BLUE
-            if _yields(r.scenario):
+            if r.scenario.clay is not None:
                 hand = GREEN
                 ax.plot(where, r.fe[:, i], color=BLUE, lw=stroke(0.9), label="clay, f$_e$")
+            if _yields(r.scenario):
                 if over == "time":
                     shade_held(ax, _held_spans(r, axis))
                 else:
@@ -499,7 +500,7 @@ def shown_axes(s: Scenario) -> str:
 
 def _velocity(record: Record) -> Figure | None:
     s = record.scenario
-    if s.muscle is not None:
+    if s.muscle is not None and s.clay is None:
         return None
     return velocity_plot(record, shown_axes(s))
 
@@ -512,8 +513,12 @@ def _force(record: Record) -> Figure | None:
 
 
 def _path(record: Record) -> Figure | None:
+    """Where the handle may leave the line of one experiment: driven, or in clay of an image."""
     s = record.scenario
-    return path_plot(record) if s.muscle is None and _clay_along_both_axes(s) else None
+    if s.clay is None:
+        return None
+    image = any(not isinstance(law, Profile) for law in s.clay.laws)
+    return path_plot(record) if s.driven or image or _clay_along_both_axes(s) else None
 
 
 def _force_position(record: Record) -> Figure | None:

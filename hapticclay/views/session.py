@@ -169,7 +169,7 @@ class LiveRun(LeapfrogRun):
             regions.keep_entries(table, self.table)
             self.table = table
             self._arrays(table=table)
-            path.settle(self.s, self.e.table)
+            path.settle(self.s, self.e.table, -1)
             if block := scenario.clay.groove:
                 self._put(block=block.numbers, cut_at=(math.nan, math.nan))
                 self._put(bare=(*self.s["base"], *self.s["base"]))

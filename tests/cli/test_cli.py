@@ -538,7 +538,8 @@ def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
-PARTS = ("arm.l1=30cm", "servo.x.G.damping=50", "compensator.den=1,40,0", "operator.mass=0.5")
+HAND = ("impedance=true", "operator.mass=0.5")
+PARTS = ("arm.l1=30cm", "servo.x.G.damping=50", "compensator.den=1,40,0", *HAND)
 
 
 def test_any_number_of_any_part_is_set_by_name(capsys, tmp_path):

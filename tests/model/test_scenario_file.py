@@ -185,7 +185,8 @@ def _sorted(x):
 
 
 def test_a_file_is_short_and_has_units(tmp_path):
-    changes = {"arm.l1": 0.3, "servo.x.G.damping": 50.0, "operator.y.mass": 0.5, "gain.x": 2.0}
+    changes = {"arm.l1": 0.3, "servo.x.G.damping": 50.0, "gain.x": 2.0}
+    changes["operator.y"] = hc.Operator(0.5)
     scenario = with_fields(hc.free(), {**changes, "operator.x": None, "length": None})
     assert scenario.save(tmp_path / "s.toml").read_text() == (
         'schema = "hapticclay-scenario-1"\n'
@@ -208,7 +209,7 @@ experiment = "constant"
 b = "70 N.s/m"
 gain = [1, 0.4]
 force.x = 2
-operator.mass = "250 g"
+operator = {mass = "250 g", damper = 2, spring = 6}
 clay = ["4 cm", "0.1 m"]
 dt = "0.36 ms"
 length = 120e-3
@@ -375,9 +376,11 @@ def test_any_number_of_any_part_is_changed_by_name(scenario, data):
     block = dataclasses.replace(getattr(servo[axis], part), damping=x)
     servo[axis] = dataclasses.replace(servo[axis], **{part: block})
     assert got == dataclasses.replace(scenario, servo=tuple(servo))
-    got = with_fields(scenario, {f"gain.{a}": x, f"operator.{a}.mass": 0.5})
     hands = list(scenario.operators)
     hands[axis] = dataclasses.replace(hands[axis] or hc.Operator(), mass=0.5)
+    entry = {".mass": 0.5} if scenario.operators[axis] else {"": hands[axis]}
+    changes = {f"operator.{a}{name}": value for name, value in entry.items()}
+    got = with_fields(scenario, {f"gain.{a}": x, **changes})
     assert got.operators == tuple(hands)
     assert (got.gain[axis], got.gain[other]) == (x, scenario.gain[other])
     got = with_fields(scenario, {f"compensator.{a}.den.1": x})
@@ -402,9 +405,12 @@ def test_any_number_of_any_part_is_changed_by_name(scenario, data):
         ({"torque_limit.y": 5}, dict(torque_limit=(40.0, 5.0))),
         ({"operator": {}}, dict(operator=hc.Operator())),
         ({"operator": "none"}, dict(operator=None)),
-        ({"operator.x.mass": 1.0}, dict(operator=(hc.Operator(1.0), None))),
         (
-            {"operator.mass": 1.0, "operator.x.damper": 3.0},
+            {"operator.x": {"mass": 1, "damper": 2, "spring": 6}},
+            dict(operator=(hc.Operator(1.0), None)),
+        ),
+        (
+            {"operator": {"mass": 1.0, "damper": 2.0, "spring": 6.0}, "operator.x.damper": 3.0},
             dict(operator=(hc.Operator(1.0, 3.0), hc.Operator(1.0))),
         ),
         ({"compensator.den": [1, 5, 0]}, dict(compensator=hc.Compensator(den=(1.0, 5.0, 0.0)))),
@@ -691,3 +697,57 @@ time = "20 ms"
     assert hc.Scenario.load(path) == scenario
     scaled = dataclasses.replace(scenario, muscle=2.0 * scenario.muscle)
     assert hc.Scenario.load(scaled.save(path)) == scaled
+
+
+@pytest.mark.parametrize("Ts", [1e-3, 1e-4, 3.6e-4, 7.3e-4, 0.02, 1e-6])
+def test_a_step_that_is_not_given_divides_the_sample(Ts, tmp_path):
+    s = hc.Scenario(control="sampled", Ts=Ts)
+    assert s.dt <= hc.Scenario().dt * (1 + 1e-6)
+    assert s.Ts / s.dt == pytest.approx(round(s.Ts / s.dt), abs=1e-6)
+    assert (round(s.Ts / s.dt) - 1) * hc.Scenario().dt < Ts  # no more parts than that takes
+    file = tmp_path / "a.toml"
+    file.write_text(f'control = "sampled"\nTs = {Ts!r}\n')
+    words = {"control": "sampled", "Ts": Ts}
+    made = (
+        hc.Scenario.load(file), hc.constant_cut(**words), with_fields(hc.Scenario(), words),
+        from_words(EXPERIMENTS["free"], words), dataclasses.replace(hc.Scenario(), **words),
+    )  # fmt: skip
+    assert [x.dt for x in made] == [s.dt] * len(made)
+    s.save(tmp_path / "b.toml")
+    assert hc.Scenario.load(tmp_path / "b.toml") == s
+
+
+@pytest.mark.parametrize("dt", [3.6e-4, 3e-4])
+def test_a_step_that_is_given_stays_and_the_nearest_sample_is_named(dt):
+    n = round(1e-3 / dt)
+    with pytest.raises(hc.ParameterError, match=f"nearest is {n * dt:.10g} s; or dt = 0.000333"):
+        hc.Scenario(control="sampled", Ts=1e-3, dt=dt)
+
+
+@pytest.mark.parametrize(
+    ("given", "path"),
+    [
+        ({"operator.mass": 0.3}, "operator.mass"),
+        ({"operator": {"mass": 0.3, "spring": 2.0}}, "operator.mass"),
+        ({"operator.y.damper": 1.0}, "operator.y.damper"),
+    ],
+)
+def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
+    """A mass alone took damper and spring of the paper along."""
+    file = tmp_path / "a.toml"
+    file.write_text('experiment = "constant"\n')
+    for make in (
+        lambda: with_fields(hc.constant_cut(), given),
+        lambda: from_words(EXPERIMENTS["constant"], {}, given),
+        lambda: scenario_file.load_scenario(file, given),
+    ):
+        with pytest.raises(hc.ParameterError, match="adds a hand") as caught:
+            make()
+        assert caught.value.field == path
+    hand = hc.Operator(0.3, 0.0, 4.0)
+    whole = {"operator.mass": 0.3, "operator.damper": 0.0, "operator.spring": 4.0}
+    assert with_fields(hc.constant_cut(), whole).operator == hand
+    mass = {"operator.mass": whole.pop("operator.mass")}
+    assert scenario_file.load_scenario(file, mass, whole).operator == hand
+    s = dataclasses.replace(hc.constant_cut(), operator=hc.Operator())
+    assert with_fields(s, {"operator.mass": 0.3}).operator == hc.Operator(0.3)

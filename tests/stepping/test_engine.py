@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.model import arm
 from hapticclay.model.signals import Multisine
-from hapticclay.stepping import engine
+from hapticclay.stepping import engine, path
 from hapticclay.views import stage
 from tests.oracles.links import Links
 
@@ -194,3 +194,28 @@ def test_a_run_steps_the_arm_of_its_scenario(clay):
     assert binary(plain) == binary(
         hc.build(dataclasses.replace(hc.free(), clay=clay, arm=hc.Arm()))
     )
+
+
+@pytest.mark.plain
+def test_a_step_beyond_arithmetic_keeps_the_events_before_it(monkeypatch):
+    """Machine code goes on with NaN, CPython raises: the crossings and stops are the same."""
+    law = hc.Profile((-0.002, 0.002), (5.0, 50.0, 20.0), Fy=(0.0, 1.0, 1.0))
+    push = hc.Samples((0.0, 0.2, 0.21), ((4.0, 0.0), (4.0, 0.0), (0.0, 0.0)))
+    s = dataclasses.replace(
+        hc.free(), clay=hc.Clay(law, hc.Profile((), (20.0,))), force=(0.0, 0.0), muscle=push,
+        t_max=3.0, length=None, start=(-0.005, 0.0),
+    )  # fmt: skip
+    whole = hc.simulate(s, engine="python")
+    assert len(whole.crossings) == 2 and whole.stops
+    careful, last = path.careful, whole.stops[-1].start + s.dt
+
+    def breaking(m, now, e):
+        if now["t"] > last:
+            raise ZeroDivisionError
+        careful(m, now, e)
+
+    monkeypatch.setattr(path, "careful", breaking)
+    broken = hc.simulate(s, engine="python")
+    assert broken.outcome.code == "out of reach" and len(broken.t) < len(whole.t)
+    assert broken.crossings == whole.crossings
+    assert [x.start for x in broken.stops] == [x.start for x in whole.stops]

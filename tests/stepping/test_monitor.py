@@ -291,3 +291,35 @@ def test_a_command_may_beat_as_it_likes():
         origin=(0.35, 0.24),
     )
     assert hc.simulate(s).outcome.code == "time limit"
+
+
+def test_gain_limits_are_worked_out_once_a_clay(monkeypatch):
+    """However far and however long an axis swings: each costs a root finding."""
+    asked = []
+    exact = monitor.gain_limit.continuous_limit
+    monkeypatch.setattr(
+        monitor.gain_limit, "continuous_limit", lambda *a: asked.append(a[1:]) or exact(*a)
+    )
+    edges = tuple(np.linspace(-0.08, 0.08, 200).tolist())
+    b = tuple(np.linspace(20.0, 3000.0, 201).tolist())
+    clay = hc.Clay(hc.Profile(edges, b), hc.Profile(edges, b, "y"))
+    s = hc.constant_cut(gain=(0.4, 0.4), t_max=10.0)
+    push = hc.Multisine((2.0, 2.0), 0.5, 40.0, 1.0)
+    s = dataclasses.replace(s, clay=clay, stop=False, length=None, muscle=push)
+    watch = monitor.StabilityMonitor(s)
+    t = np.arange(64) * s.dt
+    for k in range(100):  # swings that grow, over ever more of the clay
+        rows = np.zeros((12, len(t)))
+        rows[1] = -1.5
+        wave = np.sin(2.0 * np.pi * 60.0 * (t + k * len(t) * s.dt))
+        size = 1e-3 * 1.05 ** (k + np.arange(len(t)) / len(t))
+        rows[2:4], rows[4:6] = 0.5 * size * wave, size * wave
+        watch.look(rows, k * len(t))
+        watch._above_limit(0), watch._above_limit(1)
+    assert watch.most[1] > 0.05 and len(asked) > 20
+    assert len(asked) == len(set(asked)) <= 2 * monitor.MOST_CLAYS
+    # the level nearest to each clay, so that none is off by more than half their distance
+    near = np.array(watch._dampings(0, True))
+    seen = np.array(clay.laws[0].within((watch.least[0], 0.0), (watch.most[0], 0.0)))
+    off = np.abs(seen[:, None] - near).min(axis=1).max()
+    assert off <= 0.5 * (b[-1] - b[0]) / (monitor.MOST_CLAYS - 1) + 1e-9

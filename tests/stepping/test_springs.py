@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import hapticclay as hc
+from hapticclay.theory import linear_loop
 from tests.stepping.test_yield import V0, M, slider
 
 HIT = 0.01 / V0  # when the slider comes to the wall [s]
@@ -191,3 +193,79 @@ def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
     # 2 pi/2^36 of 0.25 m is 2e-11 m, times 2.5 kN/m 6e-8 N
     assert np.abs(fine.fe - exact.fe).max() < 1e-5
     assert np.abs(fine.p - exact.p).max() < 1e-8
+
+
+def bonded(k, b, **changes):
+    """Clay of one region that springs back along x from the start, under a push that sets in."""
+    law = hc.Profile((), (b,), springs=(hc.Spring(k=k),))
+    own = dict(clay=hc.Clay(law, hc.Profile((), (0.0,))), shaping=True, force=(2.0, 0.0))
+    own |= dict(length=None, stop=False, torque_limit=(1e5, 1e5), t_max=0.05)
+    return dataclasses.replace(hc.free(), **(own | changes))
+
+
+FEEDTHROUGH = hc.Compensator((1.0, 20.0), (1.0, 40.0))
+X, Y = hc.free().servo
+LIGHT = (hc.Servo(X.G, dataclasses.replace(X.S, gain=100.0)), Y)
+
+
+@pytest.mark.parametrize(
+    ("k", "b", "changes"),
+    [
+        (1e6, 0.0, dict(servo=LIGHT, gain=(0.0, 0.0), dt=1e-4, t_max=0.02)),
+        (1e6, 30.0, dict(servo=LIGHT, gain=(2.0, 0.0), dt=1e-3)),
+        (2e4, 300.0, dict(compensator=FEEDTHROUGH, gain=(1.0, 0.0), dt=1e-3, t_max=0.3)),
+        (3e5, 20.0, dict(compensator=FEEDTHROUGH, gain=(4.0, 0.0), dt=2e-3)),
+        (5e4, 5.0, dict(gain=(1.0, 0.0), dt=1e-3, operator=hc.Operator(0.4, 3.0, 0.0))),
+    ],
+)
+def test_a_step_resolves_a_spring_in_the_loop_that_it_closes(k, b, changes):
+    """Mobility of a light handle, and of a force that the compensator passes on at once."""
+    s = bonded(k, b, **changes)
+    loop = dataclasses.replace(hc.Loop.of(s, "x", b), k=k)
+    A, B = linear_loop.state_space(loop)
+    r = hc.simulate(s)
+    assert r.outcome.code in ("time limit", "stalled")
+    whole = np.zeros((len(A) + 1,) * 2)
+    whole[:-1, :-1], whole[:-1, -1] = A, B[:, 0] * s.force[0]
+    exact = np.array([expm(whole * t)[0, -1] for t in r.t])
+    # a step of 0.2 rad of the fastest motion: its phase lags by 0.2^2/24 of itself while it lasts
+    poles = np.linalg.eigvals(A)
+    fastest = poles[np.abs(poles).argmax()]
+    phase = abs(fastest) * min(s.t_max, 4.0 / -fastest.real) * 0.2**2 / 24.0
+    assert np.abs(exact - r.p[:, 0]).max() < (phase + 2e-3) * np.abs(exact).max()
+
+
+def test_a_spring_too_fast_for_any_step_is_refused():
+    with pytest.raises(hc.ParameterError, match="dt .*must be at most .* 1e\\+09 N/m"):
+        hc.simulate(bonded(1e9, 0.0, compensator=FEEDTHROUGH, gain=(1e3, 0.0), dt=0.005))
+
+
+@pytest.mark.parametrize("k1", [0.0, 500.0])
+def test_a_start_inside_a_wall_has_no_energy(k1):
+    spring = hc.Spring(k=1e4, k1=k1, surface=True)
+    s = dataclasses.replace(
+        hc.free(), clay=wall(spring, edges=(0.0,)), start=(0.03, 0.0), length=None,
+        force=(0.0, 0.0), t_max=0.05, stop=False,
+    )  # fmt: skip
+    r = hc.simulate(s)
+    assert not r.fe.any() and np.abs(r.p[:, 0] - 0.03).max() < 1e-12
+    assert r.energy["springs_stored"] == 0.0 and abs(r.energy["clay"]) < 1e-20
+    if k1:  # the second spring has no dent: it is new with each contact
+        return
+    # pushed out, it leaves a dent of that depth
+    push = hc.Samples((0.0, 0.1, 0.11, 0.5), ((-4.0, 0.0), (-4.0, 0.0), (6.0, 0.0), (6.0, 0.0)))
+    r = hc.simulate(dataclasses.replace(s, muscle=push, t_max=0.5, gain=(2.0, 0.0)))
+    touching = r.fe[:, 0] > 0.0
+    assert r.p[:, 0].min() < 0.0 and touching.any()
+    assert r.p[touching, 0].min() >= 0.03 - 1e-12
+    # a spring gives back what it took but for (omega h)^2/24, with omega h = 89 rad/s dt
+    assert abs(r.energy["clay"] - r.energy["springs_stored"]) < 1e-4 * abs(r.energy["muscle"])
+
+
+def test_a_wall_reached_from_its_side_has_no_energy():
+    # a slider comes into a block that is a wall along x from below, 2 cm behind its front
+    springs = hc.Spring(), hc.Spring(k=1e4, surface=True)
+    law = hc.Profile((0.01,), (0.0, 0.0), "y", springs=springs)
+    s = slider(hc.Clay(law, hc.Profile((), (0.0,))), 1e-3, 0.2, v=(0.0, 0.2))
+    r = hc.simulate(s)
+    assert len(r.crossings) == 1 and np.abs(r.fe).max() < 1e-6

@@ -114,7 +114,9 @@ def test_samples_fill_the_space(design):
 def test_parameters_reach_the_scenario():
     vary = parse_grid("b=50 gain.y=0.3 force=2 operator.mass=1.5")
     s = Sweep(
-        "constant", vary, parse_fixed("shaping=true operator.damper=3 t_max=5 clay=0.01,0.02")
+        "constant",
+        vary,
+        parse_fixed("shaping=true operator.damper=3 operator.spring=6 t_max=5 clay=0.01,0.02"),
     )
     scenario = s.run_scenario(s.points(0, 1)[0])
     assert (
@@ -158,7 +160,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     (tmp_path / "mine.toml").write_text('experiment = "free"\ngain = [1, 0.4]\n[arm]\nl1 = 0.3\n')
     spec = tmp_path / "spec.toml"
     spec.write_text('scenario = "mine.toml"\n[vary]\narm.l2 = "0.3:0.4:2"\n"gain.x" = [1, 2]\n'
-                    "[fixed]\nt_max = 0.01\noperator.mass = 0.5\n")  # fmt: skip
+                    "[fixed]\nt_max = 0.01\nimpedance = true\noperator.mass = 0.5\n")  # fmt: skip
     s = Sweep(**sampling.load_sweep(spec))
     assert s.title == "mine" and list(s.vary) == ["arm.l2", "gain.x"]
     got = s.run_scenario(s.points(1, 2)[0])

@@ -171,3 +171,16 @@ def test_plots_of_a_controller_of_ones_own_expect_nothing_of_the_papers():
         assert not [name for name in lines(figure) if "expected" in name or "/K" in name]
         told = " ".join(text.get_text() for text in figure.findobj(Text))
         assert "K =" not in told and "controller of one's own" in told
+
+
+def test_a_driven_run_in_clay_keeps_its_figures():
+    clay = hc.slab(90.0, 0.02, 0.1)
+    push = hc.Multisine((1.0, 0.5), 0.5, 8.0, 2.0)
+    s = dataclasses.replace(hc.free(), clay=clay, muscle=push, t_max=0.5, length=None)
+    driven = run_plots.figures(hc.simulate(s))
+    assert {"velocity", "force", "path", "force_position"} <= set(driven)
+    assert any("clay" in x.get_label() for x in driven["force"].axes[0].get_lines())
+    away = run_plots.figures(hc.simulate(dataclasses.replace(s, clay=None)))
+    assert "path" not in away and "velocity" not in away
+    still = dataclasses.replace(s, muscle=None, clay=hc.Clay(hc.Grid((), (), ((9.0,),)), clay.y))
+    assert "path" in run_plots.figures(hc.simulate(still))

@@ -1,0 +1,82 @@
+"""What of a scenario can be run and is hardly meant: said as a warning before the run."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..errors import Warning
+from .clay import Clay
+from .constants import AXES
+from .operator import Operator
+from .scenario import Scenario
+
+# The most that a hand and arm at a handle may plausibly have: measured are up to 3 kg, 50 N.s/m and
+# 1 kN/m in a firm grip, so ten times that is no person's.
+HAND_MOST = {"mass": (30.0, "kg"), "damper": (500.0, "N.s/m"), "spring": (1e4, "N/m")}
+
+
+def warn_of(scenario: Scenario, stacklevel: int = 3) -> None:
+    """Issues a `Warning` for each value of a scenario that is hardly meant.
+
+    Args:
+        scenario: what is to be run.
+        stacklevel: as of `warnings.warn`; 3 names the caller of the caller.
+    """
+    for text in implausible(scenario):
+        warnings.warn(text, Warning, stacklevel=stacklevel)
+
+
+def implausible(scenario: Scenario) -> Iterator[str]:
+    """Field, value and plausible range of each value that is hardly meant.
+
+    Args:
+        scenario: the scenario.
+    """
+    hands, given = scenario.operators, scenario.operator
+    for i, axis in enumerate(AXES if isinstance(given, tuple) else AXES[:1]):
+        field = f"operator.{axis}" if isinstance(given, tuple) else "operator"
+        yield from _hand_parts(field, hands[i])
+    clay = scenario.clay
+    if clay is not None and not _within(scenario, clay):
+        folded, stretched = scenario.arm.reach
+        ox, oy = scenario.origin
+        yield (
+            f"clay: lies where the handle cannot come, which is within {folded:.3g} to "
+            f"{stretched:.3g} m of the shoulder at ({-ox:g}, {-oy:g}) m; are its edges in metres?"
+        )
+
+
+def _hand_parts(field: str, hand: Operator | None) -> Iterator[str]:
+    for name, (most, unit) in HAND_MOST.items() if hand else ():
+        value = getattr(hand, name)
+        if value > most:
+            yield f"{field}.{name} = {value:g}: the hand of a person has 0 to {most:g} {unit}"
+
+
+def _within(scenario: Scenario, clay: Clay) -> bool:
+    """Whether the handle can come to any point of the clay."""
+    laws = [(*law.lines, law.some) for law in clay.laws if law.some.any()]
+    if clay.groove:
+        block = np.zeros((3, 3), dtype=bool)
+        block[1, 1] = True
+        laws.append((clay.groove.x, clay.groove.y, block))
+    return not laws or any(_meets(scenario, *law) for law in laws)
+
+
+def _meets(scenario: Scenario, x: Any, y: Any, some: np.ndarray) -> bool:
+    """Whether cells between lines [m] meet the ring that the handle can reach."""
+    near, far = [], []
+    for lines, origin in zip((x, y), scenario.origin, strict=True):
+        edges = np.array([-math.inf, *lines, math.inf]) + origin
+        low, high = edges[:-1], edges[1:]
+        near.append(np.maximum(0.0, np.maximum(low, -high)))
+        far.append(np.maximum(abs(low), abs(high)))
+    folded, stretched = scenario.arm.reach
+    least = np.hypot(near[0][:, None], near[1])
+    most = np.hypot(far[0][:, None], far[1])
+    return bool((some & (least <= stretched) & (most >= folded)).any())
