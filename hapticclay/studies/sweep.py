@@ -479,11 +479,13 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
 
 
 def _start_worker() -> None:
-    """Leaves Ctrl-C to the parent, so that a worker finishes its chunk; ends with the parent."""
+    """Leaves signals of the terminal to the parent, so that a worker finishes; ends with it."""
     import signal
     import threading
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
