@@ -38,6 +38,7 @@ MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's dige
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 SCHEDULER_PATIENCE = 4.0  # until a scheduler answers [s]; dask tries for up to twice as long
+FINISHING = "hapticclay: finishing the chunks in progress"
 BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
 NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
 RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
@@ -465,7 +466,9 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
 
     if workers == 1:
         for number in todo:
-            yield run_chunk(sweep, number, str(out))
+            with _finishing():
+                made = run_chunk(sweep, number, str(out))
+            yield made
         return
     context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
@@ -473,12 +476,41 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
             jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
             for job in as_completed(jobs):
                 yield job.result()
+        except KeyboardInterrupt:
+            print(FINISHING, file=sys.stderr, flush=True)
+            raise
         except BrokenProcessPool:
             raise ChildProcessError(
                 "a worker was killed (memory?); the same command resumes the sweep"
             ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _finishing() -> Iterator[None]:
+    """Lets Ctrl-C wait for the work in hand, and says so; a second one does not wait."""
+    import signal
+    import threading
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    caught: list[int] = []
+
+    def note(number: int, frame: Any) -> None:
+        caught.append(number)
+        signal.signal(signal.SIGINT, before)
+        print(FINISHING, file=sys.stderr, flush=True)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if caught:
+        raise KeyboardInterrupt
 
 
 def _start_worker() -> None:

@@ -673,3 +673,22 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
             study_plots.sweep_plot(table, text)
+
+
+def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):
+    real = sweep.run_point
+
+    def struck(plan, index, point):
+        if index == 2:  # the first of the second chunk
+            signal.raise_signal(signal.SIGINT)
+            assert "finishing the chunks in progress" in capsys.readouterr().err
+        return real(plan, index, point)
+
+    monkeypatch.setattr(sweep, "run_point", struck)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run_sweep(small(), tmp_path, workers=1)
+    assert sweep.missing_parts(small(), tmp_path) == [2]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    monkeypatch.undo()
+    sweep.run_sweep(small(), tmp_path, workers=1)
+    assert len(sweep.read_sweep(tmp_path)) == len(small())
