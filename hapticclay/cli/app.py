@@ -12,6 +12,7 @@ import logging
 import os
 import pkgutil
 import re
+import signal
 import sys
 import types
 import warnings
@@ -24,7 +25,7 @@ import tyro
 
 from ..errors import ParameterError, Warning, choice
 from ..files import versions
-from .console import scenario_words
+from .console import ends, scenario_words
 
 COMMANDS = {  # a command is a dataclass of its options; calling it returns the exit status
     "run": "hapticclay.cli.run:RunCommand",
@@ -82,12 +83,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit status: 0; 1 if the command failed, 2 for bad input, 130 for Ctrl-C, 141 if the
-        reader of the output has gone.
+        reader of the output has gone, 128 + number for SIGTERM (143) and SIGHUP (129).
     """
     # matplotlib warns of a home that cannot be written
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):
         sys.stdout.reconfigure(errors="replace")  # terminals without frames or bullets
+    with ends() as received:
+        code = _exit_status(argv, received)
+    return 128 + received[0] if received else code
+
+
+def _exit_status(argv: Sequence[str] | None, received: list[int]) -> int:
+    """Runs the command line under `ends`; returns the exit status without its signals."""
     try:
         command = parse_words(list(sys.argv[1:] if argv is None else argv))
         with warnings.catch_warnings():
@@ -101,22 +109,28 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except ParameterError as error:
         text = error.bound if error.field == "arguments" else str(error)
-        print(f"hapticclay: {text}", file=sys.stderr)
+        _tell(text)
         return 2
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except MemoryError as error:
-        print(f"hapticclay: out of memory: {error or 'none is left'}", file=sys.stderr)
+        _tell(f"out of memory: {error or 'none is left'}")
         return 1
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        print(f"hapticclay: {where}{error.strerror or error}", file=sys.stderr)
+        _tell(f"{where}{error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
-        print("hapticclay: interrupted", file=sys.stderr)
+        _tell(f"ended by {signal.Signals(received[0]).name}" if received else "interrupted")
         return 130
+
+
+def _tell(text: str) -> None:
+    """Prints a line about the end of a command, unless its terminal has gone."""
+    with contextlib.suppress(OSError):
+        print(f"hapticclay: {text}", file=sys.stderr, flush=True)
 
 
 def parse_words(words: Sequence[str]) -> Callable[[], int] | None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..views.figure import Figure
 
 
+ENDS = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 SET_HELP = (
     "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
     "compensator.den=1,40,0 impedance=true operator.mass=500g; hapticclay fields lists the names."
@@ -195,7 +196,10 @@ def significant(x: float) -> str:
 
 @contextlib.contextmanager
 def ctrl_c() -> Iterator[Callable[[], bool]]:
-    """Yields a function that tells whether Ctrl-C has been pressed; a second one interrupts."""
+    """Yields a function that tells whether Ctrl-C has been pressed; a second one interrupts.
+
+    Under `ends`, SIGTERM and SIGHUP count too.
+    """
     pressed = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield pressed.is_set
@@ -203,15 +207,44 @@ def ctrl_c() -> Iterator[Callable[[], bool]]:
     before = signal.getsignal(signal.SIGINT)
 
     def note(number: int, frame: object) -> None:
+        if number == signal.SIGINT and before is not signal.default_int_handler:
+            return  # nohup, and shells for jobs in the background, ignore Ctrl-C
         pressed.set()
         signal.signal(signal.SIGINT, before)
 
-    if before is signal.default_int_handler:  # nohup, and shells for jobs behind, ignore Ctrl-C
-        signal.signal(signal.SIGINT, note)
+    signal.signal(signal.SIGINT, note)
     try:
         yield pressed.is_set
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def ends() -> Iterator[list[int]]:
+    """Lets SIGTERM and SIGHUP end a command as Ctrl-C does; yields the signals received.
+
+    A signal goes to whoever listens for Ctrl-C at that moment, or raises KeyboardInterrupt. One
+    that was ignored, as SIGHUP under nohup, remains so.
+    """
+    received: list[int] = []
+
+    def end(number: int, frame: Any) -> None:
+        received.append(number)
+        listener = signal.getsignal(signal.SIGINT)
+        if not callable(listener):
+            raise KeyboardInterrupt
+        listener(number, frame)
+
+    numbers = [getattr(signal, name) for name in ENDS if hasattr(signal, name)]
+    mine = threading.current_thread() is threading.main_thread()
+    kept = [n for n in numbers if mine and signal.getsignal(n) is signal.SIG_DFL]
+    for n in kept:
+        signal.signal(n, end)
+    try:
+        yield received
+    finally:
+        for n in kept:
+            signal.signal(n, signal.SIG_DFL)
 
 
 @dataclass(frozen=True)

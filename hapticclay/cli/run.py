@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from ..model.scenario import Scenario
     from ..simulation.record import Record
 
+EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]
+MOST_CLAYS = 33  # dampings whose gain limits are computed
 MOST_ROWS = 6  # of a kind that the table shows
 
 
@@ -50,10 +54,37 @@ class RunCommand:
     def __call__(self) -> int:
         out = self.out or console.default_folder("run", self.scenario)
         writable(out)
+        for line in unstable_axes(self.scenario):
+            print(f"hapticclay: {line}", file=sys.stderr)
         with console.ctrl_c() as asked:
             record = simulate_with_progress(self.scenario, self.every, asked, self.error)
         deliver(record, out, self.figures if self.plots else None)
         return 130 if record.outcome.code == "interrupted" else 0
+
+
+def unstable_axes(scenario: Scenario) -> list[str]:
+    """A line if the linear loop of an axis, in continuous time, is unstable in some of the clay.
+
+    Springs and yielding clay are left out: the linear limit does not apply to them.
+
+    Args:
+        scenario: the run.
+    """
+    from ..theory import gain_limit
+
+    clay = scenario.clay
+    if clay is None or clay.yields or clay.springs:
+        return []
+    told = []
+    for i, axis in enumerate(AXES):
+        laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+        values = sorted({b for law in laws for b in law.within(*EVERYWHERE)})
+        step = max(1, -(-len(values) // MOST_CLAYS))
+        limits = [(gain_limit.continuous_limit(scenario, axis, b), b) for b in values[::step]]
+        limit, b = min(limits, default=(math.inf, 0.0))
+        if scenario.gain[i] > limit:
+            told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit:.4g} at b = {b:g} N.s/m")
+    return [f"the linear loop is unstable: {', '.join(told)}"] if told else []
 
 
 def simulate_with_progress(

@@ -175,6 +175,9 @@ class PathExperiment(Experiment):
 class ConstantCut(PathExperiment):
     """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
+    With the default gain the linear loop of the y axis is unstable for 219 < b < 1043 N.s/m
+    (251 < b < 1004 with the hand Th); that of the x axis is stable for every b.
+
     Attributes:
         b: damping of the clay on both axes [N.s/m], 0 to 1e9 (Eq. 21).
         gain: K of the compensator on each axis [1/kg], > 0 (Eq. 20).

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import math
 import os
 import platform
@@ -36,6 +37,8 @@ COMPILE_FROM = 2_000_000  # steps of a sweep from which compiling pays in every 
 MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's digest, chunk's number
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
+SCHEDULER_PATIENCE = 4.0  # until a scheduler answers [s]; dask tries for up to twice as long
+FINISHING = "hapticclay: finishing the chunks in progress"
 BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
 NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
 RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
@@ -437,6 +440,7 @@ def run_chunks(
     Raises:
         ParameterError: a file cannot be written, or a package is missing.
         ChildProcessError: a worker here was killed.
+        ConnectionError: the scheduler has gone.
     """
     return (
         _run_on_cluster(sweep, out, todo, scheduler)
@@ -462,7 +466,9 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
 
     if workers == 1:
         for number in todo:
-            yield run_chunk(sweep, number, str(out))
+            with _finishing():
+                made = run_chunk(sweep, number, str(out))
+            yield made
         return
     context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
@@ -470,6 +476,9 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
             jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
             for job in as_completed(jobs):
                 yield job.result()
+        except KeyboardInterrupt:
+            print(FINISHING, file=sys.stderr, flush=True)
+            raise
         except BrokenProcessPool:
             raise ChildProcessError(
                 "a worker was killed (memory?); the same command resumes the sweep"
@@ -478,12 +487,40 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _start_worker() -> None:
-    """Leaves Ctrl-C to the parent, so that a worker finishes its chunk; ends with the parent."""
+@contextlib.contextmanager
+def _finishing() -> Iterator[None]:
+    """Lets Ctrl-C wait for the work in hand, and says so; a second one does not wait."""
     import signal
     import threading
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    caught: list[int] = []
+
+    def note(number: int, frame: Any) -> None:
+        caught.append(number)
+        signal.signal(signal.SIGINT, before)
+        print(FINISHING, file=sys.stderr, flush=True)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if caught:
+        raise KeyboardInterrupt
+
+
+def _start_worker() -> None:
+    """Leaves signals of the terminal to the parent, so that a worker finishes; ends with it."""
+    import signal
+    import threading
+
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -499,6 +536,8 @@ def _end_with_parent() -> None:
 def _run_on_cluster(
     sweep: Plan, out: Path, todo: list[int], address: str
 ) -> Generator[int, None, None]:
+    from concurrent.futures import CancelledError
+
     try:
         from distributed import Client, as_completed
     except ImportError:
@@ -506,17 +545,34 @@ def _run_on_cluster(
             "scheduler", address, "needs dask: pip install 'hapticclay[cluster]'"
         ) from None
     try:
-        client = Client(address, timeout="20s", set_as_default=False)
-    except OSError as error:
+        client = Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
         raise ParameterError(
             "scheduler", address, f"must be the address of a dask scheduler ({error})"
         ) from None
-    with client:
+    with _quiet("distributed"), client:
         jobs = client.map(
             lambda n: run_chunk(sweep, n, str(out.resolve())), todo, pure=False, retries=10
         )
-        for job in as_completed(jobs, loop=client.loop):
-            yield job.result()
+        try:
+            for job in as_completed(jobs, loop=client.loop):
+                yield job.result()
+        except CancelledError:
+            raise ConnectionError(
+                f"the dask scheduler {address} has gone; the same command resumes the sweep"
+            ) from None
+
+
+@contextlib.contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """Keeps the log of a package silent: errors that it logs are raised too, and told once."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def estimate_time(sweep: Sweep) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import Arc, Patch, PathPatch
+from matplotlib.patches import Arc, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, NullFormatter
@@ -539,7 +539,9 @@ def sweep_plot(
         image, handles = draw(ax, data, look)
         if worst:
             handles = [Patch(facecolor=OUTCOME_COLORS[k], label=k) for k in kinds if k in raw]
-        elif np.isfinite(z).any():
+        if draw is _draw_grid:
+            handles += _hatch_unstable(ax, data, least_margins(table))
+        if not worst and np.isfinite(z).any():
             figure.colorbar(image, ax=ax, label=_column_label(value))
         if handles:
             add_legend(figure, None, 4, handles=handles)
@@ -608,6 +610,34 @@ def _draw_grid(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[
             ax.add_patch(PathPatch(cells, **style))
             handles.append(Patch(label=name, **style))
     return image, handles
+
+
+def least_margins(table: Any) -> np.ndarray:
+    """Gain limit of the linear loop over K, the lesser of both axes, of each run; NaN for none.
+
+    Args:
+        table: from `read_sweep`.
+    """
+    names = [n for n in table.column_names if n.startswith("gain_margin_")]
+    if not names:
+        return np.full(table.num_rows, np.nan)
+    return np.fmin.reduce([np.array(table[n], dtype=float) for n in names])
+
+
+def _hatch_unstable(ax: Axes, data: Mapped, margins: np.ndarray) -> list[Any]:
+    """Hatches cells that hold a run whose margin is below 1; returns a patch for the legend."""
+    gx, gy = np.unique(data.x), np.unique(data.y)
+    below = _cell_values(data._replace(z=np.where(margins < 1.0, 1.0, 0.0), worst=True), gx, gy)
+    j, i = np.nonzero(below == 1.0)
+    if not len(i):
+        return []
+    style: Any = dict(facecolor="none", hatch="\\\\\\", linewidth=0.0, edgecolor=BLACK)
+    ex, ey = _cell_edges(gx), _cell_edges(gy)
+    for column, row in zip(i.tolist(), j.tolist(), strict=True):
+        corner = (ex[column], ey[row])
+        size = ex[column + 1] - ex[column], ey[row + 1] - ey[row]
+        ax.add_patch(Rectangle(corner, *size, **style))
+    return [Patch(label="gain margin < 1", **style)]
 
 
 def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[Any]]:

@@ -215,7 +215,9 @@ def run_viewer() -> None:
     import glfw  # glfw and the viewer need the libraries of a desktop
     import mujoco.viewer
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the shared terminal is the session's
+    for name in ("SIGINT", "SIGHUP"):  # signals of the shared terminal are the session's
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what the viewer prints
 

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -437,15 +438,32 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
             p.wait()
 
 
-def test_unreachable_scheduler_is_one_line(tmp_path, monkeypatch):
-    import distributed
-
-    real = distributed.Client
-    monkeypatch.setattr(
-        distributed, "Client", lambda address, timeout, **kw: real(address, timeout="1s", **kw)
-    )
+def test_unreachable_scheduler_is_one_line(tmp_path):
+    begin = time.monotonic()
     with pytest.raises(ParameterError, match="scheduler"):
         sweep.run_sweep(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
+    assert time.monotonic() - begin < 60.0  # it ends: dask alone would try for ever by None
+    assert 2.0 * sweep.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
+
+
+def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd):
+    file = tmp_path / "scheduler.json"
+    words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    scheduler = spawn("distributed.cli.dask_scheduler", *words)
+    try:
+        while not (file.is_file() and file.stat().st_size):
+            assert scheduler.poll() is None
+            time.sleep(0.05)
+        address = json.loads(file.read_text())["address"]
+        end = threading.Timer(1.0, scheduler.kill)  # no worker is there: it waits for results
+        end.start()
+        with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
+            sweep.run_sweep(small(), tmp_path / "out", scheduler=address)
+        end.join()
+    finally:
+        scheduler.kill()
+        scheduler.wait()
+    assert capfd.readouterr().err == ""
 
 
 def test_a_damaged_folder_is_refused(tmp_path):
@@ -657,3 +675,22 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
             study_plots.sweep_plot(table, text)
+
+
+def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):
+    real = sweep.run_point
+
+    def struck(plan, index, point):
+        if index == 2:  # the first of the second chunk
+            signal.raise_signal(signal.SIGINT)
+            assert "finishing the chunks in progress" in capsys.readouterr().err
+        return real(plan, index, point)
+
+    monkeypatch.setattr(sweep, "run_point", struck)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run_sweep(small(), tmp_path, workers=1)
+    assert sweep.missing_parts(small(), tmp_path) == [2]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    monkeypatch.undo()
+    sweep.run_sweep(small(), tmp_path, workers=1)
+    assert len(sweep.read_sweep(tmp_path)) == len(small())

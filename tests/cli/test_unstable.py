@@ -1,0 +1,48 @@
+"""What is said, before and after a run, of a linear loop that is unstable."""
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.cli.run import unstable_axes
+from hapticclay.theory import linear_loop
+
+HAND = hc.Operator(mass=0.25, damper=2.0, spring=6.0)
+
+
+@pytest.mark.parametrize("operator,low,high", [(None, 219.0, 1043.0), (HAND, 251.0, 1004.0)])
+def test_the_default_gain_is_unstable_where_the_docs_say(operator, low, high):
+    """The printed bounds, rounded to 1 N.s/m, so told 0.5 % within them and silent outside."""
+    for b in (30.0, 0.995 * low, 1.005 * high, 1e5):
+        assert unstable_axes(hc.constant_cut(b=b, operator=operator)) == []
+    for b in (1.005 * low, 300.0, 400.0, 600.0, 0.995 * high):
+        (said,) = unstable_axes(hc.constant_cut(b=b, operator=operator))
+        assert "gain[y] = 0.5 >" in said and f"b = {b:g} N.s/m" in said and "gain[x]" not in said
+
+
+@pytest.mark.parametrize("b", [150.0, 300.0, 600.0, 1100.0])
+def test_what_is_said_agrees_with_the_poles(b):
+    """Poles of the closed loop: numpy's roots, of the characteristic polynomial at K itself."""
+    s = hc.constant_cut(b=b)
+    unstable = []
+    for axis in "xy":
+        found = linear_loop.characteristic(linear_loop.Loop.of(s, axis, b))
+        unstable.append(np.roots(found.coef[::-1]).real.max() > 0.0)
+    assert any(unstable) == bool(unstable_axes(s))
+
+
+def test_a_map_of_a_sweep_hatches_margins_below_1(tmp_path):
+    from matplotlib.patches import Rectangle
+
+    from hapticclay.studies import sampling, sweep
+    from hapticclay.views import study_plots
+
+    grid = sampling.parse_grid("b=90,150,300,600 gain.y=0.3,0.5,0.8")
+    plan = sampling.Sweep("constant", grid, {"t_max": 0.1, "start": (0.06, 0.0)})
+    sweep.run_sweep(plan, tmp_path, workers=1)
+    table = sweep.read_sweep(tmp_path)
+    below = sum(m < 1.0 for m in table["gain_margin_y"].to_pylist())
+    for value in ("status", "end_time"):
+        ax = study_plots.sweep_plot(table, value).axes[0]
+        hatched = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_hatch()]
+        assert 0 < len(hatched) == below < len(table)
