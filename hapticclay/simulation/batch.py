@@ -177,6 +177,8 @@ def _checked(scenarios: Iterable[Any]) -> Iterator[Scenario]:
             raise ParameterError(
                 f"scenarios[{i}]", s, "must be a Scenario, as constant_cut() returns"
             )
+        if s.controller is not None:
+            s.controller.function()  # imported here, not in a thread
         yield s
 
 

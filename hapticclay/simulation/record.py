@@ -446,7 +446,8 @@ class Record:
         Args:
             path: the folder, or its record.npz.
 
-        A function that was no data, or is not found here, is left out of the scenario; notes tell.
+        The law of a controller is its name, which is imported when a run starts. A function that
+        was no data is left out of the scenario; notes tell.
 
         Raises:
             ParameterError: there is no record, or it has another schema.
@@ -519,7 +520,7 @@ def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
 
 
 def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
-    """A scenario of its plain data, and what is left out: a controller that is not found here."""
+    """A scenario of its plain data, and what is left out: a controller whose law has no name."""
     try:
         return make_part(Scenario, data), []
     except ParameterError as error:

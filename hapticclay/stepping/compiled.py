@@ -218,7 +218,7 @@ def own_law(caller: LawCaller | None, desk: np.ndarray) -> tuple[Any, Any]:
         return NO_LAW, 0
     controller = caller.controller
     n, m = len(controller.state), len(controller.params)
-    compiled = _compile_law(controller.law, n, m, _outside(controller.law))
+    compiled = _compile_law(caller.law, n, m, _outside(caller.law))
     if compiled is not None:
         return CALL(compiled.address), desk.ctypes.data
     caller.pointer = CALL(caller)  # lives as long as its run

@@ -274,6 +274,7 @@ class Run:
     fields: list[Any] = []  # of the state, beside those of path
     method: Any = None
     first_loop: Any = None  # of a method that has a state `loop`: what it is at the start
+    beyond = "the arm is stretched or folded"  # why the loops cannot go on
 
     def __init__(
         self,
@@ -503,8 +504,7 @@ class Run:
                 raise
             self.flush()  # beyond floating point, or the arm exactly straight
             if self.outcome is None:
-                cause = "the arm is stretched or folded"
-                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=cause)
+                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=self.beyond)
 
     def step(self) -> None:
         """Goes on to the next sample, with the kernel STEPWISE."""
