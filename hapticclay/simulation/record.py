@@ -455,6 +455,8 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
+            if file.exists() and not file.is_file():  # a pipe would be waited for
+                raise ValueError("it is no regular file")
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
@@ -489,6 +491,7 @@ class Record:
             ValueError,
             TypeError,
             AttributeError,
+            RecursionError,
             zipfile.BadZipFile,
         ) as error:
             what = " ".join(str(error).split()) or type(error).__name__

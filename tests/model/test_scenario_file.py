@@ -691,3 +691,16 @@ time = "20 ms"
     assert hc.Scenario.load(path) == scenario
     scaled = dataclasses.replace(scenario, muscle=2.0 * scenario.muscle)
     assert hc.Scenario.load(scaled.save(path)) == scaled
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbft_max = 2.0\n")
+    assert hc.Scenario.load(tmp_path / "a.toml").t_max == 2.0
+
+
+def test_a_pipe_is_refused_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.toml")
+    os.mkfifo(tmp_path / "record.npz")
+    for load, file in ((hc.Scenario.load, "a.toml"), (hc.Record.load, "record.npz")):
+        with pytest.raises(ParameterError, match="no regular file"):
+            load(tmp_path / file)
