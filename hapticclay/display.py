@@ -19,7 +19,8 @@ def one_line(text: object, most: int = 60) -> str:
         text: the text; another object gives its str.
         most: characters to keep.
     """
-    line = " ".join(str(text).split())
+    plain = "".join(x if x.isprintable() else " " for x in str(text))  # no escapes of a terminal
+    line = " ".join(plain.split())
     return line if len(line) <= most else f"{line[: most - 3]}..."
 
 

@@ -691,11 +691,23 @@ def _value_as_data(hint: Any, value: Any, old: Any, path: str, units: dict[str, 
             return _as_data(value, old, path, units)
         return {KIND: kind.__name__.lower(), **_as_data(value, old, path, units)}
     if hint is Any and callable(value):  # a function is its name, where others find it by that
-        name = f"{getattr(value, '__module__', '')}:{getattr(value, '__qualname__', '')}"
-        with contextlib.suppress(ImportError, AttributeError, ValueError):
-            if not name.startswith("__main__") and pkgutil.resolve_name(name) is value:
-                return name
+        name = function_name(value)
+        if name:
+            return name
     raise ParameterError(path, value, "cannot be written to a file")
+
+
+def function_name(function: Any) -> str:
+    """The name "package.module:name" by which others find a function; "" if they do not.
+
+    Args:
+        function: the function.
+    """
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    with contextlib.suppress(ImportError, AttributeError, ValueError):
+        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
+            return name
+    return ""
 
 
 def _default(kind: type, name: str) -> Any:

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import pkgutil
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
+from .fields import function_name
 
 # floats of the desk that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
 # measured, hand force [N], torques [N.m]; then the law's state now and after, and its parameters
 DESK = 9
 TORQUE = 7  # place of the torques
+NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*(:[^\W\d]\w*(\.[^\W\d]\w*)*)?")
 
 Law = Callable[
     [float, tuple[float, ...], tuple[float, ...], tuple[float, ...], Any, Any], tuple[Any, Any]
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Controller:
     """A controller that takes the place of compensator and servo in a sampled loop.
 
@@ -36,7 +40,7 @@ class Controller:
     are constants to machine code: what changes from call to call belongs in the state.
 
     Attributes:
-        law: the function, or "package.module:name" of it.
+        law: the function, or "package.module:name" of it, which is imported when a run starts.
         state: at the first sample.
         params: what else the function needs.
     """
@@ -47,14 +51,44 @@ class Controller:
 
     def __post_init__(self):
         if isinstance(self.law, str):
-            try:
-                object.__setattr__(self, "law", pkgutil.resolve_name(self.law))
-            except (ImportError, AttributeError, ValueError) as error:
-                bound = f"must name a function as package.module:name ({error})"
-                raise ParameterError("controller.law", self.law, bound) from None
-        if not callable(self.law):
-            raise ParameterError("controller.law", self.law, "must be a function")
+            if not NAME.fullmatch(self.law):
+                raise self._refusal("must name a function as package.module:name")
+        elif not callable(self.law):
+            raise self._refusal("must be a function")
         check_fields(self, "controller.")
+
+    def __eq__(self, other: object) -> bool:
+        return self._key == other._key if isinstance(other, Controller) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[Any, ...]:
+        """A function equals its name, for that is what files hold of it."""
+        name = self.law if isinstance(self.law, str) else function_name(self.law)
+        return name or self.law, self.state, self.params
+
+    def function(self) -> Law:
+        """The law itself; a name is imported now, which runs its module.
+
+        Raises:
+            ParameterError: there is no such function.
+        """
+        law = self.law
+        if isinstance(law, str):
+            try:
+                law = pkgutil.resolve_name(law)
+            except (Exception, SystemExit) as error:  # of any kind: it is the user's module
+                why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+                bound = f"must name a function as package.module:name ({one_line(why, 200)})"
+                raise self._refusal(bound) from None
+        if not callable(law):
+            raise self._refusal("must be a function")
+        return law
+
+    def _refusal(self, bound: str) -> ParameterError:
+        return ParameterError("controller.law", self.law, bound)
 
 
 class LawFailed(RuntimeError):
@@ -69,47 +103,65 @@ class LawCaller:
         desk: the shared floats, shape (n,).
 
     Attributes:
+        law: the function.
         error: exception of a call that failed, after which the torques are not finite.
+        pointer: what machine code calls, where Python runs the law; else None.
     """
 
     def __init__(self, controller: Controller, desk: Any):
-        self.controller = controller
+        self.controller, self.law = controller, controller.function()
         self.desk: Any = memoryview(desk)
-        self.error: Exception | None = None
+        self.error: BaseException | None = None
+        self.pointer: Any = None
+        self._returned = 0.0, 0.0
         self._ends = DESK + len(controller.state), DESK + 2 * len(controller.state)
 
     def __call__(self, _desk: object = None) -> None:
-        if self.error is not None:
-            return
+        try:  # machine code drops what is raised here: it ends the run, and `check` raises it
+            if self.error is None:
+                self._answer()
+        except BaseException as error:
+            self.error = error
+            self.desk[TORQUE] = self.desk[TORQUE + 1] = math.nan
+
+    def _answer(self) -> None:
         t, q1, q2, w1, w2, fx, fy = self.desk[:TORQUE].tolist()
         middle, end = self._ends
         state = tuple(self.desk[DESK:middle].tolist())
+        answer: Any = self.law(t, (q1, q2), (w1, w2), (fx, fy), state, self.controller.params)
         try:
-            torque, after = self.controller.law(
-                t, (q1, q2), (w1, w2), (fx, fy), state, self.controller.params
-            )
-            t1, t2 = torque
-            after = tuple(map(float, after))
-            if len(after) != len(state):
-                raise TypeError(f"state must have {len(state)} numbers, not {len(after)}")
-            values = float(t1), float(t2), after
-        except Exception as error:  # of any kind: it is the user's function
-            self.error = error
-            values = math.nan, math.nan, state
-        self.desk[TORQUE], self.desk[TORQUE + 1] = values[:2]
-        for j, x in enumerate(values[2]):
+            (t1, t2), after = answer
+            t1, t2, after = float(t1), float(t2), tuple(map(float, after))
+        except (TypeError, ValueError):
+            form = "must return ((shoulder, elbow), state), torques [N.m] and a tuple of floats"
+            raise TypeError(f"{form}, not {one_line(repr(answer))}") from None
+        if len(after) != len(state):
+            raise TypeError(f"state must have {len(state)} numbers, not {len(after)}")
+        for j, x in enumerate(after):
             self.desk[middle + j] = x
+        self._returned = t1, t2
+        self.desk[TORQUE], self.desk[TORQUE + 1] = t1, t2
+
+    def finite(self) -> bool:
+        """Whether the torques are."""
+        return all(map(math.isfinite, self.desk[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
         """Raises LawFailed if a call has failed; machine code of it leaves torques not finite.
 
-        Torques that are not finite end a run, but for those of its first sample, which is none.
+        What is no error, as Ctrl-C, is raised as it is. Torques that are not finite end a run, but
+        for those of its first sample, which is none.
         """
-        if not all(map(math.isfinite, self.desk[TORQUE : TORQUE + 2].tolist())):
-            self()  # in Python, which says why
+        if self.error is None and not self.finite():
+            if self.pointer is None:
+                self()  # in Python, which says why
+            elif all(map(math.isfinite, self._returned)):
+                self.error = KeyboardInterrupt()  # it came before the call could keep it
             torques = tuple(self.desk[TORQUE : TORQUE + 2].tolist())
             if self.error is None and self.desk[0] <= 0.0:
                 self.error = ValueError(f"torques must be finite, not {torques}")
-        if self.error is not None:
+        if isinstance(self.error, Exception):
             what = f"{type(self.error).__name__}: {self.error}"
             raise LawFailed(f"controller.law at t = {self.desk[0]:g} s: {what}") from self.error
+        if self.error is not None:
+            raise self.error

@@ -61,7 +61,9 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
     file = Path(path)
     kind = _file_kind(file)
     try:
-        text = file.read_bytes().decode()
+        if file.exists() and not file.is_file():  # a pipe would be waited for
+            raise ValueError("it is no regular file")
+        text = file.read_bytes().decode("utf-8-sig")
         data = tomllib.loads(text) if kind == "TOML" else json.loads(text, object_pairs_hook=_table)
         if not isinstance(data, dict):
             raise ValueError("it holds no table")

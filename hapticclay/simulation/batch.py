@@ -185,6 +185,8 @@ def _checked(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
         if len(seen) < WARNED and scene not in seen:
             seen.add(scene)
             warn_of(s, 4)
+        if s.controller is not None:
+            s.controller.function()  # imported here, not in a thread
         yield s
 
 

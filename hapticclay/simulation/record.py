@@ -446,7 +446,8 @@ class Record:
         Args:
             path: the folder, or its record.npz.
 
-        A function that was no data, or is not found here, is left out of the scenario; notes tell.
+        The law of a controller is its name, which is imported when a run starts. A function that
+        was no data is left out of the scenario; notes tell.
 
         Raises:
             ParameterError: there is no record, or it has another schema.
@@ -454,6 +455,8 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
+            if file.exists() and not file.is_file():  # a pipe would be waited for
+                raise ValueError("it is no regular file")
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
@@ -488,6 +491,7 @@ class Record:
             ValueError,
             TypeError,
             AttributeError,
+            RecursionError,
             zipfile.BadZipFile,
         ) as error:
             what = " ".join(str(error).split()) or type(error).__name__
@@ -519,7 +523,7 @@ def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
 
 
 def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
-    """A scenario of its plain data, and what is left out: a controller that is not found here."""
+    """A scenario of its plain data, and what is left out: a controller whose law has no name."""
     try:
         return make_part(Scenario, data), []
     except ParameterError as error:

@@ -55,8 +55,10 @@ def simulate(
 
     Raises:
         ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
-            stiff for its integrator, the record may not fit into memory, or an error in seconds is
-            asked for without a border to cross.
+            stiff for its integrator, the record may not fit into memory, the law of its controller
+            is not found, or an error in seconds is asked for without a border to cross.
+        LawFailed: the law of its controller raised an exception. What is no error, as Ctrl-C, is
+            raised as it is.
     """
     if not isinstance(scenario, Scenario):
         raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
@@ -67,6 +69,8 @@ def simulate(
 
         return simulate_within(scenario, error, every=every, progress=progress, engine=engine)
     _check_memory(scenario, every)
+    if scenario.controller is not None:
+        scenario.controller.function()  # refused before anything is compiled
     with warnings_caught():
         kernel = _kernel(scenario, choice("engine", engine, ENGINES))
         with borrowed_store(kernel) as store:

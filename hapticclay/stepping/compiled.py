@@ -42,7 +42,7 @@ from ..model import (
 )
 from ..model.sampled_controller import DESK, TORQUE, LawCaller
 from ..model.scenario import Scenario
-from . import energy, leapfrog, loop, many, modes, monitor, path, run, runge_kutta, sampled
+from . import cache, energy, leapfrog, loop, many, modes, monitor, path, run, runge_kutta, sampled
 from .engine import mujoco
 
 SOURCES = (
@@ -101,24 +101,21 @@ def _put_row(rows, at, *row):
 
 
 def _mark(kind: type[run.Run], whole: bool) -> Path:
-    """A file that says that this machine code is kept on disk; the null device without a home."""
-    try:
-        return run.cache_folder() / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
-    except (OSError, RuntimeError):
-        return Path(os.devnull, "nothing")
+    """A file that says that this machine code is kept on disk; the null device if it is not."""
+    with contextlib.suppress(OSError, RuntimeError):  # without a home
+        if (folder := run.cache_folder()) not in cache.lost:
+            return folder / f"{kind.__name__}.{'whole' if whole else 'mixed'}"
+    return Path(os.devnull, "nothing")
 
 
 def _compiled(*functions: Any) -> list[Any]:
     """The functions, each to be compiled when first called, or taken from the disk."""
     options: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    before = numba.config.CACHE_DIR
-    try:
-        numba.config.CACHE_DIR = str(run.cache_folder())
-        return [numba.njit(cache=True, **options)(f) for f in functions]
-    except (OSError, RuntimeError):  # nowhere to keep it
-        return [numba.njit(**options)(f) for f in functions]
-    finally:
-        numba.config.CACHE_DIR = before
+    made = [numba.njit(**options)(f) for f in functions]
+    with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep them
+        for dispatcher in made:
+            dispatcher._cache = cache.FileCache(dispatcher.py_func, run.cache_folder())
+    return made
 
 
 _register()
@@ -218,7 +215,7 @@ def own_law(caller: LawCaller | None, desk: np.ndarray) -> tuple[Any, Any]:
         return NO_LAW, 0
     controller = caller.controller
     n, m = len(controller.state), len(controller.params)
-    compiled = _compile_law(controller.law, n, m, _outside(controller.law))
+    compiled = _compile_law(caller.law, n, m, _outside(caller.law))
     if compiled is not None:
         return CALL(compiled.address), desk.ctypes.data
     caller.pointer = CALL(caller)  # lives as long as its run
@@ -441,7 +438,7 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
     if whole:
         WARM.add(kind)
     with contextlib.suppress(OSError):  # nowhere to keep it
-        mark.touch()
+        _mark(kind, whole).touch()
     if caught:
         raise KeyboardInterrupt
 

@@ -27,6 +27,7 @@ ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 FELT = 14  # see loop.yield_in_kick
 SUMS = 8  # of energy.kick_work, and energy.HARDWARE_WORK
 INF = np.inf
+NAN = np.nan
 NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
 # times that the handle comes back to a region within one sample; a handle that slides along a
 # border then completes the step

@@ -7,7 +7,9 @@ import functools
 import hashlib
 import math
 import os
+import platform
 import struct
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -277,6 +279,7 @@ class Run:
     fields: list[Any] = []  # of the state, beside those of path
     method: Any = None
     first_loop: Any = None  # of a method that has a state `loop`: what it is at the start
+    beyond = "the arm is stretched or folded"  # why the loops cannot go on
 
     def __init__(
         self,
@@ -513,8 +516,7 @@ class Run:
                 raise
             self.flush()  # beyond floating point, or the arm exactly straight
             if self.outcome is None:
-                cause = "the arm is stretched or folded"
-                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=cause)
+                self.outcome = monitor.Outcome("out of reach", self.t, self.i, cause=self.beyond)
 
     def step(self) -> None:
         """Goes on to the next sample, with the kernel STEPWISE."""
@@ -902,8 +904,12 @@ def completed(  # noqa: PLR0913  # one a condition of the run
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of the machine code, in NUMBA_CACHE_DIR or the user's cache, named by the sources."""
-    digest = hashlib.sha256(version("numba").encode())
+    """Folder of the machine code, in NUMBA_CACHE_DIR or the user's cache.
+
+    It is named by all that the code depends on: sources, versions, processor.
+    """
+    packages = [version(x) for x in ("numba", "llvmlite", "mujoco", "numpy")]
+    digest = hashlib.sha256(repr((sys.version, packages, _processor())).encode())
     package = Path(__file__).resolve().parents[1]
     for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
         digest.update(file.read_bytes())
@@ -913,3 +919,11 @@ def cache_folder() -> Path:
         or Path.home() / ".cache"
     )
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+def _processor() -> str:
+    """Name and abilities of the processor."""
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return "".join(sorted({x for x in lines if x.startswith(("model name", "flags", "Feat"))}))
+    return f"{platform.machine()} {platform.processor()}"

@@ -22,7 +22,7 @@ from ..model.compensator import Compensator
 from ..model.controller import Servo
 from ..model.sampled_controller import DESK, TORQUE, Controller, LawCaller
 from . import energy, loop, path
-from .path import INF, TOUCH, put4, put6, put8, put10, put14, put22
+from .path import INF, NAN, TOUCH, put4, put6, put8, put10, put14, put22
 from .run import CHUNK, Run
 
 SLACK = 1e-9  # of dt: events so close are one
@@ -870,11 +870,14 @@ def ask_law(s, e, w1, w2, fx, fy):
         s["asked"] = s["k"]
     desk[0], desk[1], desk[2], desk[3], desk[4] = s["t"], q[0], q[1], w1, w2
     desk[5], desk[6] = fx, fy
+    desk[TORQUE] = desk[TORQUE + 1] = NAN  # what a call that fails leaves behind
     e.law(e.law_data)
     t1, t2 = desk[TORQUE], desk[TORQUE + 1]
     put10(hold, 0, t1, t2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if abs(t1) + abs(t2) < INF:  # limits would hide what is not finite
+    if abs(t1) + abs(t2) < INF:
         hold[0], hold[1] = driven_torques(s, t1, t2)
+    else:  # limits would hide it, and a delay put it off
+        s["code"] = path.NOT_FINITE
     s["shown"] = 1
 
 
@@ -1489,7 +1492,7 @@ class Sampled(NamedTuple):
         varies = row >= 0 or grows
         lowx, lowy, highx, highy = s["low"][0], s["low"][1], s["high"][0], s["high"][1]
         for made in range(n):
-            if s["uneven"] and self.stop(s)[1] < dt:
+            if s["code"] != path.OPEN or (s["uneven"] and self.stop(s)[1] < dt):
                 return made
             if varies:
                 ready_kicks(s, e.ahead, row + made if row >= 0 else -1, grows)
@@ -1706,6 +1709,8 @@ class SampledRun(Run):
         super()._make(room)
         if self.law:
             self.law.check()
+            if not self.law.finite():
+                self.beyond = "the torques of the controller are not finite"
 
     def _ahead(self, n: int) -> np.ndarray:
         """What drives the next n whole steps, see AHEAD; shape (n, AHEAD)."""

@@ -751,3 +751,16 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     assert scenario_file.load_scenario(file, mass, whole).operator == hand
     s = dataclasses.replace(hc.constant_cut(), operator=hc.Operator())
     assert with_fields(s, {"operator.mass": 0.3}).operator == hc.Operator(0.3)
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbft_max = 2.0\n")
+    assert hc.Scenario.load(tmp_path / "a.toml").t_max == 2.0
+
+
+def test_a_pipe_is_refused_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.toml")
+    os.mkfifo(tmp_path / "record.npz")
+    for load, file in ((hc.Scenario.load, "a.toml"), (hc.Record.load, "record.npz")):
+        with pytest.raises(ParameterError, match="no regular file"):
+            load(tmp_path / file)

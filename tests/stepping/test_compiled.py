@@ -275,7 +275,7 @@ def test_engine_hears_nothing_and_keeps_nothing():
 
 @fast
 def test_compiled_code_is_kept_on_disk(tmp_path):
-    """A second process is faster; a terminal is told what takes so long."""
+    """A second process is faster, a terminal is told of the wait, half a file is made anew."""
     code = (
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
@@ -284,7 +284,10 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     took, said = [], []
-    for hits in (0, 1):
+    for hits in (0, 1, 0):
+        if len(took) == 2:
+            for file in tmp_path.rglob("*.code"):
+                file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
         terminal, end = os.openpty()
         out = subprocess.run(
             [sys.executable, "-c", code], env=env, stdout=subprocess.PIPE, stderr=end, check=True

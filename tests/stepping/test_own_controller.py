@@ -2,14 +2,18 @@
 
 import functools
 import math
+import pickle
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
-from hapticclay.model.sampled_controller import LawFailed
+from hapticclay.model.sampled_controller import LawCaller, LawFailed
+from hapticclay.stepping import sampled
 from tests.oracles import paper_law
 
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau")
@@ -209,8 +213,9 @@ def burst(t, q, qd, fh, state, params):
     "make,field",
     [
         (lambda: hc.Controller(3), "controller.law"),
-        (lambda: hc.Controller("nowhere:law"), "controller.law"),
-        (lambda: hc.Controller("math:no_such"), "controller.law"),
+        (lambda: hc.Controller("no name"), "controller.law"),
+        (lambda: hc.Controller(""), "controller.law"),
+        (lambda: hc.Controller("os:path:join"), "controller.law"),
         (lambda: hc.Controller(to_pose, state=("a",)), "controller.state[0]"),
         (lambda: hc.Controller(to_pose, params=(math.nan,)), "controller.params[0]"),
         (lambda: replace(POSE, control="continuous", Ts=None, render="held"), "control"),
@@ -225,9 +230,135 @@ def test_bad_controllers_are_refused_by_name(make, field):
     assert e.value.field == field
 
 
-def test_a_law_may_be_named():
-    c = hc.Controller("tests.oracles.paper_law:paper")
-    assert c.law is paper_law.paper and c == hc.Controller(paper_law.paper)
+def test_a_law_may_be_named(tmp_path):
+    c, law = hc.Controller("tests.oracles.paper_law:paper"), paper_law.paper
+    assert c.law == "tests.oracles.paper_law:paper" and c.function() is law
+    assert c == hc.Controller(law) and hash(c) == hash(hc.Controller(law))
+    assert c != hc.Controller(to_pose) and c != hc.Controller(law, (1.0,)) and c != law
+    assert pickle.loads(pickle.dumps(c)) == c
+    scene = replace(POSE, controller=c)
+    again = hc.Scenario.load(scene.save(tmp_path / "named.toml"))
+    assert again == scene == hc.with_fields(scene, {"t_max": POSE.t_max})
+    of_function = replace(POSE, controller=hc.Controller(law)).save(tmp_path / "other.toml")
+    told = of_function.read_text().replace("other", "named")
+    assert told == again.save(tmp_path / "named.toml").read_text()
+
+
+RUNS_AWAY = {
+    "quits": "raise SystemExit(0)",
+    "fails": "raise ZeroDivisionError('x')",
+    "lacks": "",
+    "number": "law = 3",
+}
+
+
+@pytest.mark.parametrize("name", RUNS_AWAY)
+def test_opening_a_file_runs_nothing_and_a_run_refuses_what_it_cannot_import(
+    name, tmp_path, monkeypatch, capsys
+):
+    module, ran = f"module_that_{name}", tmp_path / "ran"
+    source = f"import pathlib\npathlib.Path({str(ran)!r}).touch()\n{RUNS_AWAY[name]}\n"
+    (tmp_path / f"{module}.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    named = replace(POSE, controller=hc.Controller(f"{module}:law"))
+    file = named.save(tmp_path / "scene.toml")
+    made = hc.simulate(replace(POSE, t_max=0.01, controller=hc.Controller(idle)), engine="python")
+    folder = replace(made, scenario=named).save(tmp_path / "record")
+    assert hc.Scenario.load(file) == named
+    assert hc.Record.load(folder).scenario.controller == named.controller
+    assert main(["info", str(folder)]) == 0 and f"{module}:law" in capsys.readouterr().out
+    assert main(["export", str(folder), "--format", "csv", "--out", str(tmp_path / "a.csv")]) == 0
+    assert not ran.exists()
+    for start in (hc.simulate, lambda s: hc.simulate_batch([s])):
+        with pytest.raises(ParameterError, match="must .*function") as e:
+            start(named)
+        assert e.value.field == "controller.law" and "\n" not in str(e.value)
+    assert ran.exists()
+
+
+def idle(t, q, qd, fh, state, params):
+    return (0.0, 0.0), state
+
+
+@pytest.mark.parametrize("when", [0.0, 0.05])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, GeneratorExit])
+@pytest.mark.parametrize("parts", [None, hc.Interface(delay=2e-3, lost=0.2)], ids=["bare", "late"])
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_what_a_law_raises_ends_the_run_and_is_raised(engine, parts, error, when):
+    asked, raised = [], error("as asked")
+
+    def law(t, q, qd, fh, state, params):
+        asked.append(t)
+        if t >= when:
+            raise raised
+        return (0.0, 0.0), state
+
+    s = replace(POSE, controller=hc.Controller(law), interface=parts, t_max=0.2)
+    with pytest.raises(error) as e:
+        hc.simulate(s, engine=engine)
+    assert e.value is raised
+    assert sum(t >= when for t in asked) == 1 and asked[-1] < when + 0.01
+
+
+@pytest.mark.parametrize("keep", ["records", "summaries"])
+def test_a_batch_raises_what_a_law_raises(keep):
+    def law(t, q, qd, fh, state, params):
+        if t > 0.05:
+            raise SystemExit(3)
+        return (0.0, 0.0), state
+
+    scenes = [replace(POSE, t_max=0.1, force=(0.01 * i, 0.0)) for i in range(5)]
+    scenes[3] = replace(scenes[3], controller=hc.Controller(law))
+    scenes = [replace(s, controller=s.controller or hc.Controller(idle)) for s in scenes]
+    with pytest.raises(SystemExit) as e:
+        hc.simulate_batch(scenes, threads=2, keep=keep)
+    assert e.value.code == 3
+
+
+def test_ctrl_c_at_any_moment_of_a_law_ends_the_run():
+    """It comes before the first line of the call, too, where nothing can keep it."""
+    asked = []
+
+    class Signalled(LawCaller):
+        def __call__(self, desk=None):
+            asked.append(1)
+            if len(asked) == 3:
+                raise KeyboardInterrupt
+            super().__call__(desk)
+
+    s = replace(POSE, controller=hc.Controller(counting()), t_max=0.2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampled, "LawCaller", Signalled)
+        patch.setattr(sys, "unraisablehook", lambda told: None)
+        with pytest.raises(KeyboardInterrupt):
+            hc.simulate(s, engine="native")
+    assert len(asked) <= 4  # a step that ends nowhere is worked out once more
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize(
+    "answer", [0.0, (1.0, 2.0), ((1.0,), ()), ((1.0, 2.0, 3.0), ()), ((0.0, 0.0), 0.0), None, "ab"]
+)
+def test_a_law_is_told_what_to_return(answer, engine, capfd):
+    s = replace(POSE, controller=hc.Controller(lambda *measured: answer), t_max=0.01)
+    with pytest.raises(LawFailed, match=r"must return \(\(shoulder, elbow\), state\)") as e:
+        hc.simulate(s, engine=engine)
+    assert repr(answer) in str(e.value)
+
+
+def nan_later(t, q, qd, fh, state, params):
+    return (math.nan if 0.1 < t < 0.101 else 0.0, 0.0), state
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("parts", [None, hc.Interface(delay=2e-3)], ids=["bare", "late"])
+def test_torques_that_are_once_not_finite_end_the_run_at_once(engine, parts):
+    r = hc.simulate(
+        replace(POSE, controller=hc.Controller(nan_later), interface=parts, t_max=0.2),
+        engine=engine,
+    )
+    assert r.outcome.code == "out of reach" and 0.1 < r.outcome.time < 0.102
+    assert r.outcome.cause == "the torques of the controller are not finite"
 
 
 def test_a_partial_law_works_too():

@@ -1,0 +1,146 @@
+"""Machine code on disk, each function in a file of its own that is verified before it is loaded.
+
+The linker takes what it is given: half a file ends the process. So a file begins with the digest of
+the rest, and one that fails is deleted and compiled again. Its name has the types of the arguments,
+the processor and the versions in it; it is written whole by a rename, so processes may share a
+folder. Where nothing can be written, functions are compiled for this process alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+DIGEST = hashlib.sha256().digest_size
+MARKS = "*Run.*"  # files that say for which kinds of run a folder has machine code
+lost: set[Path] = set()  # folders that machine code could not be written to
+
+
+class FileCache(_Cache):
+    """Keeps the machine code of one function, for any types of its arguments.
+
+    Args:
+        function: the function, as Python has it.
+        folder: of the files, named by all that machine code depends on but types and processor.
+    """
+
+    def __init__(self, function: Any, folder: Path):
+        self.folder, self.on = folder, True
+        self.name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+        self.code = hashlib.sha256(function.__code__.co_code).hexdigest()
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(self.folder)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The function for some types; None if there is none, or what is there is damaged.
+
+        Args:
+            sig: the types.
+            target_context: of numba.
+        """
+        target_context.refresh()
+        key = self._key(sig, target_context.codegen())
+        file = self._file(key)
+        try:
+            data = file.read_bytes() if self.on else None
+        except OSError:
+            return None
+        if data is None:
+            return None
+        try:
+            if hashlib.sha256(data[DIGEST:]).digest() == data[:DIGEST]:
+                stored, payload = pickle.loads(data[DIGEST:])
+                if stored == key:
+                    return CompileResult._rebuild(target_context, *payload)
+        except Exception:  # written whole, but by what this process cannot read
+            pass
+        for stale in (file, *self.folder.glob(MARKS)):  # the marks would promise what is gone
+            with contextlib.suppress(OSError):
+                stale.unlink()
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keeps the function for some types, if there is room for it; a line says if not.
+
+        Args:
+            sig: the types.
+            data: what numba compiled.
+        """
+        if not self.on or any(not x.can_cache for x in data.lifted):
+            return
+        if data.library.has_dynamic_globals:
+            return
+        key = self._key(sig, data.codegen)
+        body = dumps((key, data._reduce()))
+        try:
+            write(self._file(key), hashlib.sha256(body).digest() + body)
+        except OSError as error:
+            unkept(self.folder, error)
+
+    def enable(self) -> None:
+        """From now on, functions are loaded and kept."""
+        self.on = True
+
+    def disable(self) -> None:
+        """From now on, functions are neither loaded nor kept."""
+        self.on = False
+
+    def flush(self) -> None:
+        """Deletes the files of this function."""
+        for file in self.folder.glob(f"{self.name}-*.code"):
+            file.unlink(missing_ok=True)
+
+    def _key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        return str(sig), codegen.magic_tuple(), self.code, sys.version
+
+    def _file(self, key: tuple[Any, ...]) -> Path:
+        digest = hashlib.sha256(repr(key).encode()).hexdigest()
+        return self.folder / f"{self.name}-{digest[:16]}.code"
+
+
+def write(file: Path, data: bytes) -> None:
+    """Writes a file, whole or not at all.
+
+    Args:
+        file: the file; its folder is made.
+        data: its content.
+
+    Raises:
+        OSError: it cannot be written; nothing is left behind.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=".", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as f:
+            f.write(data)
+        os.replace(temporary, file)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def unkept(folder: Path, error: OSError) -> None:
+    """Says once that machine code is not kept.
+
+    Args:
+        folder: where it was to be.
+        error: why it is not.
+    """
+    if folder not in lost:
+        lost.add(folder)
+        why = error.strerror or error
+        print(f"hapticclay: machine code is not kept in {folder}: {why}", file=sys.stderr)
