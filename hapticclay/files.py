@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import functools
 import os
 import platform
+import stat
 import tempfile
+from collections.abc import Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -49,23 +52,63 @@ def writable(folder: Path) -> None:
                 p.rmdir()
 
 
+_read_from: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar(
+    "read_from", default=frozenset()
+)
+
+
+@contextlib.contextmanager
+def sources_kept(paths: Iterable[Path]) -> Iterator[None]:
+    """Lets nothing replace the files that a command reads from.
+
+    Args:
+        paths: the files; of a folder, those in it.
+    """
+    files = [f for p in paths for f in (p.iterdir() if p.is_dir() else [p])]
+    token = _read_from.set(frozenset(os.path.realpath(f) for f in files))
+    try:
+        yield
+    finally:
+        _read_from.reset(token)
+
+
+def _kind_of_file(path: str) -> str:
+    """What lies at a path in the way of a file; "" for a regular file, or nothing."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:  # nothing is there, or writing will say what is wrong
+        return ""
+    kinds = {stat.S_IFREG: "", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe"}
+    return kinds.get(stat.S_IFMT(mode), "a device or socket")
+
+
 class atomic:
     """Opens a file under a temporary name and renames it when it is complete.
+
+    A symbolic link stays, and the file that it leads to is replaced.
 
     Args:
         path: the file.
 
     Raises:
-        ParameterError: the file cannot be written; nothing is left behind.
+        ParameterError: the file cannot be written, is no regular file, or is one that the command
+            reads from; nothing is left behind.
     """
 
     def __init__(self, path: Path):
         self.path = path
+        self.target = Path(os.path.realpath(path))
 
     def __enter__(self):
+        if kind := _kind_of_file(str(self.target)):
+            raise ParameterError("out", str(self.path), f"must be a regular file, is {kind}")
+        if str(self.target) in _read_from.get():
+            bound = "must not be a file that the command reads from"
+            raise ParameterError("out", str(self.path), bound)
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
+            self.target.parent.mkdir(parents=True, exist_ok=True)
+            folder, prefix = self.target.parent, f".{self.target.name}."
+            handle, name = tempfile.mkstemp(dir=folder, prefix=prefix)
         except OSError as error:
             raise self._refusal(error) from None
         self.temporary = Path(name)
@@ -82,7 +125,7 @@ class atomic:
                     os.umask(umask)
                     os.fchmod(self.file.fileno(), 0o666 & ~umask)
             if kind is None:
-                return os.replace(self.temporary, self.path)
+                return os.replace(self.temporary, self.target)
         except OSError as late:
             error = error or late
         self.temporary.unlink(missing_ok=True)

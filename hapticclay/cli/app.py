@@ -8,6 +8,7 @@ import difflib
 import functools
 import inspect
 import io
+import itertools
 import logging
 import os
 import pkgutil
@@ -24,7 +25,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import tyro
 
 from ..errors import ParameterError, Warning, choice
-from ..files import versions
+from ..files import sources_kept, versions
 from .console import ends, scenario_words
 
 COMMANDS = {  # a command is a dataclass of its options; calling it returns the exit status
@@ -97,10 +98,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _exit_status(argv: Sequence[str] | None, received: list[int]) -> int:
     """Runs the command line under `ends`; returns the exit status without its signals."""
     try:
-        command = parse_words(list(sys.argv[1:] if argv is None else argv))
+        words = list(sys.argv[1:] if argv is None else argv)
+        command = parse_words(words)
         with warnings.catch_warnings():
             warnings.showwarning = functools.partial(_show_line, warnings.showwarning)
-            code = command() if command else 0
+            with sources_kept(sources(words)):
+                code = command() if command else 0
         if sys.stdout:  # None where it was closed before we came
             sys.stdout.flush()
         return code
@@ -163,6 +166,17 @@ def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
     if rest:
         raise _unknown(words, rest[0])
     return command
+
+
+def sources(words: Sequence[str]) -> list[Path]:
+    """Files, and folders of records, that a command line names to be read.
+
+    Args:
+        words: the command line.
+    """
+    outputs = [after for word, after in itertools.pairwise(words) if word in ("--out", "--page")]
+    named = [Path(word) for word in words if word not in outputs]
+    return [p for p in named if p.is_file() or (p / "record.npz").is_file()]
 
 
 def load_command(name: str) -> type:
