@@ -12,6 +12,7 @@ import logging
 import os
 import pkgutil
 import re
+import shutil
 import sys
 import types
 from collections.abc import Callable, Sequence
@@ -65,6 +66,9 @@ class VersionCommand:
         return 0
 
 
+NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
@@ -79,6 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):
         sys.stdout.reconfigure(errors="replace")  # terminals without frames or bullets
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
     try:
         command = parse_words(list(sys.argv[1:] if argv is None else argv))
         code = command() if command else 0
