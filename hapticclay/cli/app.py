@@ -13,6 +13,7 @@ import logging
 import os
 import pkgutil
 import re
+import shutil
 import signal
 import sys
 import types
@@ -68,6 +69,9 @@ class VersionCommand:
         return 0
 
 
+NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
+
+
 def _show_line(usual: Callable[..., None], message: Any, category: type, *where: Any) -> None:
     """Prints a warning of ours as a line, others as usual."""
     if issubclass(category, Warning):
@@ -90,6 +94,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):
         sys.stdout.reconfigure(errors="replace")  # terminals without frames or bullets
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
     with ends() as received:
         code = _exit_status(argv, received)
     return 128 + received[0] if received else code

@@ -40,7 +40,7 @@ class FileCache(_Cache):
         self.code = hashlib.sha256(function.__code__.co_code).hexdigest()
 
     @property
-    def cache_path(self) -> str:
+    def cache_path(self) -> Any:
         """The folder."""
         return str(self.folder)
 

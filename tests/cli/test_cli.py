@@ -652,3 +652,12 @@ def test_the_names_of_all_fields_are_listed(capsys):
     assert "servo.x" not in out
     for words in (["run", "--help"], ["run", "constant", "--help"]):
         assert "--set" in run(capsys, *words)[1]
+
+
+@pytest.mark.parametrize("columns", ["1", "5"])
+def test_help_ends_in_the_narrowest_terminal(columns):
+    """It was laid out for ever; the bound is many times what it takes."""
+    words = [sys.executable, "-m", "hapticclay", "run", "--help"]
+    env = {**os.environ, "COLUMNS": columns}
+    out = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
+    assert out.returncode == 0 and "usage" in out.stdout
