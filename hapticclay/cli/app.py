@@ -180,8 +180,8 @@ def sources(words: Sequence[str]) -> list[Path]:
     Args:
         words: the command line.
     """
-    outputs = [after for word, after in itertools.pairwise(words) if word in ("--out", "--page")]
-    named = [Path(word) for word in words if word not in outputs]
+    pairs = itertools.pairwise(["", *words])
+    named = [Path(word) for before, word in pairs if before not in ("--out", "--page")]
     return [p for p in named if p.is_file() or (p / "record.npz").is_file()]
 
 

@@ -7,7 +7,7 @@ import pkgutil
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
@@ -85,7 +85,7 @@ class Controller:
                 raise self._refusal(bound) from None
         if not callable(law):
             raise self._refusal("must be a function")
-        return law
+        return cast(Law, law)
 
     def _refusal(self, bound: str) -> ParameterError:
         return ParameterError("controller.law", self.law, bound)

@@ -6,7 +6,6 @@ border times at h, or that of the positions at 4h. Only a run that asks for an e
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import re
@@ -19,7 +18,7 @@ import numpy as np
 from ..errors import ParameterError, number
 from ..model.scenario import Scenario
 from ..stepping.run import Crossing
-from ..stepping.runge_kutta import STABLE_STEP, fastest_rate
+from ..stepping.runge_kutta import STABLE_STEP, check_explicit, fastest_rate
 from .record import ARRAYS, Record
 from .simulate import has_numba, simulate
 
@@ -194,14 +193,12 @@ def simulate_within(
         raise ParameterError("error", error, bound)
     if scenario.control == "sampled":
         scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)
-    trial, dt = Trial(scenario, unit, every), 0.0
+    trial = Trial(scenario, unit, every)
     trial.progress, trial.engine = progress, engine
-    record, found = None, None
-    for integrator, dt in choices(scenario, asked, unit):
-        with contextlib.suppress(IntegratorRefused):
-            record, found = trial.take(integrator, dt)
-            break
-    assert record is not None and found is not None  # every scene takes the last one
+    *others, last = choices(scenario, asked, unit)
+    integrator, dt = next((x for x in others if _is_taken(scenario, *x)), last)
+    trial.scenario = dataclasses.replace(scenario, integrator=integrator)
+    record, found = trial.compare(dt)
     order, most, doubts = METHODS[trial.scenario.integrator].order, MARGIN * asked, 0
     for rounds in range(1, ROUNDS + 1):
         doubts += not found.confirmed
@@ -286,6 +283,19 @@ def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, floa
     return [("accurate", steps["accurate"]), fast]
 
 
+def _is_taken(scenario: Scenario, integrator: str, dt: float) -> bool:
+    """Whether an integrator takes a scene at the coarsest step of a comparison."""
+    try:
+        s = dataclasses.replace(scenario, integrator=integrator, dt=RATIO * dt)
+        if integrator == "accurate":
+            check_explicit(s)
+    except ParameterError as refusal:
+        if refusal.field == "integrator":
+            return False
+        raise
+    return True
+
+
 def _divided(Ts: float, dt: float) -> float:
     """The largest part of Ts that is at most dt and whose RATIO-fold divides Ts too."""
     most = math.ceil(Ts / (RATIO * LARGEST) - 1e-9)
@@ -296,10 +306,6 @@ def _divided(Ts: float, dt: float) -> float:
         bound = f"must be at least {RATIO * SMALLEST:g} s where an error is asked for"
         raise ParameterError("Ts", Ts, bound)
     return Ts / n
-
-
-class IntegratorRefused(Exception):
-    """An integrator does not take a scene."""
 
 
 class Trial:
@@ -323,24 +329,6 @@ class Trial:
         self.engine = "auto"
         self.runs, self.wall = 0, 0.0
         self.traces: dict[float, Trace] = {}
-
-    def take(self, integrator: str, dt: float) -> tuple[Record, Comparison]:
-        """As `compare`, by another integrator.
-
-        Args:
-            integrator: its name.
-            dt: step of the finest run [s].
-
-        Raises:
-            IntegratorRefused: it does not take the scene.
-        """
-        try:
-            self.scenario = dataclasses.replace(self.scenario, integrator=integrator)
-            return self.compare(dt)
-        except ParameterError as refusal:
-            if refusal.field != "integrator":
-                raise
-            raise IntegratorRefused from refusal
 
     def compare(self, dt: float) -> tuple[Record, Comparison]:
         """Runs at 4 dt, 2 dt and dt, unless it has, and compares.

@@ -942,6 +942,38 @@ def own_rate(scenario: Scenario) -> float:
     return float(np.abs(np.concatenate(poles)).max())
 
 
+def parts_of_sample(scenario: Scenario, i: int) -> int:
+    """Engine steps a sample, the same for all samples of a block.
+
+    Args:
+        scenario: the scene.
+        i: one of the samples.
+    """
+    grown = 0.0
+    if scenario.clay and scenario.clay.grows:  # at the end of the block: no clay has grown longer
+        grown = min((i // GROWTH_BLOCK + 1) * GROWTH_BLOCK * scenario.dt, scenario.t_max)
+    return max(1, math.ceil(scenario.dt * fastest_rate(scenario, grown) / STABLE_STEP))
+
+
+def check_explicit(scenario: Scenario) -> None:
+    """Refuses a scene that is too stiff for explicit steps at its start.
+
+    Args:
+        scenario: the scene.
+
+    Raises:
+        ParameterError: it is.
+    """
+    parts, bound = parts_of_sample(scenario, 0), ""
+    if parts > SUBSTEPS:
+        bound = f"would take {parts:.4g} steps a sample in so stiff a scene"
+    elif scenario.clay and scenario.clay.yields and (creep := creep_limit(scenario)) > CREEP_MOST:
+        bound = f"would take a creep of {creep:.2g} m/s in this clay for rest"
+    if bound:
+        bound = f"explicit: {bound}; choose 'fast'"
+        raise ParameterError("integrator", scenario.integrator, bound)
+
+
 class RungeKuttaRun(Run):
     """A run by `RungeKutta`.
 
@@ -954,15 +986,9 @@ class RungeKuttaRun(Run):
     def _start(self) -> None:
         super()._start()
         s, now = self.scenario, self.s
-        parts = self._parts(0)
-        if parts > SUBSTEPS:
-            bound = f"explicit: would take {parts:.4g} steps a sample in so stiff a scene"
-            raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
+        check_explicit(s)
+        parts = parts_of_sample(s, 0)
         if now["yields"]:
-            creep = creep_limit(s)
-            if creep > CREEP_MOST:
-                bound = f"explicit: would take a creep of {creep:.2g} m/s in this clay for rest"
-                raise ParameterError("integrator", s.integrator, bound + "; choose 'fast'")
             now["lightness"] = largest_lightness(s)
             self._put(mode=(1, 1))
         now["substeps"], now["break"] = parts, math.inf
@@ -976,13 +1002,6 @@ class RungeKuttaRun(Run):
                 )
         self._put(control=control)
 
-    def _parts(self, i: int) -> int:
-        """Engine steps a sample in the samples of the same block as sample i."""
-        s, grown = self.scenario, 0.0
-        if s.clay and s.clay.grows:  # at the end of the block: longer than any clay has grown
-            grown = min((i // GROWTH_BLOCK + 1) * GROWTH_BLOCK * s.dt, s.t_max)
-        return max(1, math.ceil(s.dt * fastest_rate(s, grown) / STABLE_STEP))
-
     def _make(self, room: int) -> None:
         if not self.varies:
             super()._make(room)
@@ -990,7 +1009,7 @@ class RungeKuttaRun(Run):
         now = self.s
         if self.scenario.clay and self.scenario.clay.grows:
             if now["part"] == 0:
-                now["substeps"] = min(self._parts(self.i), SUBSTEPS + 1)
+                now["substeps"] = parts_of_sample(self.scenario, self.i)
             if now["substeps"] > SUBSTEPS:
                 self.give_up()
                 return
