@@ -19,9 +19,17 @@ def one_line(text: object, most: int = 60) -> str:
         text: the text; another object gives its str.
         most: characters to keep.
     """
-    plain = "".join(x if x.isprintable() else " " for x in str(text))  # no escapes of a terminal
-    line = " ".join(plain.split())
+    line = " ".join(printable(text).split())
     return line if len(line) <= most else f"{line[: most - 3]}..."
+
+
+def printable(text: object) -> str:
+    """A text without what a terminal would take for a command; line ends stay.
+
+    Args:
+        text: the text; another object gives its str.
+    """
+    return "".join(x if x.isprintable() or x == "\n" else " " for x in str(text))
 
 
 def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:

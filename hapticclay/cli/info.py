@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ..display import one_line
+from ..display import one_line, printable
 from ..files import versions
 from . import console
 
@@ -64,7 +64,7 @@ def record_text(record: Record, size: int) -> str:
         rows.append(("read by", f"hapticclay {now}"))
     width = max(len(name) for name, _ in rows)
     lines += [f"{name:{width}}  {value}" for name, value in rows]
-    return "\n".join([*lines, "", array_table(r)])
+    return printable("\n".join([*lines, "", array_table(r)]))
 
 
 def array_table(record: Record) -> str:

@@ -157,10 +157,19 @@ def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
 
     Args:
         changes: values by dotted name, or by name and deep.
+
+    Raises:
+        ParameterError: one value is given in both ways, or lies too deep.
     """
     out: dict[Any, Any] = {}
     for name, value in changes.items():
-        _plant(out, str(name).split("."), value)
+        try:
+            _plant(out, str(name).split("."), value)
+        except KeyError as twice:
+            bound = f"must be given once, and {twice.args[0]!r} is given twice"
+            raise ParameterError(str(name), value, bound) from None
+        except RecursionError:
+            raise ParameterError(str(name), ..., "must not lie so deep") from None
     return out
 
 
@@ -177,6 +186,8 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
                 _plant(below, [key] if key is ENTIRE else str(key).split("."), inner)
     elif isinstance(tree.get(name), dict):
         tree[name][ENTIRE] = value
+    elif name in tree:
+        raise KeyError(name)
     else:
         tree[name] = value
 

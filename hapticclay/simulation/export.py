@@ -16,6 +16,7 @@ from ..errors import ParameterError, choice
 from ..files import atomic
 from . import tables
 from .record import Record
+from .stored import check_times
 
 TOPIC = "/hapticclay"  # of MCAP
 RECORDING = "hapticclay"  # application of a Rerun recording
@@ -41,6 +42,10 @@ def export_record(record: Record, path: str | os.PathLike[str], kind: str | None
     if kind is None:
         kind = file.suffix[1:].lower()
     write = EXPORTS[choice("format", kind, tuple(EXPORTS))]
+    try:
+        check_times(record.t)
+    except ValueError as error:
+        raise ParameterError("record", record.scenario.name, str(error)) from None
     with atomic(file) as f:
         write(record, f)
     return file

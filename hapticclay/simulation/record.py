@@ -25,6 +25,7 @@ from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
 from ..theory.margins import Verdict
+from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -460,6 +461,7 @@ class Record:
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
+                check_headers(z.zip)
                 head = json.loads(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
@@ -467,8 +469,10 @@ class Record:
             _check(arrays | extra)
             schema = head["schema"]
             if schema == RECORD_SCHEMA:
+                check_head(head)
                 scenario, lost = _scenario(head["scenario"])
                 _check_ground(ground, scenario)
+                check_times(arrays["t"])
                 return cls(
                     **arrays,
                     scenario=scenario,
@@ -500,7 +504,7 @@ class Record:
 
 
 def _check(arrays: dict[str, np.ndarray]) -> None:
-    """Raises ValueError unless arrays are finite, have their shapes, and time does not go back."""
+    """Raises ValueError unless arrays are finite and have their shapes."""
     t = arrays["t"]
     for name, x in arrays.items():
         shape = (t.size,) if name in SCALAR else (t.size, 2)
@@ -510,8 +514,6 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
             )
         if not np.isfinite(x).all():
             raise ValueError(f"array {name} must be finite, is {x[~np.isfinite(x)][0]} somewhere")
-    if (np.diff(t) < 0.0).any():
-        raise ValueError("array t must not go back")
 
 
 def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:

@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation import simulate
+from hapticclay.simulation import memory, simulate
 
 GB = 10**9
 WIRED = dataclasses.replace(
@@ -57,11 +57,11 @@ def machine(root, files):
     ],
 )
 def test_the_least_of_machine_and_container_counts(files, left, tmp_path):
-    assert simulate.memory_left(machine(tmp_path, files)) == left
+    assert memory.memory_left(machine(tmp_path, files)) == left
 
 
 def test_there_is_less_left_than_installed():
-    assert 0 < simulate.memory_left() < 1e14
+    assert 0 < memory.memory_left() < 1e14
 
 
 @pytest.mark.parametrize(
