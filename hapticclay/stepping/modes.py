@@ -294,6 +294,81 @@ def yield_at_stage(s, W, mass, v, a):
     return fx, fy, gx, gy
 
 
+def torques_that_hold(s, u, S, a, f, mass, v, c):
+    """Torques of motors at their limits while clay holds an axis.
+
+    The servo answers the force of the clay, and that depends on the torques. Of the nine cases,
+    each motor free or at either limit, one agrees with itself.
+
+    Args:
+        s: state of the run.
+        u: from arm.jacobian [m].
+        S: acceleration per unit of force that the servo makes, (xx, xy, yy) [1/kg].
+        a: acceleration that the servo wants without forces, (x, y) [m/s^2].
+        f: force on the handle without that of yielding and of the hand's mass, (x, y) [N].
+        mass: of the hand, (x, y) [kg].
+        v: velocity of the handle, (x, y) [m/s].
+        c: centripetal acceleration, (x, y) [m/s^2].
+
+    Returns:
+        (shoulder, elbow) [N.m].
+    """
+    at = u, S, a, f, mass, v, c
+    limit1, limit2 = s["torque_limit"]
+    b1, b2 = wanted_torques(s, 0.0, 0.0, at)
+    xx, yx = wanted_torques(s, 1.0, 0.0, at)
+    xy, yy = wanted_torques(s, 0.0, 1.0, at)
+    xx, yx, xy, yy = xx - b1, yx - b2, xy - b1, yy - b2
+    best1, best2, least = 0.0, 0.0, INF
+    for case in range(9):
+        side1, side2 = SIDES[case // 3], SIDES[case % 3]
+        t1, t2 = side1 * limit1, side2 * limit2
+        if side1 == 0.0 and side2 == 0.0:
+            det = (1.0 - xx) * (1.0 - yy) - xy * yx
+            t1, t2 = ((1.0 - yy) * b1 + xy * b2) / det, ((1.0 - xx) * b2 + yx * b1) / det
+        elif side1 == 0.0:
+            t1 = (b1 + xy * t2) / (1.0 - xx)
+        elif side2 == 0.0:
+            t2 = (b2 + yx * t1) / (1.0 - yy)
+        w1, w2 = b1 + xx * t1 + xy * t2, b2 + yx * t1 + yy * t2
+        # how far a free motor is beyond its limit, or one at its limit is asked for less
+        wrong1 = limit1 - side1 * w1 if side1 != 0.0 else abs(t1) - limit1
+        wrong2 = limit2 - side2 * w2 if side2 != 0.0 else abs(t2) - limit2
+        wrong = max(wrong1 / limit1, wrong2 / limit2)
+        if wrong < least:
+            best1, best2, least = t1, t2, wrong
+    return best1, best2
+
+
+SIDES = (0.0, 1.0, -1.0)
+
+
+def wanted_torques(s, t1, t2, at):
+    """Torques that the servo asks for where clay holds an axis under other torques.
+
+    Args:
+        s: state of the run.
+        t1: torque of the shoulder [N.m].
+        t2: torque of the elbow [N.m].
+        at: the other arguments of `torques_that_hold`.
+
+    Returns:
+        (shoulder, elbow) [N.m].
+    """
+    u, S, a, f, mass, v, c = at
+    links = arm_of(s)
+    # kicks of one second from rest, in which the velocity after it is the acceleration
+    gx, gy = controller.velocity_under_torque(1.0, (0.0, 0.0), u, links, (t1, t2), f, mass)
+    W = arm.mobility(u, links)
+    rx, ry, _, _ = yield_at_stage(s, W, mass, v, (gx - c[0], gy - c[1]))
+    x, y = f[0] - rx, f[1] - ry
+    gx, gy = controller.solve_velocity((1.0, 1.0), a, S, (x, y), mass)
+    x, y = x - mass[0] * gx, y - mass[1] * gy
+    a1, a2 = arm.joint_velocity(gx, gy, u, 1.0)
+    p1, p2 = arm.joint_torques(x, y, u)
+    return links[2] * a1 + links[3] * a2 - p1, links[3] * a2 - p2
+
+
 def across(s, ex, ey):
     """Acceleration across a direction per unit of force across it, as felt [1/kg].
 

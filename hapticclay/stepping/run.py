@@ -596,13 +596,18 @@ class Run:
         self.end_time = self.t
         self.outcome = monitor.Outcome(code, self.t, self.i)
 
-    def give_up(self) -> None:
-        """Ends the run at its last sample: the steps behind it become too short."""
-        cause = f"more than {path.MOST_STEPS} steps in one sample"
+    def give_up(self, most: int = path.MOST_STEPS) -> None:
+        """Ends the run at its last sample: the steps behind it become too short.
+
+        Args:
+            most: steps that one sample may take.
+        """
+        cause = f"more than {most} steps in one sample"
         other = "fast" if self.scenario.integrator == "accurate" else "accurate"
         advice = f"change dt, or choose integrator {other!r}"
-        at = self.i * self.scenario.dt
-        self.outcome = monitor.Outcome("unresolved", at, self.i, cause=cause, advice=advice)
+        step = max(self.looked + self.filled - 1, 0)
+        at = step * self.scenario.dt
+        self.outcome = monitor.Outcome("unresolved", at, step, cause=cause, advice=advice)
         self._cut_events(at)
 
     def flush(self) -> None:

@@ -217,6 +217,11 @@ def march(s, e, span, n):  # noqa: PLR0912, PLR0915  # flat for CPython
             t2 = I2 * ((gy * u1x - gx * u1y) / det) - u2x * ffx - u2y * ffy
             t1 = I1 * ((gx * u2y - gy * u2x) / det) - u1x * ffx - u1y * ffy + t2
             if t1 * t1 > square1 or t2 * t2 > square2:
+                if holds and (shaped or formed):
+                    t1, t2 = modes.torques_that_hold(
+                        s, (u1x, u1y, u2x, u2y), (sxx, sxy, syy), (ax, ay), (fx, fy),
+                        (massx, massy), (vx, vy), (cx, cy),
+                    )  # fmt: skip
                 # a kick of one second from rest, in which the velocity after it is the acceleration
                 gx, gy, _, _, ffx, ffy, t1, t2 = controller.kick_at_limit(
                     1.0, (0.0, 0.0), (u1x, u1y, u2x, u2y), (L1, L2, I1, I2, trace), (fx, fy),
@@ -1011,7 +1016,7 @@ class RungeKuttaRun(Run):
             if now["part"] == 0:
                 now["substeps"] = parts_of_sample(self.scenario, self.i)
             if now["substeps"] > SUBSTEPS:
-                self.give_up()
+                self.give_up(SUBSTEPS)
                 return
             room = min(room, now["filled"] + GROWTH_BLOCK - self.i % GROWTH_BLOCK)
         parts = now["substeps"]
