@@ -57,7 +57,7 @@ def named(made: F) -> F:
     Raises:
         UnknownArgument: as `known_names`, by what is returned.
     """
-    return _guarded(made, lambda args, given: None)
+    return _with_check(made, lambda args, given: None)
 
 
 def checked(made: F) -> F:
@@ -83,10 +83,10 @@ def checked(made: F) -> F:
                 told = " or ".join(dict.fromkeys(map(_in_words, kinds[name])))
                 raise ParameterError(name, value, f"must be {told}")
 
-    return _guarded(made, check)
+    return _with_check(made, check)
 
 
-def _guarded(made: Any, check: Callable[[Sequence[Any], Mapping[str, Any]], None]) -> Any:
+def _with_check(made: Any, check: Callable[[Sequence[Any], Mapping[str, Any]], None]) -> Any:
     known, name = _parameters(made), made.__name__
     inner = made.__init__ if isinstance(made, type) else made
     own = 1 if isinstance(made, type) else 0  # self

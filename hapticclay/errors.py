@@ -224,7 +224,7 @@ def table_of(
     bound = "must be rows of numbers, all of one length"
     try:
         table = np.asarray(value)
-        if table.dtype.kind == "U" and table.ndim == 2:
+        if table.dtype.kind == "U" and table.ndim == 2 and any(map(is_quantity, table.flat)):
             rows: Any = value
             given = [
                 [number(f"{field}[{i}, {j}]", x, unit=unit) for j, x in enumerate(row)]

@@ -104,7 +104,7 @@ def transparency_error(loop: Loop, *, band: tuple[float, float] = DESIGN_BAND) -
     """
     from scipy.integrate import simpson
 
-    low, high = _band(band)
+    low, high = _design_band(band)
     x = np.linspace(math.log(low), math.log(high), 401)
     error = np.abs(1.0 - margins.transparency(loop, np.exp(x))) ** 2
     return math.sqrt(float(simpson(error, x=x)) / (x[-1] - x[0]))
@@ -134,7 +134,7 @@ def compare(
     Raises:
         ParameterError: a value is out of its bounds, or a shape has no largest K.
     """
-    out, band = [], _band(band)
+    out, band = [], _design_band(band)
     for c in map(Compensator.of, compensators):
         tried = replace(loop, compensator=c)
         K = design_gain(tried, at=at, **margin)
@@ -147,7 +147,7 @@ def compare(
     return sorted(out, key=lambda d: d.error)
 
 
-def _band(band: Any) -> tuple[float, float]:
+def _design_band(band: Any) -> tuple[float, float]:
     low, high = pair("band", band, 0.0, above=True, unit="rad/s")
     if high <= low:
         raise ParameterError("band", band, "must end beyond where it begins")
