@@ -10,7 +10,21 @@ import numbers
 import types
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from .units import from_unit, is_quantity
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class ParameterError(ValueError):
@@ -39,6 +53,23 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def quantity(field: str, text: str, unit: str = "") -> float | None:
+    """The number of a text like "5 cm", in the unit of a field; None if it is no such text.
+
+    Args:
+        field: name for the error.
+        text: number and unit.
+        unit: unit of the field, "" for none.
+
+    Raises:
+        ParameterError: the unit is unknown, or of another kind than the field's.
+    """
+    try:
+        return from_unit(text, unit)
+    except ValueError as error:
+        raise ParameterError(field, text, str(error)) from None
+
+
 def number(
     field: str,
     value: object,
@@ -52,20 +83,21 @@ def number(
 
     Args:
         field: name for the error.
-        value: the number to check [unit].
+        value: the number to check [unit], or a text with a unit of that kind, as in "5 cm".
         low: smallest value.
         high: largest value.
         above: whether low itself is refused.
-        unit: unit for the error.
+        unit: unit of the number.
 
     Raises:
-        ParameterError: wrong type, NaN, infinite, or out of bounds.
+        ParameterError: wrong type or unit, NaN, infinite, or out of bounds.
     """
     if type(value) is float and _is_within(value, low, high, above):
         return value
-    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+    given = quantity(field, value, unit) if isinstance(value, str) else value
+    if not isinstance(given, bool) and isinstance(given, numbers.Real):
         try:
-            x = float(value)
+            x = float(given)
         except (OverflowError, ValueError):
             x = math.nan
         if _is_within(x, low, high, above):
@@ -141,7 +173,7 @@ def numbers_of(
         low: smallest value.
         high: largest value.
         above: whether low itself is refused.
-        unit: unit for the error.
+        unit: unit of the numbers.
 
     Raises:
         ParameterError: another count of numbers, or one of them was refused.
@@ -182,7 +214,7 @@ def table_of(
         low: smallest value.
         high: largest value.
         above: whether low itself is refused.
-        unit: unit for the error.
+        unit: unit of the numbers.
 
     Raises:
         ParameterError: no such table, or one of the numbers was refused.
@@ -192,7 +224,16 @@ def table_of(
     bound = "must be rows of numbers, all of one length"
     try:
         table = np.asarray(value)
-    except ValueError:
+        if table.dtype.kind == "U" and table.ndim == 2 and any(map(is_quantity, table.flat)):
+            rows: Any = value
+            given = [
+                [number(f"{field}[{i}, {j}]", x, unit=unit) for j, x in enumerate(row)]
+                for i, row in enumerate(rows)
+            ]
+            table = np.asarray(given)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
         raise ParameterError(field, value, bound) from None
     if table.size == 0 and table.dtype.kind == "f":
         return ()
@@ -202,6 +243,25 @@ def table_of(
     for i, j in np.argwhere(~good | (table == low) if above else ~good)[:1].tolist():
         number(f"{field}[{i}, {j}]", table[i, j].item(), low, high, above=above, unit=unit)
     return tuple(map(tuple, table.astype(float).tolist()))
+
+
+def array_of(field: str, value: object, bound: str = "must be numbers") -> np.ndarray:
+    """Returns value as an array of floats of its own.
+
+    Args:
+        field: name for the error.
+        value: numbers, of any shape.
+        bound: what is accepted, for the error.
+
+    Raises:
+        ParameterError: it is no such array.
+    """
+    import numpy as np
+
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(field, value, bound) from None
 
 
 def pair(
@@ -221,7 +281,7 @@ def pair(
         low: smallest value.
         high: largest value.
         above: whether low itself is refused.
-        unit: unit for the error.
+        unit: unit of the numbers.
 
     Raises:
         ParameterError: as `numbers_of`.
@@ -394,7 +454,8 @@ def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
     def check(field: str, value: Any, part: Any) -> Any:
         if value is None and nullable:
             return None
-        return (word if isinstance(value, str) else other)(field, value, part)
+        spoken = isinstance(value, str) and not is_quantity(value)
+        return (word if spoken else other)(field, value, part)
 
     return check
 

@@ -25,8 +25,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import tyro
 
-from ..errors import ParameterError, Warning, choice
+from ..errors import ParameterError, Warning, choice, quantity
 from ..files import sources_kept, versions
+from ..units import is_quantity
 from .console import ends, scenario_words
 
 COMMANDS = {  # a command is a dataclass of its options; calling it returns the exit status
@@ -151,7 +152,7 @@ def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
     Raises:
         ParameterError: there is no such command, or one of its options is wrong.
     """
-    words = ordered(words)
+    words = with_units(ordered(words))
     named = words[:1] and words[0] in COMMANDS
     tyro._experimental_options["ansi_codes"] = not os.environ.get("NO_COLOR")
     complaint = io.StringIO()
@@ -172,6 +173,56 @@ def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
     if rest:
         raise _unknown(words, rest[0])
     return command
+
+
+def with_units(words: Sequence[str]) -> list[str]:
+    """The words of a command line, those with a unit as numbers in the unit of their option.
+
+    Args:
+        words: the command line, ordered.
+
+    Raises:
+        ParameterError: a unit is unknown, or of another kind than the option's.
+    """
+    numbers = any(is_quantity(word.rpartition("=")[2]) for word in words)
+    if not numbers or words[0] not in COMMANDS:
+        return list(words)
+    kinds, told, out = options(words), _option_units(words), []
+    name, place = "", 0  # the option, and that of its values which comes next
+    for word in words:
+        head, equals, value = "", "", word
+        if _is_option(word):
+            head, equals, value = word.partition("=")
+            name, place = _plain(head), 0
+        if is_quantity(value) and float in _members(kinds.get(name)):
+            own = told.get(name, "").split(", ")
+            number = quantity(f"--{name}", value, own[min(place, len(own) - 1)])
+            word = f"{head}{equals}{number!r}"
+        place += not head or bool(equals)
+        out.append(word)
+    return out
+
+
+def _option_units(words: Sequence[str]) -> dict[str, str]:
+    """Units of options, by name: those of an experiment, and those in brackets in their help."""
+    from ..model.experiments import EXPERIMENTS, parameters
+    from ..model.fields import field_descriptions
+
+    kind = load_command(words[0])
+    nested = filter(dataclasses.is_dataclass, _hints(kind).values())
+    out: dict[str, str] = {}
+    for part in (*nested, kind):
+        for name, about in field_descriptions(part).items():
+            found = re.search(r"\[([^]]*)\]", about)
+            out[name] = found[1] if found else ""
+    if len(words) > 1 and words[1] in EXPERIMENTS:
+        out |= {name: p.unit for name, p in parameters(EXPERIMENTS[words[1]]).items()}
+    return {_plain(name): unit for name, unit in out.items()}
+
+
+def _members(kind: Any) -> set[Any]:
+    """Types that a type is made of."""
+    return {kind}.union(*map(_members, get_args(kind)))
 
 
 def sources(words: Sequence[str]) -> list[Path]:
@@ -365,6 +416,8 @@ def _refusal(words: Sequence[str], complaint: str) -> ParameterError:
 
 
 def _is_option(word: str) -> bool:
+    if is_quantity(word):  # as -5cm
+        return False
     try:
         float(word)
     except ValueError:

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import L1, L2, S
 
@@ -24,6 +25,7 @@ Columns = tuple[float, float, float, float]
 Links = tuple[float, float, float, float, float]
 
 
+@named
 @dataclass(frozen=True)
 class Arm:
     """A two-link arm in a horizontal plane, link 2 balanced about the elbow; the paper's.

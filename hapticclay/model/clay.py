@@ -10,7 +10,9 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
+from ..units import is_quantity
 from .constants import AXES, B_MAX
 from .flow import Consistency, Flow, FlowIndex, YieldForce
 from .groove import Groove
@@ -150,11 +152,12 @@ def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"
     return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
 
 
+@checked
 def slab(resists: float | Flow, start: float | None = None, end: float | None = None) -> Clay:
     """A slab across the x axis that resists motion along both axes alike (Sec. 4.1).
 
     Args:
-        resists: damping [N.s/m], or a flow, whose force is then opposite to the motion.
+        resists: damping [N.s/m], 0 to 1e9, or a flow, whose force is then opposite to the motion.
         start: lower border on x [m]; None for clay without borders.
         end: upper border on x [m], given with start.
 
@@ -166,10 +169,14 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
     """
     if (start is None) != (end is None):
         raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
-    if isinstance(resists, str):
+    if isinstance(resists, str) and not is_quantity(resists):
         bound = f"must be a damping, or a flow as hc.material({resists!r}) returns"
         raise ParameterError("resists", resists, bound)
-    flow = resists if isinstance(resists, Flow) else Flow(b=number("b", resists, 0.0, B_MAX))
+    flow = (
+        resists
+        if isinstance(resists, Flow)
+        else Flow(b=number("b", resists, 0.0, B_MAX, unit="N.s/m"))
+    )
     edges = () if start is None or end is None else (start, end)
 
     def of(x: float, outside: float = 0.0) -> tuple[float, ...]:
@@ -343,6 +350,7 @@ class CellLaw:
         return self.damping[i : k + 1, j : m + 1].ravel().tolist()
 
 
+@named
 @dataclass(frozen=True)
 class Profile(CellLaw):
     """Damping b of one axis as a piecewise constant function of one coordinate.
@@ -418,6 +426,7 @@ class Profile(CellLaw):
         return np.array([values]).T if self.along == "x" else np.array([values])
 
 
+@named
 @dataclass(frozen=True)
 class Grid(CellLaw):
     """Damping b of one axis on a grid of cells, constant in each.
@@ -550,6 +559,7 @@ class Grid(CellLaw):
         return cls(along_x, along_y, _framed(inner, outside))
 
 
+@named
 @dataclass(frozen=True)
 class Smooth(CellLaw):
     """Damping b of one axis that changes smoothly with the place, by a cubic B-spline.
@@ -783,6 +793,7 @@ def _yield_alike(x: Profile | Grid | Smooth, y: Profile | Grid | Smooth) -> bool
     return x.borders == y.borders and all(map(np.array_equal, x.flows, y.flows))
 
 
+@named
 @dataclass(frozen=True)
 class Clay:
     """Clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1), or clay that

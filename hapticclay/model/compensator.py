@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from .constants import C_DEN, C_NUM
 
@@ -24,6 +25,7 @@ CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
 TERMS = 16  # of a series for exp(x) at |x| <= 1/2: the next is below 1e-19
 
 
+@named
 @dataclass(frozen=True)
 class Compensator:
     """Shape of the compensator: C = K num(s)/den(s), proper, of order 4 at most.

@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from ..arguments import named
 from ..errors import Bound, check_fields
 
 AXES = ("x", "y")
 
 
+@named
 @dataclass(frozen=True)
 class SecondOrder:
     """The transfer function gain / (s^2 + damping s + stiffness), stable.

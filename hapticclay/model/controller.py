@@ -17,12 +17,14 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import check_fields
 from . import arm
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
 
 
+@named
 @dataclass(frozen=True)
 class Servo:
     """The servo of one axis: what it makes of the commanded displacement and of the hand's force.

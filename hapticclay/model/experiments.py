@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
+from ..arguments import known_names, named
 from ..errors import Bound, ParameterError, check_fields, field_types, flag
 from .clay import Clay, Profile, slab
 from .constants import (
@@ -82,6 +83,7 @@ Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg", above=True)]
 Damping = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
 
 
+@named
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
     """Parameters that all experiments share.
@@ -171,6 +173,7 @@ class PathExperiment(Experiment):
     integrator: Integrator = "fast"
 
 
+@named
 @dataclass(frozen=True)
 class ConstantCut(PathExperiment):
     """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
@@ -210,6 +213,7 @@ class ConstantCut(PathExperiment):
         return material(self.material)
 
 
+@named
 @dataclass(frozen=True)
 class VariableCut(PathExperiment):
     """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at once.
@@ -251,6 +255,7 @@ class VariableCut(PathExperiment):
         return self.build_scenario("variable", clay=Clay(x, y), gain=gain)
 
 
+@named
 @dataclass(frozen=True)
 class StabilityTest(Experiment):
     """The stability test (Sec. 4.3, Fig. 11): an arbitrary maneuver through clay.
@@ -294,6 +299,7 @@ class StabilityTest(Experiment):
         )
 
 
+@named
 @dataclass(frozen=True)
 class Free(PathExperiment):
     """The path of the constant cut without clay: the steady speed is K f/10.
@@ -461,11 +467,14 @@ def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
     """
     assert isinstance(kind, type)
 
+    signature, told = inspect.signature(kind), field_descriptions(kind)
+    name = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
+
     def make(*args: P.args, **parameters: P.kwargs) -> Scenario:
+        known_names(name, parameters, signature.parameters)
         return kind(*args, **parameters).scenario()
 
-    signature, told = inspect.signature(kind), field_descriptions(kind)
-    make.__name__ = make.__qualname__ = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
+    make.__name__ = make.__qualname__ = name
     make.__signature__ = signature.replace(return_annotation=Scenario)  # type: ignore[attr-defined]
     summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
     about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)

@@ -25,10 +25,10 @@ from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origi
 
 import numpy as np
 
-from ..errors import Bound, ParameterError, choice, field_types
+from ..arguments import checked
+from ..errors import Bound, ParameterError, choice, field_types, quantity
 from .constants import AXES, each_axis
 from .hardware import JOINTS
-from .units import from_unit
 
 T = TypeVar("T")
 KIND = "kind"  # key of the class, where a field takes several
@@ -39,6 +39,7 @@ HAND = ["mass", "damper", "spring"]  # what a hand is added by
 ENTIRE = None  # key of the value of a whole field, beside those of its entries
 
 
+@checked
 def with_fields(part: T, changes: Mapping[str, Any]) -> T:
     """A part with some fields changed, all at once.
 
@@ -53,8 +54,11 @@ def with_fields(part: T, changes: Mapping[str, Any]) -> T:
         its mass, damper and spring.
 
     Raises:
-        ParameterError: there is no such field, a value was refused, or a hand is added in part.
+        ParameterError: part is none, there is no such field, a value was refused, or a hand is
+            added in part.
     """
+    if not dataclasses.is_dataclass(part) or isinstance(part, type):
+        raise ParameterError("part", part, "must be a part, as a Scenario")
     data, values = nested(changes), values_of(part)
     check_added_hand(values.get("operator"), data)
     return make_part(type(part), data, values)
@@ -273,7 +277,7 @@ def _taken_one(kinds: Sequence[Any], bound: Bound, value: Any, path: str) -> Any
         words = [w for k in kinds if get_origin(k) is Literal for w in get_args(k)]
         if value in words or not {float, int} & set(kinds):
             return value
-        number = from_unit(path, value, bound.unit)
+        number = quantity(path, value, bound.unit)
         return value if number is None else number
     if isinstance(value, float):  # sweeps and words give floats alone
         if bool in kinds and value in (0.0, 1.0):

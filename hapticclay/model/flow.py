@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
 
@@ -24,6 +25,7 @@ Consistency = Bound(0.0, CONSISTENCY_MAX, "N/(m/s)^n")
 FlowIndex = Bound(N_MIN, N_MAX)
 
 
+@named
 @dataclass(frozen=True)
 class Flow:
     """How clay resists a tool that moves through it at v: f = (Fy + K |v|^n) v/|v| + b v.

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from .constants import AXES, B_MAX
 from .flow import FY_MAX
@@ -167,6 +168,7 @@ def resistance(rim, x, y):
     return force, area
 
 
+@named
 @dataclass(frozen=True)
 class Groove:
     """A block of clay that stays cut: a tool at the handle removes what stands in its way.

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from . import flow
 
@@ -15,6 +16,7 @@ STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
 
 
+@named
 @dataclass(frozen=True)
 class Coupling:
     """A virtual coupling: spring and damper between the handle and a massless tool in the clay.
@@ -33,6 +35,7 @@ class Coupling:
         check_fields(self, "coupling.")
 
 
+@named
 @dataclass(frozen=True)
 class Interface:
     """The hardware between computer and arm, part by part; ideal by default.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice
 from .constants import B_CONSTANT, B_MAX
 from .flow import Flow, FlowIndex
@@ -84,6 +85,7 @@ def _speed(rpm: float) -> float:
     return rpm * math.tau / 60.0  # [rad/s]
 
 
+@named
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """What a clay withstands: the shear stress strength + K rate^n, or plain damping.
@@ -171,6 +173,7 @@ MATERIALS = {
 }
 
 
+@checked
 def material(name: str, tool: Tool = SMALL_TOOL) -> Flow:
     """Flow of a tool in a material: its yield force, consistency, flow index and damping.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
 
@@ -63,6 +64,7 @@ def mobility_with(trace, mass):
     return trace / (1.0 + mass * trace)
 
 
+@named
 @dataclass(frozen=True)
 class Operator:
     """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).

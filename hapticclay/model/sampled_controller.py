@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
+from ..arguments import named
 from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
 from .fields import function_name
@@ -24,6 +25,7 @@ Law = Callable[
 ]
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Controller:
     """A controller that takes the place of compensator and servo in a sampled loop.

@@ -13,7 +13,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..errors import ParameterError, choice
+from ..arguments import named
+from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
 
@@ -22,6 +23,7 @@ Outside = Literal["hold", "zero"]
 CSV_COLUMNS = ("t", "fx", "fy")
 
 
+@named
 @dataclass(frozen=True)
 class Samples(Signal):
     """Samples (t, values), in between straight lines or held.
@@ -39,7 +41,7 @@ class Samples(Signal):
     outside: Outside = "hold"
 
     def __post_init__(self):
-        t, values = (_array(f"samples.{x}", getattr(self, x)) for x in ("t", "values"))
+        t, values = (array_of(f"samples.{x}", getattr(self, x)) for x in ("t", "values"))
         if t.ndim != 1 or not len(t):
             raise ParameterError("samples.t", self.t, "must be a sequence of times")
         if values.shape != (len(t), 2):
@@ -135,13 +137,6 @@ class Samples(Signal):
         return self._rows[max(first - 1, 0) : max(last, 1)]
 
 
-def _array(field: str, given: Any) -> np.ndarray:
-    try:
-        return np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(field, given, "must be numbers") from None
-
-
 def _csv_number(text: str, column: str, line: int, path: Any) -> float:
     """The number in a cell of a file."""
     try:
@@ -154,6 +149,7 @@ def _csv_number(text: str, column: str, line: int, path: Any) -> float:
     return x
 
 
+@named
 @dataclass(frozen=True)
 class Function(Signal):
     """Any function of time; it must be smooth, or a run loses order where it is not.

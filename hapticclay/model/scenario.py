@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
+from ..arguments import named
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, check_fields, number
+from ..errors import Bound, ParameterError, check_fields, number, quantity
 from . import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from .arm import PAPER, Arm
 from .clay import Clay, Smooth
@@ -42,6 +43,7 @@ Render = Literal["held", "implicit"]
 RENDERS = get_args(Render)
 
 
+@named
 @dataclass(frozen=True)
 class Scenario:
     """One run, complete: simulate(scenario) needs nothing else.
@@ -341,8 +343,9 @@ def choose_step(part: Any) -> None:
     Args:
         part: a scenario, or an experiment, before its fields are checked.
     """
-    Ts = part.Ts
-    given = part.control == "sampled" and isinstance(Ts, float | int) and STEP_LEAST <= Ts <= 1.0
+    Ts = quantity("Ts", part.Ts, "s") if isinstance(part.Ts, str) else part.Ts
+    sampled = isinstance(part.control, str) and part.control == "sampled"
+    given = sampled and isinstance(Ts, float | int) and STEP_LEAST <= Ts <= 1.0
     if given and part.dt is TS:
         object.__setattr__(part, "dt", Ts / math.ceil(Ts / TS - WHOLE))
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, check_fields, number
 from . import pieces
 from .signals import Signal
@@ -17,6 +18,7 @@ Moment = Annotated[float, Bound(0.0, 1e5, "s")]
 BEFORE = 1.0  # [s] by which the piece before the first break begins early; any number would do
 
 
+@named
 @dataclass(frozen=True)
 class Constant(Signal):
     """The same at all times.
@@ -46,6 +48,7 @@ class Constant(Signal):
         return pieces.straight_pieces([0.0], [self.value])
 
 
+@named
 @dataclass(frozen=True)
 class Step(Signal):
     """Zero, then constant.
@@ -72,6 +75,7 @@ class Step(Signal):
         return pieces.straight_pieces([self.time - BEFORE, self.time], [(0.0, 0.0), self.value])
 
 
+@named
 @dataclass(frozen=True)
 class Ramp(Signal):
     """Zero, then growing evenly, then constant.
@@ -106,6 +110,7 @@ class Ramp(Signal):
         )
 
 
+@named
 @dataclass(frozen=True)
 class Pulse(Signal):
     """A rectangular pulse, or a train of them.
@@ -167,6 +172,7 @@ class Pulse(Signal):
         return share[:, None] * np.array(self.value)
 
 
+@named
 @dataclass(frozen=True)
 class Chirp(Signal):
     """A sine whose frequency goes from low to high; zero before and after.

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, integer, numbers_of
 from . import pieces
 
@@ -140,6 +141,7 @@ class Signal(ABC):
     __rmul__ = __mul__
 
 
+@named
 @dataclass(frozen=True)
 class Sum(Signal):
     """Signals added up: `a + b - 2 * c`.
@@ -225,6 +227,7 @@ def _scaled_parts(part: Signal, factor: float) -> list[tuple[Signal, float]]:
     return [(part, factor)]
 
 
+@named
 @dataclass(frozen=True)
 class Multisine(Signal):
     """A periodic signal: cosines of random phases at multiples of 1/period between low and high.

@@ -6,12 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
 
 
+@named
 @dataclass(frozen=True)
 class Spring:
     """How clay springs back along one axis, beside its damping.

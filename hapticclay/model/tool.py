@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from ..arguments import named
 from ..errors import Bound, check_fields
 
 WIDTH_MIN = 4e-3  # [m] two of the largest cells of a picture's map (studies/removal.py)
 
 
+@named
 @dataclass(frozen=True)
 class Tool:
     """The cutter at the handle.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from .arm import Arm
 from .constants import B_MAX
@@ -27,6 +28,7 @@ SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far be
 MASS_MAX = 1e6  # [kg]
 
 
+@named
 @dataclass(frozen=True)
 class Device:
     """A bare device of one axis: a mass behind a physical damper and Coulomb friction.
@@ -47,6 +49,7 @@ class Device:
         check_fields(self, "device.")
 
 
+@named
 @dataclass(frozen=True)
 class VirtualWall:
     """A virtual spring, damper and mass, rendered by the motor of a bare device every Ts.

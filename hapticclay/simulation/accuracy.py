@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError, number
 from ..model.scenario import Scenario
 from ..stepping.run import Crossing
@@ -62,6 +63,7 @@ METHODS = {
 }
 
 
+@named
 @dataclass(frozen=True)
 class Accuracy:
     """How far a run is from the exact solution, and how far it was allowed to be.

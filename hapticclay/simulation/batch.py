@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
 from ..model.plausible import warn_of
@@ -62,6 +63,7 @@ SUMMARY = np.dtype(
 WARNED = 1000  # kinds of scene of a batch that are looked at for values that are hardly meant
 
 
+@checked
 def simulate_batch(
     scenarios: Iterable[Scenario],
     *,

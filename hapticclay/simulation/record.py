@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
@@ -62,6 +63,7 @@ STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ..
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Record:
     """Arrays of one run, all over the same n samples; axes ordered (x, y).
@@ -560,6 +562,7 @@ def _mean_and_std(x: np.ndarray) -> dict[str, float] | None:
     return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
 
 
+@checked
 def port_energy(record: Record) -> np.ndarray:
     """Energy that the hand has put into the handle along each axis.
 
@@ -577,6 +580,7 @@ def port_energy(record: Record) -> np.ndarray:
     return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
 
 
+@checked
 def observed_passivity(record: Record) -> Verdict:
     """Whether a recorded run took more energy from the hand than it returned, at every instant.
 
@@ -615,6 +619,7 @@ def observed_passivity(record: Record) -> Verdict:
     )
 
 
+@checked
 def irregularity(record: Record, axis: str = "x") -> float:
     """Share of the rms of the operator's force above the band of the maneuver.
 

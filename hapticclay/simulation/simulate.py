@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..model.plausible import warn_of
 from ..model.scenario import Scenario
@@ -26,6 +27,7 @@ SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
 
 
+@checked
 def simulate(
     scenario: Scenario,
     *,
@@ -59,8 +61,6 @@ def simulate(
         LawFailed: the law of its controller raised an exception. What is no error, as Ctrl-C, is
             raised as it is.
     """
-    if not isinstance(scenario, Scenario):
-        raise ParameterError("scenario", scenario, "must be a Scenario, as constant_cut() returns")
     every = integer("every", every, 1, 1_000_000)
     warn_of(scenario)
     if error is not None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError, numbers_of, pair
 from ..model.hardware import JOINTS
 from ..model.plausible import warn_of
@@ -49,6 +50,7 @@ class Sample(NamedTuple):
     delta: np.ndarray
 
 
+@checked
 class Simulation:
     """A run that makes a step when it is told to, to the same numbers as `simulate`.
 

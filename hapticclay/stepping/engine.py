@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked
 from ..model.arm import PAPER, Arm
 from ..model.scenario import Scenario
 
@@ -54,6 +55,7 @@ def warnings_caught() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
+@checked
 def build(scenario: Scenario) -> mujoco.MjModel:
     """The model that simulate(scenario) steps.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import named
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.scenario import Scenario
@@ -405,6 +406,7 @@ def is_quiet(rows, n, limit1, limit2, swings, seen):
     return True
 
 
+@named
 @dataclass(frozen=True)
 class Outcome:
     """How a run ended.

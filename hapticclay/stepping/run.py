@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError
 from ..model import arm, compensator, regions
 from ..model.compensator import Compensator
@@ -37,6 +38,7 @@ CROSSINGS_ROOM = 64  # crossings between two looks
 SPRING_STEPS = 10_000  # parts of a step that springs may need; at most a second or two each
 
 
+@named
 @dataclass(frozen=True)
 class Crossing:
     """The handle crossed a border.

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError, check_fields, choice
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
@@ -15,6 +16,7 @@ LAWS = get_args(LawName)
 SIDES = ("mean", "standard deviation", "low", "high")
 
 
+@named
 @dataclass(frozen=True)
 class Distribution:
     """LawName of a random number. Both numbers have the unit of the parameter.

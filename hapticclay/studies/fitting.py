@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, number, numbers_of
 from ..files import versions
 from ..model.constants import AXES
@@ -103,6 +104,7 @@ class FittedLaw:
     weight: float
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A law of resistance fitted to a motion.
@@ -232,6 +234,7 @@ class _Sliding(NamedTuple):
     position_correlation: float
 
 
+@checked
 def fit_flow(
     data: Measurement | Record | str | os.PathLike[str],
     axis: str | None = None,

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 from ..files import versions
 from ..model import arm
@@ -52,6 +53,7 @@ SMOOTHED_LINES = 5  # lines over which the scatter of the response is averaged
 CONFIDENCE = 0.95
 
 
+@named
 @dataclass(frozen=True)
 class Noise:
     """Noise of the sensors. The paper prints no figure; these are ours.
@@ -113,6 +115,7 @@ class Estimate(NamedTuple):
     errors: np.ndarray | None
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Identified:
     """A frequency response and the coefficients fitted to it.
@@ -244,6 +247,7 @@ def measured(
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
 
+@checked
 def identify(  # noqa: PLR0913  # the settings of one experiment, each by its name
     axis: str = "x",
     what: str = "G",
@@ -317,7 +321,7 @@ def identify(  # noqa: PLR0913  # the settings of one experiment, each by its na
     gain = S[i].gain if shaping or what != "S" else endpoint_mobility(*base.origin)[i]
     rms = size * S[i].stiffness / gain if what == "S" else size
     along = (rms, 0.0) if i == 0 else (0.0, rms)
-    band = band or IDENTIFICATION_BAND[what]
+    band = IDENTIFICATION_BAND[what] if band is None else band
     wave = _multisine(along, band, n * base.dt, lines, 0.1 / base.dt)
     base = replace(base, t_max=(1 + periods) * wave.period)
     seeds = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1)

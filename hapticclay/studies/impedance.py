@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, number
 from ..files import versions
 from ..model.constants import AXES
@@ -42,6 +43,7 @@ LINEAR_MOTION = "must leave the motion linear: "
 Subject = PushedLoop | VirtualWall
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class MeasuredImpedance:
     """An impedance measured on a run, beside the computed one at the same lines.
@@ -163,6 +165,7 @@ def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> P
     )
 
 
+@checked
 def measure_impedance(
     subject: Subject,
     *,

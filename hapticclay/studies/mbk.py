@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError, integer, numbers_of
+from ..arguments import checked
+from ..errors import integer, numbers_of
 from ..files import versions
 from ..model.virtual_wall import VirtualWall
 from ..theory.margins import Box
@@ -162,6 +163,7 @@ class ArmMBK:
         }
 
 
+@checked
 def device_mbk(
     wall: VirtualWall,
     *,
@@ -183,8 +185,6 @@ def device_mbk(
     Raises:
         ParameterError: a value is out of its bounds, or nothing in a plane is stable.
     """
-    if not isinstance(wall, VirtualWall):
-        raise ParameterError("wall", wall, "must be a VirtualWall")
     columns = integer("columns", columns, 0, 100)
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
@@ -231,6 +231,7 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
     return out
 
 
+@checked
 def arm_mbk(
     loop: PushedLoop,
     box: Box = HANDS,

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError, choice, flag, numbers_of
+from ..arguments import checked, named
+from ..errors import ParameterError, array_of, choice, flag, numbers_of
 from ..model.constants import AXES
 from .identification import (
     BLOCK_KINDS,
@@ -52,6 +53,7 @@ NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """Columns measured on an arm, evenly sampled; SI units.
@@ -123,10 +125,7 @@ class Measurement:
 
 def _column(name: str, value: Any, t: Any) -> np.ndarray:
     """A column as an array of floats, as long as t."""
-    try:
-        x = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(name, value, "must be an array of numbers") from None
+    x = array_of(name, value, "must be an array of numbers")
     if x.ndim != 1 or len(x) < LEAST_ROWS:
         bound = f"must be one column of {LEAST_ROWS} samples or more"
         raise ParameterError(name, f"shape {x.shape}", bound)
@@ -212,6 +211,7 @@ def _is_number(cell: str) -> bool:
         return False
 
 
+@checked
 def identify_data(
     data: Measurement,
     what: str = "G",
@@ -242,8 +242,6 @@ def identify_data(
         ParameterError: the record is too short for the band, the input has no power in it, the
             output does not follow, or no such block fits.
     """
-    if not isinstance(data, Measurement):
-        raise ParameterError("data", data, "must be a Measurement")
     choice("what", what, BLOCK_KINDS)
     choice("axis", axis, AXES)
     if flag("held", held) and what == "Th":

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, number
 from ..files import versions
 from ..model.constants import AXES
@@ -51,6 +52,7 @@ LEVEL = 0.95  # of a confidence interval
 CURVE_POINTS = 61  # of a boundary
 
 
+@checked
 @dataclass(frozen=True)
 class Trials:
     """Random runs of a loop, or of a virtual wall: what is fixed, what varies, and how.
@@ -85,8 +87,6 @@ class Trials:
     chunk: int = 1000
 
     def __post_init__(self):
-        if not isinstance(self.base, PushedLoop | VirtualWall):
-            raise ParameterError("base", self.base, "must be a PushedLoop or a VirtualWall")
         for name, law in self.vary.items():
             if not isinstance(law, Distribution):
                 raise ParameterError(name, law, "must be a Distribution")
@@ -102,7 +102,8 @@ class Trials:
         if not self.vary and self.hands is None:
             raise ParameterError("vary", self.vary, "must hold a distribution, or give hands")
         if self.push is not None:
-            number("push", self.push, 1e-9, 1.0, unit="m/s")
+            push = number("push", self.push, 1e-9, 1.0, unit="m/s")
+            object.__setattr__(self, "push", push)
         integer("seed", self.seed, 0, 2**32 - 1)
         integer("chunk", self.chunk, 1, 100_000)
         integer("runs", self.runs, 1, MOST_RUNS)
@@ -432,6 +433,7 @@ class RiskMap:
         return clopper_pearson(self.events, self.runs, level)
 
 
+@named
 @dataclass(frozen=True)
 class Instability:
     """Runs that were judged.
@@ -618,6 +620,7 @@ def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: in
     return Cost(left, each * left, size, shutil.disk_usage(out).free)
 
 
+@checked
 def monte_carlo(
     trials: Trials,
     *,
@@ -642,8 +645,6 @@ def monte_carlo(
     Raises:
         ParameterError: the folder has no room for the runs, holds others, or cannot be written.
     """
-    if not isinstance(trials, Trials):
-        raise ParameterError("trials", trials, "must be Trials")
     workers, show = integer("workers", workers, 1, 1024), progress or (lambda n: None)
     if out is None:
         if announce:
@@ -669,6 +670,7 @@ def monte_carlo(
     return stored_runs(trials, folder)
 
 
+@checked
 def stored_runs(trials: Trials, out: Path | str) -> Instability:
     """The runs that a folder holds, all or those that an interruption left.
 
@@ -679,8 +681,10 @@ def stored_runs(trials: Trials, out: Path | str) -> Instability:
     Raises:
         ParameterError: it holds none, or others.
     """
-    found = json.loads((Path(out) / "sweep.json").read_text()).get("digest")
-    if found != trials.digest():
+    digest = sweep.stored_digest(Path(out))
+    if digest is None:
+        raise ParameterError("out", str(out), "holds no runs")
+    if digest != trials.digest():
         raise ParameterError("out", str(out), "holds the runs of other trials")
     table = sweep.read_sweep(out)
     columns = {n: table[n].to_numpy() for n in (*trials.names, "unstable", "longer")}

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
 from ..model.operator import Operator
 from ..model.virtual_wall import VirtualWall
@@ -25,6 +26,7 @@ PAIRS = tuple(itertools.combinations(HAND, 2))
 MOST_HANDS = 100_000
 
 
+@named
 @dataclass(frozen=True)
 class Hands:
     """A population of hands: what is known of the mass, damper and spring of Th.
@@ -201,6 +203,7 @@ def open_uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray
 # ---- bands -----------------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True)
 class Band:
     """A limit over a parameter, as a band over a population of hands.
@@ -252,6 +255,7 @@ class Band:
         return {"band": rows, "hands": hands}
 
 
+@named
 @dataclass(frozen=True)
 class Draw:
     """How many hands a band is made of.
@@ -268,6 +272,7 @@ class Draw:
         check_fields(self, "draw.")
 
 
+@checked
 def gain_band(
     loop: Loop,
     hands: str | Hands,
@@ -289,8 +294,6 @@ def gain_band(
     Raises:
         ParameterError: no such population, or b out of its bounds.
     """
-    if not isinstance(loop, Loop):
-        raise ParameterError("loop", loop, "must be a Loop")
     parts = Loop(**{f: getattr(loop, f) for f in Loop.__dataclass_fields__})
     return _limit_band(
         ("clay b [N.s/m]", "gain limit K"),
@@ -302,6 +305,7 @@ def gain_band(
     )
 
 
+@checked
 def wall_band(
     wall: VirtualWall,
     hands: str | Hands,
@@ -323,8 +327,6 @@ def wall_band(
     Raises:
         ParameterError: no such population, or B out of its bounds.
     """
-    if not isinstance(wall, VirtualWall):
-        raise ParameterError("wall", wall, "must be a VirtualWall")
     return _limit_band(
         ("virtual damping B [N.s/m]", "largest stable K [N/m]"),
         lambda x, hand: wall_limits.stiffness_band(replace(wall, B=x, operator=hand))[1],
@@ -343,9 +345,10 @@ def _limit_band(
     draw: Draw,
     progress: Progress,
 ) -> Band:
-    values = [float(v) for v in x]
+    field = names[0].split()[-2]
+    values = [number(field, v, unit="N.s/m") for v in x]
     if not values:
-        raise ParameterError(names[0], x, "must hold a value")
+        raise ParameterError(field, x, "must hold a value")
     drawn, middle = hands.sample(draw.hands, draw.seed), hands.median
     rows, nominal = [], []
     for v in progress(values):

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError, number
 from ..model.clay import Clay, extent
 from ..model.scenario import Scenario
@@ -182,6 +183,7 @@ class Removal:
         return np.where(self.clay > 0.5, thickness - self.tool.depth * self.cut, 0.0)
 
 
+@checked
 def removed(
     record: Record, width: float = TOOL.width, depth: float = TOOL.depth, cell: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:

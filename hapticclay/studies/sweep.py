@@ -22,6 +22,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError
 from ..files import atomic
 from ..model.constants import AXES
@@ -276,6 +277,21 @@ def missing_parts(sweep: Plan, out: Path) -> list[int]:
     return [n for n in range(sweep.chunks) if not sweep_part(out, n).is_file()]
 
 
+def stored_digest(out: Path) -> str | None:
+    """What tells the sweep of a folder from others; None if it holds none.
+
+    Args:
+        out: the folder.
+    """
+    file = out / "sweep.json"
+    if not file.is_file():
+        return None
+    try:
+        return str(json.loads(file.read_text())["digest"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return "unreadable"
+
+
 def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     """Prepares the folder, or checks that it holds this same sweep; returns the chunks to run.
 
@@ -289,12 +305,8 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     Raises:
         ParameterError: the folder holds another sweep, or a file that is no part of any.
     """
-    file = out / "sweep.json"
-    if file.is_file():
-        try:
-            digest = json.loads(file.read_text())["digest"]
-        except (OSError, ValueError, KeyError, TypeError):
-            digest = "unreadable"
+    file, digest = out / "sweep.json", stored_digest(out)
+    if digest is not None:
         if digest != sweep.digest():
             raise ParameterError(
                 "out", str(out), "holds another sweep, or another release's: choose another folder"
@@ -610,6 +622,7 @@ def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
     return each + (sizes[1] - each) / min(sweep.chunk, len(sweep))
 
 
+@checked
 def read_sweep(out: str | os.PathLike[str]):
     """The data set of a sweep, all its chunks, as a pyarrow Table in the order of the runs.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import integer, number
 from ..model.constants import AXES, L1, L2
 from .identification import (
@@ -26,6 +27,7 @@ DRIFT_SETTINGS: dict[str, Any] = dict(
 )
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Drift:
     """Coefficients fitted over the workspace.
@@ -116,6 +118,7 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return x[inside], y[inside]
 
 
+@checked
 def drift_map(
     spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None
 ) -> Drift:

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model.constants import AXES, TS
 from ..model.fields import with_fields
@@ -82,6 +83,7 @@ Search = Generator[float, Any, float]
 Share = Callable[[float], None]
 
 
+@named
 @dataclass(frozen=True)
 class Press:
     """The push by which a wall is tried whose loop is not linear, and what counts as rest.
@@ -214,6 +216,7 @@ class ZRegion:
         return out
 
 
+@named
 @dataclass(frozen=True)
 class ZWidth:
     """Regions of stable walls: one, or a family.
@@ -270,6 +273,7 @@ class ZWidth:
         return {"runs": runs, "lines": lines, "regions": regions}
 
 
+@checked
 def zwidth(
     wall: Wall,
     vary: str = "",
@@ -305,8 +309,6 @@ def zwidth(
         ParameterError: wall is none, an unknown name, a value out of its bounds, no values, or an
             arm in continuous time.
     """
-    if not isinstance(wall, VirtualWall | boundary.PushedLoop):
-        raise ParameterError("wall", wall, "must be a VirtualWall, or a PushedLoop of the arm")
     if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
         raise ParameterError("Ts", None, "must be given: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):
@@ -332,7 +334,7 @@ def _dampings(B: Iterable[float]) -> tuple[float, ...]:
 
 def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[str, Wall]]:
     """Names and walls of the regions."""
-    if not vary:
+    if isinstance(vary, str) and not vary:
         if values:
             raise ParameterError("values", values, "must be given with the name that they vary")
         return [("", wall)]

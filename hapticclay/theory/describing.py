@@ -16,7 +16,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import ParameterError
+from ..arguments import checked, named
+from ..errors import ParameterError, array_of
 from ..model.flow import Flow
 from . import linear_loop, roots
 from .linear_loop import Loop, of_loop
@@ -32,6 +33,7 @@ Kind = Literal["limit cycle", "threshold", "unstable"]
 PushOutcome = Literal["sticks", "comes to rest", "limit cycle", "grows"]
 
 
+@checked
 def describing_function(flow: Flow, V: Any) -> Any:
     """The damper that clay is to a sinusoidal velocity: N(V) = b + 4 Fy/(pi V) + K c(n) V^(n-1).
 
@@ -48,7 +50,7 @@ def describing_function(flow: Flow, V: Any) -> Any:
     Raises:
         ParameterError: V is not positive.
     """
-    V = np.asarray(V, dtype=float)
+    V = array_of("V", V)
     if not np.all(V > 0.0):
         raise ParameterError("V", V.tolist(), "must be > 0 [m/s]")
     N = flow.b + sum(term for term, _ in _flow_terms(flow, V))
@@ -184,6 +186,7 @@ def unstable_dampings(loop: Loop) -> tuple[tuple[float, float], ...]:
 # ---- limit cycles --------------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True)
 class LimitCycle:
     """An oscillation that the clay neither lets grow nor lets decay, as predicted.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError, number, pair
 from ..model.compensator import Compensator
 from . import gain_limit, margins
@@ -73,6 +74,7 @@ def design_gain(
     return first_failure(good, np.geomspace(1e-6 * top, top, 200).tolist(), below=0.0)[0]
 
 
+@named
 @dataclass(frozen=True)
 class Design:
     """A compensator tuned to a margin; shape and gain are `Scenario.compensator` and `gain`.
@@ -102,9 +104,7 @@ def transparency_error(loop: Loop, *, band: tuple[float, float] = DESIGN_BAND) -
     """
     from scipy.integrate import simpson
 
-    low, high = pair("band", band, 0.0, above=True, unit="rad/s")
-    if high <= low:
-        raise ParameterError("band", band, "must end beyond where it begins")
+    low, high = _design_band(band)
     x = np.linspace(math.log(low), math.log(high), 401)
     error = np.abs(1.0 - margins.transparency(loop, np.exp(x))) ** 2
     return math.sqrt(float(simpson(error, x=x)) / (x[-1] - x[0]))
@@ -134,7 +134,7 @@ def compare(
     Raises:
         ParameterError: a value is out of its bounds, or a shape has no largest K.
     """
-    out = []
+    out, band = [], _design_band(band)
     for c in map(Compensator.of, compensators):
         tried = replace(loop, compensator=c)
         K = design_gain(tried, at=at, **margin)
@@ -145,3 +145,10 @@ def compare(
         error = transparency_error(replace(tried, **TIMING), band=band)
         out.append(Design(c, K, error, margins.margins(tried, at=at)))
     return sorted(out, key=lambda d: d.error)
+
+
+def _design_band(band: Any) -> tuple[float, float]:
+    low, high = pair("band", band, 0.0, above=True, unit="rad/s")
+    if high <= low:
+        raise ParameterError("band", band, "must end beyond where it begins")
+    return low, high

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import ParameterError
+from ..arguments import checked, named
+from ..errors import ParameterError, array_of
 from ..model import controller
 from ..model.operator import Operator
 from ..model.virtual_wall import VirtualWall
@@ -24,6 +25,7 @@ from .linear_loop import Loop, of_loop
 UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Impedance:
     """What a hand feels over frequency, computed or measured.
@@ -174,7 +176,7 @@ def frequencies(omega: np.ndarray) -> np.ndarray:
     Raises:
         ParameterError: one is not above 0, or not finite.
     """
-    out = np.atleast_1d(np.asarray(omega, dtype=float))
+    out = np.atleast_1d(array_of("omega", omega))
     if out.ndim != 1 or not np.all(np.isfinite(out)) or np.any(out <= 0.0):
         raise ParameterError("omega", omega, "must be numbers above 0 rad/s, shape (n,)")
     return out
@@ -244,6 +246,7 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     return v, fh, arm.hold * seen
 
 
+@checked
 def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     """What the hand at a virtual wall feels, over frequency: the fundamental, exact.
 
@@ -276,6 +279,7 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     return Impedance(omega, fh / v, -arm.hold * asked / fh, wall.K / s + wall.B + wall.M * s)
 
 
+@checked
 def wall_impedance(wall: VirtualWall, omega: np.ndarray) -> np.ndarray:
     """Force of the hand over velocity of the device with the wall, fh/v, without a hand: exact.
 

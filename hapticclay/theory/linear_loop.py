@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ..arguments import checked, known_names, named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model import controller
 from ..model.compensator import PRINTED, Compensator
@@ -34,6 +35,7 @@ TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
 FASTEST = 1e9  # [m/s] of a steady velocity
 
 
+@named
 @dataclass(frozen=True)
 class Loop:
     """The linear loop of one axis at the nominal pose: the parts of a run, for the analysis.
@@ -181,9 +183,14 @@ def of_loop(
         name = analysis.__name__
         own = [p for n, p in inspect.signature(analysis).parameters.items() if n != "loop"]
         free = tuple(n for n in order if n not in PARTS)
+        guarded, signature = checked(analysis), _signature(order, own)
+        known = {"loop", *PARTS, *signature.parameters}
+        known = known if all(p.kind is not p.VAR_KEYWORD for p in own) else None
 
         @functools.wraps(analysis)
         def ask(*args: Any, **given: Any) -> Answer:
+            if known:
+                known_names(name, given, known)
             if args and isinstance(args[0], Scenario):
                 scenario, *rest = args
                 if not rest and "axis" not in given:
@@ -215,9 +222,9 @@ def of_loop(
                 for word, value in TIMING.items():
                     if getattr(loop, word) != value:
                         raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
-            return analysis(loop, **given)
+            return guarded(loop, **given)
 
-        ask.__signature__ = _signature(order, own)  # type: ignore[attr-defined]
+        ask.__signature__ = signature  # type: ignore[attr-defined]
         return ask
 
     return decorate

@@ -14,8 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ..arguments import named
 from ..display import html_table
-from ..errors import ParameterError, choice, flag, integer, number, numbers_of
+from ..errors import (
+    ParameterError,
+    array_of,
+    choice,
+    field_types,
+    flag,
+    integer,
+    number,
+    numbers_of,
+)
 from ..model.operator import Operator
 from . import gain_limit, linear_loop, roots
 from .linear_loop import Loop, of_loop
@@ -27,6 +37,7 @@ ARC = 1e-6  # radius of the arc around one, as a share of its frequency
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
 
+@named
 @dataclass(frozen=True)
 class Verdict:
     """An answer and its distance from the other one; true if the verdict is.
@@ -65,6 +76,7 @@ class Verdict:
         return html_table(f"Verdict: {'it holds' if self.verdict else 'it fails'}", rows)
 
 
+@named
 @dataclass(frozen=True)
 class Margins:
     """Stability margins of a loop; all zero (gain: 1) for an unstable one.
@@ -100,6 +112,7 @@ NO_MARGINS = Margins(
 )
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Nyquist:
     """L along the positive frequencies, and the encirclements of its whole contour.
@@ -383,8 +396,7 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     Returns:
         Verdict whose margin is the least ratio of right to left side; for (9), the least |1 + L|.
     """
-    if equation not in (9, 10, 11, 12, 13):
-        raise ParameterError("equation", equation, "must be 9, 10, 11, 12 or 13")
+    equation = integer("equation", equation, 9, 13)
     at = "force" if equation < 12 else "compensator"
     n, d = open_loop(loop, at=at)
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
@@ -414,7 +426,7 @@ def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
         Complex, shape (n,). At omega = 0 it is K b/(10 + K b) with the printed compensator.
     """
     z, e = linear_loop.device_impedance(loop)
-    s = 1j * np.asarray(omega, dtype=float)
+    s = 1j * array_of("omega", omega)
     felt, device = loop.b * e(s), z(s)
     if loop.k:
         felt, device = (loop.b * s + loop.k) * e(s), s * device
@@ -424,6 +436,7 @@ def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
 # ---- the worst case over hands -------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True)
 class Box:
     """Ranges of Th, and whether a rigid arm is among them.
@@ -441,8 +454,10 @@ class Box:
     rigid: bool = False
 
     def __post_init__(self):
-        for field in ("mass", "damper", "spring"):
-            low, high = numbers_of(f"box.{field}", getattr(self, field), ("low", "high"), 0.0)
+        for field, (_, bound) in field_types(Operator).items():
+            unit = bound.unit if bound else ""
+            given = getattr(self, field)
+            low, high = numbers_of(f"box.{field}", given, ("low", "high"), 0.0, unit=unit)
             if high < low:
                 raise ParameterError(f"box.{field}", (low, high), "must have low <= high")
             object.__setattr__(self, field, (low, high))
@@ -466,6 +481,7 @@ class Box:
         return [Operator(*row) for row in (low + x * (high - low)).tolist()]
 
 
+@named
 @dataclass(frozen=True)
 class WorstCase:
     """The worst hand of a box.
@@ -567,8 +583,6 @@ def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
         samples: random members tried with sampling or delay, 0 to 10000.
     """
     K = number("K", loop.gain, 0.0, above=True)
-    if not isinstance(box, Box):
-        raise ParameterError("box", box, "must be a Box")
     timed = loop.Ts is not None or loop.delay > 0.0
     if timed:
         members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))

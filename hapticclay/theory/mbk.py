@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..model.virtual_wall import VirtualWall
@@ -58,6 +59,7 @@ class Region:
     high: np.ndarray
 
 
+@checked
 def stable_band(wall: VirtualWall, part: str) -> tuple[float, float]:
     """Values of one part between which the linear wall is stable, the other two being its own.
 
@@ -118,6 +120,7 @@ def _stability(
     return grid, stable
 
 
+@checked
 def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Region:
     """Where a virtual wall is stable over a plane, exact at each of n columns.
 
@@ -178,6 +181,7 @@ def rendering(loop: Loop, M: float, B: float, K: float = 0.0) -> Loop:
     return replace(loop, compensator=Compensator((1.0,), (1.0, B / M, K / M)), K=1.0 / M)
 
 
+@checked
 def least_mass(
     loop: Loop, decay: float, box: Box | None = None, samples: int = 24
 ) -> tuple[float, float]:
@@ -243,6 +247,7 @@ class DynamicRange:
         return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x)) / (x[-1] - x[0]))
 
 
+@checked
 def dynamic_range(
     wall: VirtualWall, omega: Sequence[float] | np.ndarray, share: float = 0.9
 ) -> DynamicRange:
@@ -256,7 +261,7 @@ def dynamic_range(
     Raises:
         ParameterError: a value is out of its bounds, or no wall is stable.
     """
-    omega, share = frequencies(np.asarray(omega)), number("share", share, 0.1, 0.999)
+    omega, share = frequencies(omega), number("share", share, 0.1, 0.999)
     off = replace(wall, K=0.0, B=0.0, M=0.0, surface=False)
     low, high = stable_band(off, "B")
     if not high > low:

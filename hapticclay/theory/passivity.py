@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from ..arguments import checked
 from ..errors import number
 from . import linear_loop, roots
 from .linear_loop import Loop, of_loop
@@ -88,6 +89,7 @@ def colgate_schenkel(
     )
 
 
+@checked
 def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0) -> Verdict:
     """Passivity of held clay alone, its velocity the difference of two samples.
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError
 from ..model.compensator import moving_states
 from ..model.controller import matrix_exponential
@@ -30,6 +31,7 @@ SAMPLES = 400  # of half a period at which a solution is checked
 CYCLE_TOLERANCE = 1e-9  # of the largest velocity, or of the yield force
 
 
+@named
 @dataclass(frozen=True)
 class ExactCycle:
     """A symmetric oscillation, exact for the linear loop.

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..errors import ParameterError, integer, number
+from ..arguments import checked
+from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
 from ..model.virtual_wall import Device, VirtualWall
 from . import gain_limit, linear_loop, roots
@@ -32,6 +33,7 @@ REFINED = 3  # rounds of the search within a box of hands
 # ---- the sampled loop ----------------------------------------------------------------------------
 
 
+@checked
 def stable_wall(wall: VirtualWall) -> bool:
     """Whether the linear loop of wall, device and hand is stable.
 
@@ -50,6 +52,7 @@ def stable_wall(wall: VirtualWall) -> bool:
     return _within(less)
 
 
+@checked
 def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
     """Stiffness K between which the linear wall is stable at its own B and M [N/m].
 
@@ -223,6 +226,7 @@ def _every_stiffness(wall: VirtualWall) -> gain_limit.LoopFamily:
     return gain_limit.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
 
 
+@checked
 def hand_box_limit(wall: VirtualWall, box: Box) -> float:
     """Least stable K over a box of hands at the wall [N/m].
 
@@ -238,8 +242,6 @@ def hand_box_limit(wall: VirtualWall, box: Box) -> float:
     """
     from scipy.optimize import minimize_scalar
 
-    if not isinstance(box, Box):
-        raise ParameterError("box", box, "must be a Box")
     sides = [box.mass, box.damper, box.spring]
     known: dict[tuple[float, ...], tuple[float, float]] = {}
 
@@ -274,6 +276,7 @@ def hand_box_limit(wall: VirtualWall, box: Box) -> float:
 # ---- passivity -----------------------------------------------------------------------------------
 
 
+@checked
 def colgate_schenkel_limit(wall: VirtualWall) -> float:
     """Largest K at which the wall is passive at its own B and M [N/m].
 
@@ -326,6 +329,7 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
     return high if high > max(low, 0.0) else 0.0
 
 
+@checked
 def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
     """Physical damping to spare at each frequency: the wall is passive where it is never negative.
 
@@ -415,6 +419,7 @@ def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray)
     return min(float(y[i]), float(found.fun))
 
 
+@checked
 def abbott_okamura_limit(wall: VirtualWall) -> float:
     """Largest K at which a wall behind damper, friction and encoder is passive [N/m].
 
@@ -439,6 +444,7 @@ def abbott_okamura_limit(wall: VirtualWall) -> float:
 # ---- delay ---------------------------------------------------------------------------------------
 
 
+@checked
 def hulin_limit(wall: VirtualWall) -> float:
     """Largest stable K by the linear rule (b + B)/(Ts/2 + delay) [N/m].
 
@@ -454,6 +460,7 @@ def hulin_limit(wall: VirtualWall) -> float:
     return max(0.0, (b + wall.B) / (0.5 * wall.Ts + wall.delay))
 
 
+@checked
 def jury_limit(wall: VirtualWall) -> float:
     """Largest stable K of the held wall with delay 0 or Ts, in closed form [N/m].
 
@@ -507,6 +514,7 @@ def jury_limit(wall: VirtualWall) -> float:
     return 0.0
 
 
+@checked
 def hulin_boundary(
     mass: float, damper: float, Ts: float, samples: float = 0.0, n: int = 401
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -530,7 +538,8 @@ def hulin_boundary(
     from scipy.optimize import brentq
 
     samples, n = number("samples", samples, 0.0, 100.0), integer("n", n, 3, 100_001)
-    wall = VirtualWall(device=Device(mass=mass, damper=damper), Ts=Ts, delay=samples * Ts)
+    wall = VirtualWall(device=Device(mass=mass, damper=damper), Ts=Ts)
+    wall = replace(wall, delay=samples * wall.Ts)
 
     def crossing(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """B and K that put a pair of poles at z = exp(+-j turn): K + B (1 - 1/z)/Ts = -1/G."""
@@ -555,7 +564,7 @@ def hulin_boundary(
 
 
 def _frequencies(omega: Any) -> np.ndarray:
-    omega = np.atleast_1d(np.asarray(omega, dtype=float))
+    omega = np.atleast_1d(array_of("omega", omega))
     if omega.ndim != 1 or not np.all((omega > 0.0) & (omega <= TOP_OMEGA)):
         raise ParameterError("omega", omega, f"must be > 0 and <= {TOP_OMEGA:g} rad/s, shape (n,)")
     return omega

@@ -6,11 +6,13 @@ import os
 
 import numpy as np
 
+from ..arguments import checked
 from ..errors import ParameterError
 
 LUMA = (0.299, 0.587, 0.114)  # brightness of red, green and blue (ITU-R BT.601)
 
 
+@checked
 def gray_image(path: str | os.PathLike[str]) -> np.ndarray:
     """Reads the brightness of an image, as `Grid.of_image` takes it.
 

@@ -14,9 +14,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import files
+from hapticclay import errors, files, units
 from hapticclay.errors import Bound, ParameterError, field_types
-from hapticclay.model import fields, scenario_file, units
+from hapticclay.model import fields, scenario_file
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
 from hapticclay.model.experiments import EXPERIMENTS, from_words, parameter_unit
@@ -581,7 +581,7 @@ def test_a_prefix_is_a_power_of_ten_rounded_once(x, prefix, unit):
     """Against exact fractions; the prefix stands before the first metre, second or newton."""
     given_unit = f"1/{prefix}m" if unit == "1/m" else prefix + unit
     exact = Fraction(x) * Fraction(10) ** (PREFIXES[prefix] * (-1 if unit == "1/m" else 1))
-    assert units.from_unit("f", f"{x} {given_unit}", unit) == float(exact)
+    assert units.from_unit(f"{x} {given_unit}", unit) == float(exact)
 
 
 @pytest.mark.parametrize(
@@ -609,7 +609,7 @@ def test_a_prefix_is_a_power_of_ten_rounded_once(x, prefix, unit):
     ],
 )
 def test_quantities(text, unit, value):
-    assert units.from_unit("f", text, unit) == value
+    assert units.from_unit(text, unit) == value
 
 
 @pytest.mark.parametrize(
@@ -617,7 +617,7 @@ def test_quantities(text, unit, value):
 )
 def test_another_kind_of_unit_is_refused(text, unit):
     with pytest.raises(ParameterError) as e:
-        units.from_unit("f", text, unit)
+        errors.quantity("f", text, unit)
     assert text.split()[1] in str(e.value) and unit in str(e.value)
 
 

@@ -7,8 +7,6 @@ import re
 from decimal import Decimal
 from functools import cache
 
-from ..errors import ParameterError
-
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(\s*[^\W\d].*|\s+\S.*)")
 FACTOR = re.compile(r"1|([^\W\d]+)(?:\^(-?\d))?")
 PREFIXES = {"n": "1e-9", "u": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
@@ -57,16 +55,24 @@ def _known_unit(name: str) -> tuple[Decimal, tuple[int, ...]] | None:
     return (Decimal(prefix) * stem[0], stem[1]) if prefix and stem else None
 
 
-def from_unit(field: str, text: str, unit: str) -> float | None:
+def is_quantity(value: object) -> bool:
+    """Whether a value is a text of a number and a unit.
+
+    Args:
+        value: the value.
+    """
+    return isinstance(value, str) and QUANTITY.fullmatch(value) is not None
+
+
+def from_unit(text: str, unit: str) -> float | None:
     """The number of a text like "5 cm", in the unit of a field; None if it is no such text.
 
     Args:
-        field: name for the error.
         text: number and unit.
         unit: unit of the field, "" for none.
 
     Raises:
-        ParameterError: the unit is unknown, or of another kind than the field's.
+        ValueError: the unit is unknown, or of another kind than the field's.
     """
     found = QUANTITY.fullmatch(text)
     if not found:
@@ -75,9 +81,9 @@ def from_unit(field: str, text: str, unit: str) -> float | None:
     told = f"must be a number{f' in {unit}' if unit else ' without a unit'}"
     own, other = parse_unit(unit), parse_unit(given)
     if other is None:
-        raise ParameterError(field, text, f"{told}; {given!r} is no unit known here")
+        raise ValueError(f"{told}; {given!r} is no unit known here")
     if own is None or not unit or own[1] != other[1]:
-        raise ParameterError(field, text, f"{told}, not in {given}")
+        raise ValueError(f"{told}, not in {given}")
     try:
         return float(Decimal(found[1]) * (other[0] / own[0]))  # rounded once
     except ArithmeticError:

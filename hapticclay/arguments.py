@@ -1,0 +1,143 @@
+"""What public functions and classes check at the door: names and kinds of their arguments."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+import os
+import types
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from .errors import ParameterError
+
+F = TypeVar("F", bound=Callable[..., Any])
+IN_WORDS: dict[Any, str] = {
+    Callable: "a function",
+    Iterable: "an iterable, as a list",
+    Mapping: "a dictionary",
+    dict: "a dictionary",
+    bool: "True or False",
+    os.PathLike: "a path",
+    type(None): "None",
+}
+WIDER: dict[Any, Any] = {Sequence: Iterable, Path: os.PathLike}  # an array is no Sequence
+
+
+class UnknownArgument(ParameterError, TypeError):
+    """An argument was refused whose name nothing has."""
+
+
+def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> None:
+    """Refuses arguments of unknown names.
+
+    Args:
+        name: what takes the arguments, for the error.
+        given: arguments by name.
+        known: names that it takes.
+
+    Raises:
+        UnknownArgument: it does not take one; the error suggests the nearest name.
+    """
+    for word, value in given.items():
+        if word not in known:
+            near = difflib.get_close_matches(word, known, n=1)
+            told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}")
+
+
+def named(made: F) -> F:
+    """Lets a function or a dataclass suggest the nearest name for an unknown argument.
+
+    Args:
+        made: the function, or the class, which remains the same object.
+
+    Raises:
+        UnknownArgument: as `known_names`, by what is returned.
+    """
+    return _with_check(made, lambda args, given: None)
+
+
+def checked(made: F) -> F:
+    """As `named`, and refuses arguments that are not of the classes in their annotations.
+
+    Numbers, words and arrays are left to the function, which knows their bounds; so are tuples.
+
+    Args:
+        made: a function, or a class that does not `check_fields`.
+
+    Raises:
+        ParameterError: an argument is of another class, or unknown; by what is returned.
+    """
+    names = list(_parameters(made))
+
+    def check(args: Sequence[Any], given: Mapping[str, Any]) -> None:
+        kinds = argument_kinds(made)
+        for name, value in (*zip(names, args, strict=False), *given.items()):
+            if name in kinds and (
+                not isinstance(value, kinds[name])
+                or (isinstance(value, str | bytes) and str not in kinds[name])
+            ):
+                told = " or ".join(dict.fromkeys(map(_in_words, kinds[name])))
+                raise ParameterError(name, value, f"must be {told}")
+
+    return _with_check(made, check)
+
+
+def _with_check(made: Any, check: Callable[[Sequence[Any], Mapping[str, Any]], None]) -> Any:
+    known, name = _parameters(made), made.__name__
+    inner = made.__init__ if isinstance(made, type) else made
+    own = 1 if isinstance(made, type) else 0  # self
+    open_ = any(p.kind is p.VAR_KEYWORD for p in known.values())
+
+    @functools.wraps(inner)
+    def guarded(*args: Any, **given: Any) -> Any:
+        if not (open_ or given.keys() <= known.keys()):
+            known_names(name, given, known)
+        check(args[own:], given)
+        return inner(*args, **given)
+
+    if isinstance(made, type):
+        made.__init__ = guarded
+        return made
+    return guarded
+
+
+def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
+    return inspect.signature(made).parameters
+
+
+@functools.cache
+def argument_kinds(made: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
+    """Classes that the arguments of a function must be of; no entry for one that it checks itself.
+
+    Args:
+        made: the function, or the class.
+    """
+    hints = get_type_hints(made)
+    found = {name: _classes(hints[name]) for name in _parameters(made) if name in hints}
+    return {name: kinds for name, kinds in found.items() if kinds}
+
+
+def _classes(hint: Any) -> tuple[Any, ...]:
+    """The classes of a type; none if it takes what no class tells, as numbers and arrays."""
+    members = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    kinds = tuple(get_origin(m) or m for m in members)
+    kinds = tuple(WIDER.get(k, k) for k in kinds)
+    plain = (k for k in kinds if k is not str or os.PathLike not in kinds)
+    told = all(isinstance(k, type) and (k in IN_WORDS or _is_own(k)) for k in plain)
+    return kinds if told else ()
+
+
+def _is_own(kind: Any) -> bool:
+    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _in_words(kind: Any) -> str:
+    if kind in IN_WORDS:
+        return IN_WORDS[kind]
+    if kind is str:
+        return IN_WORDS[os.PathLike]
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
