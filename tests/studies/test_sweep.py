@@ -1,5 +1,6 @@
 """Sweeps: the points of the space, and data sets that survive interruption and killed processes."""
 
+import contextlib
 import inspect
 import json
 import math
@@ -319,10 +320,11 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
             os.killpg(p.pid, how)
         else:
             p.send_signal(how)
-        said, _ = p.communicate(timeout=60)
+        said, told = p.communicate(timeout=60)
         assert p.returncode == code
     if how == signal.SIGINT:
-        assert "resumes the sweep" in said
+        assert "resumes the sweep" in said and told.count(sweep.FINISHING) == 1
+        assert "Traceback" not in told
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
     sweep.read_sweep(out)  # whatever is there is valid
@@ -675,6 +677,71 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
             study_plots.sweep_plot(table, text)
+
+
+@pytest.mark.parametrize(
+    "seconds,size", [(1e-9, 1024), (0.001, 1024), (0.01, 150), (0.2, 7), (1.5, 1), (40.0, 1)]
+)
+def test_a_chunk_holds_a_second_or_two_of_work(tmp_path, monkeypatch, seconds, size):
+    monkeypatch.setattr(sweep, "run_time", lambda plan: seconds)
+    plan = Sweep("constant", parse_grid("b=10:1000:60log gain.x=1:2:50"), {"t_max": 0.02})
+    with sweep.claimed(plan, tmp_path) as (begun, todo):
+        assert begun.chunk == size and len(todo) == -(-3000 // size)
+    assert json.loads((tmp_path / "sweep.json").read_text())["chunk"] == size
+
+
+@pytest.mark.parametrize("each,most", [(0.01, 16 + 2), (0.5, 2), (30.0, 1)])
+def test_the_time_of_a_run_is_that_with_machine_code_loaded(monkeypatch, each, most):
+    """On a made-up clock: the first run compiles for a minute before its own time begins."""
+    plan = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
+    clock, made = [0.0], []
+
+    def timed(plan, index, point):
+        clock[0] += each if made else 60.0 + each
+        made.append(index)
+        return {"wall_time": each}
+
+    monkeypatch.setattr(sweep, "run_point", timed)
+    monkeypatch.setattr(sweep.time, "perf_counter", lambda: clock[0])
+    assert sweep.run_time(plan) == pytest.approx(each, rel=1e-9)
+    assert len(made) <= most  # the measurement costs little: of long runs, one
+
+
+def test_a_resumed_sweep_keeps_its_chunks(tmp_path, monkeypatch):
+    free = replace(small(), chunk=None)
+    times = iter([0.5, 1e-3])  # of a run: three in a chunk; later the machine seems faster
+    monkeypatch.setattr(sweep, "run_time", lambda plan: next(times))
+    sweep.run_sweep(free, tmp_path, workers=1)
+    assert len(list((tmp_path / "data").iterdir())) == 2
+    sweep.sweep_part(tmp_path, 1).unlink()
+    assert sweep.run_sweep(free, tmp_path, workers=1) == 3 and next(times) == 1e-3
+    given = replace(small(), chunk=3)  # the same sweep: nothing is left
+    assert sweep.run_sweep(given, tmp_path, workers=1) == 0
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.run_sweep(small(), tmp_path, workers=1)
+    (tmp_path / "sweep.json").write_text("[1]")
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.run_sweep(free, tmp_path, workers=1)
+
+
+def test_results_are_the_same_bits_whatever_the_chunk(tmp_path, monkeypatch):
+    found = []
+    for size in (1, 4, 100, None):
+        plan, out = replace(small(), chunk=size), tmp_path / str(size)
+        sweep.run_sweep(plan, out, workers=1)
+        found.append(columns(sweep.read_sweep(out)))
+    assert found[1:] == found[:1] * 3
+
+
+def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
+    """An interruption waits for one chunk a worker, none that stands ready behind them."""
+    plan = Sweep("constant", parse_grid("b=10:1000:20log gain.x=1:2:2"), {"t_max": 0.2}, chunk=2)
+    with sweep.claimed(plan, tmp_path) as (_, todo):
+        results = sweep.run_chunks(plan, tmp_path, todo, 2)
+        assert next(results) == 2
+        with contextlib.suppress(KeyboardInterrupt):
+            results.throw(KeyboardInterrupt)
+    assert len(list((tmp_path / "data").glob("part-*"))) <= 3
 
 
 def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):
