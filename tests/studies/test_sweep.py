@@ -622,6 +622,32 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     assert set(study_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
+@pytest.mark.parametrize("value", ["status", "speed_x"])
+def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
+    pa = pytest.importorskip("pyarrow")
+    margins = np.array([0.5, 1.0, 0.999, 3.0, math.nan, math.nan])  # of x; of y below
+    runs = {
+        "run": np.arange(6),
+        "b": np.array([10.0, 25.0, 31.0, 57.0, 64.0, 88.0]),
+        "gain.x": np.array([0.3, 1.7, 2.2, 0.9, 5.1, 4.4]),
+        "status": ["diverged", *["time limit"] * 4, "refused"],
+        "gain_margin_x": margins,
+        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, math.nan]),
+        "speed_x": np.array([math.nan, 0.1, 0.2, 0.3, 0.4, math.nan]),
+        "b_x": np.full(6, 90.0),
+    }
+    figure = study_plots.sweep_plot(pa.table(runs), value)
+    labels = [t.get_text() for t in figure.legends[0].get_texts()]
+    (rings,) = [
+        c for c in figure.axes[0].collections if c.get_label() == study_plots.UNSTABLE["label"]
+    ]
+    assert labels.count("gain margin < 1") == 1
+    np.testing.assert_array_equal(rings.get_offsets()[:, 0], [10.0, 31.0, 57.0])
+    runs |= {"gain_margin_x": np.full(6, 1.0), "gain_margin_y": np.full(6, math.nan)}
+    legend = study_plots.sweep_plot(pa.table(runs), value).legends[0]
+    assert "gain margin < 1" not in [t.get_text() for t in legend.get_texts()]
+
+
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     s = Sweep(
         "constant",
