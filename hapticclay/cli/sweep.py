@@ -46,7 +46,7 @@ class SweepCommand:
         design: All combinations, a Latin hypercube or a Sobol sequence.
         runs: Number of runs of a Latin hypercube or Sobol sequence.
         seed: Seed of that sample.
-        chunk: Runs in one file: the most that a killed process loses.
+        chunk: Runs in one file, the most that a killed process loses; by default what takes 1.5 s.
         out: Folder for sweep.json, data/ and the maps.
         workers: Processes on this machine; by default one a core.
         scheduler: Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786.
@@ -61,7 +61,7 @@ class SweepCommand:
     design: Literal["grid", "lhs", "sobol"] = "grid"
     runs: int | None = None
     seed: int = 0
-    chunk: int = 64
+    chunk: int | None = None
     out: Path = Path("out/sweep")
     workers: int | None = None
     scheduler: str | None = None
@@ -71,26 +71,20 @@ class SweepCommand:
     def __call__(self) -> int:
         from ..studies import sweep
 
-        plan = self._plan()
+        asked = self._plan()
         if self.workers is not None:
             integer("workers", self.workers, 1, 1024)
-        try:
-            with sweep.claimed(plan, self.out) as todo:
-                left = sum(len(plan.chunk_runs(n)) for n in todo)
-                if left >= LARGE_SWEEP:
-                    self._estimate(plan, left, todo)
-                chunks = sweep.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
-                with _status(plan, len(plan) - left) as show, closing(chunks) as results:
-                    for n in results:
-                        show(n)
-        except KeyboardInterrupt:
-            missing = sweep.missing_parts(plan, self.out)
-            here = len(plan) - sum(len(plan.chunk_runs(n)) for n in missing)
-            print(
-                f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
-                "the same command resumes the sweep"
-            )
-            raise
+        with sweep.claimed(asked, self.out) as (plan, todo):
+            try:
+                self._make(plan, todo)
+            except KeyboardInterrupt:
+                missing = sweep.missing_parts(plan, self.out)
+                here = len(plan) - sum(len(plan.chunk_runs(n)) for n in missing)
+                print(
+                    f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
+                    "the same command resumes the sweep"
+                )
+                raise
         table = sweep.read_sweep(self.out)
         for status, n in Counter(table["status"].to_pylist()).most_common():
             print(f"{n:8d}  {status}")
@@ -98,6 +92,17 @@ class SweepCommand:
         if self.maps:
             self._draw(table)
         return 0
+
+    def _make(self, plan: Sweep, todo: list[int]) -> None:
+        from ..studies import sweep
+
+        left = sum(len(plan.chunk_runs(n)) for n in todo)
+        if left >= LARGE_SWEEP:
+            self._estimate(plan, left, todo)
+        chunks = sweep.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
+        with _status(plan, len(plan) - left) as show, closing(chunks) as results:
+            for n in results:
+                show(n)
 
     def _plan(self) -> Sweep:
         from ..model.scenario_file import is_scenario_file, read_settings

@@ -9,11 +9,13 @@ folder. Where nothing can be written, functions are compiled for this process al
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import hashlib
 import os
 import pickle
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from numba.core.serialize import dumps
 DIGEST = hashlib.sha256().digest_size
 MARKS = "*Run.*"  # files that say for which kinds of run a folder has machine code
 lost: set[Path] = set()  # folders that machine code could not be written to
+on_miss: contextvars.ContextVar[Callable[[], object]] = contextvars.ContextVar("on_miss")
 
 
 class FileCache(_Cache):
@@ -52,6 +55,12 @@ class FileCache(_Cache):
             target_context: of numba.
         """
         target_context.refresh()
+        found = self._stored(sig, target_context)
+        if found is None and (say := on_miss.get(None)):
+            say()  # numba compiles next
+        return found
+
+    def _stored(self, sig: Any, target_context: Any) -> Any:
         key = self._key(sig, target_context.codegen())
         file = self._file(key)
         try:

@@ -17,7 +17,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -44,6 +44,7 @@ from ..model.sampled_controller import DESK, TORQUE, LawCaller
 from ..model.scenario import Scenario
 from . import cache, energy, leapfrog, loop, many, modes, monitor, path, run, runge_kutta, sampled
 from .engine import mujoco
+from .notice import Notice
 
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, regions, pieces, spring,
@@ -51,7 +52,11 @@ SOURCES = (
 )  # fmt: skip
 LOOPS = (leapfrog.Leapfrog, runge_kutta.RungeKutta, sampled.Sampled)
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
-NOTICE = "hapticclay: compiling, this once"
+TOLD = {  # name of a kind of run; processor time to compile its path, its whole steps [s], measured
+    "LeapfrogRun": ("fast runs", 80.0, 40.0),
+    "RungeKuttaRun": ("accurate runs", 70.0, 25.0),
+    "SampledRun": ("sampled runs", 85.0, 85.0),
+}
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 BORDERS = 2000  # that a run has met from which it pays to compile the whole path
 BLOCK = 256  # whole steps between two entries into the record: they stay in the cache
@@ -423,16 +428,13 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
         kind: of the run.
         whole: the whole path, or the whole steps alone.
     """
-    mark = _mark(kind, whole)
-    told = NOTICE if sys.stderr and sys.stderr.isatty() and not mark.exists() else ""
-    print(end=told, file=sys.stderr, flush=True)
     caught: list[object] = []
     mine = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *what: caught.append(what)) if mine else None
     try:
-        kind(EXAMPLES[kind.__name__], 1, WHOLE if whole else MIXED).go(None)
+        with _telling(kind, whole):
+            kind(EXAMPLES[kind.__name__], 1, WHOLE if whole else MIXED).go(None)
     finally:
-        print(end=told and f"\r{' ' * len(told)}\r", file=sys.stderr, flush=True)
         if before is not None:
             signal.signal(signal.SIGINT, before)
     if whole:
@@ -441,6 +443,20 @@ def warm(kind: type[run.Run], whole: bool = True) -> None:
         _mark(kind, whole).touch()
     if caught:
         raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _telling(kind: type[run.Run], whole: bool) -> Iterator[None]:
+    """Says that machine code is compiled, once it is: what is taken from the disk needs no word."""
+    what, path, steps = TOLD[kind.__name__]
+    with Notice(what, path if whole else steps) as notice:
+        if not isinstance(_advance._cache, cache.FileCache):  # without a home none can miss it
+            notice.begin()
+        before = cache.on_miss.set(notice.begin)
+        try:
+            yield
+        finally:
+            cache.on_miss.reset(before)
 
 
 EXAMPLES = {

@@ -655,7 +655,7 @@ def monte_carlo(
             show(len(rows[-1][1]))
         return Instability(trials, *(np.concatenate(x) for x in zip(*rows, strict=True)))
     folder = Path(out)
-    with sweep.claimed(trials, folder) as todo:
+    with sweep.claimed(trials, folder) as (_, todo):
         if todo:
             left = sum(len(trials.chunk_runs(n)) for n in todo)
             cost = measure_cost(trials, left, folder, sweep.processes(todo, workers))

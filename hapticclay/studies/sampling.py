@@ -127,7 +127,8 @@ class Sweep:
             "sobol".
         runs: number of runs of "lhs" and "sobol"; None for "grid".
         seed: seed of both.
-        chunk: runs in one file.
+        chunk: runs in one file, 1 to 100,000; None for a second or two of work, measured when the
+            sweep begins.
         scenario: plain data of a scenario file, from `read_settings`; empty for the experiment.
     """
 
@@ -137,14 +138,15 @@ class Sweep:
     design: str = "grid"
     runs: int | None = None
     seed: int = 0
-    chunk: int = 64
+    chunk: int | None = None
     scenario: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         choice("experiment", self.experiment, tuple(EXPERIMENTS))
         choice("design", self.design, DESIGNS)
         integer("seed", self.seed, 0, 2**32 - 1)
-        integer("chunk", self.chunk, 1, 100_000)
+        if self.chunk is not None:
+            self._size()
         if not self.vary:
             raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
         if (self.runs is None) != (self.design == "grid"):
@@ -171,10 +173,13 @@ class Sweep:
             return integer("runs", self.runs, 1, MOST_RUNS)
         return math.prod(r.n or 1 for r in self.vary.values())
 
+    def _size(self) -> int:
+        return integer("chunk", self.chunk, 1, 100_000)
+
     @property
     def chunks(self) -> int:
         """Number of files."""
-        return -(-len(self) // self.chunk)
+        return -(-len(self) // self._size())
 
     def chunk_runs(self, number: int) -> range:
         """The runs of one file.
@@ -182,7 +187,8 @@ class Sweep:
         Args:
             number: of the file, from 0.
         """
-        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
+        size = self._size()
+        return range(number * size, min((number + 1) * size, len(self)))
 
     def points(self, first: int, last: int) -> np.ndarray:
         """Parameters of some runs, shape (last - first, parameters).

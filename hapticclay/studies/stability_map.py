@@ -60,6 +60,8 @@ class StabilityMap:
         exact: boundaries of the linear loop of those very runs, by name: y of each.
         cells: points at which theory and a run are compared.
         notes: lines that are missing, and why.
+        limit: name of the line of the linear loop of the runs: above it, the gain margin is below
+            1; "" for none.
     """
 
     kind: str
@@ -71,6 +73,7 @@ class StabilityMap:
     exact: dict[str, list[float]]
     cells: tuple[MapCell, ...]
     notes: tuple[str, ...] = ()
+    limit: str = ""
 
     def tables(self) -> dict[str, dict[str, list]]:
         """Returns what a figure of the map shows: its cells, its lines, what runs found."""
@@ -140,6 +143,7 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
     if loop.Ts:
         name = f"sampled every {1e3 * loop.Ts:g} ms{_late(loop)}"
         lines[name] = line(lambda b: nominal_limit(replace(loop, b=b)))
+    limit = list(lines)[-1]
     notes = []
     for name, holds in (
         ("small gain (Eq. 13)", small_gain),
@@ -163,7 +167,8 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
     exact = {"runs": [nominal_limit(each) for each in loops]}
     cells = _map_cells(loops, x, "K", ys, progress)
     names = "damping b of the clay [N.s/m]", "gain K [1/kg]"
-    return StabilityMap("gain-damping", loop, *names, lines, found, exact, cells, tuple(notes))
+    said = tuple(notes)
+    return StabilityMap("gain-damping", loop, *names, lines, found, exact, cells, said, limit)
 
 
 def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
@@ -179,7 +184,7 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
             [_unstable_damping(loop, Ts, d) for d in fine],
         ),
     }
-    notes = []
+    limit, notes = list(lines)[-1], []
     damper = loop.hand.damper
     if damper:
         name = "held clay passive (Colgate, Schenkel)"
@@ -205,6 +210,7 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
         {"runs": exact},
         cells,
         tuple(notes),
+        limit,
     )
 
 
@@ -238,7 +244,8 @@ def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) ->
     ys = np.geomspace(0.4 * nominal, 1.2 * nominal, rows).tolist()
     cells = _map_cells(plain, x, "K", ys, progress)
     names = "handle from its nominal position, x [m]", "gain K [1/kg]"
-    return StabilityMap("gain-pose", loop, *names, lines, found, exact, cells)
+    limit = list(lines)[-1]
+    return StabilityMap("gain-pose", loop, *names, lines, found, exact, cells, limit=limit)
 
 
 def _map_cells(

@@ -8,6 +8,8 @@ a killed one, goes on where it stopped.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import itertools
 import json
 import logging
 import math
@@ -18,7 +20,7 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -38,6 +40,8 @@ COMPILE_FROM = 2_000_000  # steps of a sweep from which compiling pays in every 
 MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's digest, chunk's number
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
+CHUNK_TIME = 1.5  # of one process, that a chunk should take [s]: an interruption waits for it
+MOST_IN_CHUNK = 1024  # runs, where they are short
 SCHEDULER_PATIENCE = 4.0  # until a scheduler answers [s]; dask tries for up to twice as long
 FINISHING = "hapticclay: finishing the chunks in progress"
 BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
@@ -74,11 +78,6 @@ class Stored(Protocol):
     def __len__(self) -> int: ...
 
     @property
-    def chunk(self) -> int:
-        """Runs in one file."""
-        ...
-
-    @property
     def chunks(self) -> int:
         """Number of files."""
         ...
@@ -113,6 +112,7 @@ class Stored(Protocol):
 
 
 Plan = Sweep | Stored
+P = TypeVar("P", bound=Plan)
 
 
 def result_row(
@@ -283,13 +283,8 @@ def stored_digest(out: Path) -> str | None:
     Args:
         out: the folder.
     """
-    file = out / "sweep.json"
-    if not file.is_file():
-        return None
-    try:
-        return str(json.loads(file.read_text())["digest"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return "unreadable"
+    begun = _begun(out)
+    return None if begun is None else str(begun.get("digest", "unreadable"))
 
 
 def begin_sweep(sweep: Plan, out: Path) -> list[int]:
@@ -313,7 +308,7 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
             )
     else:
         text = json.dumps({"digest": sweep.digest(), **sweep.described()}, indent=1)
-        with atomic(file) as f:
+        with atomic(out / "sweep.json") as f:
             f.write(f"{text}\n".encode())
     numbers = {sweep_part(out, n): n for n in range(sweep.chunks)}
     for stray in set(_part_files(out)) - set(numbers):
@@ -328,6 +323,31 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     for left in (*bad, *(out / "data").glob(".part-*")):
         left.unlink(missing_ok=True)
     return missing_parts(sweep, out)
+
+
+def _begun(out: Path) -> dict[str, Any] | None:
+    """What a folder's sweep.json holds, empty if it is damaged; None where there is none."""
+    file = out / "sweep.json"
+    if not file.is_file():
+        return None
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        found = json.loads(file.read_text())
+        return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _with_chunk(sweep: P, out: Path) -> P:
+    """The sweep with runs in a file: as given, as the folder has it, or by the time they take."""
+    if not isinstance(sweep, Sweep) or sweep.chunk is not None:
+        return sweep
+    begun = _begun(out)
+    size = begun.get("chunk") if begun is not None else _chunk_size(run_time(sweep))
+    return dataclasses.replace(sweep, chunk=size)
+
+
+def _chunk_size(seconds: float) -> int:
+    """Runs that make up CHUNK_TIME, where one takes these seconds."""
+    return max(1, min(MOST_IN_CHUNK, int(CHUNK_TIME / max(seconds, 1e-6))))
 
 
 def _fault(sweep: Plan, number: int, file: Path, wanted: Any) -> str:
@@ -352,8 +372,10 @@ def _marks(table: Any) -> tuple[bytes, ...]:
 
 
 @contextlib.contextmanager
-def claimed(sweep: Plan, out: Path) -> Iterator[list[int]]:
-    """Locks the folder for this process and prepares it; yields the chunks to run.
+def claimed(sweep: P, out: Path) -> Iterator[tuple[P, list[int]]]:
+    """Locks the folder for this process and prepares it.
+
+    Yields the sweep, its chunk chosen if it was None, and the chunks to run.
 
     Args:
         sweep: the sweep.
@@ -378,7 +400,8 @@ def claimed(sweep: Plan, out: Path) -> Iterator[list[int]]:
         ) from None
     try:
         _hold(lock, out)
-        yield begin_sweep(sweep, out)
+        sweep = _with_chunk(sweep, out)
+        yield sweep, begin_sweep(sweep, out)
     finally:
         os.close(lock)
 
@@ -423,8 +446,8 @@ def run_sweep(
     """
     done = 0
     with (
-        claimed(sweep, out) as todo,
-        contextlib.closing(run_chunks(sweep, out, todo, workers, scheduler)) as results,
+        claimed(sweep, out) as (plan, todo),
+        contextlib.closing(run_chunks(plan, out, todo, workers, scheduler)) as results,
     ):
         for n in results:
             done += n
@@ -473,7 +496,7 @@ def processes(todo: list[int], workers: int | None) -> int:
 
 def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
     import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
     from concurrent.futures.process import BrokenProcessPool
 
     if workers == 1:
@@ -485,10 +508,18 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
     context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         try:
-            jobs = [pool.submit(run_chunk, sweep, number, str(out)) for number in todo]
-            for job in as_completed(jobs):
-                yield job.result()
-        except KeyboardInterrupt:
+            jobs: set[Future[int]] = set()
+            left = iter(todo)
+            while True:  # one chunk a worker: none waits in the pool, which would finish it too
+                jobs |= {
+                    pool.submit(run_chunk, sweep, number, str(out))
+                    for number in itertools.islice(left, workers - len(jobs))
+                }
+                if not jobs:
+                    return
+                done, jobs = wait(jobs, return_when=FIRST_COMPLETED)
+                yield from (job.result() for job in done)
+        except (KeyboardInterrupt, GeneratorExit):  # struck here, or in who takes the results
             print(FINISHING, file=sys.stderr, flush=True)
             raise
         except BrokenProcessPool:
@@ -593,16 +624,36 @@ def estimate_time(sweep: Sweep) -> tuple[float, float]:
     Args:
         sweep: the sweep.
     """
-    drawn = np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist()
-    probe = lambda i: run_point(sweep, i, sweep.points(i, i + 1)[0])  # noqa: E731
-    probe(drawn[0])  # the first run loads and compiles
+    _probed(sweep, 0.0)  # the first run loads and compiles
+    rows, spent = _probed(sweep, PROBE_TIME)
+    each = spent / len(rows)
+    if sweep.chunk is None:
+        sweep = dataclasses.replace(sweep, chunk=_chunk_size(each))
+    return each, row_size(sweep, rows)
+
+
+def run_time(sweep: Sweep) -> float:
+    """Time [s] that a run takes, from one random run if it is long, from a few if it is short.
+
+    Args:
+        sweep: the sweep.
+    """
+    (first,), _ = _probed(sweep, 0.0)  # loads and compiles, before its own time begins
+    if first["wall_time"] > CHUNK_TIME:
+        return first["wall_time"]
+    rows, spent = _probed(sweep, CHUNK_TIME / 10)
+    return spent / len(rows)
+
+
+def _probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
+    """Rows of random runs, PROBES or fewer after this patience [s], and the time they took [s]."""
     rows, spent, begin = [], 0.0, time.perf_counter()
-    for i in drawn:
-        rows.append(probe(i))
+    for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
+        rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))
         spent = time.perf_counter() - begin
-        if spent > PROBE_TIME:
+        if spent > patience:
             break
-    return spent / len(rows), row_size(sweep, rows)
+    return rows, spent
 
 
 def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
@@ -619,7 +670,7 @@ def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
         _write_part(some, parquet_schema(sweep, 0), file := pa.BufferOutputStream())
         sizes.append(file.tell())
     each = (sizes[0] - sizes[1]) / max(1, len(rows) - 1)
-    return each + (sizes[1] - each) / min(sweep.chunk, len(sweep))
+    return each + (sizes[1] - each) / len(sweep.chunk_runs(0))
 
 
 @checked

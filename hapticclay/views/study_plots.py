@@ -69,6 +69,9 @@ CELL_MARKS: Any = {
     "limit cycle": dict(marker="s", mfc="none"),
     "diverges": dict(marker="x"),
 }
+UNSTABLE: Any = dict(  # where the linear loop of a run is unstable
+    facecolor="none", hatch="\\\\\\", linewidth=0.0, edgecolor=BLACK, label="gain margin < 1"
+)
 BOUNDARY_MARKS: Any = (dict(marker="o", mfc=BLACK), dict(marker="D", mfc=WHITE))
 
 
@@ -76,7 +79,8 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
     """Plots a map of stability.
 
     Lines are analytic boundaries, dots are boundaries found by runs, and a mark in each cell shows
-    the outcome of its run, ringed where it contradicts the analysis.
+    the outcome of its run, ringed where it contradicts the analysis. The linear loop of these runs
+    is unstable where it is hatched.
 
     Args:
         chart: from `stability_map`.
@@ -99,6 +103,10 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
                 ax.axvline(factor * x[0], **look)
             else:
                 ax.plot(factor * np.array(x), _positive(y), **look)
+        if chart.limit:
+            x, y = chart.lines[chart.limit]
+            beyond = np.clip(y, low, high)
+            ax.fill_between(factor * np.array(x), beyond, high, zorder=0, **UNSTABLE)
         for name, look in CELL_MARKS.items():
             if mine := [c for c in chart.cells if c.simulated == name]:
                 look = dict(look, color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"a run: {name}")
@@ -539,8 +547,8 @@ def sweep_plot(
         image, handles = draw(ax, data, look)
         if worst:
             handles = [Patch(facecolor=OUTCOME_COLORS[k], label=k) for k in kinds if k in raw]
-        if draw is _draw_grid:
-            handles += _hatch_unstable(ax, data, least_margins(table))
+        show = _hatch_unstable if draw is _draw_grid else _ring_unstable
+        handles += show(ax, data, least_margins(table))
         if not worst and np.isfinite(z).any():
             figure.colorbar(image, ax=ax, label=_column_label(value))
         if handles:
@@ -631,18 +639,30 @@ def _hatch_unstable(ax: Axes, data: Mapped, margins: np.ndarray) -> list[Any]:
     j, i = np.nonzero(below == 1.0)
     if not len(i):
         return []
-    style: Any = dict(facecolor="none", hatch="\\\\\\", linewidth=0.0, edgecolor=BLACK)
     ex, ey = _cell_edges(gx), _cell_edges(gy)
     for column, row in zip(i.tolist(), j.tolist(), strict=True):
         corner = (ex[column], ey[row])
         size = ex[column + 1] - ex[column], ey[row + 1] - ey[row]
-        ax.add_patch(Rectangle(corner, *size, **style))
-    return [Patch(label="gain margin < 1", **style)]
+        ax.add_patch(Rectangle(corner, *size, **UNSTABLE))
+    return [Patch(**UNSTABLE)]
+
+
+def _ring_unstable(ax: Axes, data: Mapped, margins: np.ndarray) -> list[Any]:
+    """Rings points whose margin is below 1; returns a ring for the legend."""
+    below = margins < 1.0
+    if not below.any():
+        return []
+    style: Any = dict(facecolors="none", edgecolors=BLACK, linewidths=0.8, label=UNSTABLE["label"])
+    return [ax.scatter(data.x[below], data.y[below], s=3.0 * _point_size(data), **style)]
+
+
+def _point_size(data: Mapped) -> float:
+    return max(4.0, 4000.0 / len(data.z))
 
 
 def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[Any]]:
     """Draws runs that lie anywhere as points; returns as _draw_grid."""
-    size, good = max(4.0, 4000.0 / len(data.z)), np.isfinite(data.z)
+    size, good = _point_size(data), np.isfinite(data.z)
     handles = []
     for k, (name, kind) in enumerate(MISSING.items()):
         at = data.kind == k

@@ -99,3 +99,15 @@ def test_another_environment_has_a_folder_of_its_own(monkeypatch):
     monkeypatch.setattr(run, "_processor", lambda: "another")
     names.add(run.cache_folder.__wrapped__())
     assert len(names) == 6
+
+
+def test_what_no_file_holds_is_told_before_it_is_compiled(tmp_path):
+    told = []
+    before = cache.on_miss.set(lambda: told.append(len(list(tmp_path.iterdir()))))
+    try:
+        for made in (fresh(tmp_path), fresh(tmp_path)):
+            made(14)
+    finally:
+        cache.on_miss.reset(before)
+    fresh(tmp_path)(3.5)  # nobody listens
+    assert told == [0]

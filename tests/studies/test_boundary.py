@@ -235,6 +235,27 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
     figure.savefig(tmp_path / "a.png")
 
 
+def hatched(figure):
+    return [c for c in figure.axes[0].collections if c.get_hatch()]
+
+
+@pytest.mark.parametrize("x,factor", [(-0.1, 0.9), (-0.1, 1.1), (0.1, 0.9), (0.1, 1.1)])
+def test_picture_hatches_gains_above_the_limit_of_the_loop_of_the_runs(poses, x, factor):
+    """The limit at both ends of the path is worked out anew, for the loop that the runs are of."""
+    (area,) = hatched(study_plots.stability_map_plot(poses))
+    K = factor * boundary.pose_limit(replace(Loop(shaping=False), pose=(x, 0.0)))
+    inside = 0.999 * 100.0 * x  # [cm], just within the edge
+    assert area.get_paths()[0].contains_point((inside, K)) == (factor > 1.0)
+    assert area.get_label() == "gain margin < 1"
+
+
+def test_picture_hatches_nothing_where_nothing_is_unstable(poses):
+    endless = {name: (x, [math.inf] * len(x)) for name, (x, _) in poses.lines.items()}
+    (area,) = hatched(study_plots.stability_map_plot(replace(poses, lines=endless)))
+    assert np.ptp(area.get_paths()[0].vertices[:, 1]) == 0.0
+    assert not hatched(study_plots.stability_map_plot(replace(poses, limit="")))
+
+
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
     b = stability_map._unstable_damping(Loop(), Ts, delay)

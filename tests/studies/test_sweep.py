@@ -1,5 +1,6 @@
 """Sweeps: the points of the space, and data sets that survive interruption and killed processes."""
 
+import contextlib
 import inspect
 import json
 import math
@@ -319,10 +320,11 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
             os.killpg(p.pid, how)
         else:
             p.send_signal(how)
-        said, _ = p.communicate(timeout=60)
+        said, told = p.communicate(timeout=60)
         assert p.returncode == code
     if how == signal.SIGINT:
-        assert "resumes the sweep" in said
+        assert "resumes the sweep" in said and told.count(sweep.FINISHING) == 1
+        assert "Traceback" not in told
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
     sweep.read_sweep(out)  # whatever is there is valid
@@ -620,6 +622,32 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     assert set(study_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
+@pytest.mark.parametrize("value", ["status", "speed_x"])
+def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
+    pa = pytest.importorskip("pyarrow")
+    margins = np.array([0.5, 1.0, 0.999, 3.0, math.nan, math.nan])  # of x; of y below
+    runs = {
+        "run": np.arange(6),
+        "b": np.array([10.0, 25.0, 31.0, 57.0, 64.0, 88.0]),
+        "gain.x": np.array([0.3, 1.7, 2.2, 0.9, 5.1, 4.4]),
+        "status": ["diverged", *["time limit"] * 4, "refused"],
+        "gain_margin_x": margins,
+        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, math.nan]),
+        "speed_x": np.array([math.nan, 0.1, 0.2, 0.3, 0.4, math.nan]),
+        "b_x": np.full(6, 90.0),
+    }
+    figure = study_plots.sweep_plot(pa.table(runs), value)
+    labels = [t.get_text() for t in figure.legends[0].get_texts()]
+    (rings,) = [
+        c for c in figure.axes[0].collections if c.get_label() == study_plots.UNSTABLE["label"]
+    ]
+    assert labels.count("gain margin < 1") == 1
+    np.testing.assert_array_equal(rings.get_offsets()[:, 0], [10.0, 31.0, 57.0])
+    runs |= {"gain_margin_x": np.full(6, 1.0), "gain_margin_y": np.full(6, math.nan)}
+    legend = study_plots.sweep_plot(pa.table(runs), value).legends[0]
+    assert "gain margin < 1" not in [t.get_text() for t in legend.get_texts()]
+
+
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     s = Sweep(
         "constant",
@@ -675,6 +703,71 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
             study_plots.sweep_plot(table, text)
+
+
+@pytest.mark.parametrize(
+    "seconds,size", [(1e-9, 1024), (0.001, 1024), (0.01, 150), (0.2, 7), (1.5, 1), (40.0, 1)]
+)
+def test_a_chunk_holds_a_second_or_two_of_work(tmp_path, monkeypatch, seconds, size):
+    monkeypatch.setattr(sweep, "run_time", lambda plan: seconds)
+    plan = Sweep("constant", parse_grid("b=10:1000:60log gain.x=1:2:50"), {"t_max": 0.02})
+    with sweep.claimed(plan, tmp_path) as (begun, todo):
+        assert begun.chunk == size and len(todo) == -(-3000 // size)
+    assert json.loads((tmp_path / "sweep.json").read_text())["chunk"] == size
+
+
+@pytest.mark.parametrize("each,most", [(0.01, 16 + 2), (0.5, 2), (30.0, 1)])
+def test_the_time_of_a_run_is_that_with_machine_code_loaded(monkeypatch, each, most):
+    """On a made-up clock: the first run compiles for a minute before its own time begins."""
+    plan = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
+    clock, made = [0.0], []
+
+    def timed(plan, index, point):
+        clock[0] += each if made else 60.0 + each
+        made.append(index)
+        return {"wall_time": each}
+
+    monkeypatch.setattr(sweep, "run_point", timed)
+    monkeypatch.setattr(sweep.time, "perf_counter", lambda: clock[0])
+    assert sweep.run_time(plan) == pytest.approx(each, rel=1e-9)
+    assert len(made) <= most  # the measurement costs little: of long runs, one
+
+
+def test_a_resumed_sweep_keeps_its_chunks(tmp_path, monkeypatch):
+    free = replace(small(), chunk=None)
+    times = iter([0.5, 1e-3])  # of a run: three in a chunk; later the machine seems faster
+    monkeypatch.setattr(sweep, "run_time", lambda plan: next(times))
+    sweep.run_sweep(free, tmp_path, workers=1)
+    assert len(list((tmp_path / "data").iterdir())) == 2
+    sweep.sweep_part(tmp_path, 1).unlink()
+    assert sweep.run_sweep(free, tmp_path, workers=1) == 3 and next(times) == 1e-3
+    given = replace(small(), chunk=3)  # the same sweep: nothing is left
+    assert sweep.run_sweep(given, tmp_path, workers=1) == 0
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.run_sweep(small(), tmp_path, workers=1)
+    (tmp_path / "sweep.json").write_text("[1]")
+    with pytest.raises(ParameterError, match="another sweep"):
+        sweep.run_sweep(free, tmp_path, workers=1)
+
+
+def test_results_are_the_same_bits_whatever_the_chunk(tmp_path, monkeypatch):
+    found = []
+    for size in (1, 4, 100, None):
+        plan, out = replace(small(), chunk=size), tmp_path / str(size)
+        sweep.run_sweep(plan, out, workers=1)
+        found.append(columns(sweep.read_sweep(out)))
+    assert found[1:] == found[:1] * 3
+
+
+def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
+    """An interruption waits for one chunk a worker, none that stands ready behind them."""
+    plan = Sweep("constant", parse_grid("b=10:1000:20log gain.x=1:2:2"), {"t_max": 0.2}, chunk=2)
+    with sweep.claimed(plan, tmp_path) as (_, todo):
+        results = sweep.run_chunks(plan, tmp_path, todo, 2)
+        assert next(results) == 2
+        with contextlib.suppress(KeyboardInterrupt):
+            results.throw(KeyboardInterrupt)
+    assert len(list((tmp_path / "data").glob("part-*"))) <= 3
 
 
 def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):

@@ -330,7 +330,7 @@ def test_of_two_sweeps_started_at_once_one_wins_and_the_other_is_refused(tmp_pat
 
 
 def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
-    with sweep.claimed(plan(), tmp_path) as todo:
+    with sweep.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
         for again in (plan(), plan("1:2:3")):
             with pytest.raises(
@@ -342,7 +342,7 @@ def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
         assert not list(tmp_path.glob("data/*"))
     with pytest.raises(ParameterError, match="holds another sweep"):
         sweep.run_sweep(plan("1:2:3"), tmp_path)
-    with sweep.claimed(plan(), tmp_path) as todo:
+    with sweep.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
 
 
@@ -352,7 +352,7 @@ def test_the_lock_of_a_killed_process_holds_nobody_up(tmp_path):
             sweep.run_sweep(plan(t_max=0.3), tmp_path)
         p.kill()
         p.wait()
-        with sweep.claimed(plan(t_max=0.3), tmp_path) as todo:
+        with sweep.claimed(plan(t_max=0.3), tmp_path) as (_, todo):
             assert 0 < len(todo) < 20
 
 

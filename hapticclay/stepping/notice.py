@@ -1,0 +1,76 @@
+"""What is said on stderr of a compilation: how long it takes, that it lives, how long it took."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import threading
+import time
+from typing import Any
+
+TICK, EVERY = 1.0, 10.0  # between two signs of life, on a terminal and elsewhere [s]
+
+
+class Notice:
+    """Says that something is compiled, from `begin` to the end of its block, and then the time.
+
+    On a terminal one line counts the seconds. Elsewhere, as in a file or a notebook, each sign of
+    life is a line. Without `begin` nothing is said.
+
+    Args:
+        what: is compiled.
+        expected: time that it takes, measured [s].
+    """
+
+    def __init__(self, what: str, expected: float):
+        self.told = f"hapticclay: compiling {what}, this once: about {expected:.0f} s"
+        self.over = threading.Event()
+        self.life = threading.Thread(target=self._live, daemon=True)
+        self.since: float | None = None
+
+    def begin(self) -> None:
+        """Says how long it takes, once."""
+        if self.since is not None or sys.stderr is None:
+            return
+        self.since, self.stream, self.terminal = time.monotonic(), sys.stderr, _on_terminal()
+        self._say(self.told)
+        self.life.start()
+
+    def __enter__(self) -> Notice:
+        return self
+
+    def __exit__(self, kind: Any, *what: Any) -> None:
+        if self.since is None:
+            return
+        self.over.set()
+        self.life.join()
+        if self.terminal:
+            self._write("\r" + " " * self._width() + "\r")
+        if kind is None:
+            self._write(f"hapticclay: compiled in {time.monotonic() - self.since:.0f} s\n")
+
+    def _live(self) -> None:
+        while not self.over.wait(TICK if self.terminal else EVERY):
+            gone = f"{time.monotonic() - self.since:.0f} s gone"  # type: ignore[operator]
+            self._say(f"{self.told}, {gone}" if self.terminal else f"hapticclay: compiling, {gone}")
+
+    def _say(self, text: str) -> None:
+        self._write("\r" + text[: self._width()] if self.terminal else f"{text}\n")
+
+    def _width(self) -> int:
+        """Columns that can be overwritten: a longer line would wrap, and each sign with it."""
+        with contextlib.suppress(OSError, ValueError):
+            return (os.get_terminal_size(self.stream.fileno()).columns or 80) - 1
+        return 79
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(OSError, ValueError):  # who listened has gone
+            self.stream.write(text)
+            self.stream.flush()
+
+
+def _on_terminal() -> bool:
+    """Whether stderr can overwrite a line; a notebook's cannot, whatever it says."""
+    notebook = type(sys.stderr).__module__.startswith("ipykernel")
+    return not notebook and sys.stderr.isatty()
