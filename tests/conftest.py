@@ -43,9 +43,7 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
 PLAIN = {  # files whose tests are about the Python loop
     "test_energy.py",
     "test_engine.py",
-    "test_inline.py",
     "test_interrupted.py",
-    "test_loop.py",
     "test_monitor.py",
 }
 PAYS = simulate._pays

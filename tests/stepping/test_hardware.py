@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,16 +67,6 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
         "Ts" not in kw
     ):  # what the motors hold, a hold later than b v only where the last step was cut short
         np.testing.assert_allclose(a.fe[:-1], b.fe[:-1], atol=8 * EPS)
-
-
-def test_without_an_interface_nothing_of_it_is_loaded():
-    code = (
-        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, "
-        "control='sampled')); "
-        "print([m for m in ('interface', 'wired') if 'hapticclay.' + m in sys.modules])"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "[]"
 
 
 def test_seeds_repeat_and_differ():
