@@ -300,7 +300,7 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     Raises:
         ParameterError: the folder holds another sweep, or a file that is no part of any.
     """
-    file, digest = out / "sweep.json", stored_digest(out)
+    _file, digest = out / "sweep.json", stored_digest(out)
     if digest is not None:
         if digest != sweep.digest():
             raise ParameterError(

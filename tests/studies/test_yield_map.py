@@ -140,8 +140,9 @@ def test_a_loop_that_never_buzzes_has_no_map(monkeypatch):
 
 
 def test_the_command_predicts(tmp_path, capsys):
+    folder = tmp_path / ("long" * 20)  # a path has the length that it has
     command = stability.StabilityCommand(
-        "y", gain=1.0, impedance=False, clay=("Fy=5", "b=30"), out=tmp_path
+        "y", gain=1.0, impedance=False, clay=("Fy=5", "b=30"), out=folder
     )
     assert command() == 0
     out = capsys.readouterr().out.replace(str(tmp_path), "FOLDER")
@@ -149,8 +150,9 @@ def test_the_command_predicts(tmp_path, capsys):
     assert "Bingham clay, Fy = 5, b = 30; in continuous time without delay:\n" in out
     assert "the linear loop is unstable at a damping of 62.06 to 3903 N.s/m\n" in out
     assert "a small push: sticks, a large one: limit cycle" in out
-    assert all(len(line) <= 80 for line in out[out.index("Bingham") :].splitlines())
-    clay = json.loads((tmp_path / "stability.json").read_text())["clay"]
+    told, _, paths = out[out.index("Bingham") :].partition("written to ")
+    assert all(len(line) <= 80 for line in told.splitlines()) and paths.startswith(str(folder))
+    clay = json.loads((folder / "stability.json").read_text())["clay"]
     assert [x["kind"] for x in clay["predicted"]] == ["threshold", "limit cycle"]
     threshold, cycle = clay["predicted"]
     assert cycle["speed"] == pytest.approx(4.0 * 5.0 / (math.pi * (62.06292 - 30.0)), rel=1e-5)
