@@ -109,3 +109,13 @@ def ledger_rows(paper_runs):
     from hapticclay.paper import claims
 
     return claims.ledger_rows(paper_runs)
+
+
+@pytest.fixture(scope="module")
+def silent_compiler():
+    """Without machine code on disk, too, stderr holds what a test is about, and no more."""
+    from hapticclay.stepping.notice import Notice
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Notice, "begin", lambda self: None)
+        yield

@@ -25,6 +25,8 @@ from hapticclay.stepping import engine as engines
 from hapticclay.stepping import monitor, run
 from tests.stepping.test_leapfrog import CASES
 
+pytestmark = pytest.mark.usefixtures("silent_compiler")
+
 fast = pytest.mark.skipif(
     importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
 )
