@@ -71,7 +71,7 @@ def named(made: F) -> F:
 
     if isinstance(made, type):
         made.__init__ = guarded
-        return made
+        return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
 
 
@@ -103,7 +103,7 @@ def checked(made: F) -> F:
 
     if isinstance(made, type):
         made.__init__ = entry
-        return named(made)
+        return named(made)  # type: ignore[return-value]
     return named(entry)  # type: ignore[arg-type]
 
 
