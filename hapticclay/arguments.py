@@ -45,7 +45,7 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
         if word not in known:
             near = difflib.get_close_matches(word, known, n=1)
             told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}")
+            raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}") from None
 
 
 def named(made: F) -> F:
@@ -57,7 +57,22 @@ def named(made: F) -> F:
     Raises:
         UnknownArgument: as `known_names`, by what is returned.
     """
-    return _with_check(made, lambda args, given: None)
+    inner: Any = made.__init__ if isinstance(made, type) else made
+
+    @functools.wraps(inner)
+    def guarded(*args: Any, **given: Any) -> Any:
+        try:
+            return inner(*args, **given)
+        except TypeError:  # looked into only here: parts are made often
+            parameters = _parameters(made)
+            if all(p.kind is not p.VAR_KEYWORD for p in parameters.values()):
+                known_names(made.__name__, given, parameters)
+            raise
+
+    if isinstance(made, type):
+        made.__init__ = guarded
+        return made  # type: ignore[return-value]
+    return guarded  # type: ignore[return-value]
 
 
 def checked(made: F) -> F:
@@ -71,10 +86,12 @@ def checked(made: F) -> F:
     Raises:
         ParameterError: an argument is of another class, or unknown; by what is returned.
     """
-    names = list(_parameters(made))
+    inner: Any = made.__init__ if isinstance(made, type) else made
+    names = list(_parameters(inner))
 
-    def check(args: Sequence[Any], given: Mapping[str, Any]) -> None:
-        kinds = argument_kinds(made)
+    @functools.wraps(inner)
+    def entry(*args: Any, **given: Any) -> Any:
+        kinds = argument_kinds(inner)
         for name, value in (*zip(names, args, strict=False), *given.items()):
             if name in kinds and (
                 not isinstance(value, kinds[name])
@@ -82,27 +99,12 @@ def checked(made: F) -> F:
             ):
                 told = " or ".join(dict.fromkeys(map(_in_words, kinds[name])))
                 raise ParameterError(name, value, f"must be {told}")
-
-    return _with_check(made, check)
-
-
-def _with_check(made: Any, check: Callable[[Sequence[Any], Mapping[str, Any]], None]) -> Any:
-    known, name = _parameters(made), made.__name__
-    inner = made.__init__ if isinstance(made, type) else made
-    own = 1 if isinstance(made, type) else 0  # self
-    open_ = any(p.kind is p.VAR_KEYWORD for p in known.values())
-
-    @functools.wraps(inner)
-    def guarded(*args: Any, **given: Any) -> Any:
-        if not (open_ or given.keys() <= known.keys()):
-            known_names(name, given, known)
-        check(args[own:], given)
         return inner(*args, **given)
 
     if isinstance(made, type):
-        made.__init__ = guarded
-        return made
-    return guarded
+        made.__init__ = entry
+        return named(made)  # type: ignore[return-value]
+    return named(entry)  # type: ignore[arg-type]
 
 
 def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:

@@ -47,6 +47,7 @@ def good():
         "data": hc.Measurement(t, np.sin(t), np.cos(t)), "hands": next(iter(hc.POPULATIONS)),
         "mass": 1.0, "damper": 1.0, "spring": 1.0, "Ts": 1e-3, "decay": 1.0, "name": "stiff clay",
         "trials": hc.Trials(wall, {"K": hc.Distribution("uniform", 1.0, 9.0)}), "out": "nowhere",
+        "path": "nowhere",
         "part": cut, "changes": {"gain.x": 1.0}, "scenarios": [cut], "resists": 90.0,
     }  # fmt: skip
     pushed = importlib.import_module("hapticclay.studies.boundary").PushedLoop()

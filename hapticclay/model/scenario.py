@@ -343,10 +343,10 @@ def choose_step(part: Any) -> None:
     Args:
         part: a scenario, or an experiment, before its fields are checked.
     """
+    if not isinstance(part.control, str) or part.control != "sampled" or part.dt is not TS:
+        return
     Ts = quantity("Ts", part.Ts, "s") if isinstance(part.Ts, str) else part.Ts
-    sampled = isinstance(part.control, str) and part.control == "sampled"
-    given = sampled and isinstance(Ts, float | int) and STEP_LEAST <= Ts <= 1.0
-    if given and part.dt is TS:
+    if isinstance(Ts, float | int) and STEP_LEAST <= Ts <= 1.0:
         object.__setattr__(part, "dt", Ts / math.ceil(Ts / TS - WHOLE))
 
 
