@@ -182,14 +182,20 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
 def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
     """Coefficients by way of the impulse response: D, C B, C A B, ...
 
-    What is zero there but for rounding is zero, so that no zero far away is left in num.
+    What is zero there but for rounding is zero, so that no zero far away is left in num. If all of
+    it but D is, the system is a gain: it has no states, or none that the input moves and the output
+    shows.
     """
-    A, v, row = np.atleast_2d(A), np.ravel(B), np.ravel(C)
-    den, response, size = np.poly(A), [float(np.ravel(D)[0])], np.abs(v)
+    v, row = np.ravel(B), np.ravel(C)
+    A = np.reshape(A, (len(v), len(v)))
+    response, size = [float(np.ravel(D)[0])], np.abs(v)
     for _ in range(len(A)):
         x = float(row @ v)
         response.append(x if abs(x) > CANCELLED * float(np.abs(row) @ size) else 0.0)
         v, size = A @ v, np.abs(A) @ size
+    if not any(response[1:]):
+        return response[:1], (1.0,)
+    den = np.poly(A)
     return np.convolve(response, den)[: len(den)], den
 
 
@@ -235,12 +241,12 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
     m[:n, n : 2 * n], m[n : 2 * n, :n], m[n : 2 * n, n : 2 * n] = A, A, -np.eye(n)
     m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C
     m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C, D
-    right[2 * n] = v
+    right[2 * n] = 1.0  # v as it is scales the states: a tiny one has no digits to spare
     z = np.linalg.lstsq(m, right, rcond=None)[0]
-    if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9 * abs(v)):
+    if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9):
         bound = "must be 0 with a compensator without an integrator"
         raise ParameterError("velocity", v, bound)
-    out[:n] = z[:n].tolist()
+    out[:n] = (v * z[:n]).tolist()
     return out
 
 
