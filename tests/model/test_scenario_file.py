@@ -339,10 +339,10 @@ def test_what_is_no_scenario_file_is_named(tmp_path, name, raw, said):
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "d.toml").mkdir()
-    for name, said in (("none.toml", "No such file"), ("d.toml", "Is a directory")):
+    for name, said in (("none.toml", "No such file"), ("d.toml", "no regular file")):
         with pytest.raises(ParameterError, match=said):
             hc.Scenario.load(tmp_path / name)
-    with pytest.raises(ParameterError, match="must be writable"):
+    with pytest.raises(ParameterError, match="must be a regular file, is a folder"):
         hc.Scenario().save(tmp_path / "d.toml")
     with pytest.raises(ParameterError, match=r"must be a .toml or a .json file"):
         hc.Scenario().save(tmp_path / "s.txt")

@@ -1,8 +1,7 @@
-"""Every public argument and field is documented, and no top-level name has two meanings."""
+"""Every public argument and field is documented."""
 
 import ast
 import re
-from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -136,23 +135,3 @@ def _private(x): ...
 '''
     found = {where: names for where, names in undocumented("m", ast.parse(text)) if names}
     assert found == {"m.Part": ["one", "two"], "m.Part.run": ["every"], "m.go": ["a", "b", "rest"]}
-
-
-def defined(tree):
-    """Names that a module defines at its top level; an import is none."""
-    for node in tree.body:
-        if isinstance(node, Function | ast.ClassDef):
-            yield node.name
-        elif isinstance(node, ast.Assign | ast.AnnAssign):
-            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
-                yield from (x.id for x in ast.walk(target) if isinstance(x, ast.Name))
-
-
-def test_no_name_is_defined_in_two_modules():
-    places = defaultdict(set)
-    for module, tree in MODULES.items():
-        for name in defined(tree):
-            if not re.fullmatch(r"__\w+__", name):
-                places[name].add(module)
-    twice = {name: sorted(where) for name, where in sorted(places.items()) if len(where) > 1}
-    assert not twice, "\n".join(f"{name}: {', '.join(where)}" for name, where in twice.items())
