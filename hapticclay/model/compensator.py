@@ -180,14 +180,20 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
 def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
     """Coefficients by way of the impulse response: D, C B, C A B, ...
 
-    What is zero there but for rounding is zero, so that no zero far away is left in num.
+    What is zero there but for rounding is zero, so that no zero far away is left in num. If all of
+    it but D is, the system is a gain: it has no states, or none that the input moves and the output
+    shows.
     """
-    A, v, row = np.atleast_2d(A), np.ravel(B), np.ravel(C)
-    den, response, size = np.poly(A), [float(np.ravel(D)[0])], np.abs(v)
+    v, row = np.ravel(B), np.ravel(C)
+    A = np.reshape(A, (len(v), len(v)))
+    response, size = [float(np.ravel(D)[0])], np.abs(v)
     for _ in range(len(A)):
         x = float(row @ v)
         response.append(x if abs(x) > CANCELLED * float(np.abs(row) @ size) else 0.0)
         v, size = A @ v, np.abs(A) @ size
+    if not any(response[1:]):
+        return response[:1], (1.0,)
+    den = np.poly(A)
     return np.convolve(response, den)[: len(den)], den
 
 

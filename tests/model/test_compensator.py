@@ -152,7 +152,8 @@ def test_state_space_of_another_package_keeps_the_response(c):
     s = 1j * OMEGA
     for system in (control.ss(control.tf(c.num, c.den)), signal.lti(c.num, c.den).to_ss()):
         back = Compensator.of(system)
-        assert back.order == c.order
+        gain = len(c.num) == len(c.den) and np.allclose(c.num, np.multiply(c.num[0], c.den), 1e-12)
+        assert back.order == (0 if gain else c.order)
         scale = np.abs(np.polyval(np.abs(c.num), OMEGA) / np.polyval(c.den, s))
         assert np.all(np.abs(response(back, s) - response(c, s)) <= 1e-6 * scale)
 
@@ -258,7 +259,44 @@ def test_state_space_answers_as_that_of_scipy(c):
 def test_a_gain_alone_has_no_states():
     A, B, C, D = Compensator((2.0,), (4.0,)).state_space()
     assert (A.shape, B.shape, C.shape, D) == ((0, 0), (0,), (0,), 0.5)
-    assert Compensator.of(control.tf([1.0], [2.0])) == Compensator((1.0,), (2.0,))
+
+
+STATELESS = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[0.5]]
+GAINS = {
+    "control.tf": lambda: control.tf([2.0], [4.0]),
+    "control.zpk": lambda: control.zpk([], [], 0.5),
+    "control.ss": lambda: control.ss([], [], [], [[0.5]]),
+    "control.tf2ss": lambda: control.ss(control.tf([2.0], [4.0])),
+    "control product": lambda: control.ss([], [], [], [[0.25]]) * 2.0,
+    "scipy tf": lambda: signal.TransferFunction([2.0], [4.0]),
+    "scipy zpk": lambda: signal.ZerosPolesGain([], [], 0.5),
+    "scipy ss": lambda: signal.StateSpace(*STATELESS),
+    "scipy tf2ss": lambda: signal.TransferFunction([2.0], [4.0]).to_ss(),  # a state at 0, unseen
+    "scipy zpk2ss": lambda: signal.ZerosPolesGain([], [], 0.5).to_ss(),
+    "not driven": lambda: control.ss(-np.eye(2), np.zeros((2, 1)), np.ones((1, 2)), [[0.5]]),
+    "not seen": lambda: control.ss([[0, 1], [0, 2.0]], [[0], [1]], np.zeros((1, 2)), [[0.5]]),
+}
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_gains_of_other_packages_have_no_states(name):
+    """Exactly, and at any frequency what their own package answers, within roundings."""
+    system = GAINS[name]()
+    c = Compensator.of(system)
+    assert (c.num, c.den, c.order) == ((0.5,), (1.0,), 0)
+    s = hc.Scenario(compensator=(system, Compensator()))
+    assert s.compensators == (c, Compensator())
+    assert hc.Scenario(compensator=system).compensators == (c, c)
+    theirs = signal.freqresp(system, OMEGA)[1] if "scipy" in name else system(1j * OMEGA)
+    np.testing.assert_allclose(response(c, 1j * OMEGA), theirs, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["control.ss", "scipy ss"])
+def test_a_gain_of_zero_is_refused_as_a_numerator_of_zeros(name):
+    make = control.ss if name == "control.ss" else signal.StateSpace
+    with pytest.raises(ParameterError, match="not all of them 0") as e:
+        Compensator.of(make(*STATELESS[:3], [[0.0]]))
+    assert e.value.field == "compensator.num"
 
 
 @given(shapes())

@@ -191,8 +191,11 @@ OWN = {
 }
 
 
+GAIN = {"order 0": hc.Compensator((1e-3,), (1.0,))}
+
+
 @fast
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("name", OWN | GAIN)
 def test_fitted_order_of_both_methods(name):
     """2 from 0.18 to 2.88 ms, 4 from 0.36 to 1.44 ms.
 
@@ -200,7 +203,7 @@ def test_fitted_order_of_both_methods(name):
     """
     b = 0.0, 40.0, 70.0
     clay = Clay(Profile((0.01, 0.03), b), Profile((0.008, 0.02), b[::-1], along="y"))
-    own = dict(arm=hc.Arm(0.3, 0.3), compensator=OWN[name], operator=(None, hc.Operator()))
+    own = dict(arm=hc.Arm(0.3, 0.3), compensator=(OWN | GAIN)[name], operator=(None, hc.Operator()))
     s = dataclasses.replace(both_ways(0), clay=clay, **own)
     s = dataclasses.replace(s, gain=tuple(half_of_limit(s, axis, b) for axis in "xy"))
     times = np.arange(1, 26) * 0.0288
@@ -305,6 +308,43 @@ def test_sampled_arm_is_the_hybrid_system(seed):
     np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
     np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
     np.testing.assert_allclose(r.tau[:n], Q, atol=1e-3)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("make", (control.ss, signal.StateSpace, control.tf, signal.lti))
+def test_runs_with_a_gain_alone_answer_as_python_control(make, tmp_path):
+    """A handle on a spring of 1/K in clay: p = (K G + S)(uh - (Th + b s) p), to a step of uh.
+
+    Fast within 5e-7 m and of second order, as above; accurate within 1e-9 m, near the roundings of
+    either. Torques held for Ts come Ts/2 late, at 0.2 m/s at most, and half of that by half of Ts.
+    """
+    states = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[2e-3]]
+    system = make(*states) if make in (control.ss, signal.StateSpace) else make([4e-3], [2.0])
+    hc.Scenario(compensator=system).save(tmp_path / "gain.toml")
+    taken = hc.Scenario.load(tmp_path / "gain.toml").compensator
+    assert taken == hc.Compensator((2e-3,), (1.0,))
+    hand, clay = hc.Operator(0.2, 4.0, 6.0), Clay(*(Profile((), (20.0,), x) for x in "xy"))
+    loop = dict(gain=(1.5, 0.0), force=(3.0, 0.0), operator=hand, clay=clay)
+    base = hc.Scenario(shaping=True, length=None, compensator=taken, t_max=0.18, **loop)
+    G, S = base.servo[0].G, base.servo[0].S
+    free = 1.5 * control.tf([2e-3], [1.0]) * control.tf([G.gain], [1.0, G.damping, G.stiffness])
+    free += control.tf([S.gain], [1.0, S.damping, S.stiffness])
+    num, den = free.num[0][0], free.den[0][0]
+    back = [hand.mass, hand.damper + 20.0, hand.spring]  # not proper: closed by its polynomials
+    closed = control.tf(num, np.polyadd(den, np.polymul(num, back)))
+
+    def error(**kw):
+        r = hc.simulate(dataclasses.replace(base, **kw), engine="python")
+        samples = np.arange(len(r.t)) * r.scenario.dt
+        assert r.outcome.code == "time limit" and np.allclose(r.t, samples, rtol=1e-12)
+        want = np.asarray(control.step_response(closed, samples).outputs)
+        return np.abs(r.p[:, 0] - 3.0 * want).max()
+
+    fine, coarse = error(), error(dt=4 * TS)
+    assert fine < 5e-7 and 9.0 * fine < coarse < 25.0 * fine
+    assert error(integrator="accurate") < 1e-9
+    late = [error(control="sampled", Ts=Ts, dt=Ts) for Ts in (TS, TS / 2)]
+    assert late[0] < 0.5 * TS * 0.2 and late[1] < 0.6 * late[0], late
 
 
 # ---- stiff clay, hits, limits

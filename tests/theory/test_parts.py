@@ -594,6 +594,22 @@ def test_systems_of_other_packages_are_compensators():
     assert hc.gain_limit("x", 90.0, compensator=1 / (s**2 + 10 * s)) == hc.gain_limit("x", 90.0)
 
 
+@pytest.mark.parametrize("operator", (None, hc.Operator()))
+def test_a_gain_without_states_has_the_poles_of_python_control(operator):
+    """Poles to 1e-9, what roots of polynomials keep."""
+    gain = control.ss([], [], [], [[2e-3]])
+    loop = hc.Loop("x", 90.0, operator, compensator=gain, K=1.5)
+    C, G, S, T = transfer_functions(loop)
+    s = 3.7j
+    assert C(s) == pytest.approx(gain(s), rel=1e-15)
+    E = 1.5 * C * G + S
+    closed = np.polyadd(np.polymul(E.num[0][0], T.num[0][0]), E.den[0][0])
+    found = hc.closed_loop_poles(loop)
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.roots(closed)), rtol=1e-9)
+    assert hc.gain_limit(loop) == math.inf
+    assert np.all(np.roots(closed).real < 1e-9)
+
+
 # ---- steady speed, passivity, transparency -------------------------------------------------------
 
 
