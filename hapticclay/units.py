@@ -7,7 +7,9 @@ import re
 from decimal import Decimal
 from functools import cache
 
-QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(\s*[^\W\d].*|\s+\S.*)")
+QUANTITY = re.compile(
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![eE][-+]?\d)(\s*[^\W\d].*|\s+\S.*)"
+)
 FACTOR = re.compile(r"1|([^\W\d]+)(?:\^(-?\d))?")
 PREFIXES = {"n": "1e-9", "u": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
 SIZES: dict[str, tuple[Decimal, tuple[int, ...]]] = {  # in SI; powers of m, kg, s and rad

@@ -311,3 +311,12 @@ def test_every_option_with_a_number_says_its_unit_in_a_known_way():
             kind = app.options([command]).get(name)
             if float in app._members(kind) and told not in ("", "1/inch"):
                 assert all(units.parse_unit(x) for x in told.split(", ")), (command, name, told)
+
+
+@given(st.floats(allow_nan=False), st.sampled_from(["", "e", ".3e", "E", "+.2E", "g"]))
+def test_a_number_in_any_notation_has_no_unit(x, notation):
+    """ "1e-5" is no unit e-5."""
+    text = format(x, notation) if notation else repr(x)
+    assert not units.is_quantity(text)
+    if math.isfinite(x):
+        assert units.is_quantity(f"{text} mm") and units.is_quantity(f"{text}mm")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -20,15 +21,17 @@ from .scenario import Scenario
 HAND_MOST = {"mass": (30.0, "kg"), "damper": (500.0, "N.s/m"), "spring": (1e4, "N/m")}
 
 
-def warn_of(scenario: Scenario, stacklevel: int = 3) -> None:
-    """Issues a `Warning` for each value of a scenario that is hardly meant.
+def warn_of(scenario: Scenario) -> None:
+    """Issues a `Warning` for each value of a scenario that is hardly meant, at the user's line.
 
     Args:
         scenario: what is to be run.
-        stacklevel: as of `warnings.warn`; 3 names the caller of the caller.
     """
     for text in implausible(scenario):
-        warnings.warn(text, Warning, stacklevel=stacklevel)
+        level, frame = 1, sys._getframe()
+        while frame and frame.f_globals.get("__name__", "").startswith("hapticclay."):
+            level, frame = level + 1, frame.f_back
+        warnings.warn(text, Warning, stacklevel=level)
 
 
 def implausible(scenario: Scenario) -> Iterator[str]:

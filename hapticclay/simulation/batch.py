@@ -186,7 +186,7 @@ def _checked(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
         scene = id(s.clay), s.origin, s.arm, s.operator
         if len(seen) < WARNED and scene not in seen:
             seen.add(scene)
-            warn_of(s, 4)
+            warn_of(s)
         if s.controller is not None:
             s.controller.function()  # imported here, not in a thread
         yield s

@@ -77,3 +77,16 @@ def test_the_command_line_prints_a_line(capsys, tmp_path):
         assert app.main([*words, "--out", str(tmp_path)]) == 0
     err = capsys.readouterr().err
     assert err.startswith("hapticclay: clay: lies where") and len(err.splitlines()) == 1
+
+
+def test_the_line_of_the_user_is_named():
+    odd = dataclasses.replace(hc.constant_cut(t_max=0.01), operator=hc.Operator(mass=250.0))
+    calls = (
+        lambda: hc.simulate(odd, engine="python"),
+        lambda: list(_checked([odd], set())),
+        lambda: hc.Simulation(odd).close(),
+    )
+    for call in calls:
+        with pytest.warns(hc.Warning, match="operator.mass = 250") as caught:
+            call()
+        assert {w.filename for w in caught} == {__file__}
