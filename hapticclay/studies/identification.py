@@ -50,6 +50,7 @@ SETTLING = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}
 SHAPED = 5e-9
 LINE_FLOOR = 1e-6  # least relative deviation of a line in the fit
 SMOOTHED_LINES = 5  # lines over which the scatter of the response is averaged
+NOISE_ROUNDS = 3  # of a fit of the noise, each weighted by the one before; two settle
 CONFIDENCE = 0.95
 
 
@@ -455,11 +456,38 @@ def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate
     ru, ry = spectrum(r, u), spectrum(r, y)
     H = ry.mean(axis=0) / ru.mean(axis=0)
     errors = (ry - H * ru) / ru.mean(axis=0)
-    scatter = np.sum(np.abs(errors) ** 2, axis=0) / (len(r) - 1) / len(r)
-    share = _smooth(scatter / np.abs(H) ** 2)
+    share = _smooth(_scatter(errors) / np.abs(H) ** 2)
     uu, yy, uy = (spectrum(a, b).mean(axis=0) for a, b in ((u, u), (y, y), (u, y)))
     coherence = np.minimum(np.abs(uy) ** 2 / (uu.real * yy.real), 1.0)
     return Estimate(H, np.sqrt(share) * np.abs(H), coherence, None if single else errors)
+
+
+def _scatter(errors: np.ndarray) -> np.ndarray:
+    """Variance of the mean response at each line, from the contributions of runs (runs, lines)."""
+    return np.sum(np.abs(errors) ** 2, axis=0) / (len(errors) - 1) / len(errors)
+
+
+def noise_deviation(found: Estimate) -> np.ndarray:
+    """Deviation of each line that white noise of input and output would cause, (lines,).
+
+    Two numbers, fitted to the scatter of all lines. Weights that follow the scatter of a few lines
+    over a few runs favour those whose errors happen to be small, whereby the fit becomes worse than
+    its intervals say. These hold with any weights; where noise is not white, they are wider.
+
+    Args:
+        found: the response, of several runs; of a single one, its own deviation is returned.
+    """
+    from scipy.optimize import nnls
+
+    if found.errors is None:
+        return found.deviation
+    power = np.abs(found.response) ** 2
+    shapes = np.stack((np.full_like(power, power.mean()), power), axis=1)
+    scatter, variance = _scatter(found.errors), found.deviation**2
+    for _ in range(NOISE_ROUNDS):
+        variance = variance + LINE_FLOOR**2 * power
+        variance = shapes @ nnls(shapes / variance[:, None], scatter / variance)[0]
+    return np.sqrt(variance)
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
@@ -552,7 +580,7 @@ def fitted_coefficients(
         dt: as in `response`.
         floor: relative error of the fitted form itself, part of the interval.
     """
-    value, half = fit(what, frequency, found.response, found.deviation, found.errors, dt)
+    value, half = fit(what, frequency, found.response, noise_deviation(found), found.errors, dt)
     half = np.hypot(half, floor * np.abs(value))
     names, units = COEFFICIENT_NAMES[what], COEFFICIENT_UNITS[what]
     rows = zip(names, units, printed_form(what, axis), value.tolist(), half.tolist(), strict=True)

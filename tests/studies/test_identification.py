@@ -79,13 +79,14 @@ def test_printed_coefficients_and_response_without_noise(what, axis):
 def test_printed_coefficients_from_noisy_data(what, axis):
     """Encoders of 65536 counts, 0.02 N rms.
 
-    Within 0.5 %, Sh 2 %, and within 4 sigma (2 half-intervals), seeded.
+    Within 0.5 %, Sh 2 %, and within three half-intervals: 9.5 deviations of Student's t of the 3
+    degrees of freedom of four runs, beyond which a coefficient lies with a chance of 2.5e-3.
     """
     short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else {}
     r = quick(what, axis, noise=hc.Noise(), seed=1, realisations=4, **short)
     for c in r.coefficients:
         assert abs(c.error) < (0.02 if what == "S" else 0.005), c
-        assert abs(c.value - c.printed) < (c.high - c.low), c
+        assert abs(c.value - c.printed) < 1.5 * (c.high - c.low), c
     assert 0.9 < r.coherence.min() < 1.0 - 1e-6
 
 
@@ -129,6 +130,44 @@ def test_intervals_from_the_scatter_of_runs_cover_at_the_stated_rate():
         value, half = fit("G", f, H, 1e-3 * np.abs(exact), errors - errors.mean(axis=0), DT)
         hits += np.abs(value - PRINTED["Gx"]) <= half
     assert np.all(np.abs(hits / 400 - 0.95) < 0.044), hits
+
+
+def noisy_runs(rng, H, bins, runs, of_input, of_output, n=1000):
+    """Multisines of amplitude 1 at these lines, and the response H to them, in white noise."""
+    signals = []
+    for _ in range(runs):
+        drive, answer = np.zeros((2, n // 2 + 1), complex)
+        drive[bins] = 0.5 * n * np.exp(2j * np.pi * rng.random(len(bins)))
+        answer[bins] = H * drive[bins]
+        r, y = np.fft.irfft(drive, n), np.fft.irfft(answer, n)
+        noise = rng.normal(0.0, ((of_input,), (of_output,)), (2, n))
+        signals.append((r, r + noise[0], y + noise[1]))
+    return identification.estimate_response(np.array(signals), n, bins)
+
+
+@pytest.mark.parametrize("runs", [2, 4])
+@pytest.mark.parametrize(
+    "block,of_input,of_output",
+    [("Gy", 0.0, 0.05), ("Sy", 0.05, 0.0), ("Sy", 0.02, 2e-5), ("Thx", 1e-3, 0.5)],
+)
+def test_the_fit_of_few_runs_is_as_good_as_with_known_noise(block, runs, of_input, of_output):
+    """Of 150 draws; the same ones fitted with the noise's true deviation, the best weights.
+
+    Two numbers fitted to 40 and more cost some percent of the variance: -1 to 3 % here. Weights by
+    the scatter of 5 lines cost 3 to 30 %, more than 6 % in six of the eight.
+    """
+    rng = np.random.default_rng(2)
+    bins = np.unique(np.round(np.geomspace(1, 130, 24)).astype(int))
+    f, what = bins * (0.03 if block == "Thx" else 0.15), block[:-1]
+    H = response(what, PRINTED[block], f)
+    known = np.hypot(of_output, of_input * np.abs(H))  # in proportion
+    left = np.zeros((2, 3))
+    for _ in range(150):
+        found = noisy_runs(rng, H, bins, runs, of_input, of_output)
+        for i, deviation in enumerate((identification.noise_deviation(found), known)):
+            value, _ = fit(what, f, found.response, deviation, found.errors)
+            left[i] += (value / PRINTED[block] - 1.0) ** 2
+    assert np.mean(left[0] / left[1]) < 1.06, np.mean(left[0] / left[1])
 
 
 @pytest.mark.parametrize("what", ["G", "S", "Th"])
