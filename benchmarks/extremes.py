@@ -347,6 +347,7 @@ def run(case: Case, solve: Callable[..., Any] = reference.solve) -> dict[str, An
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
         os.chdir(folder)  # where the engine would leave its log
         warnings.simplefilter("always")
+        warnings.simplefilter("ignore", hc.Warning)  # extremes are hardly meant
         try:
             r = hc.simulate(case.scenario, every=case.every)
         except Exception as error:  # noqa: BLE001  a row, whatever it is
