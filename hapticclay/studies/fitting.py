@@ -238,7 +238,7 @@ class _Sliding(NamedTuple):
 def fit_flow(
     data: Measurement | Record | str | os.PathLike[str],
     axis: str | None = None,
-    laws: Sequence[str] = tuple(FLOW_LAWS),
+    laws: Sequence[str] | str = tuple(FLOW_LAWS),
     level: float = 0.95,
     *,
     time: tuple[float, float] | None = None,

@@ -8,6 +8,7 @@ function of the held arm at the samples, and by the hold's own spectrum between 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -167,7 +168,7 @@ def loop_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
     return loop_response(loop, omega).Z
 
 
-def frequencies(omega: np.ndarray) -> np.ndarray:
+def frequencies(omega: Sequence[float] | np.ndarray) -> np.ndarray:
     """Frequencies as an array of floats.
 
     Args:

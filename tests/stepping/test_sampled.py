@@ -219,8 +219,8 @@ def test_held_block_is_the_step_response_of_any_C_and_G(name):
         (dict(control="sampeld"), "control"),
         (dict(control="sampled", render="hold"), "render"),
         (dict(Ts=1e-3), "Ts"),
-        (dict(control="sampled", Ts=5e-4), "Ts"),
-        (dict(control="sampled", Ts=1e-4), "Ts"),
+        (dict(control="sampled", Ts=5e-4, dt=3.6e-4), "Ts"),
+        (dict(control="sampled", Ts=1e-4, dt=3.6e-4), "Ts"),
         (dict(control="sampled", integrator="accurate"), "integrator"),
     ],
 )
