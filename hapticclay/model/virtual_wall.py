@@ -102,14 +102,14 @@ class VirtualWall:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .fields import with_fields
+        from .fields import make_part, nested
         from .scenario_file import read_settings
 
         try:
             data = read_settings(path)
             del data["name"]
             choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA,))
-            return with_fields(cls(), data)
+            return make_part(cls, nested(data))
         except ParameterError as error:
             field = "wall" if error.field == "scenario" else error.field
             told = "" if field == "wall" else f" (in {Path(path)})"

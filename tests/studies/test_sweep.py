@@ -149,7 +149,10 @@ def test_any_field_of_any_part_is_varied_by_name(tmp_path):
         "operator.y.mass": lambda s: s.operator[1].mass,
     }
     grid = " ".join(f"{name}=0.3:0.4:2" for name in names)
-    sampled = {"control": "sampled", "interface.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0]}
+    sampled = {
+        "control": "sampled", "interface.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
+        "impedance": True,
+    }  # fmt: skip
     s = Sweep("constant", parse_grid(grid), sampled)
     assert len(s) == 2 ** len(names)
     for point in s.points(100, 104):
@@ -366,9 +369,8 @@ def test_maps(tmp_path):
     assert (
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
-    assert set(t.get_text() for t in figure.legends[0].get_texts()) == set(
-        table["status"].to_pylist()
-    )
+    shown = {t.get_text() for t in figure.legends[0].get_texts()}
+    assert shown == {*table["status"].to_pylist(), "gain margin < 1"}  # gain 1 on y, at b = 100
     study_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
         study_plots.sweep_plot(table, "speedx")
