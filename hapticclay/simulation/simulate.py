@@ -58,8 +58,8 @@ def simulate(
         ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
             stiff for its integrator, the record may not fit into memory, the law of its controller
             is not found, or an error in seconds is asked for without a border to cross.
-        LawFailed: the law of its controller raised an exception. What is no error, as Ctrl-C, is
-            raised as it is.
+        RuntimeError: the law of its controller raised an exception (`LawFailed`). What is no error,
+            as Ctrl-C, is raised as it is.
     """
     every = integer("every", every, 1, 1_000_000)
     warn_of(scenario)
