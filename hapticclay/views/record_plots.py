@@ -45,7 +45,9 @@ class RecordPlots:
 
     def __call__(self) -> Figure:
         """The first figure that `hapticclay run` draws: velocity, or in a maneuver the force."""
-        return next(iter(self.all().values()))
+        figures = self.all()
+        main = "force" if self.record.scenario.muscle is not None else "velocity"
+        return figures.get(main) or next(iter(figures.values()))
 
     def __repr__(self) -> str:
         return f"<plots of {self.record!r}: plot(), .velocity(), .force(), .path(), .energy()>"

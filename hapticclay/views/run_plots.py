@@ -515,7 +515,7 @@ def _force(record: Record) -> Figure | None:
 def _path(record: Record) -> Figure | None:
     """Where the handle may leave the line of one experiment: driven, or in clay of an image."""
     s = record.scenario
-    if s.clay is None:
+    if s.clay is None or s.clay.groove is not None:  # whose ground shows the path
         return None
     image = any(not isinstance(law, Profile) for law in s.clay.laws)
     return path_plot(record) if s.driven or image or _clay_along_both_axes(s) else None
