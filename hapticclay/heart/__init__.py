@@ -1,0 +1,1 @@
+"""How one run advances: parts in, values out (docs/equations.md, section 4)."""
