@@ -302,9 +302,11 @@ def fit_flow(
     return _fitted(s, names, level, count, axis, source, f[inside])
 
 
-def _law_names(laws: Sequence[str]) -> list[str]:
+def _law_names(laws: Sequence[str] | str) -> list[str]:
     """Laws from simple to rich; upper and lower case, hyphens and spaces are alike."""
     known = {_plain_name(x): x for x in FLOW_LAWS}
+    if not isinstance(laws, Sequence):
+        raise ParameterError("laws", laws, "must be names of laws")
     laws = (laws,) if isinstance(laws, str) else tuple(laws)
     names = {known.get(_plain_name(x)) or choice("laws", x, tuple(FLOW_LAWS)) for x in laws}
     if not names:
