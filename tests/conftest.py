@@ -22,8 +22,11 @@ try:
 except ImportError:  # Windows: no locks, so ratios of run times are disturbed there
     fcntl = None
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a background job's and its children's
+# a background job and its children ignore the one, what nohup starts the other
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if getattr(signal, "SIGHUP", None) and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing
 settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)
