@@ -188,19 +188,21 @@ def ask_to_close(window, display):
 
 @pytest.mark.parametrize("how", ["message", "destroyed", "disconnected", "Ctrl-C"])
 def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_path, how):
-    """The window closes while the button is down: 60 N/m lags by 3 s in clay of 200 N.s/m."""
-    mouse = Mouse(screen, tmp_path, "view", "--b", "200", "--out", "o", "--no-plots")
+    """The window closes while the button is down: 60 N/m lags by 30 s in clay of 2000 N.s/m.
+
+    So the handle is still in the clay however late a busy machine closes the window.
+    """
+    mouse = Mouse(screen, tmp_path, "view", "--b", "2000", "--out", "o", "--no-plots")
     try:
         mouse.drag(200)
-        mouse.until(lambda now: now["x"] > 0.06)  # 1 cm inside
+        mouse.until(lambda now: now["x"] > 0.055)
         code, out, err = mouse.end(how)
     finally:
         mouse.do("mouseup", 3, "keyup", "ctrl")
     assert (code, err) == (0, ""), out
     record = hc.Record.load(tmp_path / "o")
-    assert (
-        record.b[-1, 0] == 200.0 and record.v[-1, 0] > 1e-3 and record.extra["removed"][-1] > 1e-6
-    )
+    assert record.b[-1, 0] == 2000.0 and record.v[-1, 0] > 5e-4
+    assert record.extra["removed"][-1] > 5e-7
     assert record.outcome.code == "finished"
 
 
