@@ -1,0 +1,182 @@
+"""Regions of the clay and the borders between them: where a step must end."""
+
+from __future__ import annotations
+
+from ..model import regions
+from . import grooves, springs, viscous
+from .kick import kick, place_after
+from .state import Clay, Felt, Growth, Hit, Region, Special, State, Status
+
+TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
+
+
+def side(p, low, high):
+    """1 beyond the upper border, -1 beyond the lower, 0 within; a NaN is within."""
+    return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0
+
+
+def sides(r, p):
+    """Borders of a region between it and a place, as `side`, (x, y)."""
+    return side(p[0], r.low[0], r.high[0]), side(p[1], r.low[1], r.high[1])
+
+
+def is_within(r, p):
+    """Whether a place lies in a region; a NaN does not."""
+    (x, y), (a, b), (c, d) = p, r.low, r.high
+    return a - TOUCH <= x <= c + TOUCH and b - TOUCH <= y <= d + TOUCH
+
+
+def border_of(r, i, up):
+    """Place of a border of a region [m]."""
+    if i == 0:
+        return r.high[0] if up > 0 else r.low[0]
+    return r.high[1] if up > 0 else r.low[1]
+
+
+def is_same_beyond(table, r, i, up):
+    """Whether the clay beyond a border of a region is the same."""
+    return regions.is_alike(table, r.index[0], r.index[1], i, up)
+
+
+# ---- into another region -------------------------------------------------------------------------
+
+
+def growth_in(part, growth, rate):
+    if part is None:
+        return growth
+    return Growth(rate, growth.old)
+
+
+def felt_in(part, felt, table, index):
+    if part is None:
+        return felt
+    ax, bx, cx = regions.enter_flow(table, 0, index[0], index[1])
+    ay, by, cy = regions.enter_flow(table, 1, index[0], index[1])
+    f = felt
+    return Felt((ax, bx, cx, ay, by, cy), f.old, f.mean, f.v, f.f, f.stuck, f.anchor, f.still, f.times)
+
+
+def hit_in(part, hit, struck):
+    if part is None:
+        return hit
+    return Hit(hit.fine, max(hit.struck, struck))
+
+
+def clay_in(part, special, table, clay, index, t, p, crossed, struck):
+    """The clay of a region that the handle comes into.
+
+    Args:
+        part: the clay.
+        table: of it.
+        clay: its state.
+        index: of the region, (x, y).
+        t: now [s].
+        p: place of the handle [m].
+        crossed: coordinate of the border crossed, -1 for none.
+        struck: 1.0 where other clay lies behind it.
+    """
+    low, high, b, rate = regions.enter_region(table, index[0], index[1], t)
+    region = Region(index, low, high)
+    if part is None:
+        return Clay(region, b, clay.old, clay.growth, clay.special)
+    growth = growth_in(part.growth, clay.growth, rate)
+    clay = Clay(region, b, clay.old, growth, clay.special)
+    return special_in(special, table, clay, p, crossed, struck)
+
+
+def special_in(special, table, c, p, crossed, struck):
+    if special is None:
+        return c
+    x, r = c.special, c.region
+    elastic = springs.entered(special.springs, x.elastic, r, table, p, crossed)
+    b, cut = grooves.entered(special.groove, x.cut, c.b)
+    hit = hit_in(special.stiff, x.hit, struck)
+    felt = felt_in(special.flow, x.felt, table, r.index)
+    c = Clay(r, b, c.old, c.growth, Special(x.owed, hit, felt, elastic, cut))
+    return viscous.at_place(special.smooth, table, c, p)
+
+
+def seen_with(x, i, at):
+    """Status of a run whose region along coordinate i becomes `at`."""
+    a, b, c, d = x.seen
+    back = (a <= at <= b) if i == 0 else (c <= at <= d)
+    seen = (min(a, at), max(b, at), c, d) if i == 0 else (a, b, min(c, at), max(d, at))
+    return Status(
+        x.code, x.closing, x.steps, x.careful, x.landings + (1 if back else 0), seen, x.rows,
+        x.crossings, x.stops,
+    )  # fmt: skip
+
+
+def moved_on(parts, s, p, i, up, struck):
+    """The state in the region beyond a border of coordinate i."""
+    x, y = s.clay.region.index
+    index = (x + up, y) if i == 0 else (x, y + up)
+    clay = clay_in(parts.clay, parts.special, parts.table, s.clay, index, s.clock.t, p, i, struck)
+    return State(s.clock, s.body, s.loop, clay, s.work, seen_with(s.status, i, index[i]))
+
+
+def passed_alike(parts, s, here, p):
+    """The state in the last region on the way to a place before clay that differs."""
+    while True:
+        sx, sy = sides(s.clay.region, p)
+        i, up = (1, sy) if sx == 0 else (0, sx)
+        if (sx == 0) == (sy == 0) or not is_same_beyond(parts.table, s.clay.region, i, up):
+            return s
+        s = moved_on(parts, s, here, i, up, 0.0)
+
+
+# ---- the step that ends on a border --------------------------------------------------------------
+
+
+def beyond(h, parts, s, i, border):
+    """Distance by which a step of length h would pass a border of coordinate i [m]."""
+    k = kick(parts, s.clock, s.body, s.loop, s.clay, h)
+    x, y = place_after(parts.arm, s.body.q, k, h)
+    return (y if i else x) - border
+
+
+def find_root(f, b, fb, *args):
+    """Root of f between 0 and b, to rounding (false position, Illinois).
+
+    f may vanish at 0 itself, as when a handle enters stiff clay, stops and returns; the root of f/x
+    is then found. Where f does not change its sign, the result lies next to 0.
+    """
+    first, end, leaves = 1e-9 * b, b, False
+    a, fa = 0.0, 0.0
+    for i in range(100):
+        a = first if i == 0 else 8.0 * a
+        if a > 0.5 * b:
+            return first
+        fa = f(a, *args)
+        if fa != 0.0 and (fa > 0.0) != (fb > 0.0):
+            break
+        leaves = True
+    if leaves:
+        fa, fb = fa / a, fb / b
+    for _ in range(60):
+        h = b - fb * (b - a) / (fb - fa)
+        fh = f(h, *args)
+        small = abs(fh) < 4e-16  # rounding of a position
+        if leaves:
+            fh /= h
+        if (fh > 0.0) != (fb > 0.0):
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = h, fh
+        if abs(b - a) <= 1e-12 * end or small:
+            break
+    return b
+
+
+def first_border(parts, s, after, p, sx, sy):
+    """The step that ends on the first border in its way: its length [s], coordinate, side."""
+    span, axis, up = after, -1, 0
+    for i in range(2):
+        at = sy if i else sx
+        if at != 0:
+            border = border_of(s.clay.region, i, at)
+            length = find_root(beyond, after, (p[1] if i else p[0]) - border, parts, s, i, border)
+            if axis < 0 or length < span:
+                span, axis, up = length, i, at
+    return span, axis, up

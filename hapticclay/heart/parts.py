@@ -1,0 +1,237 @@
+"""The parts of a scene, as plain numbers; a part that the scene lacks is None.
+
+A function that takes a part asks for None first: numba prunes that branch, so what a scene lacks is
+neither compiled nor run. Machine code is cached under the types of the parts.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+INF = float("inf")
+
+
+class Time(NamedTuple):
+    """When samples lie.
+
+    Attributes:
+        dt: step [s].
+        t_max: end of the run [s].
+        last: number of whole steps.
+    """
+
+    dt: float
+    t_max: float
+    last: int
+
+
+class Arm(NamedTuple):
+    """The arm.
+
+    Attributes:
+        links: arm.Arm.links.
+        ox: world position of p = 0, x [m].
+        oy: the same, y [m].
+    """
+
+    links: Any
+    ox: float
+    oy: float
+
+
+class Servo(NamedTuple):
+    """The servo of one axis, see controller.Servo.numbers.
+
+    Attributes:
+        ratio: static gain of G.
+        damping: of G [1/s].
+        stiffness: of G [1/s^2].
+        S: gain of Sh [1/kg].
+        Sdamping: of Sh [1/s].
+        Sstiffness: of Sh [1/s^2].
+    """
+
+    ratio: float
+    damping: float
+    stiffness: float
+    S: float
+    Sdamping: float
+    Sstiffness: float
+
+
+class Lag(NamedTuple):
+    """The compensator of one axis as printed, K/(s (s + pole)).
+
+    Attributes:
+        K: gain [1/kg].
+        pole: [rad/s].
+    """
+
+    K: float
+    pole: float
+
+
+class Form(NamedTuple):
+    """Compensators of another shape.
+
+    Attributes:
+        gain: K of x and of y.
+        order: the higher one.
+        numbers: compensator.form_numbers of x, then of y.
+        kick: compensator.form_kick of both, and the lengths of the steps that it is for.
+        work: its workspace.
+    """
+
+    gain: Any
+    order: int
+    numbers: Any
+    kick: Any
+    work: Any
+
+
+class Hand(NamedTuple):
+    """Th of one axis.
+
+    Attributes:
+        mass: [kg].
+        damper: [N.s/m].
+        spring: [N/m].
+    """
+
+    mass: float
+    damper: float
+    spring: float
+
+
+class Push(NamedTuple):
+    """The muscle force.
+
+    Attributes:
+        steady: the part that is constant or changes evenly: since [s], x, y [N], rates x, y [N/s].
+        muscle: table of the muscle's signal.
+    """
+
+    steady: Any
+    muscle: Any
+
+
+class Clay(NamedTuple):
+    """The clay.
+
+    Attributes:
+        growth: 1 where damping grows.
+    """
+
+    growth: Any
+
+
+class Special(NamedTuple):
+    """Laws of the clay beside plain viscous damping.
+
+    Attributes:
+        smooth: which axes have smooth clay.
+        stiff: clay that a step may overshoot.
+        flow: clay that yields.
+        springs: clay that springs back.
+        groove: clay that stays cut.
+    """
+
+    smooth: Any
+    stiff: Any
+    flow: Any
+    springs: Any
+    groove: Any
+
+
+class Stiff(NamedTuple):
+    """Clay so stiff that a step may overshoot.
+
+    Attributes:
+        mobility: largest acceleration of handle and hand per unit of force [1/kg].
+        first: first step of a hit that saturates the motors, times the damping [s.N.s/m].
+    """
+
+    mobility: float
+    first: float
+
+
+class Flow(NamedTuple):
+    """Clay that yields.
+
+    Attributes:
+        along: None where each axis yields by itself, 1 along the motion.
+    """
+
+    along: Any
+
+
+class Springs(NamedTuple):
+    """Clay that springs back.
+
+    Attributes:
+        longest: longest step that resolves them [s].
+        rendered: None where the clay is physical, 1 where the motors render it.
+    """
+
+    longest: float
+    rendered: Any
+
+
+class Groove(NamedTuple):
+    """Clay that stays cut.
+
+    Attributes:
+        numbers: groove.Groove.numbers.
+        drag: damping per cross-section [N.s/m^3]; None for none.
+        ground: share of each cell that is left.
+        relief: height of the cells before any cut [m].
+        rim: the clay in front of the tool, see groove.cut.
+        removed: volume removed, see groove.add [m^3].
+    """
+
+    numbers: Any
+    drag: Any
+    ground: Any
+    relief: Any
+    rim: Any
+    removed: Any
+
+
+class Parts(NamedTuple):
+    """A scene.
+
+    Attributes:
+        time: the samples.
+        arm: the arm.
+        servo: of x and of y.
+        shaping: 1 where inertia is shaped.
+        lag: compensators as printed, of x and of y; None where they have another shape.
+        form: those of another shape.
+        hand: the operator's arm, of x and of y.
+        push: the muscle force.
+        command: table of the command's signal.
+        limits: of the torques [N.m].
+        table: borders and cells, from regions.region_table.
+        clay: the clay.
+        grain: cosine and sine of the angle between its axes and x, y.
+        special: laws of it beside plain viscous damping that every step resolves.
+        sampler: sampled control.
+        accurate: the accurate method.
+    """
+
+    time: Time
+    arm: Arm
+    servo: Any
+    shaping: Any
+    lag: Any
+    form: Any
+    hand: Any
+    push: Push
+    command: Any
+    limits: Any
+    table: Any
+    clay: Any
+    grain: Any
+    special: Any
+    sampler: Any
+    accurate: Any

@@ -1,0 +1,391 @@
+"""The path of a run: samples, borders of the clay and the end, for every method.
+
+A step ends on the next sample, or on the first border before it. A kick is a value, so that the
+search for a border works out as many as it likes; the run takes the last.
+"""
+
+from __future__ import annotations
+
+from ..model import regions
+from . import borders, grooves, hits, rows, springs, viscous, yielding
+from .engine_step import moved_arm, put
+from .kick import command_change, handle_at, is_finite, kick, place, place_after, velocity
+from .parts import INF
+from .state import (
+    FINISHED,
+    NOT_FINITE,
+    OPEN,
+    TIME_LIMIT,
+    UNRESOLVED,
+    Axis,
+    Body,
+    Clay,
+    Clock,
+    Growth,
+    Loop,
+    Special,
+    State,
+    Status,
+)
+
+# times that the handle comes back to a region within one sample; a handle that slides along a
+# border then completes the step
+LANDINGS = 4
+MOST_STEPS = 20_000  # from one sample to the next; a run that needs more ends as unresolved
+
+
+# ---- time ----------------------------------------------------------------------------------------
+
+
+def next_sample(time, t, i):
+    """The next sample of a run: its time, the length of the step to it (0 at the end) [s]; whether
+    now is a sample.
+    """
+    dt = time.dt
+    on_grid = t == i * dt
+    if i > time.last:
+        return t, 0.0, on_grid
+    target = (i + 1) * dt if i < time.last else time.t_max
+    after = dt if on_grid and i < time.last else target - t
+    return target, after if after > 1e-9 * dt else 0.0, on_grid
+
+
+# ---- status --------------------------------------------------------------------------------------
+
+
+def begun(x, region, after, on_grid):
+    """Status where a step begins that is looked at."""
+    closing = TIME_LIMIT if x.closing == OPEN and after == 0.0 else x.closing
+    if on_grid:
+        ix, iy = region.index
+        return Status(x.code, closing, x.steps, 1, 0, (ix, ix, iy, iy), x.rows, x.crossings, x.stops)
+    code = UNRESOLVED if x.careful >= MOST_STEPS else x.code
+    return Status(
+        code, closing, x.steps, x.careful + 1, x.landings, x.seen, x.rows, x.crossings, x.stops
+    )
+
+
+def with_status(s, x):
+    return State(s.clock, s.body, s.loop, s.clay, s.work, x)
+
+
+def ended(s, code):
+    """The state of a run that is over."""
+    x = s.status
+    x = Status(code, x.closing, x.steps, x.careful, x.landings, x.seen, x.rows, x.crossings, x.stops)
+    return with_status(s, x)
+
+
+# ---- a step --------------------------------------------------------------------------------------
+
+
+def clay_behind(part, special, table, clay, state, p, v, h):
+    """The clay after a step of length h that led to p; `state` is that of its special laws."""
+    if part is None:
+        return clay
+    growth = same_growth(part.growth, clay.growth)
+    clay = Clay(clay.region, clay.b, clay.b, growth, state)
+    return special_behind(special, table, clay, p, v, h)
+
+
+def same_growth(part, growth):
+    if part is None:
+        return growth
+    return Growth(growth.rate, growth.rate)
+
+
+def special_behind(special, table, c, p, v, h):
+    if special is None:
+        return c
+    x = c.special
+    elastic = springs.moved(special.springs, x.elastic, c.region, table, p, h)
+    b, old, cut = grooves.moved(special.groove, x.cut, c, p, v)
+    felt = yielding.behind(special.flow, x.felt)
+    c = Clay(c.region, b, old, c.growth, Special(x.owed, x.hit, felt, elastic, cut))
+    return viscous.at_place(special.smooth, table, c, p)
+
+
+def commanded(table, loop, t0, t1, h):
+    """The loop with the change of the command in its output."""
+    if table is None:
+        return loop
+    dx, dy = command_change(table, t0, t1, h)
+    x, y = loop.x, loop.y
+    x, y = Axis(x.delta + dx, x.rate, x.y, x.yrate), Axis(y.delta + dy, y.rate, y.y, y.yrate)
+    return Loop(x, y, loop.form)
+
+
+def behind_kick(special, parts, e, before, k, t, stops):
+    """State of the special laws behind a kick, and how many stops are noted."""
+    if special is None:
+        return k.motion.special, stops
+    x = k.motion.special
+    hit = hits.hit_after(special.stiff, parts, x.hit, k)
+    stops = yielding.noted(special.flow, e, x.felt, before.felt, t, stops)
+    return Special(x.owed, hit, x.felt, x.elastic, x.cut), stops
+
+
+def held_arm(special, e, state, w):
+    """Joint rates; none of an arm that clay holds, which the engine's rounding would let creep."""
+    if special is None:
+        return w
+    if yielding.is_still(special.flow, state.felt):
+        put(e.w, 0, 0.0)
+        put(e.w, 1, 0.0)
+        return 0.0, 0.0
+    return w
+
+
+def moved_clay(special, parts, clay, state, q, w, h):
+    """The clay behind a step that led the arm to q, w."""
+    if special is None:
+        return clay_behind(parts.clay, special, parts.table, clay, state, (0.0, 0.0), (0.0, 0.0), h)
+    at = handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
+    return clay_behind(parts.clay, special, parts.table, clay, state, at.p, at.v, h)
+
+
+def stepped(parts, s, e, k, after, target):
+    """The state after the step behind a kick."""
+    special, clock, x = parts.special, s.clock, s.status
+    q, w = moved_arm(parts, e, parts.grain, clock.before, s.body.w, k, after)
+    w = held_arm(special, e, k.motion.special, w)
+    state, stops = behind_kick(special, parts, e, s.clay.special, k, clock.t, x.stops)
+    clay = moved_clay(special, parts, s.clay, state, q, w, after)
+    t, i, dt = clock.t + after, clock.i, parts.time.dt
+    loop = commanded(parts.command, k.loop, clock.t, t, 0.5 * dt)
+    if target - t <= 1e-9 * dt:
+        t, i = target, i + 1
+    x = Status(
+        x.code, x.closing, x.steps + 1, x.careful, x.landings, x.seen, x.rows, x.crossings, stops
+    )
+    return State(Clock(t, i, after), Body(q, w, k.g), loop, clay, s.work, x)
+
+
+# ---- what is kept --------------------------------------------------------------------------------
+
+
+def written(parts, s, e, k, v, b):
+    """The state with the row of a sample in the record."""
+    special, x = parts.special, s.status
+    rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
+    rows.write_force(special, parts.grain, e, x.rows, k, v, b)
+    x = Status(
+        x.code, x.closing, x.steps, x.careful, x.landings, x.seen, x.rows + 1, x.crossings, x.stops
+    )
+    return with_status(s, x)
+
+
+def worked(parts, s, k):
+    """The state with the works of a kick in the ledger."""
+    work = rows.with_work(parts, s.work, k, s.body.w)
+    return State(s.clock, s.body, s.loop, s.clay, work, s.status)
+
+
+def clay_now(part, clay, before, t):
+    """Damping at a sample, or that before it, (x, y) [N.s/m]."""
+    if part is None:
+        return clay.b
+    if before:
+        return viscous.grown(part.growth, clay.old, clay.growth, 1, t)
+    return viscous.grown(part.growth, clay.b, clay.growth, 0, t)
+
+
+def kept(parts, s, e, k, after, shows):
+    """The state with what is kept of a kick: its row, if now is a sample, and its works."""
+    if shows:
+        if after == 0.0:
+            v = arrival(parts.special, parts, s)
+        else:
+            v = velocity(parts.special, parts.grain, k)
+        s = written(parts, s, e, k, v, clay_now(parts.clay, s.clay, after == 0.0, s.clock.t))
+    return worked(parts, s, k)
+
+
+# ---- borders -------------------------------------------------------------------------------------
+
+
+def arrival(special, parts, s):
+    """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
+    k = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
+    return slow_arrival(special, parts, s, velocity(special, parts.grain, k))
+
+
+def slow_arrival(special, parts, s, v):
+    if special is None:
+        return v
+    return stiff_arrival(special.stiff, special, parts, s, v)
+
+
+def stiff_arrival(stiff, special, parts, s, v):
+    """As `arrival`: half a kick has led here; in stiff clay that half holds too little of the clay,
+    and the velocity is that of a whole kick, with the step before it repeated.
+    """
+    if stiff is None:
+        return v
+    k = kick(parts, s.clock, s.body, s.loop, s.clay, s.clock.before)
+    (x, y), soft = velocity(special, parts.grain, k), k.viscous.split.soft
+    return x if soft[0] > 0.0 else v[0], y if soft[1] > 0.0 else v[1]
+
+
+def crossed(parts, s, e, i, up):
+    """The state beyond a border, which is noted; at the end of the path, that of a run to close."""
+    border, x, n = borders.border_of(s.clay.region, i, up), s.status, 4 * s.status.crossings
+    speed = 0.0
+    if s.clock.before > 0.0:
+        v = arrival(parts.special, parts, s)
+        speed = v[1] if i else v[0]
+    put(e.crossings, n, float(i))
+    put(e.crossings, n + 1, border)
+    put(e.crossings, n + 2, s.clock.t)
+    put(e.crossings, n + 3, speed)
+    closes = i == 0 and up > 0 and border == parts.table[regions.END]
+    s = with_status(
+        s,
+        Status(
+            x.code, FINISHED if closes else x.closing, x.steps, x.careful, x.landings, x.seen,
+            x.rows, x.crossings + 1, x.stops,
+        ),
+    )  # fmt: skip
+    if closes:
+        return s
+    return borders.moved_on(parts, s, place(parts.arm, s.body.q), i, up, 1.0)
+
+
+def shortened(special, state, after):
+    """The longest step that the clay allows [s]."""
+    if special is None:
+        return after
+    return springs.longest(special.springs, state.elastic, after)
+
+
+def towards(parts, s, after, over, first):
+    """The kick that leads on, with the step after it shortened to the first border in its way.
+
+    Args:
+        parts: the scene.
+        s: the state.
+        after: length that the step may have [s].
+        over: sides of the borders stepped over without a step, (x, y): there is no way back over
+            them, which must not hold the run.
+        first: whether other clay has been met since the last look.
+
+    Returns:
+        The state, in the region of the step; the kick; length of the step [s]; coordinate of the
+        border that it ends on, or that is to be crossed without a step, -1 for none; its side;
+        whether without a step.
+    """
+    axis, up, special = -1, 0, parts.special
+    here = place(parts.arm, s.body.q)
+    while True:
+        after = shortened(special, s.clay.special, after)
+        if s.status.closing != OPEN:
+            after = 0.0
+        elif first:
+            after = hits.longest(special, s.clay.special, after)
+            s, after = hits.struck(special, parts, s, after)
+        first = False
+        k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
+        if after == 0.0 or axis >= 0 or not is_finite(k):
+            return s, k, after, axis, up, False
+        p = place_after(parts.arm, s.body.q, k, after)
+        sx, sy = borders.sides(s.clay.region, p)
+        if sx == 0 and sy == 0:
+            return s, k, after, axis, up, False
+        s = borders.passed_alike(parts, s, here, p)
+        sx, sy = borders.sides(s.clay.region, p)
+        sx, sy = sx if over[0] in (0, sx) else 0, sy if over[1] in (0, sy) else 0
+        herex, herey = borders.sides(s.clay.region, here)
+        if sx == 0 and sy == 0:
+            return s, k, after, axis, up, False
+        standing = sx != 0 and herex != 0 or sy != 0 and herey != 0
+        if standing:
+            i, side = (0, sx) if sx != 0 and herex != 0 else (1, sy)
+        elif s.status.landings >= LANDINGS:
+            return s, k, after, axis, up, False
+        else:
+            length, i, side = borders.first_border(parts, s, after, p, sx, sy)
+        if borders.is_same_beyond(parts.table, s.clay.region, i, side):
+            s = borders.moved_on(parts, s, here, i, side, 0.0)
+        elif standing:
+            return s, k, after, i, side, True
+        else:
+            after, axis, up = length, i, side
+
+
+def careful(parts, s, e):
+    """The state after one step with a look at its end, which lies on a border if one is in the way."""
+    target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+    s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
+    if s.status.code != OPEN:
+        return s
+    over, after, first = (0, 0), most, True
+    while True:
+        s, k, after, axis, up, standing = towards(parts, s, after, over, first)
+        if not standing:
+            break
+        over = (up, over[1]) if axis == 0 else (over[0], up)
+        s, first = crossed(parts, s, e, axis, up), True
+        if s.status.closing != OPEN and s.clock.before == 0.0:
+            return ended(s, s.status.closing)
+    closing = s.status.closing
+    if s.clock.before > 0.0 or closing == OPEN:
+        s = kept(parts, s, e, k, after, on_grid or closing != OPEN)
+    if closing != OPEN:
+        return ended(halted_arm(s, k), closing)
+    if not is_finite(k):
+        return ended(s, NOT_FINITE)
+    put(e.w, 0, s.body.w[0])  # after a hit it starts from the velocity behind half a kick
+    put(e.w, 1, s.body.w[1])
+    s = stepped(parts, s, e, k, after, target)
+    if axis >= 0:
+        s = crossed(parts, s, e, axis, up)
+    return s
+
+
+def halted_arm(s, k):
+    """The state with the joint rates behind its last kick."""
+    return State(s.clock, Body(s.body.q, k.w, k.g), s.loop, s.clay, s.work, s.status)
+
+
+def is_calm(special, state):
+    """Whether a whole step may follow without a look at springs and hits."""
+    if special is None:
+        return True
+    return calm_hit(special.stiff, state.hit) and calm_springs(special.springs, state.elastic)
+
+
+def calm_hit(stiff, hit):
+    if stiff is None:
+        return True
+    return hit.fine == INF and hit.struck == 0.0
+
+
+def calm_springs(part, elastic):
+    if part is None:
+        return True
+    return elastic.resolved == INF
+
+
+def advance(parts, s, e, room):
+    """Steps until rows, crossings or stops are full, or the run is over."""
+    dt, last = parts.time.dt, parts.time.last
+    special = parts.special
+    while s.status.code == OPEN and s.status.rows < room and has_room(e, s.status):
+        clock, clay = s.clock, s.clay
+        whole = clock.before == dt and clock.t == clock.i * dt and clock.i < last
+        if not (whole and s.status.closing == OPEN and is_calm(special, clay.special)):
+            s = careful(parts, s, e)
+            continue
+        k = kick(parts, clock, s.body, s.loop, clay, dt)
+        if borders.is_within(clay.region, place_after(parts.arm, s.body.q, k, dt)) and is_finite(k):
+            b = clay_now(parts.clay, clay, False, clock.t)
+            s = written(parts, worked(parts, s, k), e, k, velocity(special, parts.grain, k), b)
+            s = stepped(parts, s, e, k, dt, (clock.i + 1) * dt)
+        else:
+            s = careful(parts, s, e)
+    return s
+
+
+def has_room(e, x):
+    """Whether a step may note its crossings and stops."""
+    return x.crossings < e.most_crossings and x.stops < e.most_stops

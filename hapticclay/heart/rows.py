@@ -1,0 +1,91 @@
+"""What a run keeps of a kick: its row of the record, and its entry in the ledger."""
+
+from __future__ import annotations
+
+from ..model import arm
+from . import hand, springs, viscous
+from .engine_step import put
+from .state import Work
+
+ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
+
+
+def hand_force(part, k):
+    """Mean force of the operator in a kick, (x, y) [N]."""
+    if part is None:
+        return k.uh
+    return k.motion.f[0] + k.fe[0], k.motion.f[1] + k.fe[1]
+
+
+def write(parts, rows, i, q, k, v, b):
+    """Writes the row of a sample."""
+    p, tau, delta, o = k.at.p, k.tau, k.delta, ROW * i
+    fh = hand_force(parts.hand, k)
+    r1, r2 = arm.joint_velocity(v[0], v[1], k.at.u, 1.0)
+    put(rows, o, q[0])
+    put(rows, o + 1, q[1])
+    put(rows, o + 2, p[0])
+    put(rows, o + 3, p[1])
+    put(rows, o + 4, v[0])
+    put(rows, o + 5, v[1])
+    put(rows, o + 6, fh[0])
+    put(rows, o + 7, fh[1])
+    put(rows, o + 8, tau[0])
+    put(rows, o + 9, tau[1])
+    put(rows, o + 10, delta[0])
+    put(rows, o + 11, delta[1])
+    put(rows, o + 12, b[0])
+    put(rows, o + 13, b[1])
+    put(rows, o + 14, r1)
+    put(rows, o + 15, r2 - r1)
+
+
+def write_force(special, grain, e, i, k, v, b):
+    """Writes the force of the clay where b v does not tell it."""
+    if special is None:
+        return
+    write_beside(special.flow, special.springs, special.groove, grain, e, i, k, v, b)
+
+
+def write_beside(flow, elastic, groove, grain, e, i, k, v, b):
+    if flow is None and elastic is None:
+        return
+    x, y = viscous.force(grain, b, v)
+    fx, fy = felt_force(flow, k.motion.special)
+    px, py = sprung_force(elastic, k.motion.special, k.step.L)
+    put(e.rendered, 3 * i, x + fx + px)
+    put(e.rendered, 3 * i + 1, y + fy + py)
+    write_removed(groove, e, i)
+
+
+def felt_force(flow, state):
+    if flow is None:
+        return 0.0, 0.0
+    return state.felt.f
+
+
+def sprung_force(part, state, L):
+    if part is None:
+        return 0.0, 0.0
+    return springs.force(state.elastic, L)
+
+
+def write_removed(groove, e, i):
+    if groove is None:
+        return
+    put(e.rendered, 3 * i + 2, groove.removed[0] + groove.removed[1])
+
+
+def with_work(parts, a, k, w):
+    """The ledger with the works of a kick; w are the joint rates before it."""
+    v, u, n, H, uh, tau, fe = k.at.v, k.motion.u, k.w, k.step.H, k.uh, k.tau, k.fe
+    dx, dy = hand.dampers(parts.hand)
+    vx, vy = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1])
+    muscle = H * (uh[0] * vx + uh[1] * vy)
+    motors = 0.5 * H * (tau[0] * (w[0] + n[0]) + tau[1] * (w[1] + n[1]))
+    clay = H * (fe[0] * vx + fe[1] * vy)
+    taken = H * (dx * vx * vx + dy * vy * vy)
+    return Work(
+        a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
+        a.through + (abs(muscle) + abs(motors)),
+    )  # fmt: skip

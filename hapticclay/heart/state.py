@@ -1,0 +1,414 @@
+"""The state of a run, and the value of a kick: a block a part, None where the scene lacks it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # how a run stands
+
+
+class Axis(NamedTuple):
+    """Compensator and reference model of one axis.
+
+    Attributes:
+        delta: compensator output [m]; of another shape, start and command alone.
+        rate: its rate [m/s].
+        y: reference position [m].
+        yrate: reference rate [m/s].
+    """
+
+    delta: float
+    rate: float
+    y: float
+    yrate: float
+
+
+class Loop(NamedTuple):
+    """The controller in continuous time.
+
+    Attributes:
+        x: loop of x.
+        y: loop of y.
+        form: states of compensators of another shape, of x and of y.
+    """
+
+    x: Axis
+    y: Axis
+    form: Any
+
+
+class Clock(NamedTuple):
+    """Where in time a run is.
+
+    Attributes:
+        t: now [s].
+        i: the sample at or before now.
+        before: length of the step that led here [s].
+    """
+
+    t: float
+    i: int
+    before: float
+
+
+class Body(NamedTuple):
+    """The arm.
+
+    Attributes:
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        g: link accelerations of the last kick [rad/s^2].
+    """
+
+    q: Any
+    w: Any
+    g: Any
+
+
+class Region(NamedTuple):
+    """Where all laws of the clay keep their value.
+
+    Attributes:
+        index: along x and along y.
+        low: its borders [m].
+        high: its borders [m].
+    """
+
+    index: Any
+    low: Any
+    high: Any
+
+
+class Growth(NamedTuple):
+    """Clay that grows.
+
+    Attributes:
+        rate: of the damping [N.s/m per s].
+        old: that of the clay before the sample.
+    """
+
+    rate: Any
+    old: Any
+
+
+class Clay(NamedTuple):
+    """The clay.
+
+    Attributes:
+        region: where the handle is.
+        b: damping now, at t = 0 where it grows [N.s/m].
+        old: that of the clay before the sample.
+        growth: clay that grows.
+        special: laws beside plain viscous damping.
+    """
+
+    region: Region
+    b: Any
+    old: Any
+    growth: Any
+    special: Any
+
+
+class Special(NamedTuple):
+    """Laws of the clay beside plain viscous damping.
+
+    Attributes:
+        owed: impulse owed by stiff clay [N.s].
+        hit: a hit that drives motors into their limits.
+        felt: clay that yields.
+        elastic: clay that springs back.
+        cut: clay that stays cut.
+    """
+
+    owed: Any
+    hit: Any
+    felt: Any
+    elastic: Any
+    cut: Any
+
+
+class Hit(NamedTuple):
+    """A hit that drives motors into their limits.
+
+    Attributes:
+        fine: longest step on the way from it [s].
+        struck: whether the handle has just come into this clay, 1.0 or 0.0.
+    """
+
+    fine: float
+    struck: float
+
+
+class Felt(NamedTuple):
+    """Clay that yields.
+
+    Attributes:
+        law: Fy, K, n of x, then of y.
+        old: that of the clay before the sample.
+        mean: force of the last kick [N].
+        v: velocity at its sample [m/s].
+        f: force there [N].
+        stuck: whether x and y rest behind it, 1.0 or 0.0.
+        anchor: where an axis came to rest beside one that slides [m], NaN elsewhere.
+        still: whether both rest, 1.0 or 0.0.
+        times: when they came to rest after the sample [s].
+    """
+
+    law: Any
+    old: Any
+    mean: Any
+    v: Any
+    f: Any
+    stuck: Any
+    anchor: Any
+    still: float
+    times: Any
+
+
+class Elastic(NamedTuple):
+    """Clay that springs back.
+
+    Attributes:
+        numbers: Spring.numbers and the direction of a surface, of x and of y.
+        rest: of the first spring, of x and of y [m].
+        stretch: elongation of the second [m].
+        at: place of the handle at the last sample [m].
+        force: now [N].
+        before: at the end of the clay before [N].
+        lost: energy lost [J].
+        stored: energy stored [J].
+        resolved: longest step that resolves it [s].
+    """
+
+    numbers: Any
+    rest: Any
+    stretch: Any
+    at: Any
+    force: Any
+    before: Any
+    lost: float
+    stored: float
+    resolved: float
+
+
+class Cut(NamedTuple):
+    """The tool in clay that stays cut.
+
+    Attributes:
+        at: place of the last cut [m].
+        bare: clay without it [N.s/m].
+        bare_before: that of the step before [N.s/m].
+        drag: damping of it [N.s/m].
+    """
+
+    at: Any
+    bare: Any
+    bare_before: Any
+    drag: float
+
+
+class Work(NamedTuple):
+    """The ledger [J].
+
+    Attributes:
+        muscle: of the muscle.
+        motors: of the motors.
+        clay: taken by the clay.
+        hand: taken by the damper of the hand.
+        through: sum of the magnitudes.
+    """
+
+    muscle: float
+    motors: float
+    clay: float
+    hand: float
+    through: float
+
+
+class Status(NamedTuple):
+    """How a run stands.
+
+    Attributes:
+        code: OPEN while it goes on.
+        closing: why the next row is the last, OPEN where it is not.
+        steps: engine steps since the start.
+        careful: of them, steps with a look at their end since the last sample.
+        landings: times that the handle has come back to a region since the last sample.
+        seen: regions since then: least and most index along x, then along y.
+        rows: of the record filled since the last look.
+        crossings: of borders noted since then.
+        stops: in clay that yields noted since then.
+    """
+
+    code: int
+    closing: int
+    steps: int
+    careful: int
+    landings: int
+    seen: Any
+    rows: int
+    crossings: int
+    stops: int
+
+
+class State(NamedTuple):
+    """A run between two steps.
+
+    Attributes:
+        clock: where in time it is.
+        body: the arm.
+        loop: the controller.
+        clay: the clay.
+        work: the ledger.
+        status: how it stands.
+    """
+
+    clock: Clock
+    body: Body
+    loop: Any
+    clay: Clay
+    work: Work
+    status: Status
+
+
+# ---- the value of a kick -------------------------------------------------------------------------
+
+
+class Step(NamedTuple):
+    """The steps around a sample.
+
+    Attributes:
+        H: length of the kick [s].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+        before: length of the step before [s].
+        after: length of the step after [s].
+    """
+
+    H: float
+    L: float
+    R: float
+    before: float
+    after: float
+
+
+class Handle(NamedTuple):
+    """The handle at a sample, before the kick.
+
+    Attributes:
+        u: arm.jacobian [m].
+        p: position [m].
+        W: arm.mobility [1/kg].
+        v: velocity [m/s].
+        c: centripetal acceleration [m/s^2].
+    """
+
+    u: Any
+    p: Any
+    W: Any
+    v: Any
+    c: Any
+
+
+class Load(NamedTuple):
+    """Force on the handle that is linear in its velocity u after the kick: f - d u.
+
+    Attributes:
+        f: (x, y) [N].
+        d: (xx, yy, xy) [N.s/m].
+    """
+
+    f: Any
+    d: Any
+
+
+class Law(NamedTuple):
+    """What drives the handle: n u = a + W (f - d u).
+
+    Attributes:
+        n: weight of u, (x, y) [1/s].
+        a: acceleration without forces, (x, y) [m/s^2].
+        rest: the same of a handle at rest.
+        W: acceleration per unit of net force, (xx, xy, yy) [1/kg].
+    """
+
+    n: Any
+    a: Any
+    rest: Any
+    W: Any
+
+
+class Viscous(NamedTuple):
+    """Damping of the clay in a kick.
+
+    Attributes:
+        b0: on the velocity before it, (x, y) [N.s/m].
+        b1: on the velocity after it.
+        split: of clay so stiff that a step may overshoot.
+    """
+
+    b0: Any
+    b1: Any
+    split: Any
+
+
+class Split(NamedTuple):
+    """See clay.split_damping.
+
+    Attributes:
+        over: 1.0 where any part is reduced, else 0.0.
+        share: of the force that is owed to the next kick, (x, y) [s].
+        soft: 1/b where both steps are stiff, else 0.0, (x, y) [m/(N.s)].
+    """
+
+    over: float
+    share: Any
+    soft: Any
+
+
+class Motion(NamedTuple):
+    """The handle in a kick.
+
+    Attributes:
+        u: velocity after it [m/s].
+        f: net force [N].
+        rest: force that stiff clay returns, less what it owes [N].
+        beside: clay force beside its dampers [N].
+        special: laws of the clay behind it.
+    """
+
+    u: Any
+    f: Any
+    rest: Any
+    beside: Any
+    special: Any
+
+
+class Kick(NamedTuple):
+    """A kick.
+
+    Attributes:
+        step: the steps around it.
+        at: the handle before it.
+        viscous: damping in it.
+        motion: of the handle.
+        w: joint rates after it [rad/s].
+        g: link accelerations [rad/s^2].
+        fe: mean force of the clay [N].
+        uh: muscle force [N].
+        tau: torques [N.m].
+        delta: compensator output at the sample [m].
+        loop: behind the step after it.
+    """
+
+    step: Step
+    at: Handle
+    viscous: Viscous
+    motion: Motion
+    w: Any
+    g: Any
+    fe: Any
+    uh: Any
+    tau: Any
+    delta: Any
+    loop: Any

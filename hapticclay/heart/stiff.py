@@ -1,0 +1,92 @@
+"""Clay so stiff that a step may overshoot: how a kick splits it, and the impulse it owes."""
+
+from __future__ import annotations
+
+from ..model import arm
+from ..model import clay as law
+from . import hand as hands
+from .servo import added
+from .state import Handle, Split, Viscous
+
+NONE = (0.0, 0.0)
+
+
+def split_stiff(stiff, step, hand, b0, b1):
+    """Damping in a kick, see clay.split_damping."""
+    L, R = step.L, step.R
+    if stiff is None:
+        return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]), None)
+    dx, dy = hands.dampers(hand)
+    x0, x1, y0, y1, over, sharex, sharey, softx, softy = law.split_damping(
+        b0, b1, step.H, L, R, stiff.mobility, dx, dy
+    )
+    return Viscous((x0, y0), (x1, y1), Split(over, (sharex, sharey), (softx, softy)))
+
+
+def behind_sample(split, step, at):
+    """The handle in a kick: behind the sample it stands where clay is stiff."""
+    if split is None:
+        return at
+    if split.over == 0.0:
+        return at
+    v, c, share = at.v, at.c, split.share
+    vx, vy = 0.0 if share[0] > 0.0 else v[0], 0.0 if share[1] > 0.0 else v[1]
+    return Handle(at.u, at.p, at.W, v, arm.centripetal_about_sample(step.L, c[0], c[1], vx, vy, at.u))
+
+
+def slow_force(split, law_, at, k, hand, uh, pulled):
+    """The force that stiff clay bears in slow motion, (x, y) [N]; see clay.slow_force."""
+    if split is None or split.over == 0.0:
+        return NONE
+    kx, ky = hands.springs(hand)
+    p, v, W, a, b0, b1, share = at.p, at.v, law_.W, law_.rest, k.b0, k.b1, split.share
+    hx, hy = uh[0] - kx * p[0] - pulled[0], uh[1] - ky * p[1] - pulled[1]
+    gx, gy = a[0] + W[0] * hx + W[1] * hy, a[1] + W[1] * hx + W[2] * hy
+    return law.slow_force(
+        gx, gy, W[0], W[1], W[2], share[0], share[1], (b0[0] + b1[0]) * v[0], (b0[1] + b1[1]) * v[1]
+    )
+
+
+def with_owed(split, hand, step, load, owed, g):
+    """The load with what stiff clay owes from the step before, and owes to the next kick.
+
+    Args:
+        split: of the kick.
+        hand: the operator's arm.
+        step: the steps.
+        load: the load.
+        owed: impulse from the step before [N.s].
+        g: the slow force [N].
+
+    Returns:
+        The load; force returned [N]; force owed [N], and its part per unit of the velocity after
+        the kick [N.s/m].
+    """
+    if split is None or split.over == 0.0:
+        return load, NONE, NONE, NONE
+    back = owed[0] / step.H, owed[1] / step.H
+    (kx, ky), share = hands.springs(hand), split.share
+    owes = share[0] * g[0], share[1] * g[1]
+    soft = 0.5 * step.after * kx * share[0], 0.5 * step.after * ky * share[1]
+    load = added(load, (owes[0] - back[0], owes[1] - back[1]), (soft[0], soft[1], 0.0))
+    return load, back, owes, soft
+
+
+def still_owed(split, before, step, back, owes, soft, u):
+    """Clay force beside its dampers [N], and impulse owed to the next kick [N.s]."""
+    if split is None or split.over == 0.0:
+        return NONE, NONE
+    x, y = owes[0] - soft[0] * u[0], owes[1] - soft[1] * u[1]
+    return (back[0] - x, back[1] - y), (step.H * x, step.H * y)
+
+
+def at_sample(split, k, v, u, beside, slow):
+    """Velocity at the sample, (x, y) [m/s]: in stiff clay what its damping feels."""
+    if split is None:
+        return slow
+    (x, y), b0, b1, soft = slow, k.b0, k.b1, split.soft
+    if soft[0] > 0.0:
+        x = soft[0] * (b0[0] * v[0] + b1[0] * u[0] + beside[0])
+    if soft[1] > 0.0:
+        y = soft[1] * (b0[1] * v[1] + b1[1] * u[1] + beside[1])
+    return x, y

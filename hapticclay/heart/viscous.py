@@ -1,0 +1,103 @@
+"""Viscous clay in a kick: constant, growing, turned, smooth."""
+
+from __future__ import annotations
+
+from ..model import clay as law
+from ..model import controller, regions
+from .state import Clay, Growth, Load, Region, Viscous
+from .stiff import split_stiff
+
+NONE = (0.0, 0.0)
+
+
+def weighted(step, b0, b1):
+    """Damping in a kick: each step gives half of its clay to the kick before it and after it."""
+    L, R = step.L, step.R
+    return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]), None)
+
+
+def damping(part, special, clay, t, hand, step):
+    """Damping of the clay in a kick."""
+    if part is None:
+        return Viscous(NONE, NONE, None)
+    b0 = grown(part.growth, clay.old, clay.growth, 1, t - 0.25 * step.before)
+    b1 = grown(part.growth, clay.b, clay.growth, 0, t + 0.25 * step.after)
+    return special_damping(special, step, hand, b0, b1)
+
+
+def special_damping(special, step, hand, b0, b1):
+    if special is None:
+        return weighted(step, b0, b1)
+    return split_stiff(special.stiff, step, hand, b0, b1)
+
+
+def grown(part, b, growth, before, t):
+    """Damping at a time, now or before the sample, (x, y) [N.s/m]."""
+    if part is None:
+        return b
+    return law.damping_at(b, growth.old if before else growth.rate, t)
+
+
+def force(grain, b, v):
+    """Force of damping, (x, y) [N]."""
+    if grain is None:
+        return b[0] * v[0], b[1] * v[1]
+    return law.turned_force(grain[0], grain[1], b[0], b[1], v[0], v[1])
+
+
+def tensor(grain, b):
+    """Damping tensor, (xx, yy, xy) [N.s/m]."""
+    if grain is None:
+        return b[0], b[1], 0.0
+    return law.turned_damping(grain[0], grain[1], b[0], b[1])
+
+
+def with_clay(part, grain, load, k, v):
+    """The load with that of viscous clay."""
+    if part is None:
+        return load
+    f, d = load.f, load.d
+    x, y = force(grain, k.b0, v)
+    xx, yy, xy = tensor(grain, k.b1)
+    return Load((f[0] - x, f[1] - y), (d[0] + xx, d[1] + yy, d[2] + xy))
+
+
+def mean_force(part, grain, k, v, u):
+    """Mean force of the dampers in a kick, (x, y) [N]."""
+    if part is None:
+        return NONE
+    ax, ay = force(grain, k.b0, v)
+    bx, by = force(grain, k.b1, u)
+    return ax + bx, ay + by
+
+
+def at_place(smooth, table, clay, p):
+    """The clay at a place, where it is smooth: that before the sample too."""
+    if smooth is None:
+        return clay
+    x, y = regions.smooth_clay(table, smooth, p[0], p[1], clay.b[0], clay.b[1])
+    o = clay.old
+    old = (x, o[1]) if smooth == 1 else (o[0], y) if smooth == 2 else (x, y)
+    return Clay(clay.region, (x, y), old, without_growth(clay.growth, smooth), clay.special)
+
+
+def without_growth(growth, smooth):
+    if growth is None:
+        return growth
+    r = growth.old
+    old = (0.0, r[1]) if smooth == 1 else (r[0], 0.0) if smooth == 2 else (0.0, 0.0)
+    return Growth(growth.rate, old)
+
+
+def along(grain, x, y):
+    """Components along the axes of the clay."""
+    if grain is None:
+        return x, y
+    return controller.along_axes(grain[0], grain[1], x, y)
+
+
+def across(grain, x, y):
+    """The inverse of `along`."""
+    if grain is None:
+        return x, y
+    return controller.along_axes(grain[0], -grain[1], x, y)
