@@ -92,7 +92,7 @@ def special_in(special, table, c, p, crossed, struck):
     b, cut = grooves.entered(special.groove, x.cut, c.b)
     hit = hit_in(special.stiff, x.hit, struck)
     felt = felt_in(special.flow, x.felt, table, r.index)
-    c = Clay(r, b, c.old, c.growth, Special(x.owed, hit, felt, elastic, cut))
+    c = Clay(r, b, c.old, c.growth, Special(x.owed, x.split, hit, felt, elastic, cut))
     return viscous.at_place(special.smooth, table, c, p)
 
 

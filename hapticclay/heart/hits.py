@@ -55,7 +55,7 @@ def struck_stiff(stiff, parts, s, after):
 def with_hit(s, hit):
     c = s.clay
     x = c.special
-    x = Special(x.owed, hit, x.felt, x.elastic, x.cut)
+    x = Special(x.owed, x.split, hit, x.felt, x.elastic, x.cut)
     clay = Clay(c.region, c.b, c.old, c.growth, x)
     return State(s.clock, s.body, s.loop, clay, s.work, s.status)
 

@@ -70,23 +70,24 @@ def moved(special, grain, hand_, law, load, state, step, at, k, uh):
         return Motion(u, servo.net(load, u, NONE), NONE, NONE, state)
     pulled = springs.pull(special.springs, state.elastic, step)
     load = springs.with_pull(load, pulled)
-    g = stiff.slow_force(k.split, law, at, k, hand_, uh, pulled)
-    g = yielding.creeping(special.flow, special.groove, k.split, state.felt, k, step.L, g, at.v)
-    load, back, owes, soft = stiff.with_owed(k.split, hand_, step, load, state.owed, g)
+    split = state.split
+    g = stiff.slow_force(special.stiff, split, law, at, k, hand_, uh, pulled)
+    g = yielding.creeping(special.flow, special.groove, special.stiff, state.felt, k, step.L, g, at.v)
+    load, back, owes, soft = stiff.with_owed(special.stiff, split, hand_, step, load, state.owed, g)
     u = servo.solve(law, load)
     u, felt = yielding.resist(special, grain, state.felt, step, at, law, load, u)
     r = yielding.mean(special.flow, felt)
     f = servo.net(load, u, r)
-    rest, owed = stiff.still_owed(k.split, state.owed, step, back, owes, soft, u)
+    rest, owed = stiff.still_owed(special.stiff, split, step, back, owes, soft, u)
     beside = rest[0] + r[0] + pulled[0], rest[1] + r[1] + pulled[1]
-    return Motion(u, f, rest, beside, Special(owed, state.hit, felt, state.elastic, state.cut))
+    return Motion(u, f, rest, beside, Special(owed, split, state.hit, felt, state.elastic, state.cut))
 
 
-def special_handle(special, k, step, at, w):
+def special_handle(special, state, step, at, w):
     """The handle in a kick of clay that stops it."""
     if special is None:
         return at
-    return yielding.at_rest(special.flow, w, stiff.behind_sample(k.split, step, at))
+    return yielding.at_rest(special.flow, w, stiff.behind_sample(special.stiff, state.split, step, at))
 
 
 def rests(special, motion):
@@ -111,12 +112,12 @@ def clipped(tau, limit):
 def kick(parts, clock, body, loop, clay, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
     part, hand_, links, limit = parts.clay, parts.hand, parts.arm.links, parts.limits
-    special, grain, state = parts.special, parts.grain, clay.special
+    special, grain = parts.special, parts.grain
     step = step_around(clock.before, after)
     at = handle_at(parts.arm, body, 0.5 * clock.before)
     uh = muscle_force(parts.push, clock.t, step)
-    k = viscous.damping(part, special, clay, clock.t, hand_, step)
-    at = special_handle(special, k, step, at, body.w)
+    k, state = viscous.damping(part, special, clay, clock.t, hand_, step)
+    at = special_handle(special, state, step, at, body.w)
     load = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
     load = hand.with_hand(hand_, load, step, at)
     law, delta, feed, rates, pushes = servo.servo_law(parts, step, at, loop)
@@ -153,9 +154,9 @@ def velocity(special, grain, k):
     slow = v[0] + L * (u[0] - v[0]), v[1] + L * (u[1] - v[1])
     if special is None:
         return slow
-    m, split = k.motion, k.viscous.split
-    slow = stiff.at_sample(split, k.viscous, v, u, m.rest, slow)
-    return yielding.at_sample(special.flow, grain, m.special.felt, split, slow)
+    m = k.motion
+    slow = stiff.at_sample(special.stiff, m.special.split, k.viscous, v, u, m.rest, slow)
+    return yielding.at_sample(special.flow, special.stiff, grain, m.special, slow)
 
 
 def is_finite(k):

@@ -101,7 +101,7 @@ def special_behind(special, table, c, p, v, h):
     elastic = springs.moved(special.springs, x.elastic, c.region, table, p, h)
     b, old, cut = grooves.moved(special.groove, x.cut, c, p, v)
     felt = yielding.behind(special.flow, x.felt)
-    c = Clay(c.region, b, old, c.growth, Special(x.owed, x.hit, felt, elastic, cut))
+    c = Clay(c.region, b, old, c.growth, Special(x.owed, x.split, x.hit, felt, elastic, cut))
     return viscous.at_place(special.smooth, table, c, p)
 
 
@@ -122,7 +122,7 @@ def behind_kick(special, parts, e, before, k, t, stops):
     x = k.motion.special
     hit = hits.hit_after(special.stiff, parts, x.hit, k)
     stops = yielding.noted(special.flow, e, x.felt, before.felt, t, stops)
-    return Special(x.owed, hit, x.felt, x.elastic, x.cut), stops
+    return Special(x.owed, x.split, hit, x.felt, x.elastic, x.cut), stops
 
 
 def held_arm(special, e, state, w):
@@ -223,7 +223,7 @@ def stiff_arrival(stiff, special, parts, s, v):
     if stiff is None:
         return v
     k = kick(parts, s.clock, s.body, s.loop, s.clay, s.clock.before)
-    (x, y), soft = velocity(special, parts.grain, k), k.viscous.split.soft
+    (x, y), soft = velocity(special, parts.grain, k), k.motion.special.split.soft
     return x if soft[0] > 0.0 else v[0], y if soft[1] > 0.0 else v[1]
 
 

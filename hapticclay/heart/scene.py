@@ -121,6 +121,7 @@ def first_special(special, p):
     law, nan = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (math.nan, math.nan)
     return s_.Special(
         NONE,
+        s_.Split(0.0, NONE, NONE) if special.stiff else None,
         s_.Hit(INF, 0.0) if special.stiff else None,
         s_.Felt(law, law, NONE, NONE, NONE, NONE, nan, 0.0, NONE) if special.flow else None,
         s_.Elastic(((0.0,) * 6, (0.0,) * 6), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)

@@ -114,6 +114,7 @@ class Special(NamedTuple):
 
     Attributes:
         owed: impulse owed by stiff clay [N.s].
+        split: how the last kick split the damping of stiff clay.
         hit: a hit that drives motors into their limits.
         felt: clay that yields.
         elastic: clay that springs back.
@@ -121,10 +122,25 @@ class Special(NamedTuple):
     """
 
     owed: Any
+    split: Any
     hit: Any
     felt: Any
     elastic: Any
     cut: Any
+
+
+class Split(NamedTuple):
+    """See clay.split_damping.
+
+    Attributes:
+        over: 1.0 where any part is reduced, else 0.0.
+        share: of the force that is owed to the next kick, (x, y) [s].
+        soft: 1/b where both steps are stiff, else 0.0, (x, y) [m/(N.s)].
+    """
+
+    over: float
+    share: Any
+    soft: Any
 
 
 class Hit(NamedTuple):
@@ -344,26 +360,10 @@ class Viscous(NamedTuple):
     Attributes:
         b0: on the velocity before it, (x, y) [N.s/m].
         b1: on the velocity after it.
-        split: of clay so stiff that a step may overshoot.
     """
 
     b0: Any
     b1: Any
-    split: Any
-
-
-class Split(NamedTuple):
-    """See clay.split_damping.
-
-    Attributes:
-        over: 1.0 where any part is reduced, else 0.0.
-        share: of the force that is owed to the next kick, (x, y) [s].
-        soft: 1/b where both steps are stiff, else 0.0, (x, y) [m/(N.s)].
-    """
-
-    over: float
-    share: Any
-    soft: Any
 
 
 class Motion(NamedTuple):

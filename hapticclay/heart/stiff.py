@@ -6,37 +6,23 @@ from ..model import arm
 from ..model import clay as law
 from . import hand as hands
 from .servo import added
-from .state import Handle, Split, Viscous
+from .state import Handle
 
 NONE = (0.0, 0.0)
 
 
-def split_stiff(stiff, step, hand, b0, b1):
-    """Damping in a kick, see clay.split_damping."""
-    L, R = step.L, step.R
-    if stiff is None:
-        return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]), None)
-    dx, dy = hands.dampers(hand)
-    x0, x1, y0, y1, over, sharex, sharey, softx, softy = law.split_damping(
-        b0, b1, step.H, L, R, stiff.mobility, dx, dy
-    )
-    return Viscous((x0, y0), (x1, y1), Split(over, (sharex, sharey), (softx, softy)))
-
-
-def behind_sample(split, step, at):
+def behind_sample(stiff, split, step, at):
     """The handle in a kick: behind the sample it stands where clay is stiff."""
-    if split is None:
-        return at
-    if split.over == 0.0:
+    if stiff is None or split.over == 0.0:
         return at
     v, c, share = at.v, at.c, split.share
     vx, vy = 0.0 if share[0] > 0.0 else v[0], 0.0 if share[1] > 0.0 else v[1]
     return Handle(at.u, at.p, at.W, v, arm.centripetal_about_sample(step.L, c[0], c[1], vx, vy, at.u))
 
 
-def slow_force(split, law_, at, k, hand, uh, pulled):
+def slow_force(stiff, split, law_, at, k, hand, uh, pulled):
     """The force that stiff clay bears in slow motion, (x, y) [N]; see clay.slow_force."""
-    if split is None or split.over == 0.0:
+    if stiff is None or split.over == 0.0:
         return NONE
     kx, ky = hands.springs(hand)
     p, v, W, a, b0, b1, share = at.p, at.v, law_.W, law_.rest, k.b0, k.b1, split.share
@@ -47,10 +33,11 @@ def slow_force(split, law_, at, k, hand, uh, pulled):
     )
 
 
-def with_owed(split, hand, step, load, owed, g):
+def with_owed(stiff, split, hand, step, load, owed, g):
     """The load with what stiff clay owes from the step before, and owes to the next kick.
 
     Args:
+        stiff: the part.
         split: of the kick.
         hand: the operator's arm.
         step: the steps.
@@ -62,7 +49,7 @@ def with_owed(split, hand, step, load, owed, g):
         The load; force returned [N]; force owed [N], and its part per unit of the velocity after
         the kick [N.s/m].
     """
-    if split is None or split.over == 0.0:
+    if stiff is None or split.over == 0.0:
         return load, NONE, NONE, NONE
     back = owed[0] / step.H, owed[1] / step.H
     (kx, ky), share = hands.springs(hand), split.share
@@ -72,17 +59,17 @@ def with_owed(split, hand, step, load, owed, g):
     return load, back, owes, soft
 
 
-def still_owed(split, before, step, back, owes, soft, u):
+def still_owed(stiff, split, step, back, owes, soft, u):
     """Clay force beside its dampers [N], and impulse owed to the next kick [N.s]."""
-    if split is None or split.over == 0.0:
+    if stiff is None or split.over == 0.0:
         return NONE, NONE
     x, y = owes[0] - soft[0] * u[0], owes[1] - soft[1] * u[1]
     return (back[0] - x, back[1] - y), (step.H * x, step.H * y)
 
 
-def at_sample(split, k, v, u, beside, slow):
+def at_sample(stiff, split, k, v, u, beside, slow):
     """Velocity at the sample, (x, y) [m/s]: in stiff clay what its damping feels."""
-    if split is None:
+    if stiff is None:
         return slow
     (x, y), b0, b1, soft = slow, k.b0, k.b1, split.soft
     if soft[0] > 0.0:

@@ -4,31 +4,43 @@ from __future__ import annotations
 
 from ..model import clay as law
 from ..model import controller, regions
-from .state import Clay, Growth, Load, Region, Viscous
-from .stiff import split_stiff
+from . import hand as hands
+from .state import Clay, Growth, Load, Special, Split, Viscous
 
 NONE = (0.0, 0.0)
+
+
+def damping(part, special, clay, t, hand, step):
+    """Damping of the clay in a kick, and the state of its special laws, which stiff clay splits."""
+    if part is None:
+        return Viscous(NONE, NONE), clay.special
+    b0 = grown(part.growth, clay.old, clay.growth, 1, t - 0.25 * step.before)
+    b1 = grown(part.growth, clay.b, clay.growth, 0, t + 0.25 * step.after)
+    return special_damping(special, clay.special, step, hand, b0, b1)
+
+
+def special_damping(special, state, step, hand, b0, b1):
+    if special is None:
+        return weighted(step, b0, b1), state
+    return split_damping(special.stiff, state, step, hand, b0, b1)
 
 
 def weighted(step, b0, b1):
     """Damping in a kick: each step gives half of its clay to the kick before it and after it."""
     L, R = step.L, step.R
-    return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]), None)
+    return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]))
 
 
-def damping(part, special, clay, t, hand, step):
-    """Damping of the clay in a kick."""
-    if part is None:
-        return Viscous(NONE, NONE, None)
-    b0 = grown(part.growth, clay.old, clay.growth, 1, t - 0.25 * step.before)
-    b1 = grown(part.growth, clay.b, clay.growth, 0, t + 0.25 * step.after)
-    return special_damping(special, step, hand, b0, b1)
-
-
-def special_damping(special, step, hand, b0, b1):
-    if special is None:
-        return weighted(step, b0, b1)
-    return split_stiff(special.stiff, step, hand, b0, b1)
+def split_damping(stiff, state, step, hand, b0, b1):
+    """Damping in a kick, see clay.split_damping, and the state with the split."""
+    if stiff is None:
+        return weighted(step, b0, b1), state
+    dx, dy = hands.dampers(hand)
+    x0, x1, y0, y1, over, sharex, sharey, softx, softy = law.split_damping(
+        b0, b1, step.H, step.L, step.R, stiff.mobility, dx, dy
+    )
+    split, s = Split(over, (sharex, sharey), (softx, softy)), state
+    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.hit, s.felt, s.elastic, s.cut)
 
 
 def grown(part, b, growth, before, t):

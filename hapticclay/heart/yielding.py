@@ -143,13 +143,13 @@ def is_still(part, felt):
     return felt.still > 0.0
 
 
-def creeping(part, groove, split, felt, k, L, g, v):
+def creeping(part, groove, stiff, felt, k, L, g, v):
     """The part of a slow force on stiff clay that its damping bears: what yielding leaves of it."""
     if part is None:
         return g
     if groove is not None:
         return g
-    if split is None:
+    if stiff is None:
         return g
     fyk = law_now(part, felt, L, v)
     bx, by = k.b0[0] + k.b1[0], k.b0[1] + k.b1[1]
@@ -166,11 +166,12 @@ def creep(size, b, Fy, K, n, g):
     return 0.0
 
 
-def at_sample(part, grain, felt, split, slow):
+def at_sample(part, stiff, grain, state, slow):
     """Velocity at the sample: 0.0 where it is against the yield force, which holds the handle."""
     if part is None:
         return slow
-    x, y = over_stiff(split, felt.v, slow)
+    felt = state.felt
+    x, y = over_stiff(stiff, state.split, felt.v, slow)
     if grain is not None:
         return x, y
     px, py = x * felt.f[0], y * felt.f[1]
@@ -179,8 +180,8 @@ def at_sample(part, grain, felt, split, slow):
     return 0.0 if px < 0.0 else x, 0.0 if py < 0.0 else y
 
 
-def over_stiff(split, v, slow):
-    if split is None:
+def over_stiff(stiff, split, v, slow):
+    if stiff is None:
         return v
     (x, y), soft = v, split.soft
     if soft[0] > 0.0 and x != 0.0:
