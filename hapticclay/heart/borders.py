@@ -41,12 +41,6 @@ def is_same_beyond(table, r, i, up):
 # ---- into another region -------------------------------------------------------------------------
 
 
-def growth_in(part, growth, rate):
-    if part is None:
-        return growth
-    return Growth(rate, growth.old)
-
-
 def felt_in(part, felt, table, index):
     if part is None:
         return felt
@@ -62,12 +56,11 @@ def hit_in(part, hit, struck):
     return Hit(hit.fine, max(hit.struck, struck))
 
 
-def clay_in(part, special, table, clay, index, t, p, crossed, struck):
+def clay_in(parts, clay, index, t, p, crossed, struck):
     """The clay of a region that the handle comes into.
 
     Args:
-        part: the clay.
-        table: of it.
+        parts: the scene.
         clay: its state.
         index: of the region, (x, y).
         t: now [s].
@@ -75,24 +68,34 @@ def clay_in(part, special, table, clay, index, t, p, crossed, struck):
         crossed: coordinate of the border crossed, -1 for none.
         struck: 1.0 where other clay lies behind it.
     """
-    low, high, b, rate = regions.enter_region(table, index[0], index[1], t)
-    region = Region(index, low, high)
+    low, high, b, rate = regions.enter_region(parts.table, index[0], index[1], t)
+    clay = Clay(Region(index, low, high), b, clay.old, clay.growth, clay.hit, clay.special)
+    clay = grown_in(parts.clay, clay, rate)
+    clay = Clay(clay.region, b, clay.old, clay.growth, hit_in(parts.hits, clay.hit, struck), clay.special)
+    return special_in(parts.special, parts.table, clay, p, crossed)
+
+
+def grown_in(part, clay, rate):
     if part is None:
-        return Clay(region, b, clay.old, clay.growth, clay.special)
-    growth = growth_in(part.growth, clay.growth, rate)
-    clay = Clay(region, b, clay.old, growth, clay.special)
-    return special_in(special, table, clay, p, crossed, struck)
+        return clay
+    return growing_in(part.growth, clay, rate)
 
 
-def special_in(special, table, c, p, crossed, struck):
+def growing_in(growth, clay, rate):
+    if growth is None:
+        return clay
+    growth_ = Growth(rate, clay.growth.old)
+    return Clay(clay.region, clay.b, clay.old, growth_, clay.hit, clay.special)
+
+
+def special_in(special, table, c, p, crossed):
     if special is None:
         return c
     x, r = c.special, c.region
     elastic = springs.entered(special.springs, x.elastic, r, table, p, crossed)
     b, cut = grooves.entered(special.groove, x.cut, c.b)
-    hit = hit_in(special.stiff, x.hit, struck)
     felt = felt_in(special.flow, x.felt, table, r.index)
-    c = Clay(r, b, c.old, c.growth, Special(x.owed, x.split, hit, felt, elastic, cut))
+    c = Clay(r, b, c.old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut))
     return viscous.at_place(special.smooth, table, c, p)
 
 
@@ -111,7 +114,7 @@ def moved_on(parts, s, p, i, up, struck):
     """The state in the region beyond a border of coordinate i."""
     x, y = s.clay.region.index
     index = (x + up, y) if i == 0 else (x, y + up)
-    clay = clay_in(parts.clay, parts.special, parts.table, s.clay, index, s.clock.t, p, i, struck)
+    clay = clay_in(parts, s.clay, index, s.clock.t, p, i, struck)
     return State(s.clock, s.body, s.loop, clay, s.work, seen_with(s.status, i, index[i]))
 
 

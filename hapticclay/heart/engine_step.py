@@ -6,34 +6,33 @@ from ..model import arm
 from . import viscous
 
 
-def put(array, i, x):
-    """Writes a number into an array; compiled, `array` is its address."""
-    array[i] = x
+def put(array, i, values):
+    """Writes numbers into an array from i on; compiled, `array` is its address."""
+    for x in values:
+        array[i] = x
+        i += 1
 
 
-def get(array, i):
-    """Reads a number from an array; compiled, `array` is its address."""
-    return array[i]
+def pair(array):
+    """The first two numbers of an array; compiled, `array` is its address."""
+    return array[0], array[1]
 
 
 def with_dampers(clay, e, dampers):
     """Gives the clay's dampers to the engine, which has some where there is clay."""
     if clay is None:
         return
-    put(e.ctrl, 2, dampers[0])
-    put(e.ctrl, 3, dampers[1])
+    put(e.ctrl, 2, dampers)
 
 
 def step_engine(e, clay, tau, push, dampers, h):
     """Lets the engine step; returns joint angles and rates."""
-    put(e.ctrl, 0, tau[0])
-    put(e.ctrl, 1, tau[1])
+    put(e.ctrl, 0, tau)
     with_dampers(clay, e, dampers)
-    put(e.push, 0, push[0])
-    put(e.push, 1, push[1])
-    put(e.timestep, 0, h)
+    put(e.push, 0, push)
+    put(e.timestep, 0, (h,))
     e.step(e.model, e.data)
-    return (get(e.q, 0), get(e.q, 1)), (get(e.w, 0), get(e.w, 1))
+    return pair(e.q), pair(e.w)
 
 
 def moved_arm(parts, e, grain, before, w, k, h):

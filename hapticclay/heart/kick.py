@@ -80,7 +80,7 @@ def moved(special, grain, hand_, law, load, state, step, at, k, uh):
     f = servo.net(load, u, r)
     rest, owed = stiff.still_owed(special.stiff, split, step, back, owes, soft, u)
     beside = rest[0] + r[0] + pulled[0], rest[1] + r[1] + pulled[1]
-    return Motion(u, f, rest, beside, Special(owed, split, state.hit, felt, state.elastic, state.cut))
+    return Motion(u, f, rest, beside, Special(owed, split, felt, state.elastic, state.cut))
 
 
 def special_handle(special, state, step, at, w):

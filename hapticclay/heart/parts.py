@@ -148,10 +148,18 @@ class Stiff(NamedTuple):
 
     Attributes:
         mobility: largest acceleration of handle and hand per unit of force [1/kg].
-        first: first step of a hit that saturates the motors, times the damping [s.N.s/m].
     """
 
     mobility: float
+
+
+class Hits(NamedTuple):
+    """Clay so stiff that a hit may drive the motors into their limits within a step.
+
+    Attributes:
+        first: first step of such a hit, times the damping [s.N.s/m].
+    """
+
     first: float
 
 
@@ -214,7 +222,8 @@ class Parts(NamedTuple):
         table: borders and cells, from regions.region_table.
         clay: the clay.
         grain: cosine and sine of the angle between its axes and x, y.
-        special: laws of it beside plain viscous damping that every step resolves.
+        hits: clay in which a hit may saturate the motors within a step.
+        special: laws of the clay beside plain viscous damping that every step resolves.
         sampler: sampled control.
         accurate: the accurate method.
     """
@@ -232,6 +241,7 @@ class Parts(NamedTuple):
     table: Any
     clay: Any
     grain: Any
+    hits: Any
     special: Any
     sampler: Any
     accurate: Any

@@ -79,30 +79,21 @@ def ended(s, code):
 # ---- a step --------------------------------------------------------------------------------------
 
 
-def clay_behind(part, special, table, clay, state, p, v, h):
-    """The clay after a step of length h that led to p; `state` is that of its special laws."""
-    if part is None:
-        return clay
-    growth = same_growth(part.growth, clay.growth)
-    clay = Clay(clay.region, clay.b, clay.b, growth, state)
-    return special_behind(special, table, clay, p, v, h)
-
-
 def same_growth(part, growth):
     if part is None:
         return growth
     return Growth(growth.rate, growth.rate)
 
 
-def special_behind(special, table, c, p, v, h):
+def special_behind(special, parts, c, q, w, h):
     if special is None:
         return c
-    x = c.special
-    elastic = springs.moved(special.springs, x.elastic, c.region, table, p, h)
-    b, old, cut = grooves.moved(special.groove, x.cut, c, p, v)
+    x, table, at = c.special, parts.table, handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
+    elastic = springs.moved(special.springs, x.elastic, c.region, table, at.p, h)
+    b, old, cut = grooves.moved(special.groove, x.cut, c, at.p, at.v)
     felt = yielding.behind(special.flow, x.felt)
-    c = Clay(c.region, b, old, c.growth, Special(x.owed, x.split, x.hit, felt, elastic, cut))
-    return viscous.at_place(special.smooth, table, c, p)
+    c = Clay(c.region, b, old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut))
+    return viscous.at_place(special.smooth, table, c, at.p)
 
 
 def commanded(table, loop, t0, t1, h):
@@ -115,14 +106,11 @@ def commanded(table, loop, t0, t1, h):
     return Loop(x, y, loop.form)
 
 
-def behind_kick(special, parts, e, before, k, t, stops):
-    """State of the special laws behind a kick, and how many stops are noted."""
+def noted(special, e, before, k, t, n):
+    """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
-        return k.motion.special, stops
-    x = k.motion.special
-    hit = hits.hit_after(special.stiff, parts, x.hit, k)
-    stops = yielding.noted(special.flow, e, x.felt, before.felt, t, stops)
-    return Special(x.owed, x.split, hit, x.felt, x.elastic, x.cut), stops
+        return n
+    return yielding.noted(special.flow, e, k.motion.special.felt, before.felt, t, n)
 
 
 def held_arm(special, e, state, w):
@@ -130,18 +118,19 @@ def held_arm(special, e, state, w):
     if special is None:
         return w
     if yielding.is_still(special.flow, state.felt):
-        put(e.w, 0, 0.0)
-        put(e.w, 1, 0.0)
+        put(e.w, 0, (0.0, 0.0))
         return 0.0, 0.0
     return w
 
 
-def moved_clay(special, parts, clay, state, q, w, h):
-    """The clay behind a step that led the arm to q, w."""
-    if special is None:
-        return clay_behind(parts.clay, special, parts.table, clay, state, (0.0, 0.0), (0.0, 0.0), h)
-    at = handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
-    return clay_behind(parts.clay, special, parts.table, clay, state, at.p, at.v, h)
+def clay_behind(parts, clay, k, q, w, h):
+    """The clay behind a step of length h after a kick, which led the arm to q, w."""
+    if parts.clay is None:
+        return clay
+    growth, state = same_growth(parts.clay.growth, clay.growth), k.motion.special
+    hit = hits.after_kick(parts.hits, parts, clay.hit, k)
+    clay = Clay(clay.region, clay.b, clay.b, growth, hit, state)
+    return special_behind(parts.special, parts, clay, q, w, h)
 
 
 def stepped(parts, s, e, k, after, target):
@@ -149,8 +138,8 @@ def stepped(parts, s, e, k, after, target):
     special, clock, x = parts.special, s.clock, s.status
     q, w = moved_arm(parts, e, parts.grain, clock.before, s.body.w, k, after)
     w = held_arm(special, e, k.motion.special, w)
-    state, stops = behind_kick(special, parts, e, s.clay.special, k, clock.t, x.stops)
-    clay = moved_clay(special, parts, s.clay, state, q, w, after)
+    stops = noted(special, e, s.clay.special, k, clock.t, x.stops)
+    clay = clay_behind(parts, s.clay, k, q, w, after)
     t, i, dt = clock.t + after, clock.i, parts.time.dt
     loop = commanded(parts.command, k.loop, clock.t, t, 0.5 * dt)
     if target - t <= 1e-9 * dt:
@@ -234,10 +223,7 @@ def crossed(parts, s, e, i, up):
     if s.clock.before > 0.0:
         v = arrival(parts.special, parts, s)
         speed = v[1] if i else v[0]
-    put(e.crossings, n, float(i))
-    put(e.crossings, n + 1, border)
-    put(e.crossings, n + 2, s.clock.t)
-    put(e.crossings, n + 3, speed)
+    put(e.crossings, n, (float(i), border, s.clock.t, speed))
     closes = i == 0 and up > 0 and border == parts.table[regions.END]
     s = with_status(
         s,
@@ -281,8 +267,8 @@ def towards(parts, s, after, over, first):
         if s.status.closing != OPEN:
             after = 0.0
         elif first:
-            after = hits.longest(special, s.clay.special, after)
-            s, after = hits.struck(special, parts, s, after)
+            after = hits.longest(parts.hits, s.clay.hit, after)
+            s, after = hits.struck(parts.hits, parts, s, after)
         first = False
         k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
         if after == 0.0 or axis >= 0 or not is_finite(k):
@@ -334,8 +320,7 @@ def careful(parts, s, e):
         return ended(halted_arm(s, k), closing)
     if not is_finite(k):
         return ended(s, NOT_FINITE)
-    put(e.w, 0, s.body.w[0])  # after a hit it starts from the velocity behind half a kick
-    put(e.w, 1, s.body.w[1])
+    put(e.w, 0, s.body.w)  # after a hit it starts from the velocity behind half a kick
     s = stepped(parts, s, e, k, after, target)
     if axis >= 0:
         s = crossed(parts, s, e, axis, up)
@@ -348,44 +333,43 @@ def halted_arm(s, k):
 
 
 def is_calm(special, state):
-    """Whether a whole step may follow without a look at springs and hits."""
+    """Whether the springs of the clay ask for no short steps."""
     if special is None:
         return True
-    return calm_hit(special.stiff, state.hit) and calm_springs(special.springs, state.elastic)
+    return springs.is_calm(special.springs, state.elastic)
 
 
-def calm_hit(stiff, hit):
-    if stiff is None:
-        return True
-    return hit.fine == INF and hit.struck == 0.0
+def may_glide(parts, s):
+    """Whether a whole step may follow without a look at more than its end."""
+    c, clay = s.clock, s.clay
+    whole = c.before == parts.time.dt and c.t == c.i * parts.time.dt and c.i < parts.time.last
+    calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.special)
+    return whole and calm and s.status.closing == OPEN
 
 
-def calm_springs(part, elastic):
-    if part is None:
-        return True
-    return elastic.resolved == INF
+def has_room(e, x, room):
+    """Whether a step may write its row, crossings and stops."""
+    return x.rows < room and x.crossings < e.most_crossings and x.stops < e.most_stops
+
+
+def glide(parts, s, e, room):
+    """Whole steps within one region, up to one that `careful` has to look at."""
+    dt = parts.time.dt
+    while has_room(e, s.status, room) and may_glide(parts, s):
+        k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
+        p = place_after(parts.arm, s.body.q, k, dt)
+        if not (borders.is_within(s.clay.region, p) and is_finite(k)):
+            break
+        b = clay_now(parts.clay, s.clay, False, s.clock.t)
+        s = written(parts, s, e, k, velocity(parts.special, parts.grain, k), b)
+        s = stepped(parts, worked(parts, s, k), e, k, dt, (s.clock.i + 1) * dt)
+    return s
 
 
 def advance(parts, s, e, room):
     """Steps until rows, crossings or stops are full, or the run is over."""
-    dt, last = parts.time.dt, parts.time.last
-    special = parts.special
-    while s.status.code == OPEN and s.status.rows < room and has_room(e, s.status):
-        clock, clay = s.clock, s.clay
-        whole = clock.before == dt and clock.t == clock.i * dt and clock.i < last
-        if not (whole and s.status.closing == OPEN and is_calm(special, clay.special)):
-            s = careful(parts, s, e)
-            continue
-        k = kick(parts, clock, s.body, s.loop, clay, dt)
-        if borders.is_within(clay.region, place_after(parts.arm, s.body.q, k, dt)) and is_finite(k):
-            b = clay_now(parts.clay, clay, False, clock.t)
-            s = written(parts, worked(parts, s, k), e, k, velocity(special, parts.grain, k), b)
-            s = stepped(parts, s, e, k, dt, (clock.i + 1) * dt)
-        else:
+    while s.status.code == OPEN and has_room(e, s.status, room):
+        s = glide(parts, s, e, room)
+        if has_room(e, s.status, room):
             s = careful(parts, s, e)
     return s
-
-
-def has_room(e, x):
-    """Whether a step may note its crossings and stops."""
-    return x.crossings < e.most_crossings and x.stops < e.most_stops

@@ -19,25 +19,16 @@ def hand_force(part, k):
 
 def write(parts, rows, i, q, k, v, b):
     """Writes the row of a sample."""
-    p, tau, delta, o = k.at.p, k.tau, k.delta, ROW * i
+    p, tau, delta = k.at.p, k.tau, k.delta
     fh = hand_force(parts.hand, k)
     r1, r2 = arm.joint_velocity(v[0], v[1], k.at.u, 1.0)
-    put(rows, o, q[0])
-    put(rows, o + 1, q[1])
-    put(rows, o + 2, p[0])
-    put(rows, o + 3, p[1])
-    put(rows, o + 4, v[0])
-    put(rows, o + 5, v[1])
-    put(rows, o + 6, fh[0])
-    put(rows, o + 7, fh[1])
-    put(rows, o + 8, tau[0])
-    put(rows, o + 9, tau[1])
-    put(rows, o + 10, delta[0])
-    put(rows, o + 11, delta[1])
-    put(rows, o + 12, b[0])
-    put(rows, o + 13, b[1])
-    put(rows, o + 14, r1)
-    put(rows, o + 15, r2 - r1)
+    put(
+        rows, ROW * i,
+        (
+            q[0], q[1], p[0], p[1], v[0], v[1], fh[0], fh[1], tau[0], tau[1], delta[0], delta[1],
+            b[0], b[1], r1, r2 - r1,
+        ),
+    )  # fmt: skip
 
 
 def write_force(special, grain, e, i, k, v, b):
@@ -53,8 +44,7 @@ def write_beside(flow, elastic, groove, grain, e, i, k, v, b):
     x, y = viscous.force(grain, b, v)
     fx, fy = felt_force(flow, k.motion.special)
     px, py = sprung_force(elastic, k.motion.special, k.step.L)
-    put(e.rendered, 3 * i, x + fx + px)
-    put(e.rendered, 3 * i + 1, y + fy + py)
+    put(e.rendered, 3 * i, (x + fx + px, y + fy + py))
     write_removed(groove, e, i)
 
 
@@ -73,7 +63,7 @@ def sprung_force(part, state, L):
 def write_removed(groove, e, i):
     if groove is None:
         return
-    put(e.rendered, 3 * i + 2, groove.removed[0] + groove.removed[1])
+    put(e.rendered, 3 * i + 2, (groove.removed[0] + groove.removed[1],))
 
 
 def with_work(parts, a, k, w):

@@ -56,16 +56,16 @@ def compensators(s: Scenario):
     )  # fmt: skip
 
 
-def is_stiff(s: Scenario) -> bool:
-    """Whether a step may overshoot in the clay, or a hit saturate the motors."""
+def stiffness(s: Scenario) -> float:
+    """Largest share of its velocity that a step of explicit damping would take from the handle."""
     b = B_MAX if s.clay.grows else s.clay.largest
-    return b * s.dt * max(s.mobility, s.arm.links[4]) > 0.02
+    return b * s.dt * max(s.mobility, s.arm.links[4])
 
 
 def clay_part(s: Scenario):
     clay = s.clay
     if clay is None:
-        return None, None, None
+        return None, None, None, None
     grain = (math.cos(clay.angle), math.sin(clay.angle)) if clay.angle else None
     flow = p_.Flow(1 if clay.isotropic or clay.groove else None) if clay.yields else None
     springy = block = None
@@ -78,10 +78,12 @@ def clay_part(s: Scenario):
             g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
-    stiff = p_.Stiff(float(s.mobility), 0.02 / s.arm.links[4]) if is_stiff(s) else None
+    b = stiffness(s)
+    stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
+    hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block)
     special = special if any(x is not None for x in special) else None
-    return p_.Clay(1 if clay.grows else None), grain, special
+    return p_.Clay(1 if clay.grows else None), grain, hits, special
 
 
 def parts_of(s: Scenario):
@@ -122,7 +124,6 @@ def first_special(special, p):
     return s_.Special(
         NONE,
         s_.Split(0.0, NONE, NONE) if special.stiff else None,
-        s_.Hit(INF, 0.0) if special.stiff else None,
         s_.Felt(law, law, NONE, NONE, NONE, NONE, nan, 0.0, NONE) if special.flow else None,
         s_.Elastic(((0.0,) * 6, (0.0,) * 6), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)
         if special.springs else None,
@@ -140,11 +141,12 @@ def start(parts, s: Scenario, e):
     special = parts.special
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE,
-        s_.Growth(NONE, NONE) if part and part.growth else None, first_special(special, p),
+        s_.Growth(NONE, NONE) if part and part.growth else None,
+        s_.Hit(INF, 0.0) if parts.hits else None, first_special(special, p),
     )  # fmt: skip
     index = regions.region_of(parts.table, p)
     # at the very place: the start may be off by the rounding of the angles
-    clay = borders.clay_in(part, special, parts.table, clay, index, 0.0, kick.place(parts.arm, q), -1, 0.0)
+    clay = borders.clay_in(parts, clay, index, 0.0, kick.place(parts.arm, q), -1, 0.0)
     if special is not None and special.groove is not None:
         at = kick.handle_at(parts.arm, body, 0.0)
         b, old, cut = grooves.moved(special.groove, clay.special.cut, clay, at.p, at.v)

@@ -43,6 +43,13 @@ def longest(springs, elastic, after):
     return after / math.ceil(after / elastic.resolved - NEAR)
 
 
+def is_calm(springs, elastic):
+    """Whether springs ask for no short steps."""
+    if springs is None:
+        return True
+    return elastic.resolved == INF
+
+
 def moved(springs, elastic, region, table, p, h):
     """The springs after the handle has moved to p."""
     if springs is None:

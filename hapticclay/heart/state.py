@@ -99,6 +99,7 @@ class Clay(NamedTuple):
         b: damping now, at t = 0 where it grows [N.s/m].
         old: that of the clay before the sample.
         growth: clay that grows.
+        hit: a hit that drives motors into their limits.
         special: laws beside plain viscous damping.
     """
 
@@ -106,6 +107,7 @@ class Clay(NamedTuple):
     b: Any
     old: Any
     growth: Any
+    hit: Any
     special: Any
 
 
@@ -115,7 +117,6 @@ class Special(NamedTuple):
     Attributes:
         owed: impulse owed by stiff clay [N.s].
         split: how the last kick split the damping of stiff clay.
-        hit: a hit that drives motors into their limits.
         felt: clay that yields.
         elastic: clay that springs back.
         cut: clay that stays cut.
@@ -123,7 +124,6 @@ class Special(NamedTuple):
 
     owed: Any
     split: Any
-    hit: Any
     felt: Any
     elastic: Any
     cut: Any

@@ -40,7 +40,7 @@ def split_damping(stiff, state, step, hand, b0, b1):
         b0, b1, step.H, step.L, step.R, stiff.mobility, dx, dy
     )
     split, s = Split(over, (sharex, sharey), (softx, softy)), state
-    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.hit, s.felt, s.elastic, s.cut)
+    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.felt, s.elastic, s.cut)
 
 
 def grown(part, b, growth, before, t):
@@ -90,7 +90,7 @@ def at_place(smooth, table, clay, p):
     x, y = regions.smooth_clay(table, smooth, p[0], p[1], clay.b[0], clay.b[1])
     o = clay.old
     old = (x, o[1]) if smooth == 1 else (o[0], y) if smooth == 2 else (x, y)
-    return Clay(clay.region, (x, y), old, without_growth(clay.growth, smooth), clay.special)
+    return Clay(clay.region, (x, y), old, without_growth(clay.growth, smooth), clay.hit, clay.special)
 
 
 def without_growth(growth, smooth):

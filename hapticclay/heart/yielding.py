@@ -213,7 +213,5 @@ def noted(part, e, felt, before, t, n):
 
 
 def note(stops, n, axis, starts, t):
-    put(stops, 3 * n, axis)
-    put(stops, 3 * n + 1, starts)
-    put(stops, 3 * n + 2, t)
+    put(stops, 3 * n, (axis, starts, t))
     return n + 1
