@@ -20,12 +20,6 @@ def sides(r, p):
     return side(p[0], r.low[0], r.high[0]), side(p[1], r.low[1], r.high[1])
 
 
-def is_within(r, p):
-    """Whether a place lies in a region; a NaN does not."""
-    (x, y), (a, b), (c, d) = p, r.low, r.high
-    return a - TOUCH <= x <= c + TOUCH and b - TOUCH <= y <= d + TOUCH
-
-
 def border_of(r, i, up):
     """Place of a border of a region [m]."""
     if i == 0:
@@ -104,10 +98,7 @@ def seen_with(x, i, at):
     a, b, c, d = x.seen
     back = (a <= at <= b) if i == 0 else (c <= at <= d)
     seen = (min(a, at), max(b, at), c, d) if i == 0 else (a, b, min(c, at), max(d, at))
-    return Status(
-        x.code, x.closing, x.steps, x.careful, x.landings + (1 if back else 0), seen, x.rows,
-        x.crossings, x.stops,
-    )  # fmt: skip
+    return Status(x.code, x.closing, x.careful, x.landings + (1 if back else 0), seen)
 
 
 def moved_on(parts, s, p, i, up, struck):
@@ -115,7 +106,7 @@ def moved_on(parts, s, p, i, up, struck):
     x, y = s.clay.region.index
     index = (x + up, y) if i == 0 else (x, y + up)
     clay = clay_in(parts, s.clay, index, s.clock.t, p, i, struck)
-    return State(s.clock, s.body, s.loop, clay, s.work, seen_with(s.status, i, index[i]))
+    return State(s.clock, s.body, s.loop, clay, s.work, seen_with(s.status, i, index[i]), s.filled)
 
 
 def passed_alike(parts, s, here, p):

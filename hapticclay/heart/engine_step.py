@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ..model import arm
-from . import viscous
 
 
 def put(array, i, values):
@@ -35,13 +34,12 @@ def step_engine(e, clay, tau, push, dampers, h):
     return pair(e.q), pair(e.w)
 
 
-def moved_arm(parts, e, grain, before, w, k, h):
+def moved_arm(parts, e, before, w, k, h):
     """Steps the engine to the rates of a kick; joint angles and rates there."""
     if before == h:  # beside its dampers the engine gets all of the force
-        b, u, f = k.viscous.b1, k.motion.u, k.motion.f
-        x, y = viscous.force(grain, b, u)
+        (x, y), f = k.damped, k.motion.f
         push = arm.joint_torques(f[0] + x, f[1] + y, k.at.u)
-        return step_engine(e, parts.clay, k.tau, push, b, h)
+        return step_engine(e, parts.clay, k.tau, push, k.viscous.b1, h)
     # its step is longer or shorter than the kick
     links, n, tau = parts.arm.links, k.w, k.tau
     a1, a2 = (n[0] - w[0]) / h, (n[0] + n[1] - w[0] - w[1]) / h

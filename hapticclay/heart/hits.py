@@ -50,7 +50,7 @@ def struck(part, parts, s, after):
 def with_hit(s, hit):
     c = s.clay
     clay = Clay(c.region, c.b, c.old, c.growth, hit, c.special)
-    return State(s.clock, s.body, s.loop, clay, s.work, s.status)
+    return State(s.clock, s.body, s.loop, clay, s.work, s.status, s.filled)
 
 
 def halted(parts, s):
@@ -59,7 +59,7 @@ def halted(parts, s):
     body, clock = Body(s.body.q, k.w, k.g), Clock(s.clock.t, s.clock.i, 0.0)
     clay = Clay(c.region, c.b, c.old, c.growth, c.hit, k.motion.special)
     work = rows.with_work(parts, s.work, k, s.body.w)
-    return State(clock, body, k.loop, clay, work, s.status)
+    return State(clock, body, k.loop, clay, work, s.status, s.filled)
 
 
 def after_kick(part, parts, hit, k):

@@ -6,6 +6,8 @@ section 4, is a function here or in the module of its part.
 
 from __future__ import annotations
 
+from math import cos, sin
+
 from ..model import arm, pieces
 from . import hand, servo, springs, stiff, viscous, yielding
 from .parts import INF
@@ -22,7 +24,8 @@ def step_around(before, after):
 
 def place(part, q):
     """Position of the handle, (x, y) [m]."""
-    x, y = arm.handle_position(q[0], q[1], part.links)
+    links, a = part.links, q[0] + q[1]
+    x, y = links[0] * cos(q[0]) + links[1] * cos(a), links[0] * sin(q[0]) + links[1] * sin(a)
     return x - part.ox, y - part.oy
 
 
@@ -99,9 +102,8 @@ def rests(special, motion):
 
 def link_torques(links, u, g, f):
     """Motor torques that, beside a force on the handle, give link accelerations [N.m]."""
-    x, y = arm.joint_torques(f[0], f[1], u)
-    t2 = links[3] * g[1] - y
-    return links[2] * g[0] + links[3] * g[1] - x, t2
+    t2 = links[3] * g[1] - u[2] * f[0] - u[3] * f[1]
+    return links[2] * g[0] - u[0] * f[0] - u[1] * f[1] + t2, t2
 
 
 def clipped(tau, limit):
@@ -118,7 +120,7 @@ def kick(parts, clock, body, loop, clay, after):
     uh = muscle_force(parts.push, clock.t, step)
     k, state = viscous.damping(part, special, clay, clock.t, hand_, step)
     at = special_handle(special, state, step, at, body.w)
-    load = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
+    load, (cx, cy), d = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
     load = hand.with_hand(hand_, load, step, at)
     law, delta, feed, rates, pushes = servo.servo_law(parts, step, at, loop)
     m = moved(special, grain, hand_, law, load, state, step, at, k, uh)
@@ -134,10 +136,10 @@ def kick(parts, clock, body, loop, clay, after):
     w = w[0] + H * g[0], w[1] + H * (g[1] - g[0])
     if rests(special, m):
         w = 0.0, 0.0
-    x, y = viscous.mean_force(part, grain, k, v, u)
+    x, y = d[0] * u[0] + d[2] * u[1], d[1] * u[1] + d[2] * u[0]
     rates = rates[0] + pushes[0] * f[0], rates[1] + pushes[1] * f[1]
     return Kick(
-        step, at, k, m, w, g, (x + m.beside[0], y + m.beside[1]), uh, tau,
+        step, at, k, m, w, g, (x, y), (cx + x + m.beside[0], cy + y + m.beside[1]), uh, tau,
         (delta[0] + feed[0] * f[0], delta[1] + feed[1] * f[1]),
         servo.advanced(parts.lag, parts.form, step, loop, rates, f),
     )  # fmt: skip
@@ -162,6 +164,15 @@ def velocity(special, grain, k):
 def is_finite(k):
     """Whether the rates after a kick are finite."""
     return abs(k.w[0]) + abs(k.w[1]) < INF
+
+
+def is_calm_end(part, r, q, w, h):
+    """Whether a step with joint rates w ends within a region."""
+    w1, w2 = w
+    if not abs(w1) + abs(w2) < INF:
+        return False
+    x, y = place(part, (q[0] + h * w1, q[1] + h * w2))
+    return r.low[0] <= x <= r.high[0] and r.low[1] <= y <= r.high[1]
 
 
 def place_after(part, q, k, h):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ..model import regions
 from . import borders, grooves, hits, rows, springs, viscous, yielding
 from .engine_step import moved_arm, put
-from .kick import command_change, handle_at, is_finite, kick, place, place_after, velocity
+from .kick import command_change, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
 from .parts import INF
 from .state import (
     FINISHED,
@@ -21,6 +21,7 @@ from .state import (
     Body,
     Clay,
     Clock,
+    Filled,
     Growth,
     Loop,
     Special,
@@ -58,22 +59,23 @@ def begun(x, region, after, on_grid):
     closing = TIME_LIMIT if x.closing == OPEN and after == 0.0 else x.closing
     if on_grid:
         ix, iy = region.index
-        return Status(x.code, closing, x.steps, 1, 0, (ix, ix, iy, iy), x.rows, x.crossings, x.stops)
+        return Status(x.code, closing, 1, 0, (ix, ix, iy, iy))
     code = UNRESOLVED if x.careful >= MOST_STEPS else x.code
-    return Status(
-        code, closing, x.steps, x.careful + 1, x.landings, x.seen, x.rows, x.crossings, x.stops
-    )
+    return Status(code, closing, x.careful + 1, x.landings, x.seen)
 
 
 def with_status(s, x):
-    return State(s.clock, s.body, s.loop, s.clay, s.work, x)
+    return State(s.clock, s.body, s.loop, s.clay, s.work, x, s.filled)
+
+
+def with_filled(s, x):
+    return State(s.clock, s.body, s.loop, s.clay, s.work, s.status, x)
 
 
 def ended(s, code):
     """The state of a run that is over."""
     x = s.status
-    x = Status(code, x.closing, x.steps, x.careful, x.landings, x.seen, x.rows, x.crossings, x.stops)
-    return with_status(s, x)
+    return with_status(s, Status(code, x.closing, x.careful, x.landings, x.seen))
 
 
 # ---- a step --------------------------------------------------------------------------------------
@@ -135,39 +137,36 @@ def clay_behind(parts, clay, k, q, w, h):
 
 def stepped(parts, s, e, k, after, target):
     """The state after the step behind a kick."""
-    special, clock, x = parts.special, s.clock, s.status
-    q, w = moved_arm(parts, e, parts.grain, clock.before, s.body.w, k, after)
+    special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
+    q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
     w = held_arm(special, e, k.motion.special, w)
     stops = noted(special, e, s.clay.special, k, clock.t, x.stops)
     clay = clay_behind(parts, s.clay, k, q, w, after)
-    t, i, dt = clock.t + after, clock.i, parts.time.dt
+    t, i = clock.t + after, clock.i
     loop = commanded(parts.command, k.loop, clock.t, t, 0.5 * dt)
     if target - t <= 1e-9 * dt:
         t, i = target, i + 1
-    x = Status(
-        x.code, x.closing, x.steps + 1, x.careful, x.landings, x.seen, x.rows, x.crossings, stops
-    )
-    return State(Clock(t, i, after), Body(q, w, k.g), loop, clay, s.work, x)
+    clock, x = Clock(t, i, after), Filled(x.steps + 1, x.rows, x.crossings, stops)
+    return State(clock, Body(q, w, k.g), loop, clay, s.work, s.status, x)
 
 
 # ---- what is kept --------------------------------------------------------------------------------
 
 
-def written(parts, s, e, k, v, b):
-    """The state with the row of a sample in the record."""
-    special, x = parts.special, s.status
-    rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
-    rows.write_force(special, parts.grain, e, x.rows, k, v, b)
-    x = Status(
-        x.code, x.closing, x.steps, x.careful, x.landings, x.seen, x.rows + 1, x.crossings, x.stops
-    )
-    return with_status(s, x)
-
-
-def worked(parts, s, k):
-    """The state with the works of a kick in the ledger."""
+def kept(parts, s, e, k, after, shows):
+    """The state with what is kept of a kick: its row, if now is a sample, and its works."""
+    x = s.filled
+    if shows:
+        if after == 0.0:
+            v = arrival(parts.special, parts, s)
+        else:
+            v = velocity(parts.special, parts.grain, k)
+        b = clay_now(parts.clay, s.clay, after == 0.0, s.clock.t)
+        rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
+        rows.write_force(parts.special, parts.grain, e, x.rows, k, v, b)
+        x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     work = rows.with_work(parts, s.work, k, s.body.w)
-    return State(s.clock, s.body, s.loop, s.clay, work, s.status)
+    return State(s.clock, s.body, s.loop, s.clay, work, s.status, x)
 
 
 def clay_now(part, clay, before, t):
@@ -177,17 +176,6 @@ def clay_now(part, clay, before, t):
     if before:
         return viscous.grown(part.growth, clay.old, clay.growth, 1, t)
     return viscous.grown(part.growth, clay.b, clay.growth, 0, t)
-
-
-def kept(parts, s, e, k, after, shows):
-    """The state with what is kept of a kick: its row, if now is a sample, and its works."""
-    if shows:
-        if after == 0.0:
-            v = arrival(parts.special, parts, s)
-        else:
-            v = velocity(parts.special, parts.grain, k)
-        s = written(parts, s, e, k, v, clay_now(parts.clay, s.clay, after == 0.0, s.clock.t))
-    return worked(parts, s, k)
 
 
 # ---- borders -------------------------------------------------------------------------------------
@@ -218,22 +206,17 @@ def stiff_arrival(stiff, special, parts, s, v):
 
 def crossed(parts, s, e, i, up):
     """The state beyond a border, which is noted; at the end of the path, that of a run to close."""
-    border, x, n = borders.border_of(s.clay.region, i, up), s.status, 4 * s.status.crossings
+    border, x = borders.border_of(s.clay.region, i, up), s.filled
     speed = 0.0
     if s.clock.before > 0.0:
         v = arrival(parts.special, parts, s)
         speed = v[1] if i else v[0]
-    put(e.crossings, n, (float(i), border, s.clock.t, speed))
+    put(e.crossings, 4 * x.crossings, (float(i), border, s.clock.t, speed))
     closes = i == 0 and up > 0 and border == parts.table[regions.END]
-    s = with_status(
-        s,
-        Status(
-            x.code, FINISHED if closes else x.closing, x.steps, x.careful, x.landings, x.seen,
-            x.rows, x.crossings + 1, x.stops,
-        ),
-    )  # fmt: skip
+    s = with_filled(s, Filled(x.steps, x.rows, x.crossings + 1, x.stops))
     if closes:
-        return s
+        x = s.status
+        return with_status(s, Status(x.code, FINISHED, x.careful, x.landings, x.seen))
     return borders.moved_on(parts, s, place(parts.arm, s.body.q), i, up, 1.0)
 
 
@@ -329,7 +312,8 @@ def careful(parts, s, e):
 
 def halted_arm(s, k):
     """The state with the joint rates behind its last kick."""
-    return State(s.clock, Body(s.body.q, k.w, k.g), s.loop, s.clay, s.work, s.status)
+    body = Body(s.body.q, k.w, k.g)
+    return State(s.clock, body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
 def is_calm(special, state):
@@ -355,21 +339,18 @@ def has_room(e, x, room):
 def glide(parts, s, e, room):
     """Whole steps within one region, up to one that `careful` has to look at."""
     dt = parts.time.dt
-    while has_room(e, s.status, room) and may_glide(parts, s):
+    while has_room(e, s.filled, room) and may_glide(parts, s):
         k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
-        p = place_after(parts.arm, s.body.q, k, dt)
-        if not (borders.is_within(s.clay.region, p) and is_finite(k)):
+        if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
             break
-        b = clay_now(parts.clay, s.clay, False, s.clock.t)
-        s = written(parts, s, e, k, velocity(parts.special, parts.grain, k), b)
-        s = stepped(parts, worked(parts, s, k), e, k, dt, (s.clock.i + 1) * dt)
+        s = stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
     return s
 
 
 def advance(parts, s, e, room):
     """Steps until rows, crossings or stops are full, or the run is over."""
-    while s.status.code == OPEN and has_room(e, s.status, room):
+    while s.status.code == OPEN and has_room(e, s.filled, room):
         s = glide(parts, s, e, room)
-        if has_room(e, s.status, room):
+        if has_room(e, s.filled, room):
             s = careful(parts, s, e)
     return s

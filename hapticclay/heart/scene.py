@@ -159,7 +159,7 @@ def start(parts, s: Scenario, e):
     ix, iy = index
     return s_.State(
         s_.Clock(0.0, 0, 0.0), body, first_loop(parts, s), clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0),
-        s_.Status(OPEN, OPEN, 0, 0, 0, (ix, ix, iy, iy), 0, 0, 0),
+        s_.Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy)), s_.Filled(0, 0, 0, 0),
     )  # fmt: skip
 
 
@@ -188,9 +188,9 @@ def run(s: Scenario, advance=None, engine_of=None):
     go = advance or path.advance
     while st.status.code == OPEN:
         st = go(parts, st, e, CHUNK - 1)
-        x = st.status
+        x = st.filled
         rows.append(arrays[5][: 16 * x.rows].reshape(-1, 16).copy())
         crossings += arrays[6][: 4 * x.crossings].reshape(-1, 4).tolist()
         stops += arrays[7][: 3 * x.stops].reshape(-1, 3).tolist()
-        st = path.with_status(st, x._replace(rows=0, crossings=0, stops=0))
+        st = path.with_filled(st, s_.Filled(0, 0, 0, 0))
     return np.concatenate(rows), crossings, stops, st, parts

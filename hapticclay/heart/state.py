@@ -247,21 +247,29 @@ class Status(NamedTuple):
     Attributes:
         code: OPEN while it goes on.
         closing: why the next row is the last, OPEN where it is not.
-        steps: engine steps since the start.
-        careful: of them, steps with a look at their end since the last sample.
+        careful: steps with a look at their end since the last sample.
         landings: times that the handle has come back to a region since the last sample.
         seen: regions since then: least and most index along x, then along y.
-        rows: of the record filled since the last look.
-        crossings: of borders noted since then.
-        stops: in clay that yields noted since then.
     """
 
     code: int
     closing: int
-    steps: int
     careful: int
     landings: int
     seen: Any
+
+
+class Filled(NamedTuple):
+    """What a run has made since the last look.
+
+    Attributes:
+        steps: engine steps.
+        rows: of the record.
+        crossings: of borders.
+        stops: in clay that yields.
+    """
+
+    steps: int
     rows: int
     crossings: int
     stops: int
@@ -277,6 +285,7 @@ class State(NamedTuple):
         clay: the clay.
         work: the ledger.
         status: how it stands.
+        filled: what it has made.
     """
 
     clock: Clock
@@ -285,6 +294,7 @@ class State(NamedTuple):
     clay: Clay
     work: Work
     status: Status
+    filled: Filled
 
 
 # ---- the value of a kick -------------------------------------------------------------------------
@@ -394,6 +404,7 @@ class Kick(NamedTuple):
         motion: of the handle.
         w: joint rates after it [rad/s].
         g: link accelerations [rad/s^2].
+        damped: force of the dampers behind the sample [N].
         fe: mean force of the clay [N].
         uh: muscle force [N].
         tau: torques [N.m].
@@ -407,6 +418,7 @@ class Kick(NamedTuple):
     motion: Motion
     w: Any
     g: Any
+    damped: Any
     fe: Any
     uh: Any
     tau: Any

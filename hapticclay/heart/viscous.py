@@ -14,9 +14,16 @@ def damping(part, special, clay, t, hand, step):
     """Damping of the clay in a kick, and the state of its special laws, which stiff clay splits."""
     if part is None:
         return Viscous(NONE, NONE), clay.special
-    b0 = grown(part.growth, clay.old, clay.growth, 1, t - 0.25 * step.before)
-    b1 = grown(part.growth, clay.b, clay.growth, 0, t + 0.25 * step.after)
+    b0, b1 = around(part.growth, clay, t, step)
     return special_damping(special, clay.special, step, hand, b0, b1)
+
+
+def around(growth, clay, t, step):
+    """Damping in the middle of the halves of a kick, (x, y) each [N.s/m]."""
+    if growth is None:
+        return clay.old, clay.b
+    b0 = law.damping_at(clay.old, clay.growth.old, t - 0.25 * step.before)
+    return b0, law.damping_at(clay.b, clay.growth.rate, t + 0.25 * step.after)
 
 
 def special_damping(special, state, step, hand, b0, b1):
@@ -65,22 +72,14 @@ def tensor(grain, b):
 
 
 def with_clay(part, grain, load, k, v):
-    """The load with that of viscous clay."""
+    """The load with that of viscous clay; of it the force [N] and the damping (xx, yy, xy)."""
     if part is None:
-        return load
+        return load, NONE, (0.0, 0.0, 0.0)
     f, d = load.f, load.d
     x, y = force(grain, k.b0, v)
     xx, yy, xy = tensor(grain, k.b1)
-    return Load((f[0] - x, f[1] - y), (d[0] + xx, d[1] + yy, d[2] + xy))
-
-
-def mean_force(part, grain, k, v, u):
-    """Mean force of the dampers in a kick, (x, y) [N]."""
-    if part is None:
-        return NONE
-    ax, ay = force(grain, k.b0, v)
-    bx, by = force(grain, k.b1, u)
-    return ax + bx, ay + by
+    load = Load((f[0] - x, f[1] - y), (d[0] + xx, d[1] + yy, d[2] + xy))
+    return load, (x, y), (xx, yy, xy)
 
 
 def at_place(smooth, table, clay, p):
