@@ -1,0 +1,190 @@
+"""Compiled runs: numba compiles the functions that CPython runs, of the parts that a scene has.
+
+They call the engine's own functions and hold no lock, so runs go on in parallel threads. The
+machine code is kept on disk under the types of its parts, in a folder named by the sources.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import inspect
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic, overload
+
+from ..model import (
+    arm,
+    clay,
+    compensator,
+    controller,
+    flow,
+    groove,
+    hardware,
+    operator,
+    pieces,
+    regions,
+    spring,
+)
+from ..stepping import cache, run
+from ..stepping.engine import mujoco
+from ..stepping.notice import Notice
+from . import (
+    borders,
+    engine_step,
+    grooves,
+    hand,
+    hits,
+    kick,
+    lacking,
+    path,
+    rows,
+    servo,
+    springs,
+    stiff,
+    viscous,
+    yielding,
+)
+
+SOURCES = (
+    arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
+    borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
+    engine_step,
+)  # fmt: skip
+LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+CAREFUL = 1000  # careful steps in CPython, some 1 ms each, that repay the machine code for them
+
+
+# ---- numbers at an address -----------------------------------------------------------------------
+
+
+def place_of(builder: Any, address: Any, i: Any) -> Any:
+    """Pointer to a number of an array.
+
+    Args:
+        builder: of LLVM.
+        address: of the array.
+        i: index of the number.
+    """
+    return builder.gep(builder.inttoptr(address, ir.DoubleType().as_pointer()), [i])
+
+
+@intrinsic
+def store(context, address, i, values):  # noqa: ARG001
+    """Writes numbers into an array from i on."""
+
+    def generate(context, builder, signature, arguments):
+        address, i, tuple_ = arguments
+        for j in range(len(signature.args[2])):
+            at = builder.add(i, ir.Constant(i.type, j))
+            builder.store(builder.extract_value(tuple_, j), place_of(builder, address, at))
+        return context.get_dummy_value()
+
+    numbers = types.UniTuple(types.float64, len(values))
+    return types.none(types.intp, types.intp, numbers), generate
+
+
+@intrinsic
+def load_pair(context, address):  # noqa: ARG001
+    """The first two numbers of an array."""
+
+    def generate(context, builder, signature, arguments):
+        at = [ir.Constant(ir.IntType(64), j) for j in range(2)]
+        found = [builder.load(place_of(builder, arguments[0], i)) for i in at]
+        return context.make_tuple(builder, signature.return_type, found)
+
+    return types.UniTuple(types.float64, 2)(types.intp), generate
+
+
+# ---- sources -------------------------------------------------------------------------------------
+
+
+def choice(f: FunctionType) -> Callable[..., Any]:
+    """What numba asks for the source of a function, which depends on the parts that are None.
+
+    Args:
+        f: the function.
+    """
+    names = list(inspect.signature(f).parameters)
+
+    def choose(*arguments):
+        kinds = dict(zip(names, arguments, strict=False))
+        none = frozenset(x for x, kind in kinds.items() if isinstance(kind, types.NoneType))
+        return lacking.without(f, none, frozenset(kinds) - none)
+
+    return choose
+
+
+def register(modules: tuple[ModuleType, ...]) -> None:
+    """Lets numba find the source of every function of some modules.
+
+    Args:
+        modules: of the stepping.
+    """
+    atoms = {engine_step.put: store, engine_step.pair: load_pair}
+    for module in modules:
+        for f in list(vars(module).values()):
+            if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in atoms:
+                overload(f, jit_options=LAW, strict=False)(choice(f))
+    overload(engine_step.put, inline="always")(
+        lambda array, i, values: lambda array, i, values: store(array, i, values)
+    )
+    overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
+
+
+# ---- entries: all that is called between them is compiled with the same flags ---------------------
+
+
+def glide(parts, s, e, room):
+    """path.glide."""
+    return path.glide(parts, s, e, room)
+
+
+def advance(parts, s, e, room):
+    """path.advance."""
+    return path.advance(parts, s, e, room)
+
+
+def entry(f: Any) -> Any:
+    """A function that is compiled when it is first called with its types, or taken from the disk.
+
+    Args:
+        f: the function.
+    """
+    made = numba.njit(**ENTRY)(f)
+    with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep it
+        made._cache = cache.FileCache(made.py_func, run.cache_folder())
+    return made
+
+
+register(SOURCES)
+GLIDE, ADVANCE = entry(glide), entry(advance)
+
+
+def library() -> ctypes.CDLL:
+    """The engine."""
+    return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
+
+
+def function(name: str) -> Any:
+    """A function of the engine that takes model and data.
+
+    Args:
+        name: its name.
+    """
+    found = getattr(library(), name)
+    found.argtypes, found.restype = [ctypes.c_size_t, ctypes.c_size_t], None
+    return found
+
+
+STEP = function("mj_step")
