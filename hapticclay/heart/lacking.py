@@ -26,7 +26,7 @@ def asked(statement: ast.stmt) -> str | None:
             test=ast.Compare(
                 left=ast.Name(id=name), ops=[ast.Is()], comparators=[ast.Constant(value=None)]
             ),
-            body=[ast.Return()],
+            body=[*_, ast.Return()],
             orelse=[],
         ):
             return name
