@@ -2,7 +2,47 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from ..model import arm
+
+
+class Engine(NamedTuple):
+    """The engine, and the arrays that a run fills: memoryviews, or addresses for compiled steps.
+
+    Attributes:
+        step: mj_step.
+        model: the model, or its address.
+        data: the data, or its address.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        ctrl: controls.
+        push: applied joint torques [N.m].
+        timestep: length of a step [s].
+        rows: of the record, rows.ROW numbers each.
+        crossings: coordinate, border [m], time [s], speed along it [m/s] of each.
+        stops: where yielding clay stops the handle or lets it go: coordinate, or 2.0 for both; 1.0
+            for a stop, 0.0 for the end of one; time [s].
+        rendered: force of the clay [N] where b v does not tell it, and volume removed [m^3], a line
+            a row.
+        most_crossings: from which on they are full.
+        most_stops: from which on they are full.
+    """
+
+    step: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    ctrl: Any
+    push: Any
+    timestep: Any
+    rows: Any
+    crossings: Any
+    stops: Any
+    rendered: Any
+    most_crossings: int
+    most_stops: int
 
 
 def put(array, i, values):

@@ -40,3 +40,10 @@ def springs(hand):
     if hand is None:
         return 0.0, 0.0
     return hand[0].spring, hand[1].spring
+
+
+def masses(hand):
+    """Masses of the hand, (x, y) [kg]."""
+    if hand is None:
+        return 0.0, 0.0
+    return hand[0].mass, hand[1].mass

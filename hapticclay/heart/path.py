@@ -311,9 +311,9 @@ def careful(parts, s, e):
 
 
 def halted_arm(s, k):
-    """The state with the joint rates behind its last kick."""
-    body = Body(s.body.q, k.w, k.g)
-    return State(s.clock, body, s.loop, s.clay, s.work, s.status, s.filled)
+    """The state behind its last kick, at its sample."""
+    body, c = Body(s.body.q, k.w, k.g), s.clock
+    return State(Clock(c.t, c.i, 0.0), body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
 def is_calm(special, state):
@@ -336,15 +336,29 @@ def has_room(e, x, room):
     return x.rows < room and x.crossings < e.most_crossings and x.stops < e.most_stops
 
 
+def whole_step(parts, s, e):
+    """A whole step within one region: whether it could be made, and the state after it."""
+    dt = parts.time.dt
+    k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
+    if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
+        return False, s
+    return True, stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
+
+
 def glide(parts, s, e, room):
     """Whole steps within one region, up to one that `careful` has to look at."""
-    dt = parts.time.dt
-    while has_room(e, s.filled, room) and may_glide(parts, s):
-        k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
-        if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
-            break
-        s = stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
+    made = True
+    while made and has_room(e, s.filled, room) and may_glide(parts, s):
+        made, s = whole_step(parts, s, e)
     return s
+
+
+def step(parts, s, e):
+    """The state after one step."""
+    made = False
+    if may_glide(parts, s):
+        made, s = whole_step(parts, s, e)
+    return s if made else careful(parts, s, e)
 
 
 def advance(parts, s, e, room):

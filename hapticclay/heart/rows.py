@@ -31,6 +31,11 @@ def write(parts, rows, i, q, k, v, b):
     )  # fmt: skip
 
 
+def tells(special):
+    """Whether the clay has a force that b v does not tell."""
+    return special.flow is not None or special.springs is not None
+
+
 def write_force(special, grain, e, i, k, v, b):
     """Writes the force of the clay where b v does not tell it."""
     if special is None:

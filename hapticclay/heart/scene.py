@@ -3,39 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..model import arm, compensator, groove, regions
 from ..model.constants import B_MAX
 from ..model.scenario import Scenario
-from ..stepping import engine
-from ..stepping.engine import mujoco
 from ..stepping.run import spring_step
-from . import borders, grooves, kick, parts as p_, path, state as s_
+from . import borders, grooves, kick, parts as p_, state as s_
 from .parts import INF
 from .state import OPEN
 
-CHUNK, CROSSINGS = 4096, 64
 NONE = (0.0, 0.0)
-
-
-class Engine(NamedTuple):
-    step: Any
-    model: Any
-    data: Any
-    q: Any
-    w: Any
-    ctrl: Any
-    push: Any
-    timestep: Any
-    rows: Any
-    crossings: Any
-    stops: Any
-    rendered: Any
-    most_crossings: int
-    most_stops: int
 
 
 def hand_parts(s: Scenario):
@@ -163,34 +142,15 @@ def start(parts, s: Scenario, e):
     )  # fmt: skip
 
 
-def make_engine(s: Scenario):
-    model = engine.build(s)
-    data = mujoco.MjData(model)
-    clay = s.clay
-    stops = np.zeros(3 * 4 * CHUNK if clay and clay.yields else 0)
-    rendered = np.zeros(3 * CHUNK if clay and (clay.yields or clay.springs) else 0)
-    arrays = (
-        data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model),
-        np.zeros(CHUNK * 16), np.zeros(CROSSINGS * 4), stops, rendered,
-    )  # fmt: skip
-    bounds = CROSSINGS - 3, len(stops) // 3 - 8 if len(stops) else 1
-    plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds)
-    return plain, arrays, bounds, model, data
+def written(parts):
+    """Arrays of a scene that steps write into."""
+    out = [parts.table]
+    if parts.special is not None and parts.special.groove is not None:
+        g = parts.special.groove
+        out += [g.ground, g.rim, g.removed]
+    return out
 
 
-def run(s: Scenario, advance=None, engine_of=None):
-    e, arrays, bounds, model, data = make_engine(s)
-    parts = parts_of(s)
-    st = start(parts, s, e)
-    if engine_of:
-        e = engine_of(model, data, arrays, bounds)
-    rows, crossings, stops = [], [], []
-    go = advance or path.advance
-    while st.status.code == OPEN:
-        st = go(parts, st, e, CHUNK - 1)
-        x = st.filled
-        rows.append(arrays[5][: 16 * x.rows].reshape(-1, 16).copy())
-        crossings += arrays[6][: 4 * x.crossings].reshape(-1, 4).tolist()
-        stops += arrays[7][: 3 * x.stops].reshape(-1, 3).tolist()
-        st = path.with_filled(st, s_.Filled(0, 0, 0, 0))
-    return np.concatenate(rows), crossings, stops, st, parts
+def beyond(parts):
+    """Why no step can go on from an arm beyond floating point."""
+    return "the arm is stretched or folded"

@@ -1,0 +1,573 @@
+"""A run from start to end: it advances, keeps the record and asks the monitor."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import named
+from ..errors import ParameterError
+from ..model.constants import AXES
+from ..model.scenario import Scenario
+from ..stepping import engine, monitor
+from ..stepping.engine import mujoco
+from . import energy, path, rows, scene, viscous
+from .engine_step import Engine
+from .parts import Parts
+from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
+
+CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
+STORED = 8  # that one store keeps: two of an arm, with clay and without
+CROSSINGS, STOPS = 64, 4 * CHUNK  # between two looks: an axis stops and goes on in each step
+NONE_MADE = Filled(0, 0, 0, 0)
+
+
+@named
+@dataclass(frozen=True)
+class Crossing:
+    """The handle crossed a border.
+
+    Attributes:
+        axis: coordinate of the border, "x" or "y".
+        border: where it lies [m].
+        time: when it was crossed [s].
+        speed: velocity along the axis [m/s].
+    """
+
+    axis: str
+    border: float
+    time: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The clay held the handle still.
+
+    Attributes:
+        axis: "x" or "y" where that axis alone was held by its own law, "xy" for the handle as a
+            whole.
+        start: when it came to rest [s].
+        end: when it moved on [s]; None if it still rested at the end of the run.
+    """
+
+    axis: str
+    start: float
+    end: float | None = None
+
+
+class Kernel(NamedTuple):
+    """How the steps of a run are made: by CPython, or compiled.
+
+    Attributes:
+        advance: makes steps, called with (run, room).
+        calls: mj_step, model and data as compiled code calls them; None if there is none.
+        quiet: monitor.is_quiet, compiled; None asks the monitor itself.
+    """
+
+    advance: Callable[[Run, int], None]
+    calls: Callable[[Any, Any], tuple[Any, Any, Any]] | None = None
+    quiet: Callable[..., bool] | None = None
+
+
+def plainly(run: Run, room: int) -> None:
+    """Makes steps in CPython, where those of an arm that is exactly straight raise.
+
+    Args:
+        run: the run.
+        room: rows that it may have.
+    """
+    parts, e = run.parts, run.e
+    try:
+        while run.state.status.code == OPEN and path.has_room(e, run.state.filled, room):
+            run.state = path.step(parts, run.state, e)
+    except ArithmeticError:
+        run.state = path.ended(run.state, NOT_FINITE)
+    except ValueError:  # of the sine of an infinite angle
+        if np.isfinite(run.data.qpos).all() and np.isfinite(run.data.qvel).all():
+            raise
+        run.state = path.ended(run.state, NOT_FINITE)
+
+
+PLAIN = Kernel(plainly)
+
+
+class NeedsMonitor(Exception):
+    """A run without samples that is to be repeated with them, for the monitor."""
+
+
+class EngineStore:
+    """Engines and arrays that run after run uses: engines with clay and without.
+
+    Args:
+        kernel: of the runs.
+    """
+
+    def __init__(self, kernel: Kernel):
+        self.kernel = kernel
+        self.engines: dict[Any, tuple[Any, Any]] = {}
+        self.rows = np.empty((CHUNK - 1, rows.ROW))
+        self.crossings = np.empty((CROSSINGS, 4))
+        self.stops, self.rendered = np.empty((0, 3)), np.empty((0, 3))
+
+    def engine(self, s: Scenario) -> tuple[Any, Any]:
+        """The engine as engine.build would make it, at rest: model and data.
+
+        Args:
+            s: the scenario.
+        """
+        key = s.clay is not None, s.arm
+        if key not in self.engines:
+            if len(self.engines) >= STORED:
+                del self.engines[next(iter(self.engines))]  # the one longest there
+            model = engine.build(s)
+            self.engines[key] = model, mujoco.MjData(model)
+        model, data = self.engines[key]
+        model.opt.timestep = s.dt
+        for i, limit in enumerate(s.torque_limit):
+            model.actuator_ctrlrange[i] = -limit, limit
+        engine.turn_dampers(model, s)
+        mujoco.mj_resetData(model, data)
+        return model, data
+
+    def arrays(self, s: Scenario, model: Any, data: Any) -> tuple[Engine, Engine | None]:
+        """Arrays of a run for CPython, and for compiled steps.
+
+        Args:
+            s: the scenario.
+            model: of the engine.
+            data: of the engine.
+        """
+        if s.clay is not None and s.clay.yields and not len(self.stops):
+            self.stops = np.empty((STOPS, 3))
+        if s.clay is not None and (s.clay.yields or s.clay.springs) and not len(self.rendered):
+            self.rendered = np.empty((CHUNK - 1, 3))
+        kept: Any = self.rows, self.crossings, self.stops, self.rendered
+        own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
+        arrays = [*own, *(x.reshape(-1) for x in kept)]
+        bounds = CROSSINGS - 3, max(len(self.stops) - 8, 1)
+        plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds)
+        if self.kernel.calls is None:
+            return plain, None
+        addresses = [x.ctypes.data for x in arrays]
+        return plain, Engine(*self.kernel.calls(model, data), *addresses, *bounds)
+
+
+_idle: dict[Kernel, list[EngineStore]] = {}  # engines that no run uses
+
+
+@contextlib.contextmanager
+def borrowed_store(kernel: Kernel) -> Iterator[EngineStore]:
+    """Engines for one run, made anew only while others are in use.
+
+    Args:
+        kernel: of the run.
+    """
+    idle = _idle.setdefault(kernel, [])
+    try:
+        store = idle.pop()
+    except IndexError:
+        store = EngineStore(kernel)
+    yield store
+    idle.append(store)  # but not after an exception
+
+
+class Saved(NamedTuple):
+    """A run at a sample, to return to.
+
+    Attributes:
+        state: its state.
+        arrays: copies of what steps write into its parts.
+    """
+
+    state: State
+    arrays: list[np.ndarray]
+
+
+class Run:
+    """One run of a scenario; this class makes its steps and keeps their results.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+        kernel: how the steps are made.
+        store: engines to use; None for its own.
+        brief: keep no samples, for `brief` alone.
+        watched: let the monitor look at all rows; else NeedsMonitor is raised where it has to look
+            at rows that are not kept.
+
+    Raises:
+        ParameterError: a control callback is installed in the engine, which would interfere.
+
+    Attributes:
+        parts: the scenario, compiled of its parts.
+        state: between two steps.
+        pause: index of the sample to pause at.
+    """
+
+    def __init__(  # noqa: PLR0913
+        self,
+        scenario: Scenario,
+        every: int,
+        kernel: Kernel = PLAIN,
+        store: EngineStore | None = None,
+        brief: bool = False,
+        watched: bool = False,
+    ):
+        if mujoco.get_mjcb_control() is not None:
+            bound = "the engine must be free of control callbacks"
+            raise ParameterError("mjcb_control", mujoco.get_mjcb_control(), bound)
+        self.scenario, self.every, self.kernel = scenario, every, kernel
+        self.store = store or EngineStore(kernel)
+        self.model, self.data = self.store.engine(scenario)
+        self.e, self.native = self.store.arrays(scenario, self.model, self.data)
+        self.parts: Parts = scene.parts_of(scenario)
+        self.state: State = scene.start(self.parts, scenario, self.e)
+        self.steps = 0
+        self.pause = math.inf
+        self.watch = monitor.StabilityMonitor(scenario)
+        self.looked = 0  # samples judged so far
+        self.kept: list[tuple[np.ndarray, np.ndarray]] = []  # index, rows
+        self.rendered = self.parts.special is not None and rows.tells(self.parts.special)
+        self.rendered_kept: list[np.ndarray] = []
+        self.last_rendered: Any = None
+        self.crossings: list[Crossing] = []
+        self.stops: list[Stop] = []
+        self.outcome: monitor.Outcome | None = None
+        self.end_time: float | None = None
+        self.without_samples = brief
+        # nothing to report so far; later the monitor may want all rows once more
+        self.calm = kernel.quiet is not None and scenario.stop and not watched
+        self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
+        self.first = energy.stored(self.parts, self.state)
+
+    @property
+    def t(self) -> float:
+        """Now [s]."""
+        return self.state.clock.t
+
+    @property
+    def i(self) -> int:
+        """Index of the sample at or before now."""
+        return self.state.clock.i
+
+    @property
+    def filled(self) -> int:
+        """Samples that have not been judged yet."""
+        return self.state.filled.rows
+
+    def b(self) -> tuple[float, float]:
+        """Clay of the present region, (x, y) [N.s/m]."""
+        return path.clay_now(self.parts.clay, self.state.clay, False, self.t)
+
+    # ---- steps
+
+    def advance(self, room: int = CHUNK - 1) -> None:
+        """Makes steps until rows are filled, or the run is over.
+
+        Args:
+            room: largest number of rows.
+        """
+        if not self.filled and not (self.without_samples and self.looked):
+            self._saved = self.saved()  # of what has been judged
+        self._make(room)
+        code = self.state.status.code
+        if code == UNRESOLVED:
+            self.give_up()
+        elif code == NOT_FINITE:
+            self._end(monitor.Outcome("out of reach", self.t, self.i, cause=scene.beyond(self.parts)))
+        elif code != OPEN:
+            self.finish("finished" if code == FINISHED else "time limit")
+
+    def _make(self, room: int) -> None:
+        self.kernel.advance(self, room)
+        made = self.state.filled
+        self._note_events(made.crossings, made.stops)
+        self.steps += made.steps
+        self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
+
+    def _note_events(self, crossings: int, stops: int) -> None:
+        """Takes the crossings and stops of the steps just made."""
+        for axis, *crossing in self.store.crossings[:crossings].tolist():
+            self.crossings.append(Crossing(AXES[int(axis)], *crossing))
+        for axis, begins, t in self.store.stops[:stops].tolist():
+            self._note_stop(("x", "y", "xy")[int(axis)], begins > 0.0, t)
+
+    def _note_stop(self, axis: str, begins: bool, t: float) -> None:
+        if begins:
+            self.stops.append(Stop(axis, t))
+            return
+        for i in reversed(range(len(self.stops))):
+            if self.stops[i].axis == axis:
+                self.stops[i] = replace(self.stops[i], end=t)
+                break
+
+    def saved(self) -> Saved:
+        """The run at its sample, to return to."""
+        return Saved(self.state, [x.copy() for x in scene.written(self.parts)])
+
+    def restore(self, saved: Saved) -> None:
+        """Returns to a sample; the record is not changed.
+
+        Args:
+            saved: from `saved`.
+        """
+        self.state = saved.state
+        self.data.qpos[:], self.data.qvel[:] = saved.state.body.q, saved.state.body.w
+        for x, before in zip(scene.written(self.parts), saved.arrays, strict=True):
+            x[:] = before
+
+    def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
+        """Runs to the end, until progress returns True, or until sample `pause`.
+
+        A run that was paused is not flushed.
+
+        Args:
+            progress: called now and then with (time [s], handle x [m]); True ends the run.
+        """
+        while self.outcome is None and self.i < self.pause:
+            self.advance(int(min(CHUNK - 1, self.pause - self.i + self.filled)))
+            if self.filled >= CHUNK - 1 or self.outcome:
+                if progress and progress(self.t, self.position()[0]) and self.outcome is None:
+                    self.outcome = monitor.Outcome("interrupted", self.t, self.i)
+                self.flush()
+
+    def interrupt(self) -> None:
+        """Ends the run at its last sample."""
+        self.outcome = monitor.Outcome("interrupted", self.t, self.i)
+        self.flush()
+
+    def position(self, h: float = 0.0) -> tuple[float, float]:
+        """Handle position after the joints have turned at their present rates, (x, y) [m].
+
+        Args:
+            h: time [s].
+        """
+        (q1, q2), (w1, w2) = self.state.body.q, self.state.body.w
+        return path.place(self.parts.arm, (q1 + h * w1, q2 + h * w2))
+
+    def finish(self, code: str) -> None:
+        """Ends the run now.
+
+        Args:
+            code: as Outcome.code.
+        """
+        self.end_time = self.t
+        self._end(monitor.Outcome(code, self.t, self.i))
+
+    def _end(self, outcome: monitor.Outcome) -> None:
+        self.outcome = self.outcome or outcome
+
+    def give_up(self, most: int = path.MOST_STEPS) -> None:
+        """Ends the run at its last sample: the steps behind it become too short.
+
+        Args:
+            most: steps that one sample may take.
+        """
+        cause = f"more than {most} steps in one sample"
+        other = "fast" if self.scenario.integrator == "accurate" else "accurate"
+        advice = f"change dt, or choose integrator {other!r}"
+        step = max(self.looked + self.filled - 1, 0)
+        at = step * self.scenario.dt
+        self.outcome = monitor.Outcome("unresolved", at, step, cause=cause, advice=advice)
+        self._cut_events(at)
+
+    # ---- the record
+
+    def flush(self) -> None:
+        """Judges the rows since the last look."""
+        n = self.filled
+        self.state = path.with_filled(self.state, NONE_MADE)
+        if n and self.rendered:
+            self.last_rendered = self.store.rendered[n - 1, :2].tolist()
+        if self.without_samples and n and self._still_calm(n):
+            if self.outcome is not None:
+                self.outcome = self.watch.end(self.outcome)
+                self.last_row = self.store.rows[n - 1].tolist()
+            self.looked += n
+            return
+        if self.without_samples and self.looked:
+            raise NeedsMonitor
+        if self.without_samples:  # the monitor can have all rows so far
+            self.without_samples = self.calm = False
+        good = self.judge(self.store.rows[:n])
+        if self.outcome is not None and self.end_time is None and good < n:
+            made, crossings, stops = self.steps, list(self.crossings), list(self.stops)
+            self.restore(self._saved)  # the ledger ends with the good rows
+            while self.filled < good:  # in parts, where borders are many
+                self._make(good)
+            self.state = path.with_filled(self.state, NONE_MADE)
+            self.steps, self.crossings, self.stops = made, crossings, stops
+
+    def look(self, made: np.ndarray) -> tuple[int, monitor.Outcome | None]:
+        """Judges the next rows, as StabilityMonitor.look.
+
+        Args:
+            made: rows of the record, shape (n, rows.ROW).
+        """
+        if self.calm:
+            if self._still_calm(len(made)):
+                return len(made), None
+            if self.looked and self.every != 1:
+                raise NeedsMonitor
+            self.calm = False
+            for index, earlier in self.kept:
+                self.watch.look(_columns(earlier), int(index[0]))
+        return self.watch.look(_columns(made), self.looked)
+
+    def _still_calm(self, n: int) -> bool:
+        """Whether n more rows give the monitor nothing to report; at the end it gets the counts."""
+        quiet, watch = self.kernel.quiet, self.watch
+        limit = self.scenario.torque_limit
+        if not quiet or not quiet(self.store.rows, n, *limit, self.swings, self.seen):
+            return False
+        if self.outcome is not None:
+            watch.seen, watch.moved, watch.unbound, watch.often = self.seen.tolist()
+        return True
+
+    def judge(self, made: np.ndarray) -> int:
+        """Takes samples into the record, up to the end of the good part of the run.
+
+        Args:
+            made: rows of the record, shape (n, rows.ROW).
+
+        Returns:
+            Number of samples taken.
+        """
+        good, found = self.look(made)
+        if found is not None:
+            self.outcome, self.end_time = found, None
+            self._cut_events(found.time)
+        elif self.outcome is not None:
+            if self.outcome.code == "interrupted":  # anywhere: the record ends with its last sample
+                step = self.looked + good - 1
+                self.outcome = replace(self.outcome, time=step * self.scenario.dt, step=step)
+                self._cut_events(self.outcome.time)
+            self.outcome = self.watch.end(self.outcome)
+        if good:
+            keep = np.arange(-self.looked % self.every, good, self.every)
+            if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
+                keep = np.append(keep, good - 1)
+            everything = len(keep) == len(made)
+            self.kept.append((self.looked + keep, made.copy() if everything else made[keep]))
+            if self.rendered:
+                self.rendered_kept.append(self.store.rendered[keep])
+        self.looked += good
+        return good
+
+    def _cut_events(self, t: float) -> None:
+        """Leaves out what came after the end of the record."""
+        self.crossings = [c for c in self.crossings if c.time <= t]
+        self.stops = [
+            replace(x, end=None) if x.end is not None and x.end > t else x
+            for x in self.stops
+            if x.start <= t
+        ]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The samples kept, by the names of Record's arrays."""
+        t = np.concatenate([index for index, _ in self.kept]) * self.scenario.dt
+        if self.end_time is not None and len(t):
+            t[-1] = self.end_time
+        out = {"t": t} | self._columns([x for _, x in self.kept])
+        if self.rendered_kept:
+            kept = np.concatenate(self.rendered_kept)
+            out["fe"] = kept[:, :2]
+            if self.parts.special.groove is not None:
+                out["removed"] = kept[:, 2]
+        return out
+
+    def left_ground(self) -> np.ndarray | None:
+        """As Record.ground."""
+        special = self.parts.special
+        if special is None or special.groove is None:
+            return None
+        return special.groove.relief * special.groove.ground
+
+    def columns(self, made: np.ndarray, first: int) -> dict[str, np.ndarray]:
+        """Rows by the names of Record's arrays, without their times.
+
+        Args:
+            made: shape (n, rows.ROW).
+            first: index of the first one among those not yet judged.
+        """
+        out = self._columns([made])
+        if self.rendered:
+            out["fe"] = self.store.rendered[first : first + len(made), :2].copy()
+        return out
+
+    def _columns(self, parts: list[np.ndarray]) -> dict[str, np.ndarray]:
+        columns = (np.concatenate([x[:, j : j + 2] for x in parts]) for j in range(0, rows.ROW, 2))
+        q, p, v, fh, tau, delta, b, qd = columns
+        fe = np.column_stack(self._force(*b.T, *v.T))
+        return dict(p=p, v=v, fh=fh, fe=fe, b=b, q=q, qd=qd, tau=tau, delta=delta)
+
+    def _force(self, bx: Any, by: Any, vx: Any, vy: Any) -> tuple[Any, Any]:
+        """Force of the clay's damping, (x, y) [N]."""
+        return viscous.force(self.parts.grain, (bx, by), (vx, vy))
+
+    def brief(self) -> tuple[Any, ...]:
+        """The end of the run: outcome, steps, crossings, the last p, v, fh, fe and b, energy."""
+        if self.without_samples:
+            px, py, vx, vy, fx, fy, _, _, _, _, bx, by = self.last_row[2:14]
+            force = self.last_rendered or self._force(bx, by, vx, vy)
+            last: Any = [(px, py), (vx, vy), (fx, fy), force, (bx, by)]
+            return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
+        arrays = self.arrays()
+        final = (arrays[name] for name in ("p", "v", "fh", "fe", "b"))
+        last = [x[-1] if len(x) else (np.nan, np.nan) for x in final]
+        return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
+
+    def balance(self) -> dict[str, float]:
+        """The energy balance, as Record.energy."""
+        last = energy.stored(self.parts, self.state)
+        out = energy.balance(self.state.work, self.first if self.looked else last, last)
+        special = self.state.clay.special
+        if special is not None and special.elastic is not None:
+            x = special.elastic
+            out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
+        return out
+
+
+def _columns(made: np.ndarray) -> np.ndarray:
+    """Rows as the monitor takes them, shape (12, n)."""
+    return np.ascontiguousarray(made[:, :12].T)
+
+
+def completed(  # noqa: PLR0913
+    scenario: Scenario,
+    every: int,
+    kernel: Kernel,
+    store: EngineStore,
+    progress: Callable[[float, float], bool | None] | None = None,
+    brief: bool = False,
+) -> tuple[Run, float]:
+    """Makes a run; a second time if the monitor has to look at rows that are not kept.
+
+    Args:
+        scenario: what to run.
+        every: as in Run.
+        kernel: as in Run.
+        store: as in Run.
+        progress: as in Run.go.
+        brief: as in Run.
+
+    Returns:
+        The run, and the seconds it took.
+    """
+    brief = brief and scenario.stop
+    watched = every > 1 and progress is not None  # which must not begin anew
+    while True:
+        run = Run(scenario, every, kernel, store, brief, watched)
+        begin = time.perf_counter()
+        try:
+            run.go(progress)
+            return run, time.perf_counter() - begin
+        except NeedsMonitor:
+            brief, watched = False, True
