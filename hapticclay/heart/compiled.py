@@ -35,7 +35,8 @@ from ..model import (
     regions,
     spring,
 )
-from ..stepping import cache, run
+from ..stepping import cache, monitor
+from ..stepping.run import cache_folder
 from ..stepping.engine import mujoco
 from ..stepping.notice import Notice
 from . import (
@@ -47,6 +48,7 @@ from . import (
     kick,
     lacking,
     path,
+    run,
     rows,
     servo,
     springs,
@@ -163,7 +165,7 @@ def entry(f: Any) -> Any:
     """
     made = numba.njit(**ENTRY)(f)
     with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep it
-        made._cache = cache.FileCache(made.py_func, run.cache_folder())
+        made._cache = cache.FileCache(made.py_func, cache_folder())
     return made
 
 
@@ -188,3 +190,51 @@ def function(name: str) -> Any:
 
 
 STEP = function("mj_step")
+
+
+# ---- kernels -------------------------------------------------------------------------------------
+
+QUIET = entry(monitor.is_quiet)
+met: dict[Any, int] = {}  # careful steps that CPython has made, by kind of scene
+
+
+def kind_of(part: Any) -> Any:
+    """What scenes have in common whose steps are made by the same machine code.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        return type(part), *map(kind_of, part)
+    return None if part is None else type(part)
+
+
+def natively(r: run.Run, room: int) -> None:
+    """Makes steps: whole ones compiled, the others too once they are many.
+
+    Args:
+        r: the run.
+        room: rows that it may have.
+    """
+    kind = kind_of(r.parts)
+    while r.state.status.code == run.OPEN and path.has_room(r.e, r.state.filled, room):
+        if met.get(kind, 0) > CAREFUL:
+            r.state = ADVANCE(r.parts, r.state, r.native, room)
+            continue
+        r.state = GLIDE(r.parts, r.state, r.native, room)
+        if path.has_room(r.e, r.state.filled, room):
+            run.one_plainly(r, path.careful)
+            met[kind] = met.get(kind, 0) + 1
+
+
+def calls(model: Any, data: Any) -> tuple[Any, Any, Any]:
+    """mj_step, model and data as compiled code calls them.
+
+    Args:
+        model: of the engine.
+        data: of the engine.
+    """
+    return STEP, model._address, data._address
+
+
+KERNEL = run.Kernel(natively, calls, QUIET)

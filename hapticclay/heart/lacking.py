@@ -19,17 +19,30 @@ from typing import Any
 Function = Callable[..., Any]
 
 
-def asked(statement: ast.stmt) -> str | None:
-    """Name of the argument that a statement `if name is None: return ...` asks for."""
+def asked(statement: ast.stmt) -> tuple[str, ast.stmt | None] | None:
+    """What a statement `if name is None: ... return ...` asks for; None for any other statement.
+
+    Args:
+        statement: of a function.
+
+    Returns:
+        Name of the argument; what is left of the statement where it is not None: nothing, or the
+        rest of `if name is None or ...`.
+    """
     match statement:
-        case ast.If(
-            test=ast.Compare(
-                left=ast.Name(id=name), ops=[ast.Is()], comparators=[ast.Constant(value=None)]
-            ),
-            body=[*_, ast.Return()],
-            orelse=[],
+        case ast.If(test=test, body=[*_, ast.Return()] as body, orelse=[]):
+            pass
+        case _:
+            return None
+    first, rest = test, None
+    if isinstance(test, ast.BoolOp) and isinstance(test.op, ast.Or) and len(test.values) == 2:
+        first = test.values[0]
+        rest = ast.copy_location(ast.If(test.values[1], body, []), statement)
+    match first:
+        case ast.Compare(
+            left=ast.Name(id=name), ops=[ast.Is()], comparators=[ast.Constant(value=None)]
         ):
-            return name
+            return name, rest
     return None
 
 
@@ -56,15 +69,18 @@ def without(f: FunctionType, lacking: frozenset[str], given: frozenset[str]) -> 
     Returns:
         f itself where it asks for none of them.
     """
-    tree, body = tree_of(f), []
+    tree, body, same = tree_of(f), [], True
     for statement in tree.body:
-        name = asked(statement)
-        if name in lacking:
+        found = asked(statement)
+        if found is None or found[0] not in lacking | given:
+            body.append(statement)
+            continue
+        same = False
+        if found[0] in lacking:
             body += statement.body  # type: ignore[attr-defined]
             break
-        if name not in given:
-            body.append(statement)
-    if len(body) == len(tree.body) and body[-1] is tree.body[-1]:
+        body += [found[1]] if found[1] else []
+    if same:
         return f
     fields = {x: getattr(tree, x) for x in tree._fields} | {"body": body, "returns": None}
     new = ast.FunctionDef(**fields, lineno=tree.lineno, col_offset=tree.col_offset)

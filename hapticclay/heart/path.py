@@ -157,13 +157,12 @@ def kept(parts, s, e, k, after, shows):
     """The state with what is kept of a kick: its row, if now is a sample, and its works."""
     x = s.filled
     if shows:
+        v, f = velocity(parts.special, parts.grain, k), rows.yield_force(parts.special, k)
         if after == 0.0:
-            v = arrival(parts.special, parts, s)
-        else:
-            v = velocity(parts.special, parts.grain, k)
+            v, f = slow_arrival(parts.special, parts, s, v, f)
         b = clay_now(parts.clay, s.clay, after == 0.0, s.clock.t)
         rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
-        rows.write_force(parts.special, parts.grain, e, x.rows, k, v, b)
+        rows.write_force(parts.special, parts.grain, e, x.rows, k, f, v, b)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     work = rows.with_work(parts, s.work, k, s.body.w)
     return State(s.clock, s.body, s.loop, s.clay, work, s.status, x)
@@ -181,27 +180,32 @@ def clay_now(part, clay, before, t):
 # ---- borders -------------------------------------------------------------------------------------
 
 
-def arrival(special, parts, s):
+def arrival(parts, s):
     """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
     k = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
-    return slow_arrival(special, parts, s, velocity(special, parts.grain, k))
+    v = velocity(parts.special, parts.grain, k)
+    return slow_arrival(parts.special, parts, s, v, (0.0, 0.0))[0]
 
 
-def slow_arrival(special, parts, s, v):
+def slow_arrival(special, parts, s, v, f):
+    """Velocity there [m/s], and force of yielding [N], from those of half a kick."""
     if special is None:
-        return v
-    return stiff_arrival(special.stiff, special, parts, s, v)
+        return v, f
+    return stiff_arrival(special.stiff, special, parts, s, v, f)
 
 
-def stiff_arrival(stiff, special, parts, s, v):
-    """As `arrival`: half a kick has led here; in stiff clay that half holds too little of the clay,
-    and the velocity is that of a whole kick, with the step before it repeated.
+def stiff_arrival(stiff, special, parts, s, v, f):
+    """As `slow_arrival`: half a kick has led here; in stiff clay that half holds too little of the
+    clay, and velocity and force are those of a whole kick, with the step before it repeated.
     """
-    if stiff is None:
-        return v
+    if stiff is None or s.clock.before == 0.0:
+        return v, f
     k = kick(parts, s.clock, s.body, s.loop, s.clay, s.clock.before)
-    (x, y), soft = velocity(special, parts.grain, k), k.motion.special.split.soft
-    return x if soft[0] > 0.0 else v[0], y if soft[1] > 0.0 else v[1]
+    (x, y), (fx, fy) = velocity(special, parts.grain, k), rows.yield_force(special, k)
+    soft = k.motion.special.split.soft
+    x, fx = (x, fx) if soft[0] > 0.0 else (v[0], f[0])
+    y, fy = (y, fy) if soft[1] > 0.0 else (v[1], f[1])
+    return (x, y), (fx, fy)
 
 
 def crossed(parts, s, e, i, up):
@@ -209,7 +213,7 @@ def crossed(parts, s, e, i, up):
     border, x = borders.border_of(s.clay.region, i, up), s.filled
     speed = 0.0
     if s.clock.before > 0.0:
-        v = arrival(parts.special, parts, s)
+        v = arrival(parts, s)
         speed = v[1] if i else v[0]
     put(e.crossings, 4 * x.crossings, (float(i), border, s.clock.t, speed))
     closes = i == 0 and up > 0 and border == parts.table[regions.END]

@@ -36,21 +36,27 @@ def tells(special):
     return special.flow is not None or special.springs is not None
 
 
-def write_force(special, grain, e, i, k, v, b):
-    """Writes the force of the clay where b v does not tell it."""
+def write_force(special, grain, e, i, k, f, v, b):
+    """Writes the force of the clay where b v does not tell it; f of it is that of yielding [N]."""
     if special is None:
         return
-    write_beside(special.flow, special.springs, special.groove, grain, e, i, k, v, b)
+    write_beside(special.flow, special.springs, special.groove, grain, e, i, k, f, v, b)
 
 
-def write_beside(flow, elastic, groove, grain, e, i, k, v, b):
+def write_beside(flow, elastic, groove, grain, e, i, k, f, v, b):
     if flow is None and elastic is None:
         return
     x, y = viscous.force(grain, b, v)
-    fx, fy = felt_force(flow, k.motion.special)
     px, py = sprung_force(elastic, k.motion.special, k.step.L)
-    put(e.rendered, 3 * i, (x + fx + px, y + fy + py))
+    put(e.rendered, 3 * i, (x + f[0] + px, y + f[1] + py))
     write_removed(groove, e, i)
+
+
+def yield_force(special, k):
+    """Force of yielding at the sample of a kick, (x, y) [N]."""
+    if special is None:
+        return 0.0, 0.0
+    return felt_force(special.flow, k.motion.special)
 
 
 def felt_force(flow, state):

@@ -76,23 +76,32 @@ class Kernel(NamedTuple):
     quiet: Callable[..., bool] | None = None
 
 
-def plainly(run: Run, room: int) -> None:
-    """Makes steps in CPython, where those of an arm that is exactly straight raise.
+def one_plainly(run: Run, step: Callable[..., State]) -> None:
+    """Makes a step in CPython, where that of an arm which is exactly straight raises.
 
     Args:
         run: the run.
-        room: rows that it may have.
+        step: path.step or path.careful.
     """
-    parts, e = run.parts, run.e
     try:
-        while run.state.status.code == OPEN and path.has_room(e, run.state.filled, room):
-            run.state = path.step(parts, run.state, e)
+        run.state = step(run.parts, run.state, run.e)
     except ArithmeticError:
         run.state = path.ended(run.state, NOT_FINITE)
     except ValueError:  # of the sine of an infinite angle
         if np.isfinite(run.data.qpos).all() and np.isfinite(run.data.qvel).all():
             raise
         run.state = path.ended(run.state, NOT_FINITE)
+
+
+def plainly(run: Run, room: int) -> None:
+    """Makes steps in CPython.
+
+    Args:
+        run: the run.
+        room: rows that it may have.
+    """
+    while run.state.status.code == OPEN and path.has_room(run.e, run.state.filled, room):
+        one_plainly(run, path.step)
 
 
 PLAIN = Kernel(plainly)
