@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import functools
 import inspect
-import signal
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -38,7 +35,6 @@ from ..model import (
 from ..stepping import cache, monitor
 from ..stepping.run import cache_folder
 from ..stepping.engine import mujoco
-from ..stepping.notice import Notice
 from . import (
     borders,
     engine_step,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..model import groove as law
-from .state import Clay, Cut
+from .state import Cut
 
 
 def cut(groove, at, p):

@@ -11,7 +11,7 @@ from math import cos, sin
 from ..model import arm, pieces
 from . import hand, servo, springs, stiff, viscous, yielding
 from .parts import INF
-from .state import Handle, Kick, Load, Motion, Special, Step
+from .state import Axis, Handle, Kick, Load, Loop, Motion, Special, Step
 
 NONE = (0.0, 0.0)
 
@@ -39,19 +39,47 @@ def handle_at(part, body, half):
     return Handle(u, p, arm.mobility(u, part.links), arm.handle_velocity(r1, r2, u), c)
 
 
-def muscle_force(push, t, step):
-    """Mean muscle force over a kick at t, (x, y) [N]."""
-    since, x, y, rx, ry = push.steady
-    t = t + 0.25 * (step.after - step.before)
+def muscle_force(parts, clock, step):
+    """Mean muscle force over a kick, (x, y) [N]."""
+    since, x, y, rx, ry = parts.push.steady
+    t = clock.t + 0.25 * (step.after - step.before)
     f = x + (t - since) * rx, y + (t - since) * ry
-    return with_signal(push.muscle, f, t, 0.5 * step.H)
+    return with_signal(parts.push.muscle, f, parts.time.dt, clock, step)
 
 
-def with_signal(table, f, t, h):
-    if table is None:
+def with_signal(signal, f, dt, clock, step):
+    if signal is None:
         return f
-    x, y = pieces.mean_of_table(table, t, h)
+    if is_whole(dt, clock, step):
+        x, y = row_ahead(signal, clock.i)
+    else:
+        t = clock.t + 0.25 * (step.after - step.before)
+        x, y = pieces.mean_of_table(signal.table, t, 0.5 * step.H)
     return f[0] + x, f[1] + y
+
+
+def is_whole(dt, clock, step):
+    """Whether whole steps lie around a sample."""
+    return step.before == dt and step.after == dt and clock.t == clock.i * dt
+
+
+def row_ahead(signal, i):
+    """What a signal does at a sample, (x, y)."""
+    n = i - signal.first
+    return signal.ahead[n, 0], signal.ahead[n, 1]
+
+
+def commanded(signal, loop, dt, clock, step):
+    """The loop with the change of the command over the step after a kick in its output."""
+    if signal is None:
+        return loop
+    if is_whole(dt, clock, step):
+        dx, dy = row_ahead(signal, clock.i)
+    else:
+        dx, dy = command_change(signal.table, clock.t, clock.t + step.after, 0.5 * dt)
+    x, y = loop.x, loop.y
+    x, y = Axis(x.delta + dx, x.rate, x.y, x.yrate), Axis(y.delta + dy, y.rate, y.y, y.yrate)
+    return Loop(x, y, loop.form)
 
 
 def command_change(table, t0, t1, h):
@@ -117,7 +145,7 @@ def kick(parts, clock, body, loop, clay, after):
     special, grain = parts.special, parts.grain
     step = step_around(clock.before, after)
     at = handle_at(parts.arm, body, 0.5 * clock.before)
-    uh = muscle_force(parts.push, clock.t, step)
+    uh = muscle_force(parts, clock, step)
     k, state = viscous.damping(part, special, clay, clock.t, hand_, step)
     at = special_handle(special, state, step, at, body.w)
     load, (cx, cy), d = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)

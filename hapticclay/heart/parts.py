@@ -103,12 +103,27 @@ class Hand(NamedTuple):
     spring: float
 
 
+class Signal(NamedTuple):
+    """A signal over the steps that come next.
+
+    Attributes:
+        table: of it, see model.pieces.
+        ahead: of whole steps, a row a sample: its mean around the sample of a muscle force [N], its
+            change to the next sample of a command [m]; (x, y).
+        first: sample of the first row.
+    """
+
+    table: Any
+    ahead: Any
+    first: int
+
+
 class Push(NamedTuple):
     """The muscle force.
 
     Attributes:
         steady: the part that is constant or changes evenly: since [s], x, y [N], rates x, y [N/s].
-        muscle: table of the muscle's signal.
+        muscle: the muscle's Signal.
     """
 
     steady: Any
@@ -217,7 +232,7 @@ class Parts(NamedTuple):
         form: those of another shape.
         hand: the operator's arm, of x and of y.
         push: the muscle force.
-        command: table of the command's signal.
+        command: the command's Signal.
         limits: of the torques [N.m].
         table: borders and cells, from regions.region_table.
         clay: the clay.

@@ -9,21 +9,18 @@ from __future__ import annotations
 from ..model import regions
 from . import borders, grooves, hits, rows, springs, viscous, yielding
 from .engine_step import moved_arm, put
-from .kick import command_change, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
-from .parts import INF
+from .kick import commanded, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
 from .state import (
     FINISHED,
     NOT_FINITE,
     OPEN,
     TIME_LIMIT,
     UNRESOLVED,
-    Axis,
     Body,
     Clay,
     Clock,
     Filled,
     Growth,
-    Loop,
     Special,
     State,
     Status,
@@ -98,16 +95,6 @@ def special_behind(special, parts, c, q, w, h):
     return viscous.at_place(special.smooth, table, c, at.p)
 
 
-def commanded(table, loop, t0, t1, h):
-    """The loop with the change of the command in its output."""
-    if table is None:
-        return loop
-    dx, dy = command_change(table, t0, t1, h)
-    x, y = loop.x, loop.y
-    x, y = Axis(x.delta + dx, x.rate, x.y, x.yrate), Axis(y.delta + dy, y.rate, y.y, y.yrate)
-    return Loop(x, y, loop.form)
-
-
 def noted(special, e, before, k, t, n):
     """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
@@ -135,19 +122,19 @@ def clay_behind(parts, clay, k, q, w, h):
     return special_behind(parts.special, parts, clay, q, w, h)
 
 
-def stepped(parts, s, e, k, after, target):
-    """The state after the step behind a kick."""
+def stepped(parts, s, e, k, after, target, work, filled):
+    """The state after the step behind a kick; rows filled and the ledger are given."""
     special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
     q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
     w = held_arm(special, e, k.motion.special, w)
     stops = noted(special, e, s.clay.special, k, clock.t, x.stops)
     clay = clay_behind(parts, s.clay, k, q, w, after)
     t, i = clock.t + after, clock.i
-    loop = commanded(parts.command, k.loop, clock.t, t, 0.5 * dt)
+    loop = commanded(parts.command, k.loop, dt, clock, k.step)
     if target - t <= 1e-9 * dt:
         t, i = target, i + 1
-    clock, x = Clock(t, i, after), Filled(x.steps + 1, x.rows, x.crossings, stops)
-    return State(clock, Body(q, w, k.g), loop, clay, s.work, s.status, x)
+    clock, x = Clock(t, i, after), Filled(x.steps + 1, filled, x.crossings, stops)
+    return State(clock, Body(q, w, k.g), loop, clay, work, s.status, x)
 
 
 # ---- what is kept --------------------------------------------------------------------------------
@@ -308,7 +295,7 @@ def careful(parts, s, e):
     if not is_finite(k):
         return ended(s, NOT_FINITE)
     put(e.w, 0, s.body.w)  # after a hit it starts from the velocity behind half a kick
-    s = stepped(parts, s, e, k, after, target)
+    s = stepped(parts, s, e, k, after, target, s.work, s.filled.rows)
     if axis >= 0:
         s = crossed(parts, s, e, axis, up)
     return s
@@ -346,7 +333,13 @@ def whole_step(parts, s, e):
     k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
     if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
         return False, s
-    return True, stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
+    n, special = s.filled.rows, parts.special
+    v, f = velocity(special, parts.grain, k), rows.yield_force(special, k)
+    b = clay_now(parts.clay, s.clay, False, s.clock.t)
+    rows.write(parts, e.rows, n, s.body.q, k, v, b)
+    rows.write_force(special, parts.grain, e, n, k, f, v, b)
+    work = rows.with_work(parts, s.work, k, s.body.w)
+    return True, stepped(parts, s, e, k, dt, (s.clock.i + 1) * dt, work, n + 1)
 
 
 def glide(parts, s, e, room):

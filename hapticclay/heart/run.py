@@ -19,7 +19,7 @@ from ..stepping import engine, monitor
 from ..stepping.engine import mujoco
 from . import energy, path, rows, scene, viscous
 from .engine_step import Engine
-from .parts import Parts
+from .parts import Parts, Signal
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
 CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
@@ -84,7 +84,7 @@ def one_plainly(run: Run, step: Callable[..., State]) -> None:
         step: path.step or path.careful.
     """
     try:
-        run.state = step(run.parts, run.state, run.e)
+        run.state = step(run.views, run.state, run.e)
     except ArithmeticError:
         run.state = path.ended(run.state, NOT_FINITE)
     except ValueError:  # of the sine of an infinite angle
@@ -216,6 +216,7 @@ class Run:
 
     Attributes:
         parts: the scenario, compiled of its parts.
+        views: the same, for CPython.
         state: between two steps.
         pause: index of the sample to pause at.
     """
@@ -237,7 +238,10 @@ class Run:
         self.model, self.data = self.store.engine(scenario)
         self.e, self.native = self.store.arrays(scenario, self.model, self.data)
         self.parts: Parts = scene.parts_of(scenario)
-        self.state: State = scene.start(self.parts, scenario, self.e)
+        self.views: Parts = scene.viewed(self.parts)
+        self.state: State = scene.start(self.views, scenario, self.e)
+        self.drives = _drives(scenario)
+        self.muscle, self.command = self.drives.get("muscle"), self.drives.get("command")
         self.steps = 0
         self.pause = math.inf
         self.watch = monitor.StabilityMonitor(scenario)
@@ -295,11 +299,35 @@ class Run:
             self.finish("finished" if code == FINISHED else "time limit")
 
     def _make(self, room: int) -> None:
+        if self.drives:
+            self._prepare(min(room - self.filled, max(self.parts.time.last - self.i, 0)) + 1)
         self.kernel.advance(self, room)
         made = self.state.filled
         self._note_events(made.crossings, made.stops)
         self.steps += made.steps
         self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
+
+    def _prepare(self, n: int) -> None:
+        """Readies the signals for the next n whole steps."""
+        dt, i, t_max = self.scenario.dt, self.i, self.scenario.t_max
+        for drive in self.drives.values():
+            drive.prepare(max(i - 1, 0) * dt, min((i + n + 2) * dt, t_max))
+        t, parts = (i + np.arange(n + 1)) * dt, self.parts
+        if self.muscle:
+            ahead = Signal(self.muscle.table, self.muscle.mean(t[:n], 0.5 * dt), i)
+            parts = parts._replace(push=parts.push._replace(muscle=ahead))
+        if self.command:
+            change = np.diff(self.command.around(t, 0.5 * dt), axis=0)
+            parts = parts._replace(command=Signal(self.command.table, change, i))
+        self.take(parts)
+
+    def take(self, parts: Parts) -> None:
+        """Goes on with other numbers in the same parts.
+
+        Args:
+            parts: these.
+        """
+        self.parts, self.views = parts, scene.viewed(parts)
 
     def _note_events(self, crossings: int, stops: int) -> None:
         """Takes the crossings and stops of the steps just made."""
@@ -542,6 +570,20 @@ class Run:
             x = special.elastic
             out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
         return out
+
+
+def _drives(scenario: Scenario) -> dict[str, Any]:
+    """The Drive of the muscle and of the command, where they vary."""
+    if not scenario.driven:
+        return {}
+    from ..stepping.drive import Drive  # only a run that has one pays for it
+
+    both = {"muscle": scenario.muscle, "command": scenario.command}
+    return {
+        name: Drive(signal, scenario.dt, name == "command")
+        for name, signal in both.items()
+        if signal is not None and signal.varies
+    }
 
 
 def _columns(made: np.ndarray) -> np.ndarray:
