@@ -36,6 +36,7 @@ from ..stepping import cache, monitor
 from ..stepping.run import cache_folder
 from ..stepping.engine import mujoco
 from . import (
+    begin,
     borders,
     engine_step,
     grooves,
@@ -56,7 +57,7 @@ from . import (
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
-    engine_step,
+    engine_step, begin,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}

@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from ..model import arm, compensator, groove, regions
+from ..model import compensator, groove, regions
 from ..model.constants import B_MAX
 from ..model.scenario import Scenario
 from ..stepping.run import spring_step
-from . import borders, grooves, kick, parts as p_, state as s_
+from . import begin, parts as p_, state as s_
 from .parts import INF
-from .state import OPEN
 
 NONE = (0.0, 0.0)
 
@@ -80,21 +79,6 @@ def parts_of(s: Scenario):
     )  # fmt: skip
 
 
-def first_loop(parts, s):
-    axes, form, p = [], None, s.start
-    for i in (0, 1):
-        G = s.servo[i].G
-        v, ratio = float(s.velocity[i]), parts.servo[i].ratio
-        axes.append(s_.Axis((p[i] + G.damping / G.stiffness * v) / ratio, v / ratio, float(p[i]), v))
-    if parts.form is not None:
-        form = tuple(
-            tuple(compensator.moving_states(c, v / x.ratio))
-            for c, x, v in zip(s.compensators, parts.servo, s.velocity, strict=True)
-        )
-        axes = [s_.Axis(a.delta, 0.0, a.y, a.yrate) for a in axes]
-    return s_.Loop(*axes, form)
-
-
 def first_special(special, p):
     """State of the special laws before the handle has been anywhere."""
     if special is None:
@@ -110,36 +94,33 @@ def first_special(special, p):
     )  # fmt: skip
 
 
-def start(parts, s: Scenario, e):
-    links, part = parts.arm.links, parts.clay
-    q = arm.inverse_kinematics(s.origin[0] + s.start[0], s.origin[1] + s.start[1], links)
-    r = arm.joint_velocity(*map(float, s.velocity), arm.jacobian(*q, links), 1.0)
-    e.q[0], e.q[1], e.w[0], e.w[1] = q[0], q[1], r[0], r[1] - r[0]
-    q, w = (e.q[0], e.q[1]), (e.w[0], e.w[1])
-    body, p = s_.Body(q, w, NONE), tuple(map(float, s.start))
-    special = parts.special
+def first_form(parts, s):
+    """States of compensators of another shape, of a handle that has long moved evenly."""
+    if parts.form is None:
+        return None
+    both = zip(s.compensators, parts.servo, s.velocity, strict=True)
+    return tuple(tuple(compensator.moving_states(c, v / x.ratio)) for c, x, v in both)
+
+
+def blocks(parts, s: Scenario):
+    """A state with the blocks of all parts, before the handle has been anywhere."""
+    axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
+    growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
+    hit = s_.Hit(INF, 0.0) if parts.hits else None
     clay = s_.Clay(
-        s_.Region((0, 0), NONE, NONE), NONE, NONE,
-        s_.Growth(NONE, NONE) if part and part.growth else None,
-        s_.Hit(INF, 0.0) if parts.hits else None, first_special(special, p),
-    )  # fmt: skip
-    index = regions.region_of(parts.table, p)
-    # at the very place: the start may be off by the rounding of the angles
-    clay = borders.clay_in(parts, clay, index, 0.0, kick.place(parts.arm, q), -1, 0.0)
-    if special is not None and special.groove is not None:
-        at = kick.handle_at(parts.arm, body, 0.0)
-        b, old, cut = grooves.moved(special.groove, clay.special.cut, clay, at.p, at.v)
-        clay = clay._replace(b=b, special=clay.special._replace(cut=cut))
-    x = clay.special
-    if special is not None and special.flow is not None:
-        x = x._replace(felt=x.felt._replace(old=x.felt.law))
-    growth = s_.Growth(clay.growth.rate, clay.growth.rate) if clay.growth else None
-    clay = clay._replace(old=clay.b, growth=growth, special=x)
-    ix, iy = index
+        s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit, first_special(parts.special, NONE)
+    )
     return s_.State(
-        s_.Clock(0.0, 0, 0.0), body, first_loop(parts, s), clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0),
-        s_.Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy)), s_.Filled(0, 0, 0, 0),
+        s_.Clock(0.0, 0, 0.0), s_.Body(NONE, NONE, NONE), s_.Loop(axis, axis, first_form(parts, s)),
+        clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0), s_.Status(0, 0, 0, 0, (0, 0, 0, 0)),
+        s_.Filled(0, 0, 0, 0),
     )  # fmt: skip
+
+
+def start(parts, s: Scenario, e):
+    """The state at the start of a run."""
+    p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
+    return begin.begun(parts, blocks(parts, s), e, p, v)
 
 
 def written(parts):
