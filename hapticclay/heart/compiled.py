@@ -38,12 +38,14 @@ from ..stepping.engine import mujoco
 from . import (
     begin,
     borders,
+    energy,
     engine_step,
     grooves,
     hand,
     hits,
     kick,
     lacking,
+    many,
     path,
     run,
     rows,
@@ -57,7 +59,7 @@ from . import (
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
-    engine_step, begin,
+    engine_step, begin, energy, many, monitor,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -91,6 +93,28 @@ def store(context, address, i, values):  # noqa: ARG001
 
     numbers = types.UniTuple(types.float64, len(values))
     return types.none(types.intp, types.intp, numbers), generate
+
+
+@intrinsic
+def fill(context, like, row):  # noqa: ARG001
+    """The tuple `like`, its numbers replaced by those at an address, one after the other."""
+
+    def generate(context, builder, signature, arguments):
+        count = iter(range(1 << 20))
+
+        def made(kind, value):
+            if isinstance(kind, types.BaseTuple):
+                parts = [made(x, builder.extract_value(value, j)) for j, x in enumerate(kind)]
+                return context.make_tuple(builder, kind, parts)
+            if not isinstance(kind, types.Float | types.Integer):
+                return value
+            at = ir.Constant(ir.IntType(64), next(count))
+            number = builder.load(place_of(builder, arguments[1], at))
+            return context.cast(builder, number, types.float64, kind)
+
+        return made(signature.args[0], arguments[0])
+
+    return like(like, types.intp), generate
 
 
 @intrinsic
@@ -130,13 +154,16 @@ def register(modules: tuple[ModuleType, ...]) -> None:
     Args:
         modules: of the stepping.
     """
-    atoms = {engine_step.put: store, engine_step.pair: load_pair}
+    atoms = {engine_step.put, engine_step.pair, many.filled}
     for module in modules:
         for f in list(vars(module).values()):
             if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in atoms:
                 overload(f, jit_options=LAW, strict=False)(choice(f))
     overload(engine_step.put, inline="always")(
         lambda array, i, values: lambda array, i, values: store(array, i, values)
+    )
+    overload(many.filled, jit_options=LAW)(
+        lambda like, numbers, k: lambda like, numbers, k: fill(like, numbers[k].ctypes.data)
     )
     overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
 
@@ -154,6 +181,11 @@ def advance(parts, s, e, room):
     return path.advance(parts, s, e, room)
 
 
+def carry(like, blocks, e, runs):
+    """many.carry."""
+    many.carry(like, blocks, e, runs)
+
+
 def entry(f: Any) -> Any:
     """A function that is compiled when it is first called with its types, or taken from the disk.
 
@@ -167,7 +199,7 @@ def entry(f: Any) -> Any:
 
 
 register(SOURCES)
-GLIDE, ADVANCE = entry(glide), entry(advance)
+GLIDE, ADVANCE, CARRY = entry(glide), entry(advance), entry(carry)
 
 
 def library() -> ctypes.CDLL:
@@ -186,7 +218,7 @@ def function(name: str) -> Any:
     return found
 
 
-STEP = function("mj_step")
+STEP, RESET = function("mj_step"), function("mj_resetData")
 
 
 # ---- kernels -------------------------------------------------------------------------------------
