@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..model import arm, regions
 from . import borders, grooves, yielding
 from .engine_step import put
-from .kick import handle_at
+from .kick import handle_at, place
 from .state import (
     OPEN,
     Axis,
@@ -93,3 +93,36 @@ def begun(parts, blocks, e, p, v):
     ix, iy = clay.region.index
     status, work = Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy)), Work(0.0, 0.0, 0.0, 0.0, 0.0)
     return State(Clock(0.0, 0, 0.0), body, loop, clay, work, status, Filled(0, 0, 0, 0))
+
+
+def changed(parts, blocks, s, before):
+    """The state that goes on in a scene that has changed between the same borders; in CPython only.
+
+    Laws of the clay that stay keep their state, new ones begin.
+
+    Args:
+        parts: the scene.
+        blocks: from scene.blocks.
+        s: the state so far.
+        before: the scene so far.
+    """
+    p = place(parts.arm, s.body.q)
+    clay = blocks.clay._replace(region=s.clay.region)
+    fresh = borders.clay_in(parts, clay, s.clay.region.index, s.clock.t, p, -1, 0.0)
+    special = kept_laws(fresh.special, s.clay.special)
+    fresh = fresh._replace(old=s.clay.old, special=special, hit=fresh.hit and (s.clay.hit or fresh.hit))
+    if fresh.growth is not None and s.clay.growth is not None:
+        fresh = fresh._replace(growth=Growth(fresh.growth.rate, s.clay.growth.old))
+    return s._replace(clay=fresh, loop=s.loop._replace(form=s.loop.form or blocks.loop.form))
+
+
+def kept_laws(fresh, before):
+    """Blocks of laws: those of a new scene, which go on as before where they did."""
+    if fresh is None or before is None:
+        return fresh
+    felt = fresh.felt
+    if felt is not None and before.felt is not None:
+        felt = before.felt._replace(law=felt.law)
+    pairs = zip(fresh, before, strict=True)
+    made = Special(*(new if new is None or old is None else old for new, old in pairs))
+    return made._replace(felt=felt, elastic=fresh.elastic)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -13,11 +14,12 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError
+from ..model import regions
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..stepping import engine, monitor
 from ..stepping.engine import mujoco
-from . import energy, path, rows, scene, viscous
+from . import begin, energy, path, rows, scene, viscous
 from .engine_step import Engine
 from .parts import Parts, Signal
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
@@ -26,6 +28,10 @@ CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); f
 STORED = 8  # that one store keeps: two of an arm, with clay and without
 CROSSINGS, STOPS = 64, 4 * CHUNK  # between two looks: an axis stops and goes on in each step
 NONE_MADE = Filled(0, 0, 0, 0)
+RECORDED = (  # of a run
+    "steps", "watch", "looked", "kept", "rendered_kept", "last_rendered", "crossings", "stops",
+    "outcome", "end_time", "calm", "swings", "seen", "first",
+)  # fmt: skip
 
 
 @named
@@ -188,7 +194,7 @@ def borrowed_store(kernel: Kernel) -> Iterator[EngineStore]:
 
 
 class Saved(NamedTuple):
-    """A run at a sample, to return to.
+    """A run between two steps, to return to.
 
     Attributes:
         state: its state.
@@ -197,6 +203,26 @@ class Saved(NamedTuple):
 
     state: State
     arrays: list[np.ndarray]
+
+
+class Snapshot(NamedTuple):
+    """A run with its record, to return to; it can be pickled.
+
+    Attributes:
+        scenario: of the run.
+        saved: the run.
+        before: the run at the last look of the monitor.
+        rows: that have not been judged yet.
+        rendered: force of the clay in them [N].
+        record: what the run keeps of those judged.
+    """
+
+    scenario: Scenario
+    saved: Saved
+    before: Saved
+    rows: np.ndarray
+    rendered: np.ndarray
+    record: dict[str, Any]
 
 
 class Run:
@@ -259,6 +285,7 @@ class Run:
         self.calm = kernel.quiet is not None and scenario.stop and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self.first = energy.stored(self.parts, self.state)
+        self._saved = self.saved()
 
     @property
     def t(self) -> float:
@@ -360,6 +387,43 @@ class Run:
         for x, before in zip(scene.written(self.parts), saved.arrays, strict=True):
             x[:] = before
 
+    def snapshot(self) -> Snapshot:
+        """The run with its record, to return to."""
+        n = self.filled
+        kept = copy.deepcopy({name: getattr(self, name) for name in RECORDED})
+        return Snapshot(
+            self.scenario, self.saved(), self._saved, self.store.rows[:n].copy(),
+            self.store.rendered[:n].copy(), kept,
+        )  # fmt: skip
+
+    def return_to(self, x: Snapshot) -> None:
+        """Returns to a snapshot of a run of this scenario, or of one that it was changed from.
+
+        Args:
+            x: the snapshot.
+        """
+        if x.scenario != self.scenario:
+            self.scenario = x.scenario
+            self.take(scene.parts_of(x.scenario))
+        self.restore(x.saved)
+        self._saved, n = x.before, len(x.rows)
+        self.store.rows[:n], self.store.rendered[: len(x.rendered)] = x.rows, x.rendered
+        for name, value in copy.deepcopy(x.record).items():
+            setattr(self, name, value)
+
+    def change(self, scenario: Scenario) -> None:
+        """Goes on with another gain, operator, force or clay between the same borders.
+
+        Args:
+            scenario: with these.
+        """
+        before, table = self.parts, self.parts.table
+        self.scenario = self.watch.scenario = scenario
+        parts = scene.parts_of(scenario)
+        regions.keep_entries(parts.table, table)
+        self.take(parts)
+        self.state = begin.changed(self.views, scene.blocks(parts, scenario), self.state, before)
+
     def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
         """Runs to the end, until progress returns True, or until sample `pause`.
 
@@ -379,6 +443,16 @@ class Run:
         """Ends the run at its last sample."""
         self.outcome = monitor.Outcome("interrupted", self.t, self.i)
         self.flush()
+
+    def change_force(self, force: tuple[float, float]) -> None:
+        """Goes on under another constant muscle force.
+
+        Args:
+            force: (x, y) [N].
+        """
+        self.scenario = replace(self.scenario, force=force)
+        steady = 0.0, *scene.steady_force(self.scenario), 0.0, 0.0
+        self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
@@ -414,6 +488,23 @@ class Run:
         at = step * self.scenario.dt
         self.outcome = monitor.Outcome("unresolved", at, step, cause=cause, advice=advice)
         self._cut_events(at)
+
+    def ahead(self) -> dict[str, np.ndarray]:
+        """The sample that a step would write now, as `arrays`; the run stays where it is."""
+        n, saved, events = self.filled, self.saved(), (self.steps, list(self.crossings), list(self.stops))
+        try:
+            self._make(n + 1)
+            return self.columns(self.store.rows[n : n + 1], n)
+        finally:
+            self.restore(saved)
+            self.steps, self.crossings, self.stops = events
+
+    def is_diverging(self) -> bool:
+        """Whether the monitor would find the run unstable by now."""
+        watch = copy.deepcopy(self.watch)
+        n = self.filled
+        _, found = watch.look(_columns(self.store.rows[:n]), self.looked) if n else (0, None)
+        return found is not None or watch.onset is not None
 
     # ---- the record
 

@@ -64,17 +64,22 @@ def clay_part(s: Scenario):
     return p_.Clay(1 if clay.grows else None), grain, hits, special
 
 
+def steady_force(s: Scenario) -> tuple[float, float]:
+    """The constant part of the muscle force, (x, y) [N]."""
+    (x, y), muscle = s.force, s.muscle
+    if muscle is not None and not muscle.varies:
+        more = muscle(0.0)
+        x, y = x + more[0], y + more[1]
+    return float(x), float(y)
+
+
 def parts_of(s: Scenario):
     lag, form = compensators(s)
-    x, y = s.force
-    if s.muscle is not None and not s.muscle.varies:
-        more = s.muscle(0.0)
-        x, y = x + float(more[0]), y + float(more[1])
     return p_.Parts(
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
-        hand_parts(s), p_.Push((0.0, float(x), float(y), 0.0, 0.0), None), None,
+        hand_parts(s), p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay_part(s), None, None,
     )  # fmt: skip
 
