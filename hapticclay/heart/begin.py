@@ -73,7 +73,7 @@ def cut_at(special, clay, at):
         return clay
     x = clay.special
     b, old, cut = grooves.moved(special.groove, x.cut, clay, at.p, at.v)
-    x = Special(x.owed, x.split, yielding.behind(special.flow, x.felt), x.elastic, cut)
+    x = Special(x.owed, x.split, yielding.behind(special.flow, x.felt), x.elastic, cut, x.more)
     return Clay(clay.region, b, old, clay.growth, clay.hit, x)
 
 

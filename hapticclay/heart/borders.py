@@ -89,7 +89,7 @@ def special_in(special, table, c, p, crossed):
     elastic = springs.entered(special.springs, x.elastic, r, table, p, crossed)
     b, cut = grooves.entered(special.groove, x.cut, c.b)
     felt = felt_in(special.flow, x.felt, table, r.index)
-    c = Clay(r, b, c.old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut))
+    c = Clay(r, b, c.old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut, x.more))
     return viscous.at_place(special.smooth, table, c, p)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import inspect
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -45,6 +46,7 @@ from . import (
     hits,
     kick,
     lacking,
+    laws,
     many,
     path,
     run,
@@ -59,7 +61,7 @@ from . import (
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
-    engine_step, begin, energy, many, monitor,
+    engine_step, begin, energy, laws, many, monitor,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -148,24 +150,52 @@ def choice(f: FunctionType) -> Callable[..., Any]:
     return choose
 
 
+OF_LAW = {"load": laws.load_of, "moved": laws.moved_of, "force": laws.force_of}
+laws_known: set[ModuleType] = set()
+
+
+def choice_of_law(name: str) -> Callable[..., Any]:
+    """What numba asks for the source of a function of a law, by the type of its part.
+
+    Args:
+        name: of the function.
+    """
+
+    def choose(part, *arguments):
+        module = sys.modules[part.instance_class.__module__]
+        if module not in laws_known and module not in SOURCES:
+            laws_known.add(module)
+            register((module,))
+        return choice(getattr(module, name))(part, *arguments)
+
+    choose.__signature__ = inspect.signature(OF_LAW[name])  # type: ignore[attr-defined]
+    return choose
+
+
 def register(modules: tuple[ModuleType, ...]) -> None:
     """Lets numba find the source of every function of some modules.
 
     Args:
         modules: of the stepping.
     """
-    atoms = {engine_step.put, engine_step.pair, many.filled}
+    own = {*OF_LAW.values(), engine_step.put, engine_step.pair, many.filled}
     for module in modules:
         for f in list(vars(module).values()):
-            if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in atoms:
+            if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in own:
                 overload(f, jit_options=LAW, strict=False)(choice(f))
+
+
+def register_atoms() -> None:
+    """Lets numba find what machine code does in other ways than CPython."""
+    for name, f in OF_LAW.items():
+        overload(f, jit_options=LAW, strict=False)(choice_of_law(name))
     overload(engine_step.put, inline="always")(
         lambda array, i, values: lambda array, i, values: store(array, i, values)
     )
+    overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
     overload(many.filled, jit_options=LAW)(
         lambda like, numbers, k: lambda like, numbers, k: fill(like, numbers[k].ctypes.data)
     )
-    overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
 
 
 # ---- entries: all that is called between them is compiled with the same flags ---------------------
@@ -199,6 +229,7 @@ def entry(f: Any) -> Any:
 
 
 register(SOURCES)
+register_atoms()
 GLIDE, ADVANCE, CARRY = entry(glide), entry(advance), entry(carry)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from ..model import arm, pieces
-from . import hand, servo, springs, stiff, viscous, yielding
+from . import hand, laws, servo, springs, stiff, viscous, yielding
 from .parts import INF
 from .state import Axis, Handle, Kick, Load, Loop, Motion, Special, Step
 
@@ -101,17 +101,22 @@ def moved(special, grain, hand_, law, load, state, step, at, k, uh):
         return Motion(u, servo.net(load, u, NONE), NONE, NONE, state)
     pulled = springs.pull(special.springs, state.elastic, step)
     load = springs.with_pull(load, pulled)
+    bare = load
+    load = laws.with_loads(special.more, state.more, load, step, at)
     split = state.split
     g = stiff.slow_force(special.stiff, split, law, at, k, hand_, uh, pulled)
     g = yielding.creeping(special.flow, special.groove, special.stiff, state.felt, k, step.L, g, at.v)
+    load_of_laws = load
     load, back, owes, soft = stiff.with_owed(special.stiff, split, hand_, step, load, state.owed, g)
     u = servo.solve(law, load)
     u, felt = yielding.resist(special, grain, state.felt, step, at, law, load, u)
     r = yielding.mean(special.flow, felt)
     f = servo.net(load, u, r)
     rest, owed = stiff.still_owed(special.stiff, split, step, back, owes, soft, u)
-    beside = rest[0] + r[0] + pulled[0], rest[1] + r[1] + pulled[1]
-    return Motion(u, f, rest, beside, Special(owed, split, felt, state.elastic, state.cut))
+    x, y = servo.taken(bare, load_of_laws, u)
+    beside = rest[0] + r[0] + pulled[0] + x, rest[1] + r[1] + pulled[1] + y
+    s = state
+    return Motion(u, f, rest, beside, Special(owed, split, felt, s.elastic, s.cut, s.more))
 
 
 def special_handle(special, state, step, at, w):

@@ -149,6 +149,7 @@ class Special(NamedTuple):
         flow: clay that yields.
         springs: clay that springs back.
         groove: clay that stays cut.
+        more: laws that are modules of their own, see laws.
     """
 
     smooth: Any
@@ -156,6 +157,7 @@ class Special(NamedTuple):
     flow: Any
     springs: Any
     groove: Any
+    more: Any
 
 
 class Stiff(NamedTuple):

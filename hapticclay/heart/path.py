@@ -7,7 +7,7 @@ search for a border works out as many as it likes; the run takes the last.
 from __future__ import annotations
 
 from ..model import regions
-from . import borders, grooves, hits, rows, springs, viscous, yielding
+from . import borders, grooves, hits, laws, rows, springs, viscous, yielding
 from .engine_step import moved_arm, put
 from .kick import commanded, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
 from .state import (
@@ -90,8 +90,8 @@ def special_behind(special, parts, c, q, w, h):
     x, table, at = c.special, parts.table, handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
     elastic = springs.moved(special.springs, x.elastic, c.region, table, at.p, h)
     b, old, cut = grooves.moved(special.groove, x.cut, c, at.p, at.v)
-    felt = yielding.behind(special.flow, x.felt)
-    c = Clay(c.region, b, old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut))
+    felt, more = yielding.behind(special.flow, x.felt), laws.moved(special.more, x.more, at, h)
+    c = Clay(c.region, b, old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut, more))
     return viscous.at_place(special.smooth, table, c, at.p)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..model import arm
-from . import hand, springs, viscous
+from . import hand, laws, springs, viscous
 from .engine_step import put
 from .state import Work
 
@@ -33,23 +33,20 @@ def write(parts, rows, i, q, k, v, b):
 
 def tells(special):
     """Whether the clay has a force that b v does not tell."""
-    return special.flow is not None or special.springs is not None
+    return not (special.flow is None and special.springs is None and special.more is None)
 
 
 def write_force(special, grain, e, i, k, f, v, b):
     """Writes the force of the clay where b v does not tell it; f of it is that of yielding [N]."""
     if special is None:
         return
-    write_beside(special.flow, special.springs, special.groove, grain, e, i, k, f, v, b)
-
-
-def write_beside(flow, elastic, groove, grain, e, i, k, f, v, b):
-    if flow is None and elastic is None:
+    if special.flow is None and special.springs is None and special.more is None:
         return
-    x, y = viscous.force(grain, b, v)
-    px, py = sprung_force(elastic, k.motion.special, k.step.L)
-    put(e.rendered, 3 * i, (x + f[0] + px, y + f[1] + py))
-    write_removed(groove, e, i)
+    (x, y), state = viscous.force(grain, b, v), k.motion.special
+    px, py = sprung_force(special.springs, state, k.step.L)
+    fx, fy = laws.force(special.more, state.more, k.at.p, v)
+    put(e.rendered, 3 * i, (x + f[0] + px + fx, y + f[1] + py + fy))
+    write_removed(special.groove, e, i)
 
 
 def yield_force(special, k):

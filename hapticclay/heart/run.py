@@ -151,17 +151,18 @@ class EngineStore:
         mujoco.mj_resetData(model, data)
         return model, data
 
-    def arrays(self, s: Scenario, model: Any, data: Any) -> tuple[Engine, Engine | None]:
+    def arrays(self, parts: Parts, model: Any, data: Any) -> tuple[Engine, Engine | None]:
         """Arrays of a run for CPython, and for compiled steps.
 
         Args:
-            s: the scenario.
+            parts: the scene.
             model: of the engine.
             data: of the engine.
         """
-        if s.clay is not None and s.clay.yields and not len(self.stops):
+        special = parts.special
+        if special is not None and special.flow is not None and not len(self.stops):
             self.stops = np.empty((STOPS, 3))
-        if s.clay is not None and (s.clay.yields or s.clay.springs) and not len(self.rendered):
+        if special is not None and rows.tells(special) and not len(self.rendered):
             self.rendered = np.empty((CHUNK - 1, 3))
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
@@ -262,8 +263,8 @@ class Run:
         self.scenario, self.every, self.kernel = scenario, every, kernel
         self.store = store or EngineStore(kernel)
         self.model, self.data = self.store.engine(scenario)
-        self.e, self.native = self.store.arrays(scenario, self.model, self.data)
         self.parts: Parts = scene.parts_of(scenario)
+        self.e, self.native = self.store.arrays(self.parts, self.model, self.data)
         self.views: Parts = scene.viewed(self.parts)
         self.state: State = scene.start(self.views, scenario, self.e)
         self.drives = _drives(scenario)

@@ -10,7 +10,7 @@ from ..model import compensator, groove, regions
 from ..model.constants import B_MAX
 from ..model.scenario import Scenario
 from ..stepping.run import spring_step
-from . import begin, parts as p_, state as s_
+from . import begin, laws, parts as p_, state as s_
 from .parts import INF
 
 NONE = (0.0, 0.0)
@@ -59,7 +59,7 @@ def clay_part(s: Scenario):
     b = stiffness(s)
     stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
     hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 else None
-    special = p_.Special(clay.smooth or None, stiff, flow, springy, block)
+    special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
     special = special if any(x is not None for x in special) else None
     return p_.Clay(1 if clay.grows else None), grain, hits, special
 
@@ -95,7 +95,7 @@ def first_special(special, p):
         s_.Felt(law, law, NONE, NONE, NONE, NONE, nan, 0.0, NONE) if special.flow else None,
         s_.Elastic(((0.0,) * 6, (0.0,) * 6), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)
         if special.springs else None,
-        s_.Cut(nan, NONE, NONE, 0.0) if special.groove else None,
+        s_.Cut(nan, NONE, NONE, 0.0) if special.groove else None, laws.start(special.more, p),
     )  # fmt: skip
 
 

@@ -154,3 +154,9 @@ def added(load, f, d):
     """The load with a force (x, y) and damping (xx, yy, xy)."""
     a, b = load.f, load.d
     return Load((a[0] + f[0], a[1] + f[1]), (b[0] + d[0], b[1] + d[1], b[2] + d[2]))
+
+
+def taken(before, after, u):
+    """Force that a load gains from one to another, against the motion, (x, y) [N]."""
+    a, b = net(before, u, (0.0, 0.0)), net(after, u, (0.0, 0.0))
+    return a[0] - b[0], a[1] - b[1]

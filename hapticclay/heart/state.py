@@ -120,6 +120,7 @@ class Special(NamedTuple):
         felt: clay that yields.
         elastic: clay that springs back.
         cut: clay that stays cut.
+        more: states of the laws that are modules of their own.
     """
 
     owed: Any
@@ -127,6 +128,7 @@ class Special(NamedTuple):
     felt: Any
     elastic: Any
     cut: Any
+    more: Any
 
 
 class Split(NamedTuple):

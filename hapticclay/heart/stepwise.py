@@ -15,9 +15,7 @@ from ..arguments import checked
 from ..errors import ParameterError, integer, pair
 from ..model.plausible import warn_of
 from ..model.scenario import Scenario
-from ..simulation import record
 from ..stepping.engine import warnings_caught
-from ..stepping.monitor import Outcome
 from .run import PLAIN, Kernel, Run, Snapshot, borrowed_store
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given

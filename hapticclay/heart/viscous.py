@@ -47,7 +47,7 @@ def split_damping(stiff, state, step, hand, b0, b1):
         b0, b1, step.H, step.L, step.R, stiff.mobility, dx, dy
     )
     split, s = Split(over, (sharex, sharey), (softx, softy)), state
-    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.felt, s.elastic, s.cut)
+    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.felt, s.elastic, s.cut, s.more)
 
 
 def grown(part, b, growth, before, t):
