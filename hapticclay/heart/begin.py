@@ -14,9 +14,9 @@ from .state import (
     Clock,
     Filled,
     Growth,
+    Laws,
     Loop,
     Region,
-    Special,
     State,
     Status,
     Work,
@@ -53,11 +53,11 @@ def loop_at(form, loop, servo, p, v):
 def clay_at(parts, blocks, body, p):
     """The clay around a handle at p; `blocks` are those of its laws before it has been anywhere."""
     index = regions.region_of(parts.table, p)
-    clay = Clay(Region(index, NONE, NONE), NONE, NONE, blocks.growth, blocks.hit, blocks.special)
+    clay = Clay(Region(index, NONE, NONE), NONE, NONE, blocks.growth, blocks.hit, blocks.reaction, blocks.laws)
     at = handle_at(parts.arm, body, 0.0)
     clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 0.0)
     growth = same_growth(blocks.growth, clay.growth)
-    clay = Clay(clay.region, clay.b, clay.b, growth, clay.hit, clay.special)
+    clay = Clay(clay.region, clay.b, clay.b, growth, clay.hit, clay.reaction, clay.laws)
     return cut_at(parts.special, clay, at)
 
 
@@ -71,10 +71,10 @@ def cut_at(special, clay, at):
     """The clay behind the first cut of the tool, and before the first sample."""
     if special is None:
         return clay
-    x = clay.special
+    x = clay.laws
     b, old, cut = grooves.moved(special.groove, x.cut, clay, at.p, at.v)
-    x = Special(x.owed, x.split, yielding.behind(special.flow, x.felt), x.elastic, cut, x.more)
-    return Clay(clay.region, b, old, clay.growth, clay.hit, x)
+    x = Laws(yielding.behind(special.flow, x.flow), x.elastic, cut, x.more)
+    return Clay(clay.region, b, old, clay.growth, clay.hit, clay.reaction, x)
 
 
 def begun(parts, blocks, e, p, v):
@@ -109,20 +109,21 @@ def changed(parts, blocks, s, before):
     p = place(parts.arm, s.body.q)
     clay = blocks.clay._replace(region=s.clay.region)
     fresh = borders.clay_in(parts, clay, s.clay.region.index, s.clock.t, p, -1, 0.0)
-    special = kept_laws(fresh.special, s.clay.special)
-    fresh = fresh._replace(old=s.clay.old, special=special, hit=fresh.hit and (s.clay.hit or fresh.hit))
-    if fresh.growth is not None and s.clay.growth is not None:
-        fresh = fresh._replace(growth=Growth(fresh.growth.rate, s.clay.growth.old))
+    old = s.clay
+    reaction = kept_blocks(fresh.reaction, old.reaction)
+    laws = kept_blocks(fresh.laws, old.laws)
+    if laws is not None:
+        laws = laws._replace(flow=fresh.laws.flow, elastic=fresh.laws.elastic)
+    hit = old.hit if fresh.hit and old.hit else fresh.hit
+    fresh = fresh._replace(old=old.old, hit=hit, reaction=reaction, laws=laws)
+    if fresh.growth is not None and old.growth is not None:
+        fresh = fresh._replace(growth=Growth(fresh.growth.rate, old.growth.old))
     return s._replace(clay=fresh, loop=s.loop._replace(form=s.loop.form or blocks.loop.form))
 
 
-def kept_laws(fresh, before):
-    """Blocks of laws: those of a new scene, which go on as before where they did."""
+def kept_blocks(fresh, before):
+    """Blocks of a new scene, which go on as before where they did."""
     if fresh is None or before is None:
         return fresh
-    felt = fresh.felt
-    if felt is not None and before.felt is not None:
-        felt = before.felt._replace(law=felt.law)
     pairs = zip(fresh, before, strict=True)
-    made = Special(*(new if new is None or old is None else old for new, old in pairs))
-    return made._replace(felt=felt, elastic=fresh.elastic)
+    return type(fresh)(*(new if new is None or old is None else old for new, old in pairs))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..model import regions
 from . import grooves, springs, viscous
 from .kick import kick, place_after
-from .state import Clay, Felt, Growth, Hit, Region, Special, State, Status
+from .state import Clay, Flow, Growth, Hit, Laws, Region, State, Status
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 
@@ -35,13 +35,12 @@ def is_same_beyond(table, r, i, up):
 # ---- into another region -------------------------------------------------------------------------
 
 
-def felt_in(part, felt, table, index):
+def flow_in(part, state, table, index):
     if part is None:
-        return felt
+        return state
     ax, bx, cx = regions.enter_flow(table, 0, index[0], index[1])
     ay, by, cy = regions.enter_flow(table, 1, index[0], index[1])
-    f = felt
-    return Felt((ax, bx, cx, ay, by, cy), f.old, f.mean, f.v, f.f, f.stuck, f.anchor, f.still, f.times)
+    return Flow((ax, bx, cx, ay, by, cy), state.old)
 
 
 def hit_in(part, hit, struck):
@@ -63,33 +62,32 @@ def clay_in(parts, clay, index, t, p, crossed, struck):
         struck: 1.0 where other clay lies behind it.
     """
     low, high, b, rate = regions.enter_region(parts.table, index[0], index[1], t)
-    clay = Clay(Region(index, low, high), b, clay.old, clay.growth, clay.hit, clay.special)
-    clay = grown_in(parts.clay, clay, rate)
-    clay = Clay(clay.region, b, clay.old, clay.growth, hit_in(parts.hits, clay.hit, struck), clay.special)
-    return special_in(parts.special, parts.table, clay, p, crossed)
+    growth = grown_in(parts.clay, clay.growth, rate)
+    hit, c = hit_in(parts.hits, clay.hit, struck), clay
+    clay = Clay(Region(index, low, high), b, c.old, growth, hit, c.reaction, c.laws)
+    return laws_in(parts.special, parts.table, clay, p, crossed)
 
 
-def grown_in(part, clay, rate):
+def grown_in(part, growth, rate):
     if part is None:
-        return clay
-    return growing_in(part.growth, clay, rate)
+        return growth
+    return growing_in(part.growth, growth, rate)
 
 
-def growing_in(growth, clay, rate):
-    if growth is None:
-        return clay
-    growth_ = Growth(rate, clay.growth.old)
-    return Clay(clay.region, clay.b, clay.old, growth_, clay.hit, clay.special)
+def growing_in(part, growth, rate):
+    if part is None:
+        return growth
+    return Growth(rate, growth.old)
 
 
-def special_in(special, table, c, p, crossed):
+def laws_in(special, table, c, p, crossed):
     if special is None:
         return c
-    x, r = c.special, c.region
+    x, r = c.laws, c.region
     elastic = springs.entered(special.springs, x.elastic, r, table, p, crossed)
     b, cut = grooves.entered(special.groove, x.cut, c.b)
-    felt = felt_in(special.flow, x.felt, table, r.index)
-    c = Clay(r, b, c.old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut, x.more))
+    laws = Laws(flow_in(special.flow, x.flow, table, r.index), elastic, cut, x.more)
+    c = Clay(r, b, c.old, c.growth, c.hit, c.reaction, laws)
     return viscous.at_place(special.smooth, table, c, p)
 
 

@@ -49,7 +49,7 @@ def struck(part, parts, s, after):
 
 def with_hit(s, hit):
     c = s.clay
-    clay = Clay(c.region, c.b, c.old, c.growth, hit, c.special)
+    clay = Clay(c.region, c.b, c.old, c.growth, hit, c.reaction, c.laws)
     return State(s.clock, s.body, s.loop, clay, s.work, s.status, s.filled)
 
 
@@ -57,7 +57,7 @@ def halted(parts, s):
     """The state behind half a kick that leads to the sample: the next kick starts from rest there."""
     k, c = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0), s.clay
     body, clock = Body(s.body.q, k.w, k.g), Clock(s.clock.t, s.clock.i, 0.0)
-    clay = Clay(c.region, c.b, c.old, c.growth, c.hit, k.motion.special)
+    clay = Clay(c.region, c.b, c.old, c.growth, c.hit, k.motion.reaction, c.laws)
     work = rows.with_work(parts, s.work, k, s.body.w)
     return State(clock, body, k.loop, clay, work, s.status, s.filled)
 

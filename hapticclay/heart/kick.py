@@ -11,7 +11,7 @@ from math import cos, sin
 from ..model import arm, pieces
 from . import hand, laws, servo, springs, stiff, viscous, yielding
 from .parts import INF
-from .state import Axis, Handle, Kick, Load, Loop, Motion, Special, Step
+from .state import Axis, Handle, Kick, Load, Loop, Moment, Motion, Reaction, Step
 
 NONE = (0.0, 0.0)
 
@@ -94,43 +94,51 @@ def command_change(table, t0, t1, h):
     return x1 - x0, y1 - y0
 
 
-def moved(special, grain, hand_, law, load, state, step, at, k, uh):
+def loads(parts, clay, step, at, uh, k):
+    """The load of muscle, viscous clay and hand; of it the clay's force [N] and damping [N.s/m]."""
+    load = Load(uh, (0.0, 0.0, 0.0))
+    load, force, damping = viscous.with_clay(parts.clay, parts.grain, load, k, at.v)
+    load = hand.with_hand(parts.hand, load, step, at)
+    return load, force, damping
+
+
+def moved(parts, law, load, clay, moment):
     """The handle in a kick, driven by a law."""
+    return moved_through(parts.special, parts, law, load, clay, moment)
+
+
+def moved_through(special, parts, law, load, clay, moment):
     if special is None:
         u = servo.solve(law, load)
-        return Motion(u, servo.net(load, u, NONE), NONE, NONE, state)
-    pulled = springs.pull(special.springs, state.elastic, step)
-    load = springs.with_pull(load, pulled)
-    bare = load
-    load = laws.with_loads(special.more, state.more, load, step, at)
-    split = state.split
-    g = stiff.slow_force(special.stiff, split, law, at, k, hand_, uh, pulled)
-    g = yielding.creeping(special.flow, special.groove, special.stiff, state.felt, k, step.L, g, at.v)
-    load_of_laws = load
-    load, back, owes, soft = stiff.with_owed(special.stiff, split, hand_, step, load, state.owed, g)
+        return Motion(u, servo.net(load, u, NONE), NONE, NONE, clay.reaction)
+    step, at, states, before = moment.step, moment.at, clay.laws, clay.reaction
+    pulled = springs.pull(special.springs, states.elastic, step)
+    bare = springs.with_pull(load, pulled)
+    all_ = laws.with_loads(special.more, states.more, bare, step, at)
+    g = stiff.slow_force(special.stiff, parts.hand, moment, law, pulled)
+    g = yielding.creeping(special.flow, special.stiff, special.groove, states.flow, moment, g)
+    load, back, owes, soft = stiff.with_owed(special.stiff, parts.hand, moment, all_, before.owed, g)
     u = servo.solve(law, load)
-    u, felt = yielding.resist(special, grain, state.felt, step, at, law, load, u)
+    u, felt = yielding.resist(special.flow, special.groove, parts.grain, clay, moment, law, load, u)
     r = yielding.mean(special.flow, felt)
-    f = servo.net(load, u, r)
-    rest, owed = stiff.still_owed(special.stiff, split, step, back, owes, soft, u)
-    x, y = servo.taken(bare, load_of_laws, u)
+    rest, owed = stiff.still_owed(special.stiff, moment, back, owes, soft, u)
+    x, y = servo.taken(bare, all_, u)
     beside = rest[0] + r[0] + pulled[0] + x, rest[1] + r[1] + pulled[1] + y
-    s = state
-    return Motion(u, f, rest, beside, Special(owed, split, felt, s.elastic, s.cut, s.more))
+    return Motion(u, servo.net(load, u, r), rest, beside, Reaction(owed, moment.split, felt))
 
 
-def special_handle(special, state, step, at, w):
+def stopped_handle(special, split, step, at, w):
     """The handle in a kick of clay that stops it."""
     if special is None:
         return at
-    return yielding.at_rest(special.flow, w, stiff.behind_sample(special.stiff, state.split, step, at))
+    return yielding.at_rest(special.flow, w, stiff.behind_sample(special.stiff, split, step, at))
 
 
 def rests(special, motion):
     """Whether clay holds the handle behind a kick."""
     if special is None:
         return False
-    return yielding.is_still(special.flow, motion.special.felt)
+    return yielding.is_still(special.flow, motion.reaction.felt)
 
 
 def link_torques(links, u, g, f):
@@ -146,24 +154,23 @@ def clipped(tau, limit):
 
 def kick(parts, clock, body, loop, clay, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
-    part, hand_, links, limit = parts.clay, parts.hand, parts.arm.links, parts.limits
-    special, grain = parts.special, parts.grain
+    links, limit, special = parts.arm.links, parts.limits, parts.special
     step = step_around(clock.before, after)
     at = handle_at(parts.arm, body, 0.5 * clock.before)
     uh = muscle_force(parts, clock, step)
-    k, state = viscous.damping(part, special, clay, clock.t, hand_, step)
-    at = special_handle(special, state, step, at, body.w)
-    load, (cx, cy), d = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
-    load = hand.with_hand(hand_, load, step, at)
+    k, split = viscous.damping(parts.clay, special, clay, clock.t, parts.hand, step)
+    at = stopped_handle(special, split, step, at, body.w)
+    load, (cx, cy), d = loads(parts, clay, step, at, uh, k)
     law, delta, feed, rates, pushes = servo.servo_law(parts, step, at, loop)
-    m = moved(special, grain, hand_, law, load, state, step, at, k, uh)
+    moment = Moment(step, at, k, split, uh)
+    m = moved(parts, law, load, clay, moment)
     u, v, f, w, H = m.u, at.v, m.f, body.w, step.H
     g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
     tau = link_torques(links, at.u, g, f)
     if abs(tau[0]) > limit[0] or abs(tau[1]) > limit[1]:
         tau = clipped(tau, limit)
         law = servo.torque_law(links, step, at, tau)
-        m = moved(special, grain, hand_, law, load, state, step, at, k, uh)
+        m = moved(parts, law, load, clay, moment)
         u, f = m.u, m.f
         g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
     w = w[0] + H * g[0], w[1] + H * (g[1] - g[0])
@@ -190,8 +197,8 @@ def velocity(special, grain, k):
     if special is None:
         return slow
     m = k.motion
-    slow = stiff.at_sample(special.stiff, m.special.split, k.viscous, v, u, m.rest, slow)
-    return yielding.at_sample(special.flow, special.stiff, grain, m.special, slow)
+    slow = stiff.at_sample(special.stiff, m.reaction.split, k.viscous, v, u, m.rest, slow)
+    return yielding.at_sample(special.flow, special.stiff, grain, m.reaction, slow)
 
 
 def is_finite(k):

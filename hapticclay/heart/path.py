@@ -21,7 +21,7 @@ from .state import (
     Clock,
     Filled,
     Growth,
-    Special,
+    Laws,
     State,
     Status,
 )
@@ -84,29 +84,18 @@ def same_growth(part, growth):
     return Growth(growth.rate, growth.rate)
 
 
-def special_behind(special, parts, c, q, w, h):
-    if special is None:
-        return c
-    x, table, at = c.special, parts.table, handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
-    elastic = springs.moved(special.springs, x.elastic, c.region, table, at.p, h)
-    b, old, cut = grooves.moved(special.groove, x.cut, c, at.p, at.v)
-    felt, more = yielding.behind(special.flow, x.felt), laws.moved(special.more, x.more, at, h)
-    c = Clay(c.region, b, old, c.growth, c.hit, Special(x.owed, x.split, felt, elastic, cut, more))
-    return viscous.at_place(special.smooth, table, c, at.p)
-
-
 def noted(special, e, before, k, t, n):
     """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
         return n
-    return yielding.noted(special.flow, e, k.motion.special.felt, before.felt, t, n)
+    return yielding.noted(special.flow, e, k.motion.reaction.felt, before.felt, t, n)
 
 
-def held_arm(special, e, state, w):
+def held_arm(special, e, reaction, w):
     """Joint rates; none of an arm that clay holds, which the engine's rounding would let creep."""
     if special is None:
         return w
-    if yielding.is_still(special.flow, state.felt):
+    if yielding.is_still(special.flow, reaction.felt):
         put(e.w, 0, (0.0, 0.0))
         return 0.0, 0.0
     return w
@@ -116,18 +105,30 @@ def clay_behind(parts, clay, k, q, w, h):
     """The clay behind a step of length h after a kick, which led the arm to q, w."""
     if parts.clay is None:
         return clay
-    growth, state = same_growth(parts.clay.growth, clay.growth), k.motion.special
-    hit = hits.after_kick(parts.hits, parts, clay.hit, k)
-    clay = Clay(clay.region, clay.b, clay.b, growth, hit, state)
-    return special_behind(parts.special, parts, clay, q, w, h)
+    growth = same_growth(parts.clay.growth, clay.growth)
+    hit, c = hits.after_kick(parts.hits, parts, clay.hit, k), clay
+    clay = Clay(c.region, c.b, c.b, growth, hit, k.motion.reaction, c.laws)
+    return laws_behind(parts.special, parts, clay, q, w, h)
+
+
+def laws_behind(special, parts, c, q, w, h):
+    if special is None:
+        return c
+    x, table, at = c.laws, parts.table, handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
+    elastic = springs.moved(special.springs, x.elastic, c.region, table, at.p, h)
+    b, old, cut = grooves.moved(special.groove, x.cut, c, at.p, at.v)
+    more = laws.moved(special.more, x.more, at, h)
+    x = Laws(yielding.behind(special.flow, x.flow), elastic, cut, more)
+    c = Clay(c.region, b, old, c.growth, c.hit, c.reaction, x)
+    return viscous.at_place(special.smooth, table, c, at.p)
 
 
 def stepped(parts, s, e, k, after, target, work, filled):
     """The state after the step behind a kick; rows filled and the ledger are given."""
     special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
     q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
-    w = held_arm(special, e, k.motion.special, w)
-    stops = noted(special, e, s.clay.special, k, clock.t, x.stops)
+    w = held_arm(special, e, k.motion.reaction, w)
+    stops = noted(special, e, s.clay.reaction, k, clock.t, x.stops)
     clay = clay_behind(parts, s.clay, k, q, w, after)
     t, i = clock.t + after, clock.i
     loop = commanded(parts.command, k.loop, dt, clock, k.step)
@@ -149,7 +150,7 @@ def kept(parts, s, e, k, after, shows):
             v, f = slow_arrival(parts.special, parts, s, v, f)
         b = clay_now(parts.clay, s.clay, after == 0.0, s.clock.t)
         rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
-        rows.write_force(parts.special, parts.grain, e, x.rows, k, f, v, b)
+        rows.write_force(parts.special, parts.grain, e, x.rows, k, s.clay.laws, f, v, b)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     work = rows.with_work(parts, s.work, k, s.body.w)
     return State(s.clock, s.body, s.loop, s.clay, work, s.status, x)
@@ -189,7 +190,7 @@ def stiff_arrival(stiff, special, parts, s, v, f):
         return v, f
     k = kick(parts, s.clock, s.body, s.loop, s.clay, s.clock.before)
     (x, y), (fx, fy) = velocity(special, parts.grain, k), rows.yield_force(special, k)
-    soft = k.motion.special.split.soft
+    soft = k.motion.reaction.split.soft
     x, fx = (x, fx) if soft[0] > 0.0 else (v[0], f[0])
     y, fy = (y, fy) if soft[1] > 0.0 else (v[1], f[1])
     return (x, y), (fx, fy)
@@ -211,11 +212,11 @@ def crossed(parts, s, e, i, up):
     return borders.moved_on(parts, s, place(parts.arm, s.body.q), i, up, 1.0)
 
 
-def shortened(special, state, after):
+def shortened(special, laws_, after):
     """The longest step that the clay allows [s]."""
     if special is None:
         return after
-    return springs.longest(special.springs, state.elastic, after)
+    return springs.longest(special.springs, laws_.elastic, after)
 
 
 def towards(parts, s, after, over, first):
@@ -237,7 +238,7 @@ def towards(parts, s, after, over, first):
     axis, up, special = -1, 0, parts.special
     here = place(parts.arm, s.body.q)
     while True:
-        after = shortened(special, s.clay.special, after)
+        after = shortened(special, s.clay.laws, after)
         if s.status.closing != OPEN:
             after = 0.0
         elif first:
@@ -307,18 +308,18 @@ def halted_arm(s, k):
     return State(Clock(c.t, c.i, 0.0), body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
-def is_calm(special, state):
+def is_calm(special, laws_):
     """Whether the springs of the clay ask for no short steps."""
     if special is None:
         return True
-    return springs.is_calm(special.springs, state.elastic)
+    return springs.is_calm(special.springs, laws_.elastic)
 
 
 def may_glide(parts, s):
     """Whether a whole step may follow without a look at more than its end."""
     c, clay = s.clock, s.clay
     whole = c.before == parts.time.dt and c.t == c.i * parts.time.dt and c.i < parts.time.last
-    calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.special)
+    calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.laws)
     return whole and calm and s.status.closing == OPEN
 
 
@@ -337,7 +338,7 @@ def whole_step(parts, s, e):
     v, f = velocity(special, parts.grain, k), rows.yield_force(special, k)
     b = clay_now(parts.clay, s.clay, False, s.clock.t)
     rows.write(parts, e.rows, n, s.body.q, k, v, b)
-    rows.write_force(special, parts.grain, e, n, k, f, v, b)
+    rows.write_force(special, parts.grain, e, n, k, s.clay.laws, f, v, b)
     work = rows.with_work(parts, s.work, k, s.body.w)
     return True, stepped(parts, s, e, k, dt, (s.clock.i + 1) * dt, work, n + 1)
 

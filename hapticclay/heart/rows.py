@@ -36,15 +36,15 @@ def tells(special):
     return not (special.flow is None and special.springs is None and special.more is None)
 
 
-def write_force(special, grain, e, i, k, f, v, b):
+def write_force(special, grain, e, i, k, states, f, v, b):  # noqa: PLR0913
     """Writes the force of the clay where b v does not tell it; f of it is that of yielding [N]."""
     if special is None:
         return
     if special.flow is None and special.springs is None and special.more is None:
         return
-    (x, y), state = viscous.force(grain, b, v), k.motion.special
-    px, py = sprung_force(special.springs, state, k.step.L)
-    fx, fy = laws.force(special.more, state.more, k.at.p, v)
+    x, y = viscous.force(grain, b, v)
+    px, py = sprung_force(special.springs, states, k.step.L)
+    fx, fy = laws.force(special.more, states.more, k.at.p, v)
     put(e.rendered, 3 * i, (x + f[0] + px + fx, y + f[1] + py + fy))
     write_removed(special.groove, e, i)
 
@@ -53,7 +53,7 @@ def yield_force(special, k):
     """Force of yielding at the sample of a kick, (x, y) [N]."""
     if special is None:
         return 0.0, 0.0
-    return felt_force(special.flow, k.motion.special)
+    return felt_force(special.flow, k.motion.reaction)
 
 
 def felt_force(flow, state):
@@ -62,10 +62,10 @@ def felt_force(flow, state):
     return state.felt.f
 
 
-def sprung_force(part, state, L):
+def sprung_force(part, states, L):
     if part is None:
         return 0.0, 0.0
-    return springs.force(state.elastic, L)
+    return springs.force(states.elastic, L)
 
 
 def write_removed(groove, e, i):

@@ -657,9 +657,9 @@ class Run:
         """The energy balance, as Record.energy."""
         last = energy.stored(self.parts, self.state)
         out = energy.balance(self.state.work, self.first if self.looked else last, last)
-        special = self.state.clay.special
-        if special is not None and special.elastic is not None:
-            x = special.elastic
+        laws = self.state.clay.laws
+        if laws is not None and laws.elastic is not None:
+            x = laws.elastic
             out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
         return out
 

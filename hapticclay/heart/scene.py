@@ -84,18 +84,25 @@ def parts_of(s: Scenario):
     )  # fmt: skip
 
 
-def first_special(special, p):
-    """State of the special laws before the handle has been anywhere."""
+def first_reaction(special):
+    """What clay left to the first kick."""
     if special is None:
         return None
-    law, nan = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (math.nan, math.nan)
-    return s_.Special(
-        NONE,
-        s_.Split(0.0, NONE, NONE) if special.stiff else None,
-        s_.Felt(law, law, NONE, NONE, NONE, NONE, nan, 0.0, NONE) if special.flow else None,
-        s_.Elastic(((0.0,) * 6, (0.0,) * 6), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)
-        if special.springs else None,
-        s_.Cut(nan, NONE, NONE, 0.0) if special.groove else None, laws.start(special.more, p),
+    felt = s_.Felt(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
+    split = s_.Split(0.0, NONE, NONE) if special.stiff else None
+    return s_.Reaction(NONE, split, felt if special.flow else None)
+
+
+def first_laws(special, p):
+    """State of the laws before the handle has been anywhere."""
+    if special is None:
+        return None
+    law, none = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (0.0,) * 6
+    return s_.Laws(
+        s_.Flow(law, law) if special.flow else None,
+        s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF) if special.springs else None,
+        s_.Cut((math.nan, math.nan), NONE, NONE, 0.0) if special.groove else None,
+        laws.start(special.more, p),
     )  # fmt: skip
 
 
@@ -113,7 +120,8 @@ def blocks(parts, s: Scenario):
     growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
     hit = s_.Hit(INF, 0.0) if parts.hits else None
     clay = s_.Clay(
-        s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit, first_special(parts.special, NONE)
+        s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
+        first_reaction(parts.special), first_laws(parts.special, NONE),
     )
     return s_.State(
         s_.Clock(0.0, 0, 0.0), s_.Body(NONE, NONE, NONE), s_.Loop(axis, axis, first_form(parts, s)),

@@ -100,7 +100,8 @@ class Clay(NamedTuple):
         old: that of the clay before the sample.
         growth: clay that grows.
         hit: a hit that drives motors into their limits.
-        special: laws beside plain viscous damping.
+        reaction: of the last kick.
+        laws: beside plain viscous damping.
     """
 
     region: Region
@@ -108,24 +109,35 @@ class Clay(NamedTuple):
     old: Any
     growth: Any
     hit: Any
-    special: Any
+    reaction: Any
+    laws: Any
 
 
-class Special(NamedTuple):
-    """Laws of the clay beside plain viscous damping.
+class Reaction(NamedTuple):
+    """What clay beside plain viscous damping did in a kick, and leaves to the next one.
 
     Attributes:
         owed: impulse owed by stiff clay [N.s].
-        split: how the last kick split the damping of stiff clay.
+        split: how the damping of stiff clay was split.
         felt: clay that yields.
-        elastic: clay that springs back.
-        cut: clay that stays cut.
-        more: states of the laws that are modules of their own.
     """
 
     owed: Any
     split: Any
     felt: Any
+
+
+class Laws(NamedTuple):
+    """Laws of the clay with a state that steps move on.
+
+    Attributes:
+        flow: clay that yields.
+        elastic: clay that springs back.
+        cut: clay that stays cut.
+        more: states of the laws that are modules of their own.
+    """
+
+    flow: Any
     elastic: Any
     cut: Any
     more: Any
@@ -157,14 +169,24 @@ class Hit(NamedTuple):
     struck: float
 
 
-class Felt(NamedTuple):
+class Flow(NamedTuple):
     """Clay that yields.
 
     Attributes:
         law: Fy, K, n of x, then of y.
         old: that of the clay before the sample.
-        mean: force of the last kick [N].
-        v: velocity at its sample [m/s].
+    """
+
+    law: Any
+    old: Any
+
+
+class Felt(NamedTuple):
+    """Clay that yields, in a kick.
+
+    Attributes:
+        mean: force [N].
+        v: velocity at the sample [m/s].
         f: force there [N].
         stuck: whether x and y rest behind it, 1.0 or 0.0.
         anchor: where an axis came to rest beside one that slides [m], NaN elsewhere.
@@ -172,8 +194,6 @@ class Felt(NamedTuple):
         times: when they came to rest after the sample [s].
     """
 
-    law: Any
-    old: Any
     mean: Any
     v: Any
     f: Any
@@ -378,6 +398,24 @@ class Viscous(NamedTuple):
     b1: Any
 
 
+class Moment(NamedTuple):
+    """What a kick is worked out from.
+
+    Attributes:
+        step: the steps around it.
+        at: the handle before it.
+        viscous: damping in it.
+        split: how stiff clay splits that.
+        uh: muscle force [N].
+    """
+
+    step: Step
+    at: Handle
+    viscous: Viscous
+    split: Any
+    uh: Any
+
+
 class Motion(NamedTuple):
     """The handle in a kick.
 
@@ -386,14 +424,14 @@ class Motion(NamedTuple):
         f: net force [N].
         rest: force that stiff clay returns, less what it owes [N].
         beside: clay force beside its dampers [N].
-        special: laws of the clay behind it.
+        reaction: of the clay.
     """
 
     u: Any
     f: Any
     rest: Any
     beside: Any
-    special: Any
+    reaction: Any
 
 
 class Kick(NamedTuple):

@@ -5,17 +5,17 @@ from __future__ import annotations
 from ..model import clay as law
 from ..model import controller, regions
 from . import hand as hands
-from .state import Clay, Growth, Load, Special, Split, Viscous
+from .state import Clay, Growth, Load, Split, Viscous
 
 NONE = (0.0, 0.0)
 
 
 def damping(part, special, clay, t, hand, step):
-    """Damping of the clay in a kick, and the state of its special laws, which stiff clay splits."""
+    """Damping of the clay in a kick, and how stiff clay splits it."""
     if part is None:
-        return Viscous(NONE, NONE), clay.special
+        return Viscous(NONE, NONE), None
     b0, b1 = around(part.growth, clay, t, step)
-    return special_damping(special, clay.special, step, hand, b0, b1)
+    return special_damping(special, step, hand, b0, b1)
 
 
 def around(growth, clay, t, step):
@@ -26,10 +26,10 @@ def around(growth, clay, t, step):
     return b0, law.damping_at(clay.b, clay.growth.rate, t + 0.25 * step.after)
 
 
-def special_damping(special, state, step, hand, b0, b1):
+def special_damping(special, step, hand, b0, b1):
     if special is None:
-        return weighted(step, b0, b1), state
-    return split_damping(special.stiff, state, step, hand, b0, b1)
+        return weighted(step, b0, b1), None
+    return split_damping(special.stiff, step, hand, b0, b1)
 
 
 def weighted(step, b0, b1):
@@ -38,16 +38,15 @@ def weighted(step, b0, b1):
     return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]))
 
 
-def split_damping(stiff, state, step, hand, b0, b1):
-    """Damping in a kick, see clay.split_damping, and the state with the split."""
+def split_damping(stiff, step, hand, b0, b1):
+    """Damping in a kick, see clay.split_damping, and the split."""
     if stiff is None:
-        return weighted(step, b0, b1), state
+        return weighted(step, b0, b1), None
     dx, dy = hands.dampers(hand)
     x0, x1, y0, y1, over, sharex, sharey, softx, softy = law.split_damping(
         b0, b1, step.H, step.L, step.R, stiff.mobility, dx, dy
     )
-    split, s = Split(over, (sharex, sharey), (softx, softy)), state
-    return Viscous((x0, y0), (x1, y1)), Special(s.owed, split, s.felt, s.elastic, s.cut, s.more)
+    return Viscous((x0, y0), (x1, y1)), Split(over, (sharex, sharey), (softx, softy))
 
 
 def grown(part, b, growth, before, t):
@@ -89,7 +88,8 @@ def at_place(smooth, table, clay, p):
     x, y = regions.smooth_clay(table, smooth, p[0], p[1], clay.b[0], clay.b[1])
     o = clay.old
     old = (x, o[1]) if smooth == 1 else (o[0], y) if smooth == 2 else (x, y)
-    return Clay(clay.region, (x, y), old, without_growth(clay.growth, smooth), clay.hit, clay.special)
+    growth, c = without_growth(clay.growth, smooth), clay
+    return Clay(c.region, (x, y), old, growth, c.hit, c.reaction, c.laws)
 
 
 def without_growth(growth, smooth):

@@ -7,7 +7,7 @@ import math
 from ..model import controller, flow
 from . import grooves, viscous
 from .engine_step import put
-from .state import Felt, Handle
+from .state import Felt, Flow, Handle
 
 NO_FORCE = (0.0, 0.0)
 
@@ -21,9 +21,9 @@ def at_rest(part, w, at):
     return at
 
 
-def law_now(part, felt, L, v):
+def law_now(part, state, L, v):
     """Fy, K, n of x and y in a kick. Half a step of other clay before it counts as steady force."""
-    a, b = felt.law, felt.old
+    a, b = state.law, state.old
     if a == b:
         return a
     R, x, y = 1.0 - L, abs(v[0]), abs(v[1])
@@ -33,11 +33,11 @@ def law_now(part, felt, L, v):
     return L * x + R * a[0], R * a[1], a[2], L * y + R * a[3], R * a[4], a[5]
 
 
-def law_in_kick(groove, part, grain, felt, L, B, v, u):
+def law_in_kick(groove, part, clay, L, B, v, u):
     """As `law_now`, of any clay that yields; v along its axes, u in x and y."""
     if groove is None:
-        return law_now(part, felt, L, v)
-    return grooves.law_in_kick(groove, felt.stuck, B, viscous.across(grain, v[0], v[1]), u)
+        return law_now(part, clay.laws.flow, L, v)
+    return grooves.law_in_kick(groove, clay.reaction.felt.stuck, B, v, u)
 
 
 def resist_by(along, B, v, end, law, L):
@@ -61,14 +61,11 @@ def anchored(still, stuck, rests, anchor, place):
     return anchor
 
 
-def resist(special, grain, felt, step, at, law, load, u):
-    """Velocity after the kick, and what the clay did; as they were where nothing yields."""
-    return resist_flow(special.flow, special, grain, felt, step, at, law, load, u)
-
-
-def resist_flow(part, special, grain, felt, step, at, law, load, u):
+def resist(part, groove, grain, clay, moment, law, load, u):
+    """Velocity after the kick, and what the clay did; None where nothing yields."""
     if part is None:
-        return u, felt
+        return u, None
+    step, at, felt = moment.step, moment.at, clay.reaction.felt
     stuck, c, v = felt.stuck, at.c, at.v
     # a straight step in the joints bends the path of the handle: its mean velocities are these
     lead, on = step.H * step.L, step.H * (1.0 - step.L)
@@ -77,7 +74,7 @@ def resist_flow(part, special, grain, felt, step, at, law, load, u):
     B = controller.velocity_per_force(law.n, law.W, load.d)
     ax, ay = viscous.along(grain, ax, ay)
     a = 0.0 if stuck[0] > 0.0 else ax, 0.0 if stuck[1] > 0.0 else ay
-    fyk = law_in_kick(special.groove, part, grain, felt, step.L, B, a, (ex, ey))
+    fyk = law_in_kick(groove, part, clay, step.L, B, a, (ex, ey))
     B = turned_matrix(grain, B)
     ex, ey = viscous.along(grain, ex, ey)
     place = viscous.along(grain, at.p[0], at.p[1])
@@ -103,7 +100,7 @@ def resist_flow(part, special, grain, felt, step, at, law, load, u):
         anchored(still, stuck[1], rests[1], felt.anchor[1], place[1]),
     )
     return u, Felt(
-        felt.law, felt.old, viscous.across(grain, r[0], r[1]), viscous.across(grain, s[0], s[1]),
+        viscous.across(grain, r[0], r[1]), viscous.across(grain, s[0], s[1]),
         viscous.across(grain, f[0], f[1]), rests, anchor, 1.0 if still else 0.0,
         (stop_time(step, stops[0]), stop_time(step, stops[1])),
     )  # fmt: skip
@@ -143,15 +140,23 @@ def is_still(part, felt):
     return felt.still > 0.0
 
 
-def creeping(part, groove, stiff, felt, k, L, g, v):
+def creeping(part, stiff, groove, state, moment, g):
     """The part of a slow force on stiff clay that its damping bears: what yielding leaves of it."""
     if part is None:
         return g
-    if groove is not None:
-        return g
     if stiff is None:
         return g
-    fyk = law_now(part, felt, L, v)
+    return creeping_flow(groove, part, state, moment, g)
+
+
+def creeping_flow(groove, part, state, moment, g):
+    if groove is None:
+        return crept(part, law_now(part, state, moment.step.L, moment.at.v), moment.viscous, g)
+    return g
+
+
+def crept(part, fyk, k, g):
+    """The part of a slow force that damping bears under Fy, K, n of x and y."""
     bx, by = k.b0[0] + k.b1[0], k.b0[1] + k.b1[1]
     gx, gy = abs(g[0]), abs(g[1])
     if part.along is not None:
@@ -191,12 +196,11 @@ def over_stiff(stiff, split, v, slow):
     return x, y
 
 
-def behind(part, felt):
+def behind(part, state):
     """The state after a step: the clay before the sample is that of now."""
     if part is None:
-        return felt
-    f = felt
-    return Felt(f.law, f.law, f.mean, f.v, f.f, f.stuck, f.anchor, f.still, f.times)
+        return state
+    return Flow(state.law, state.law)
 
 
 def noted(part, e, felt, before, t, n):
