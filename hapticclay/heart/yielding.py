@@ -9,7 +9,8 @@ from . import grooves, viscous
 from .engine_step import put
 from .state import Felt, Flow, Handle
 
-NO_FORCE = (0.0, 0.0)
+NONE = (0.0, 0.0)
+NOWHERE = (math.nan, math.nan)
 
 
 def at_rest(part, w, at):
@@ -61,12 +62,23 @@ def anchored(still, stuck, rests, anchor, place):
     return anchor
 
 
+def flows_freely(groove, state):
+    """Whether the clay around a kick does not yield."""
+    if groove is None:
+        a, b = state.law, state.old
+        return a[0] + a[1] + a[3] + a[4] + b[0] + b[1] + b[3] + b[4] == 0.0
+    return False
+
+
 def resist(part, groove, grain, clay, moment, law, load, u):
     """Velocity after the kick, and what the clay did; None where nothing yields."""
     if part is None:
         return u, None
     step, at, felt = moment.step, moment.at, clay.reaction.felt
     stuck, c, v = felt.stuck, at.c, at.v
+    if flows_freely(groove, clay.laws.flow):
+        s = v[0] + step.L * (u[0] - v[0]), v[1] + step.L * (u[1] - v[1])
+        return u, Felt(NONE, s, NONE, NONE, NOWHERE, 0.0, NONE)
     # a straight step in the joints bends the path of the handle: its mean velocities are these
     lead, on = step.H * step.L, step.H * (1.0 - step.L)
     ax, ay = v[0] + lead * c[0], v[1] + lead * c[1]
