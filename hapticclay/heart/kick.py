@@ -11,7 +11,7 @@ from math import cos, sin
 from ..model import arm, pieces
 from . import hand, servo, springs, stiff, viscous, yielding
 from .parts import INF
-from .state import Handle, Kick, Load, Motion, Special, Step
+from .state import Acting, Handle, Kick, Load, Motion, Special, Step
 
 NONE = (0.0, 0.0)
 
@@ -39,12 +39,23 @@ def handle_at(part, body, half):
     return Handle(u, p, arm.mobility(u, part.links), arm.handle_velocity(r1, r2, u), c)
 
 
+def at_rates(at, w):
+    """The handle at other joint rates."""
+    r1, r2 = w[0], w[0] + w[1]
+    return Handle(
+        at.u, at.p, at.W, arm.handle_velocity(r1, r2, at.u), arm.centripetal(r1, r2, at.u)
+    )
+
+
 def muscle_force(push, t, step):
     """Mean muscle force over a kick at t, (x, y) [N]."""
+    return mean_push(push, t + 0.25 * (step.after - step.before), 0.5 * step.H)
+
+
+def mean_push(push, t, h):
+    """Mean muscle force over h before and after a time, (x, y) [N]."""
     since, x, y, rx, ry = push.steady
-    t = t + 0.25 * (step.after - step.before)
-    f = x + (t - since) * rx, y + (t - since) * ry
-    return with_signal(push.muscle, f, t, 0.5 * step.H)
+    return with_signal(push.muscle, (x + (t - since) * rx, y + (t - since) * ry), t, h)
 
 
 def with_signal(table, f, t, h):
@@ -111,35 +122,55 @@ def clipped(tau, limit):
     return min(max(tau[0], -limit[0]), limit[0]), min(max(tau[1], -limit[1]), limit[1])
 
 
-def kick(parts, clock, body, loop, clay, after):
+def acting(parts, clay_, special, t, step, at, w, clay):  # noqa: PLR0913
+    """What acts on the handle in a kick at t, with joint rates w before it."""
+    hand_, grain = parts.hand, parts.grain
+    uh = muscle_force(parts.push, t, step)
+    k, state = viscous.damping(clay_, special, clay, t, hand_, step)
+    at = special_handle(special, state, step, at, w)
+    load, f, d = viscous.with_clay(clay_, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
+    return Acting(step, at, k, hand.with_hand(hand_, load, step, at), f, d, uh, state)
+
+
+def driven(parts, special, a, law):
+    """The handle under what acts on it in a kick, driven by a law; link accelerations [rad/s^2]."""
+    at, v = a.at, a.at.v
+    m = moved(special, parts.grain, parts.hand, law, a.load, a.special, a.step, at, a.viscous, a.uh)
+    u = m.u
+    return m, arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, a.step.H)
+
+
+def rates_after(special, m, H, w, g):
+    """Joint rates after a kick [rad/s]."""
+    if rests(special, m):
+        return 0.0, 0.0
+    return w[0] + H * g[0], w[1] + H * (g[1] - g[0])
+
+
+def kicked(a, m, w, g, tau, delta, loop):
+    """The value of a kick, with joint rates w after it."""
+    (cx, cy), d, u, beside = a.f, a.d, m.u, m.beside
+    x, y = d[0] * u[0] + d[2] * u[1], d[1] * u[1] + d[2] * u[0]
+    fe = cx + x + beside[0], cy + y + beside[1]
+    return Kick(a.step, a.at, a.viscous, m, w, g, (x, y), fe, a.uh, tau, delta, loop)
+
+
+def servo_kick(parts, clock, body, loop, clay, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
-    part, hand_, links, limit = parts.clay, parts.hand, parts.arm.links, parts.limits
-    special, grain = parts.special, parts.grain
+    special, links, limit = parts.special, parts.arm.links, parts.limits
     step = step_around(clock.before, after)
     at = handle_at(parts.arm, body, 0.5 * clock.before)
-    uh = muscle_force(parts.push, clock.t, step)
-    k, state = viscous.damping(part, special, clay, clock.t, hand_, step)
-    at = special_handle(special, state, step, at, body.w)
-    load, (cx, cy), d = viscous.with_clay(part, grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
-    load = hand.with_hand(hand_, load, step, at)
-    law, delta, feed, rates, pushes = servo.servo_law(parts, step, at, loop)
-    m = moved(special, grain, hand_, law, load, state, step, at, k, uh)
-    u, v, f, w, H = m.u, at.v, m.f, body.w, step.H
-    g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
-    tau = link_torques(links, at.u, g, f)
+    a = acting(parts, parts.clay, special, clock.t, step, at, body.w, clay)
+    law, delta, feed, rates, pushes = servo.servo_law(parts, step, a.at, loop)
+    m, g = driven(parts, special, a, law)
+    tau = link_torques(links, at.u, g, m.f)
     if abs(tau[0]) > limit[0] or abs(tau[1]) > limit[1]:
         tau = clipped(tau, limit)
-        law = servo.torque_law(links, step, at, tau)
-        m = moved(special, grain, hand_, law, load, state, step, at, k, uh)
-        u, f = m.u, m.f
-        g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
-    w = w[0] + H * g[0], w[1] + H * (g[1] - g[0])
-    if rests(special, m):
-        w = 0.0, 0.0
-    x, y = d[0] * u[0] + d[2] * u[1], d[1] * u[1] + d[2] * u[0]
+        m, g = driven(parts, special, a, servo.torque_law(links, step, a.at, tau))
+    f = m.f
     rates = rates[0] + pushes[0] * f[0], rates[1] + pushes[1] * f[1]
-    return Kick(
-        step, at, k, m, w, g, (x, y), (cx + x + m.beside[0], cy + y + m.beside[1]), uh, tau,
+    return kicked(
+        a, m, rates_after(special, m, step.H, body.w, g), g, tau,
         (delta[0] + feed[0] * f[0], delta[1] + feed[1] * f[1]),
         servo.advanced(parts.lag, parts.form, step, loop, rates, f),
     )  # fmt: skip

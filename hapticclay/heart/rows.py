@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..model import arm
 from . import hand, springs, viscous
 from .engine_step import put
-from .state import Work
+from .state import HardwareWork, Work
 
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 
@@ -17,10 +17,9 @@ def hand_force(part, k):
     return k.motion.f[0] + k.fe[0], k.motion.f[1] + k.fe[1]
 
 
-def write(parts, rows, i, q, k, v, b):
+def write(rows, i, q, k, v, b, fh, delta):  # noqa: PLR0913
     """Writes the row of a sample."""
-    p, tau, delta = k.at.p, k.tau, k.delta
-    fh = hand_force(parts.hand, k)
+    p, tau = k.at.p, k.tau
     r1, r2 = arm.joint_velocity(v[0], v[1], k.at.u, 1.0)
     put(
         rows, ROW * i,
@@ -31,27 +30,33 @@ def write(parts, rows, i, q, k, v, b):
     )  # fmt: skip
 
 
-def write_force(special, grain, e, i, k, v, b):
-    """Writes the force of the clay where b v does not tell it."""
+def flow_force(special, k):
+    """Force of clay that yields at the sample of a kick, (x, y) [N]."""
     if special is None:
-        return
-    write_beside(special.flow, special.springs, special.groove, grain, e, i, k, v, b)
-
-
-def write_beside(flow, elastic, groove, grain, e, i, k, v, b):
-    if flow is None and elastic is None:
-        return
-    x, y = viscous.force(grain, b, v)
-    fx, fy = felt_force(flow, k.motion.special)
-    px, py = sprung_force(elastic, k.motion.special, k.step.L)
-    put(e.rendered, 3 * i, (x + fx + px, y + fy + py))
-    write_removed(groove, e, i)
+        return 0.0, 0.0
+    return felt_force(special.flow, k.motion.special)
 
 
 def felt_force(flow, state):
     if flow is None:
         return 0.0, 0.0
     return state.felt.f
+
+
+def write_force(special, grain, e, i, k, v, b, f):  # noqa: PLR0913
+    """Writes the force of the clay where b v does not tell it; f is that of yielding."""
+    if special is None:
+        return
+    x, y = viscous.force(grain, b, v)
+    write_beside(special.flow, special.springs, special.groove, e, i, k, (x + f[0], y + f[1]))
+
+
+def write_beside(flow, elastic, groove, e, i, k, f):
+    if flow is None and elastic is None:
+        return
+    px, py = sprung_force(elastic, k.motion.special, k.step.L)
+    put(e.rendered, 3 * i, (f[0] + px, f[1] + py))
+    write_removed(groove, e, i)
 
 
 def sprung_force(part, state, L):
@@ -77,5 +82,35 @@ def with_work(parts, a, k, w):
     taken = H * (dx * vx * vx + dy * vy * vy)
     return Work(
         a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
-        a.through + (abs(muscle) + abs(motors)),
+        a.through + (abs(muscle) + abs(motors)), hardware_work(a.hardware, k, w, (vx, vy)),
     )  # fmt: skip
+
+
+def hardware_work(works, k, w, v):
+    """What hardware has taken, with its works in a kick; v is the mean velocity."""
+    if works is None:
+        return works
+    H, (hold, slip), n = k.step.H, k.loop, k.w
+    rates = 0.5 * (w[0] + n[0]), 0.5 * (w[1] + n[1])
+    return HardwareWork(
+        works.friction + friction_work(slip, H, rates), works.guard + guard_work(hold.guard, H, v),
+        works.coupling + coupling_work(hold.pull, H, v),
+    )  # fmt: skip
+
+
+def friction_work(slip, H, w):
+    if slip is None:
+        return 0.0
+    return -H * (slip[0] * w[0] + slip[1] * w[1])
+
+
+def guard_work(guard, H, v):
+    if guard is None:
+        return 0.0
+    return H * (guard[0] * v[0] + guard[1] * v[1])
+
+
+def coupling_work(pull, H, v):
+    if pull is None:
+        return 0.0
+    return H * (pull.f[0] * (v[0] - pull.u[0]) + pull.f[1] * (v[1] - pull.u[1]))
