@@ -96,11 +96,13 @@ class Hand(NamedTuple):
         mass: [kg].
         damper: [N.s/m].
         spring: [N/m].
+        longer: 1 where a kick counts its spring by the longer step around it, else by their mean.
     """
 
     mass: float
     damper: float
     spring: float
+    longer: Any
 
 
 class Push(NamedTuple):

@@ -44,7 +44,9 @@ class Engine(NamedTuple):
 def hand_parts(s: Scenario):
     if not any(s.operators):
         return None
-    return tuple(p_.Hand(th.mass, th.damper, th.spring) if th else p_.Hand(0.0, 0.0, 0.0) for th in s.operators)
+    longer = 1 if s.control == "sampled" else None
+    none = p_.Hand(0.0, 0.0, 0.0, longer)
+    return tuple(p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators)
 
 
 def compensators(s: Scenario):
