@@ -19,7 +19,6 @@ from .state import (
     Region,
     State,
     Status,
-    Work,
 )
 
 NONE = (0.0, 0.0)
@@ -91,8 +90,8 @@ def begun(parts, blocks, e, p, v):
     loop = loop_at(parts.form, blocks.loop, parts.servo, p, v)
     clay = clay_at(parts, blocks.clay, body, p)
     ix, iy = clay.region.index
-    status, work = Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy)), Work(0.0, 0.0, 0.0, 0.0, 0.0)
-    return State(Clock(0.0, 0, 0.0), body, loop, clay, work, status, Filled(0, 0, 0, 0))
+    status = Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy))
+    return State(Clock(0.0, 0, 0.0), body, loop, clay, blocks.work, status, Filled(0, 0, 0, 0))
 
 
 def changed(parts, blocks, s, before):

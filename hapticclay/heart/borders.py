@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ..model import regions
 from . import grooves, springs, viscous
-from .kick import kick, place_after
+from .drive import kick
+from .kick import place_after
 from .state import Clay, Flow, Growth, Hit, Laws, Region, State, Status
 
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings

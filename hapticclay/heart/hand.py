@@ -21,11 +21,17 @@ def resisting(th, step, p, v, c):
     Mass and damping as for the handle. The spring acts by the place at the sample; a quarter of
     k h^2 added to the mass makes its energy exact in even steps.
     """
-    # at the start and the end the kick is half of one
-    h = step.H if step.before > 0.0 and step.after > 0.0 else max(step.before, step.after)
+    h = span(th.longer, step)
     mass = th.mass + 0.25 * th.spring * h * h
     before, after = th.damper * step.L - mass / step.H, th.damper * step.R + mass / step.H
     return th.spring * p - mass * c + before * v, after
+
+
+def span(longer, step):
+    """Length of the steps by which a kick counts the spring [s]."""
+    if longer is None:  # at the start and the end the kick is half of one
+        return step.H if step.before > 0.0 and step.after > 0.0 else max(step.before, step.after)
+    return max(step.before, step.after)
 
 
 def dampers(hand):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from . import rows, viscous
-from .kick import is_limited, kick
+from .drive import kick
+from .kick import is_limited
 from .parts import INF
 from .state import Body, Clay, Clock, Hit, State
 

@@ -11,7 +11,7 @@ from math import cos, sin
 from ..model import arm, pieces
 from . import hand, laws, servo, springs, stiff, viscous, yielding
 from .parts import INF
-from .state import Axis, Handle, Kick, Load, Loop, Moment, Motion, Reaction, Step
+from .state import Acting, Axis, Handle, Kick, Load, Loop, Motion, Reaction, Step
 
 NONE = (0.0, 0.0)
 
@@ -39,12 +39,36 @@ def handle_at(part, body, half):
     return Handle(u, p, arm.mobility(u, part.links), arm.handle_velocity(r1, r2, u), c)
 
 
+def at_rates(at, w):
+    """The handle at other joint rates."""
+    r1, r2 = w[0], w[0] + w[1]
+    return Handle(
+        at.u, at.p, at.W, arm.handle_velocity(r1, r2, at.u), arm.centripetal(r1, r2, at.u)
+    )
+
+
+def steady_force(push, t):
+    """Muscle force but for its signal, (x, y) [N]."""
+    since, x, y, rx, ry = push.steady
+    return x + (t - since) * rx, y + (t - since) * ry
+
+
 def muscle_force(parts, clock, step):
     """Mean muscle force over a kick, (x, y) [N]."""
-    since, x, y, rx, ry = parts.push.steady
-    t = clock.t + 0.25 * (step.after - step.before)
-    f = x + (t - since) * rx, y + (t - since) * ry
+    f = steady_force(parts.push, clock.t + 0.25 * (step.after - step.before))
     return with_signal(parts.push.muscle, f, parts.time.dt, clock, step)
+
+
+def mean_push(push, t, h):
+    """Mean muscle force over h before and after a time, (x, y) [N]."""
+    return with_mean(push.muscle, steady_force(push, t), t, h)
+
+
+def with_mean(signal, f, t, h):
+    if signal is None:
+        return f
+    x, y = pieces.mean_of_table(signal.table, t, h)
+    return f[0] + x, f[1] + y
 
 
 def with_signal(signal, f, dt, clock, step):
@@ -52,10 +76,8 @@ def with_signal(signal, f, dt, clock, step):
         return f
     if is_whole(dt, clock, step):
         x, y = row_ahead(signal, clock.i)
-    else:
-        t = clock.t + 0.25 * (step.after - step.before)
-        x, y = pieces.mean_of_table(signal.table, t, 0.5 * step.H)
-    return f[0] + x, f[1] + y
+        return f[0] + x, f[1] + y
+    return with_mean(signal, f, clock.t + 0.25 * (step.after - step.before), 0.5 * step.H)
 
 
 def is_whole(dt, clock, step):
@@ -94,37 +116,25 @@ def command_change(table, t0, t1, h):
     return x1 - x0, y1 - y0
 
 
-def loads(parts, clay, step, at, uh, k):
-    """The load of muscle, viscous clay and hand; of it the clay's force [N] and damping [N.s/m]."""
-    load = Load(uh, (0.0, 0.0, 0.0))
-    load, force, damping = viscous.with_clay(parts.clay, parts.grain, load, k, at.v)
-    load = hand.with_hand(parts.hand, load, step, at)
-    return load, force, damping
-
-
-def moved(parts, law, load, clay, moment):
+def moved(special, parts, clay, a, law):
     """The handle in a kick, driven by a law."""
-    return moved_through(parts.special, parts, law, load, clay, moment)
-
-
-def moved_through(special, parts, law, load, clay, moment):
     if special is None:
-        u = servo.solve(law, load)
-        return Motion(u, servo.net(load, u, NONE), NONE, NONE, clay.reaction)
-    step, at, states, before = moment.step, moment.at, clay.laws, clay.reaction
-    pulled = springs.pull(special.springs, states.elastic, step)
-    bare = springs.with_pull(load, pulled)
-    all_ = laws.with_loads(special.more, states.more, bare, step, at)
-    g = stiff.slow_force(special.stiff, parts.hand, moment, law, pulled)
-    g = yielding.creeping(special.flow, special.stiff, special.groove, states.flow, moment, g)
-    load, back, owes, soft = stiff.with_owed(special.stiff, parts.hand, moment, all_, before.owed, g)
+        u = servo.solve(law, a.load)
+        return Motion(u, servo.net(a.load, u, NONE), NONE, NONE, clay.reaction)
+    hand_, states, before = parts.hand, clay.laws, clay.reaction
+    pulled = springs.pull(special.springs, states.elastic, a.step)
+    bare = springs.with_pull(a.load, pulled)
+    all_ = laws.with_loads(special.more, states.more, bare, a.step, a.at)
+    g = stiff.slow_force(special.stiff, hand_, a, law, pulled)
+    g = yielding.creeping(special.flow, special.stiff, special.groove, states.flow, a, g)
+    load, back, owes, soft = stiff.with_owed(special.stiff, hand_, a, all_, before.owed, g)
     u = servo.solve(law, load)
-    u, felt = yielding.resist(special.flow, special.groove, parts.grain, clay, moment, law, load, u)
+    u, felt = yielding.resist(special.flow, special.groove, parts.grain, clay, a, law, load, u)
     r = yielding.mean(special.flow, felt)
-    rest, owed = stiff.still_owed(special.stiff, moment, back, owes, soft, u)
+    rest, owed = stiff.still_owed(special.stiff, a, back, owes, soft, u)
     x, y = servo.taken(bare, all_, u)
     beside = rest[0] + r[0] + pulled[0] + x, rest[1] + r[1] + pulled[1] + y
-    return Motion(u, servo.net(load, u, r), rest, beside, Reaction(owed, moment.split, felt))
+    return Motion(u, servo.net(load, u, r), rest, beside, Reaction(owed, a.split, felt))
 
 
 def stopped_handle(special, split, step, at, w):
@@ -152,34 +162,52 @@ def clipped(tau, limit):
     return min(max(tau[0], -limit[0]), limit[0]), min(max(tau[1], -limit[1]), limit[1])
 
 
-def kick(parts, clock, body, loop, clay, after):
+def acting(parts, part, special, clock, step, at, w, clay):
+    """What acts on the handle in a kick, with joint rates w before it, in the clay `part`."""
+    uh = muscle_force(parts, clock, step)
+    k, split = viscous.damping(part, special, clay, clock.t, parts.hand, step)
+    at = stopped_handle(special, split, step, at, w)
+    load, f, d = viscous.with_clay(part, parts.grain, Load(uh, (0.0, 0.0, 0.0)), k, at.v)
+    return Acting(step, at, k, split, hand.with_hand(parts.hand, load, step, at), f, d, uh)
+
+
+def driven(special, parts, clay, a, law):
+    """The handle under what acts on it in a kick, driven by a law; link accelerations [rad/s^2]."""
+    m, v = moved(special, parts, clay, a, law), a.at.v
+    return m, arm.joint_velocity(m.u[0] - v[0], m.u[1] - v[1], a.at.u, a.step.H)
+
+
+def rates_after(special, m, H, w, g):
+    """Joint rates after a kick [rad/s]."""
+    if rests(special, m):
+        return 0.0, 0.0
+    return w[0] + H * g[0], w[1] + H * (g[1] - g[0])
+
+
+def kicked(a, m, w, g, tau, delta, loop):
+    """The value of a kick, with joint rates w after it."""
+    (cx, cy), d, u, beside = a.f, a.d, m.u, m.beside
+    x, y = d[0] * u[0] + d[2] * u[1], d[1] * u[1] + d[2] * u[0]
+    fe = cx + x + beside[0], cy + y + beside[1]
+    return Kick(a.step, a.at, a.viscous, m, w, g, (x, y), fe, a.uh, tau, delta, loop)
+
+
+def servo_kick(parts, clock, body, loop, clay, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
-    links, limit, special = parts.arm.links, parts.limits, parts.special
+    special, links, limit = parts.special, parts.arm.links, parts.limits
     step = step_around(clock.before, after)
     at = handle_at(parts.arm, body, 0.5 * clock.before)
-    uh = muscle_force(parts, clock, step)
-    k, split = viscous.damping(parts.clay, special, clay, clock.t, parts.hand, step)
-    at = stopped_handle(special, split, step, at, body.w)
-    load, (cx, cy), d = loads(parts, clay, step, at, uh, k)
-    law, delta, feed, rates, pushes = servo.servo_law(parts, step, at, loop)
-    moment = Moment(step, at, k, split, uh)
-    m = moved(parts, law, load, clay, moment)
-    u, v, f, w, H = m.u, at.v, m.f, body.w, step.H
-    g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
-    tau = link_torques(links, at.u, g, f)
+    a = acting(parts, parts.clay, special, clock, step, at, body.w, clay)
+    law, delta, feed, rates, pushes = servo.servo_law(parts, step, a.at, loop)
+    m, g = driven(special, parts, clay, a, law)
+    tau = link_torques(links, at.u, g, m.f)
     if abs(tau[0]) > limit[0] or abs(tau[1]) > limit[1]:
         tau = clipped(tau, limit)
-        law = servo.torque_law(links, step, at, tau)
-        m = moved(parts, law, load, clay, moment)
-        u, f = m.u, m.f
-        g = arm.joint_velocity(u[0] - v[0], u[1] - v[1], at.u, H)
-    w = w[0] + H * g[0], w[1] + H * (g[1] - g[0])
-    if rests(special, m):
-        w = 0.0, 0.0
-    x, y = d[0] * u[0] + d[2] * u[1], d[1] * u[1] + d[2] * u[0]
+        m, g = driven(special, parts, clay, a, servo.torque_law(links, step, a.at, tau))
+    f = m.f
     rates = rates[0] + pushes[0] * f[0], rates[1] + pushes[1] * f[1]
-    return Kick(
-        step, at, k, m, w, g, (x, y), (cx + x + m.beside[0], cy + y + m.beside[1]), uh, tau,
+    return kicked(
+        a, m, rates_after(special, m, step.H, body.w, g), g, tau,
         (delta[0] + feed[0] * f[0], delta[1] + feed[1] * f[1]),
         servo.advanced(parts.lag, parts.form, step, loop, rates, f),
     )  # fmt: skip

@@ -96,11 +96,13 @@ class Hand(NamedTuple):
         mass: [kg].
         damper: [N.s/m].
         spring: [N/m].
+        longer: 1 where a kick counts its spring by the longer step around it, else by their mean.
     """
 
     mass: float
     damper: float
     spring: float
+    longer: Any
 
 
 class Signal(NamedTuple):
@@ -220,6 +222,134 @@ class Groove(NamedTuple):
     relief: Any
     rim: Any
     removed: Any
+
+
+class Sampler(NamedTuple):
+    """Sampled control and its hardware.
+
+    Attributes:
+        ratio: steps in a control sample.
+        Ts: control sample [s].
+        clay: the clay that acts on the handle; None where the motors render it.
+        special: its laws beside plain viscous damping.
+        rendered: 1 where the force that the motors hold is recorded.
+        memory: rows (A, B) of controller.held_compensator of x and of y.
+        formed: compensators of another shape.
+        own: the user's own controller.
+        command: table of the command's signal.
+        chance: random effects, four numbers a sample, see hardware.SampleNoise.
+        uneven: 1 where events may lie between the steps.
+        encoder: counts per turn.
+        difference: joint rates by difference.
+        filter: hardware.butterworth.
+        adc: converter of the force.
+        dac: converter of the torques.
+        delay: of the torques.
+        friction: Coulomb torques of both joints [N.m].
+        passivity: the passivity controller.
+        coupling: the virtual coupling.
+    """
+
+    ratio: int
+    Ts: float
+    clay: Any
+    special: Any
+    rendered: Any
+    memory: Any
+    formed: Any
+    own: Any
+    command: Any
+    chance: Any
+    uneven: Any
+    encoder: Any
+    difference: Any
+    filter: Any
+    adc: Any
+    dac: Any
+    delay: Any
+    friction: Any
+    passivity: Any
+    coupling: Any
+
+
+class Own(NamedTuple):
+    """The user's own controller.
+
+    Attributes:
+        law: called with the desk.
+        desk: the floats that it reads and writes, see sampled_controller.DESK.
+        size: numbers of its state.
+    """
+
+    law: Any
+    desk: Any
+    size: int
+
+
+class Difference(NamedTuple):
+    """Joint rates by the difference of measured angles.
+
+    Attributes:
+        window: samples that it spans.
+        cutoff: of the low-pass behind it [Hz].
+        ring: index and angles of past samples, three numbers each.
+    """
+
+    window: int
+    cutoff: Any
+    ring: Any
+
+
+class Converter(NamedTuple):
+    """A converter of two channels.
+
+    Attributes:
+        bits: resolution.
+        span: full scale of both.
+    """
+
+    bits: int
+    span: Any
+
+
+class Delay(NamedTuple):
+    """Torques come late.
+
+    Attributes:
+        delay: [s].
+        rows: of the ring.
+        ring: torques on their way, QUEUED numbers each.
+    """
+
+    delay: float
+    rows: int
+    ring: Any
+
+
+class Passivity(NamedTuple):
+    """The passivity controller.
+
+    Attributes:
+        whole: whole samples of the delay.
+        share: the rest of it, of a sample.
+        ring: forces at past samples, two numbers each.
+    """
+
+    whole: int
+    share: float
+    ring: Any
+
+
+class Coupling(NamedTuple):
+    """The virtual coupling.
+
+    Attributes:
+        spring: [N/m].
+        damper: [N.s/m].
+    """
+
+    spring: float
+    damper: float
 
 
 class Parts(NamedTuple):

@@ -7,9 +7,10 @@ search for a border works out as many as it likes; the run takes the last.
 from __future__ import annotations
 
 from ..model import regions
-from . import borders, grooves, hits, laws, rows, springs, viscous, yielding
-from .engine_step import moved_arm, put
-from .kick import commanded, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
+from . import borders, grooves, hits, laws, rows, sampled, springs, viscous, yielding
+from .drive import kick
+from .engine_step import put
+from .kick import commanded, handle_at, is_calm_end, is_finite, place, place_after, velocity
 from .state import (
     FINISHED,
     NOT_FINITE,
@@ -35,6 +36,11 @@ MOST_STEPS = 20_000  # from one sample to the next; a run that needs more ends a
 # ---- time ----------------------------------------------------------------------------------------
 
 
+def grid_after(time, i):
+    """Time of the sample behind sample i [s]."""
+    return (i + 1) * time.dt if i < time.last else time.t_max
+
+
 def next_sample(time, t, i):
     """The next sample of a run: its time, the length of the step to it (0 at the end) [s]; whether
     now is a sample.
@@ -43,7 +49,7 @@ def next_sample(time, t, i):
     on_grid = t == i * dt
     if i > time.last:
         return t, 0.0, on_grid
-    target = (i + 1) * dt if i < time.last else time.t_max
+    target = grid_after(time, i)
     after = dt if on_grid and i < time.last else target - t
     return target, after if after > 1e-9 * dt else 0.0, on_grid
 
@@ -126,16 +132,19 @@ def laws_behind(special, parts, c, q, w, h):
 def stepped(parts, s, e, k, after, target, work, filled):
     """The state after the step behind a kick; rows filled and the ledger are given."""
     special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
-    q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
+    q, w = sampled.stepped_arm(parts.sampler, parts, e, s, k, after)
     w = held_arm(special, e, k.motion.reaction, w)
-    stops = noted(special, e, s.clay.reaction, k, clock.t, x.stops)
+    before, stops = sampled.noted_early(parts.sampler, e, s, x.stops)
+    stops = noted(special, e, before, k, clock.t, stops)
     clay = clay_behind(parts, s.clay, k, q, w, after)
     t, i = clock.t + after, clock.i
-    loop = commanded(parts.command, k.loop, dt, clock, k.step)
+    loop = sampled.taken(parts.sampler, parts, s, k)
+    loop = commanded(parts.command, loop, dt, clock, k.step)
     if target - t <= 1e-9 * dt:
-        t, i = target, i + 1
+        t, i = target, i + 1 if target == grid_after(parts.time, i) else i
     clock, x = Clock(t, i, after), Filled(x.steps + 1, filled, x.crossings, stops)
-    return State(clock, Body(q, w, k.g), loop, clay, work, s.status, x)
+    status = sampled.status_behind(parts.sampler, s)
+    return State(clock, Body(q, w, k.g), loop, clay, work, status, x)
 
 
 # ---- what is kept --------------------------------------------------------------------------------
@@ -145,24 +154,25 @@ def kept(parts, s, e, k, after, shows):
     """The state with what is kept of a kick: its row, if now is a sample, and its works."""
     x = s.filled
     if shows:
-        v, f = velocity(parts.special, parts.grain, k), rows.yield_force(parts.special, k)
-        if after == 0.0:
-            v, f = slow_arrival(parts.special, parts, s, v, f)
-        b = clay_now(parts.clay, s.clay, after == 0.0, s.clock.t)
-        rows.write(parts, e.rows, x.rows, s.body.q, k, v, b)
-        rows.write_force(parts.special, parts.grain, e, x.rows, k, s.clay.laws, f, v, b)
+        write_row(parts, s, e, k, after)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
-    work = rows.with_work(parts, s.work, k, s.body.w)
+    work, w = sampled.ledger(parts.sampler, s, after)
+    work = rows.with_work(parts, work, k, w)
     return State(s.clock, s.body, s.loop, s.clay, work, s.status, x)
 
 
-def clay_now(part, clay, before, t):
-    """Damping at a sample, or that before it, (x, y) [N.s/m]."""
-    if part is None:
-        return clay.b
-    if before:
-        return viscous.grown(part.growth, clay.old, clay.growth, 1, t)
-    return viscous.grown(part.growth, clay.b, clay.growth, 0, t)
+def write_row(parts, s, e, k, after):
+    """Writes the row of a kick, and the force of the clay where b v does not tell it."""
+    i, sampler = s.filled.rows, parts.sampler
+    special = sampled.acting_laws(sampler, parts.special)
+    v, f = velocity(special, parts.grain, k), rows.yield_force(special, k)
+    if after == 0.0:
+        v, f = slow_arrival(special, parts, s, v, f)
+    b = viscous.now(parts.clay, s.clay, after == 0.0, s.clock.t)
+    fh, delta, f = sampled.shown(sampler, parts, s, k, after, v, f)
+    rows.write(e.rows, i, s.body.q, k, v, b, fh, delta)
+    rows.write_force(parts.special, parts.grain, e, i, k, s.clay.laws, f, v, b)
+    sampled.write_held(sampler, parts, e, i, k)
 
 
 # ---- borders -------------------------------------------------------------------------------------
@@ -170,9 +180,10 @@ def clay_now(part, clay, before, t):
 
 def arrival(parts, s):
     """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
+    special = sampled.acting_laws(parts.sampler, parts.special)
     k = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
-    v = velocity(parts.special, parts.grain, k)
-    return slow_arrival(parts.special, parts, s, v, (0.0, 0.0))[0]
+    v = velocity(special, parts.grain, k)
+    return slow_arrival(special, parts, s, v, (0.0, 0.0))[0]
 
 
 def slow_arrival(special, parts, s, v, f):
@@ -188,6 +199,7 @@ def stiff_arrival(stiff, special, parts, s, v, f):
     """
     if stiff is None or s.clock.before == 0.0:
         return v, f
+    s = sampled.without_event(parts.sampler, s)
     k = kick(parts, s.clock, s.body, s.loop, s.clay, s.clock.before)
     (x, y), (fx, fy) = velocity(special, parts.grain, k), rows.yield_force(special, k)
     soft = k.motion.reaction.split.soft
@@ -242,6 +254,7 @@ def towards(parts, s, after, over, first):
         if s.status.closing != OPEN:
             after = 0.0
         elif first:
+            s = sampled.acted(parts.sampler, parts, s)
             after = hits.longest(parts.hits, s.clay.hit, after)
             s, after = hits.struck(parts.hits, parts, s, after)
         first = False
@@ -276,6 +289,7 @@ def towards(parts, s, after, over, first):
 def careful(parts, s, e):
     """The state after one step with a look at its end, which lies on a border if one is in the way."""
     target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+    target, most = sampled.before_event(parts.sampler, parts.time.dt, s, target, most)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
     if s.status.code != OPEN:
         return s
@@ -320,7 +334,9 @@ def may_glide(parts, s):
     c, clay = s.clock, s.clay
     whole = c.before == parts.time.dt and c.t == c.i * parts.time.dt and c.i < parts.time.last
     calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.laws)
-    return whole and calm and s.status.closing == OPEN
+    dt, target, x = parts.time.dt, (c.i + 1) * parts.time.dt, s.status
+    _, after = sampled.before_event(parts.sampler, dt, s, target, dt)
+    return whole and calm and after == dt and x.code == OPEN and x.closing == OPEN
 
 
 def has_room(e, x, room):
@@ -330,17 +346,14 @@ def has_room(e, x, room):
 
 def whole_step(parts, s, e):
     """A whole step within one region: whether it could be made, and the state after it."""
-    dt = parts.time.dt
+    dt, s = parts.time.dt, sampled.acted(parts.sampler, parts, s)
     k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
     if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
         return False, s
-    n, special = s.filled.rows, parts.special
-    v, f = velocity(special, parts.grain, k), rows.yield_force(special, k)
-    b = clay_now(parts.clay, s.clay, False, s.clock.t)
-    rows.write(parts, e.rows, n, s.body.q, k, v, b)
-    rows.write_force(special, parts.grain, e, n, k, s.clay.laws, f, v, b)
-    work = rows.with_work(parts, s.work, k, s.body.w)
-    return True, stepped(parts, s, e, k, dt, (s.clock.i + 1) * dt, work, n + 1)
+    write_row(parts, s, e, k, dt)
+    work, w = sampled.ledger(parts.sampler, s, dt)
+    work, n = rows.with_work(parts, work, k, w), s.filled.rows + 1
+    return True, stepped(parts, s, e, k, dt, (s.clock.i + 1) * dt, work, n)
 
 
 def glide(parts, s, e, room):

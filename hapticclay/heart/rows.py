@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..model import arm
 from . import hand, laws, springs, viscous
 from .engine_step import put
-from .state import Work
+from .state import HardwareWork, Work
 
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 
@@ -17,10 +17,9 @@ def hand_force(part, k):
     return k.motion.f[0] + k.fe[0], k.motion.f[1] + k.fe[1]
 
 
-def write(parts, rows, i, q, k, v, b):
+def write(rows, i, q, k, v, b, fh, delta):  # noqa: PLR0913
     """Writes the row of a sample."""
-    p, tau, delta = k.at.p, k.tau, k.delta
-    fh = hand_force(parts.hand, k)
+    p, tau = k.at.p, k.tau
     r1, r2 = arm.joint_velocity(v[0], v[1], k.at.u, 1.0)
     put(
         rows, ROW * i,
@@ -85,5 +84,35 @@ def with_work(parts, a, k, w):
     taken = H * (dx * vx * vx + dy * vy * vy)
     return Work(
         a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
-        a.through + (abs(muscle) + abs(motors)),
+        a.through + (abs(muscle) + abs(motors)), hardware_work(a.hardware, k, w, (vx, vy)),
     )  # fmt: skip
+
+
+def hardware_work(works, k, w, v):
+    """What hardware has taken, with its works in a kick; v is the mean velocity."""
+    if works is None:
+        return works
+    H, (hold, slip), n = k.step.H, k.loop, k.w
+    rates = 0.5 * (w[0] + n[0]), 0.5 * (w[1] + n[1])
+    return HardwareWork(
+        works.friction + friction_work(slip, H, rates), works.guard + guard_work(hold.guard, H, v),
+        works.coupling + coupling_work(hold.pull, H, v),
+    )  # fmt: skip
+
+
+def friction_work(slip, H, w):
+    if slip is None:
+        return 0.0
+    return -H * (slip[0] * w[0] + slip[1] * w[1])
+
+
+def guard_work(guard, H, v):
+    if guard is None:
+        return 0.0
+    return H * (guard[0] * v[0] + guard[1] * v[1])
+
+
+def coupling_work(pull, H, v):
+    if pull is None:
+        return 0.0
+    return H * (pull.f[0] * (v[0] - pull.u[0]) + pull.f[1] * (v[1] - pull.u[1]))

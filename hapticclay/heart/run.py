@@ -162,7 +162,7 @@ class EngineStore:
         special = parts.special
         if special is not None and special.flow is not None and not len(self.stops):
             self.stops = np.empty((STOPS, 3))
-        if special is not None and rows.tells(special) and not len(self.rendered):
+        if scene.tells(parts) and not len(self.rendered):
             self.rendered = np.empty((CHUNK - 1, 3))
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
@@ -274,7 +274,7 @@ class Run:
         self.watch = monitor.StabilityMonitor(scenario)
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray]] = []  # index, rows
-        self.rendered = self.parts.special is not None and rows.tells(self.parts.special)
+        self.rendered = scene.tells(self.parts)
         self.rendered_kept: list[np.ndarray] = []
         self.last_rendered: Any = None
         self.crossings: list[Crossing] = []
@@ -305,7 +305,7 @@ class Run:
 
     def b(self) -> tuple[float, float]:
         """Clay of the present region, (x, y) [N.s/m]."""
-        return path.clay_now(self.parts.clay, self.state.clay, False, self.t)
+        return viscous.now(self.parts.clay, self.state.clay, False, self.t)
 
     # ---- steps
 
@@ -608,7 +608,8 @@ class Run:
         if self.rendered_kept:
             kept = np.concatenate(self.rendered_kept)
             out["fe"] = kept[:, :2]
-            if self.parts.special.groove is not None:
+            special = self.parts.special
+            if special is not None and special.groove is not None:
                 out["removed"] = kept[:, 2]
         return out
 
@@ -656,12 +657,22 @@ class Run:
     def balance(self) -> dict[str, float]:
         """The energy balance, as Record.energy."""
         last = energy.stored(self.parts, self.state)
-        out = energy.balance(self.state.work, self.first if self.looked else last, last)
+        out = energy.balance(self.state.work[:5], self.first if self.looked else last, last)
         laws = self.state.clay.laws
         if laws is not None and laws.elastic is not None:
             x = laws.elastic
             out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
-        return out
+        return out | self._hardware(out)
+
+    def _hardware(self, out: dict[str, float]) -> dict[str, float]:
+        """What the hardware takes; of it friction is no part of the motors."""
+        x, io = self.state.work.hardware, self.scenario.interface
+        if x is None or io is None:
+            return {}
+        used = any(io.friction), io.passivity, io.coupling is not None
+        names = "friction", "passivity_controller", "coupling"
+        found = {n: float(each) for n, each, on in zip(names, x, used, strict=True) if on}
+        return found | {"residual": out["residual"] - found.get("friction", 0.0)}
 
 
 def _drives(scenario: Scenario) -> dict[str, Any]:

@@ -37,6 +37,212 @@ class Loop(NamedTuple):
     form: Any
 
 
+class Sampled(NamedTuple):
+    """Sampled control.
+
+    Attributes:
+        machine: controller and hardware now.
+        event: what happens at this step's beginning; past once the step is taken.
+    """
+
+    machine: Any
+    event: Any
+
+
+class Machine(NamedTuple):
+    """The controller in sampled time, and its hardware; what a scene lacks is None.
+
+    Attributes:
+        x: compensator and reference model of x at the next sample.
+        y: those of y.
+        form: states of compensators of another shape.
+        own: state of the user's own controller.
+        hold: what the motors hold.
+        samples: when the next samples come.
+        force: net force last given to the compensators, (x, y) [N].
+        rates: joint rates as measured by difference.
+        filtered: states of the filters of the force, two of x, two of y.
+        guard: the passivity observer.
+        tool: place of the virtual tool, (x, y) [m].
+        queue: torques on their way.
+    """
+
+    x: Axis
+    y: Axis
+    form: Any
+    own: Any
+    hold: Any
+    samples: Any
+    force: Any
+    rates: Any
+    filtered: Any
+    guard: Any
+    tool: Any
+    queue: Any
+
+
+class Formed(NamedTuple):
+    """Compensators of another shape in sampled time.
+
+    Attributes:
+        x: states of x.
+        y: states of y.
+        start: output of start and command, to which they add, (x, y) [m].
+    """
+
+    x: Any
+    y: Any
+    start: Any
+
+
+class Hold(NamedTuple):
+    """What the motors hold.
+
+    Attributes:
+        tau: their torques [N.m].
+        force: of the clay, as rendered [N].
+        guard: of it that of the passivity controller [N].
+        pull: the virtual coupling.
+    """
+
+    tau: Any
+    force: Any
+    guard: Any
+    pull: Any
+
+
+class Pull(NamedTuple):
+    """The virtual coupling.
+
+    Attributes:
+        f: its force, (x, y) [N].
+        u: velocity of its tool, (x, y) [m/s].
+    """
+
+    f: Any
+    u: Any
+
+
+class Held(NamedTuple):
+    """What acts on the joints in a kick.
+
+    Attributes:
+        hold: what the motors hold.
+        slip: torques of friction [N.m].
+    """
+
+    hold: Hold
+    slip: Any
+
+
+class Samples(NamedTuple):
+    """When control samples come.
+
+    Attributes:
+        k: index of the next.
+        when: its time [s].
+        then: time of the one after it [s].
+    """
+
+    k: int
+    when: float
+    then: float
+
+
+class Rates(NamedTuple):
+    """Joint rates as measured by difference.
+
+    Attributes:
+        w: behind their filter [rad/s].
+        oldest: row of the ring of past samples.
+    """
+
+    w: Any
+    oldest: int
+
+
+class Guard(NamedTuple):
+    """The passivity observer.
+
+    Attributes:
+        energy: that the clay has taken, of x and y [J].
+        place: of the handle at the last sample [m].
+        newest: row of the ring of past forces.
+    """
+
+    energy: Any
+    place: Any
+    newest: int
+
+
+class Queue(NamedTuple):
+    """Torques on their way to the motors.
+
+    Attributes:
+        first: number of the next, counted from the start.
+        n: how many there are.
+        due: when the next come [s], INF for none.
+        then: those after them.
+    """
+
+    first: int
+    n: int
+    due: float
+    then: float
+
+
+class Answer(NamedTuple):
+    """What the controller makes of a sample.
+
+    Attributes:
+        shown: 1.0, 0.0 where the sample is lost.
+        hold: what the motors are to hold.
+        force: net force for the compensators [N].
+        delta: their output at the sample [m].
+        own: as Machine.own; and so on.
+        rates: joint rates as measured.
+        guard: the passivity observer.
+        tool: the virtual tool.
+    """
+
+    shown: float
+    hold: Hold
+    force: Any
+    delta: Any
+    own: Any
+    rates: Any
+    guard: Any
+    tool: Any
+
+
+class Event(NamedTuple):
+    """A control sample, or a change of the torques, at the beginning of a step.
+
+    Attributes:
+        on: whether there is one, 1.0 or 0.0.
+        at: the handle behind the kick that leads to it.
+        w: joint rates there [rad/s].
+        reaction: of the clay there.
+        fh: force of the hand in that kick [N].
+        work: the ledger with it.
+        delta: compensator output at the sample [m].
+        shown: 1.0 where a sample asks for torques.
+        asked: those.
+        machine: controller and hardware behind the event.
+    """
+
+    on: float
+    at: Any
+    w: Any
+    reaction: Any
+    fh: Any
+    work: Any
+    delta: Any
+    shown: float
+    asked: Hold
+    machine: Machine
+
+
 class Clock(NamedTuple):
     """Where in time a run is.
 
@@ -254,6 +460,7 @@ class Work(NamedTuple):
         clay: taken by the clay.
         hand: taken by the damper of the hand.
         through: sum of the magnitudes.
+        hardware: what hardware takes; None without any.
     """
 
     muscle: float
@@ -261,6 +468,21 @@ class Work(NamedTuple):
     clay: float
     hand: float
     through: float
+    hardware: Any
+
+
+class HardwareWork(NamedTuple):
+    """What the hardware between computer and arm takes [J]; the last two are part of motors.
+
+    Attributes:
+        friction: of the joints.
+        guard: of the passivity controller.
+        coupling: of the virtual coupling.
+    """
+
+    friction: float
+    guard: float
+    coupling: float
 
 
 class Status(NamedTuple):
@@ -398,14 +620,17 @@ class Viscous(NamedTuple):
     b1: Any
 
 
-class Moment(NamedTuple):
-    """What a kick is worked out from.
+class Acting(NamedTuple):
+    """What acts on the handle in a kick, whatever drives it.
 
     Attributes:
         step: the steps around it.
         at: the handle before it.
         viscous: damping in it.
         split: how stiff clay splits that.
+        load: all of it that is linear in the velocity after the kick.
+        f: of it the force of the clay on the velocity before [N].
+        d: of it the damping of the clay on the velocity after, (xx, yy, xy) [N.s/m].
         uh: muscle force [N].
     """
 
@@ -413,6 +638,9 @@ class Moment(NamedTuple):
     at: Handle
     viscous: Viscous
     split: Any
+    load: Load
+    f: Any
+    d: Any
     uh: Any
 
 
@@ -448,8 +676,8 @@ class Kick(NamedTuple):
         fe: mean force of the clay [N].
         uh: muscle force [N].
         tau: torques [N.m].
-        delta: compensator output at the sample [m].
-        loop: behind the step after it.
+        delta: compensator output at the sample [m]; none of sampled control.
+        loop: behind the step after it; of sampled control what acts on the joints.
     """
 
     step: Step

@@ -56,6 +56,15 @@ def grown(part, b, growth, before, t):
     return law.damping_at(b, growth.old if before else growth.rate, t)
 
 
+def now(part, clay, before, t):
+    """Damping at a sample, or that before it, (x, y) [N.s/m]."""
+    if part is None:
+        return clay.b
+    if before:
+        return grown(part.growth, clay.old, clay.growth, 1, t)
+    return grown(part.growth, clay.b, clay.growth, 0, t)
+
+
 def force(grain, b, v):
     """Force of damping, (x, y) [N]."""
     if grain is None:

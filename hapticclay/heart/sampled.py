@@ -1,0 +1,699 @@
+"""Sampled control: a machine around the kick. It senses, computes, queues and holds.
+
+At an event, a control sample or a change of the torques, the kick falls into two: one under the old
+torques, which brings the velocity to the sample, where it is measured, and one under the new.
+"""
+
+from __future__ import annotations
+
+from ..model import arm, compensator, controller, operator
+from ..model import flow as yielding_law
+from ..model import spring as spring_law
+from . import friction, grooves, hardware, rows, servo, viscous, yielding
+from .engine_step import moved_arm, put
+from .kick import (
+    at_rates,
+    clipped,
+    command_change,
+    handle_at,
+    link_torques,
+    mean_push,
+    step_around,
+    velocity,
+)
+from .parts import INF
+from .sampled_controller import asked_law, is_refused
+from .state import (
+    NOT_FINITE,
+    Answer,
+    Axis,
+    Event,
+    Formed,
+    Handle,
+    Hold,
+    Load,
+    Machine,
+    Sampled,
+    Samples,
+    State,
+    Status,
+    Step,
+)
+from .torque import behind, pushed
+
+SLACK = 1e-9  # of dt: events so close are one
+NONE = (0.0, 0.0)
+REACTION = 1e-9  # [s] so long after a sample a force is that at it
+FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
+
+
+# ---- the operator's force on the sensor, and that of clay that yields, at an instant ---------------
+
+
+def masses(hand):
+    """Masses of the hand, (x, y) [kg]."""
+    if hand is None:
+        return NONE
+    return hand[0].mass, hand[1].mass
+
+
+def instant_acceleration(parts, at, tau, f):
+    """Acceleration of the handle and its hand under torques and a force, (x, y) [m/s^2]."""
+    x, y = masses(parts.hand)
+    # a kick of one second from rest, in which the velocity after it is the acceleration
+    at = Handle(at.u, at.p, at.W, NONE, at.c)
+    law = servo.torque_law(parts.arm.links, Step(1.0, 0.0, 1.0, 0.0, 1.0), at, tau)
+    return servo.solve(law, Load(f, (x, y, 0.0)))
+
+
+def resisted(hand, uh, at):
+    """Muscle force less that of the hand without its acceleration along the way, (x, y) [N]."""
+    if hand is None:
+        return uh
+    (x, y), p, v, c = hand, at.p, at.v, at.c
+    return (
+        uh[0] - operator.operator_force(x.spring, x.mass, x.damper, p[0], c[0], v[0]),
+        uh[1] - operator.operator_force(y.spring, y.mass, y.damper, p[1], c[1], v[1]),
+    )
+
+
+def outer_force(part, sampler, parts, s, uh, at):
+    """All forces on the handle at an instant but that of clay that yields, (x, y) [N].
+
+    Of the clay before the sample.
+    """
+    x, y = resisted(parts.hand, uh, at)
+    if part is None:
+        return x, y
+    b = viscous.now(part, s.clay, True, s.clock.t)
+    bx, by = viscous.force(parts.grain, b, at.v)
+    px, py = sprung_before(sampler.special, s.clay.laws)
+    return x - bx - px, y - by - py
+
+
+def sprung_before(special, state):
+    if special is None:
+        return NONE
+    return elastic_before(special.springs, state)
+
+
+def elastic_before(springs, state):
+    if springs is None:
+        return NONE
+    return state.elastic.before
+
+
+def reaction(special, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
+    """Force of physical clay that yields at an instant, (x, y) [N].
+
+    Where clay holds the handle it is what keeps it from accelerating.
+
+    Args:
+        special: laws of the clay that acts.
+        sampler: the machine.
+        parts: the scene.
+        s: the state.
+        felt: laws of the clay behind the kick that leads to the instant.
+        at: the handle.
+        tau: torques on the joints [N.m].
+        uh: muscle force [N].
+    """
+    if special is None:
+        return NONE
+    return reaction_of(special.flow, sampler, parts, s, felt, at, tau, uh)
+
+
+def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
+    if flow is None:
+        return NONE
+    f = outer_force(sampler.clay, sampler, parts, s, uh, at)
+    ax, ay = instant_acceleration(parts, at, tau, f)
+    x, y = masses(parts.hand)
+    xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), at.W, (x, y, 0.0))
+    h, grain, clay = REACTION, parts.grain, behind(sampler.special, s.clay, felt)
+    stuck = felt.felt.stuck
+    B, a = (h * xx, h * xy, h * yx, h * yy), (ax - at.c[0], ay - at.c[1])
+    vx, vy = viscous.along(grain, at.v[0], at.v[1])
+    v = 0.0 if stuck[0] > 0.0 else vx, 0.0 if stuck[1] > 0.0 else vy
+    law = yielding.law_in_kick(sampler.special.groove, flow, clay, 1.0, B, v, a)
+    ax, ay = viscous.along(grain, a[0], a[1])
+    end = v[0] + h * ax, v[1] + h * ay
+    B = yielding.turned_matrix(grain, B)
+    _, _, _, fs, _ = yielding.split_resist(yielding.resist_by(flow.along, B, v, end, law, 0.0))
+    return viscous.across(grain, fs[0], fs[1])
+
+
+def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
+    """Force of the operator on the sensor at an instant, (x, y) [N].
+
+    At the start the handle does not accelerate.
+
+    Args:
+        hand: the operator's arm.
+        sampler: the machine.
+        parts: the scene.
+        s: the state.
+        at: the handle.
+        tau: torques on the joints [N.m].
+        uh: muscle force [N].
+        pull: force of physical clay that yields [N].
+    """
+    if hand is None:
+        return uh
+    if s.clock.before == 0.0:
+        return resisted(hand, uh, Handle(at.u, at.p, at.W, at.v, NONE))
+    x, y = outer_force(sampler.clay, sampler, parts, s, uh, at)
+    ax, ay = instant_acceleration(parts, at, tau, (x - pull[0], y - pull[1]))
+    x, y = resisted(hand, uh, at)
+    return x - hand[0].mass * ax, y - hand[1].mass * ay
+
+
+# ---- sense ---------------------------------------------------------------------------------------
+
+
+def soft_velocity(special, sampler, parts, s, at, early):
+    """Velocity at a sample, (x, y) [m/s]: behind the early kick, but in stiff clay."""
+    if special is None:
+        return early.motion.u
+    return stiff_velocity(special.stiff, sampler, parts, s, at, early)
+
+
+def stiff_velocity(part, sampler, parts, s, at, early):
+    """As `soft_velocity`: half a kick holds too little of stiff clay; the velocity is that of a
+    whole kick, with the step before it repeated.
+    """
+    if part is None:
+        return early.motion.u
+    t, before, u = s.clock.t, s.clock.before, early.motion.u
+    step = step_around(before, before)
+    _, split = viscous.damping(sampler.clay, sampler.special, s.clay, t, parts.hand, step)
+    soft = split.soft
+    if soft[0] == 0.0 and soft[1] == 0.0:
+        return u
+    k = pushed(sampler, parts, s.clock, step, at, s.body.w, s.clay, s.loop.machine.hold)
+    x, y = velocity(sampler.special, parts.grain, k)
+    return x if soft[0] > 0.0 else u[0], y if soft[1] > 0.0 else u[1]
+
+
+def rates_of(at, u, v, w):
+    """Joint rates of a handle velocity v [rad/s]; w where it is u, of which they are."""
+    if v == u:
+        return w
+    r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
+    return r1, r2 - r1
+
+
+# ---- compute -------------------------------------------------------------------------------------
+
+
+def rendered_clay(part, special, sampler, parts, s, at, pull):  # noqa: PLR0913
+    """Force of the clay as the controller takes it, (x, y) [N]; pull is that of yielding."""
+    if part is None:
+        return NONE
+    b = viscous.now(part, s.clay, False, s.clock.t)
+    x, y = viscous.force(parts.grain, b, at.v)
+    fx, fy = special_force(special, sampler, parts, s, at, pull)
+    return x + fx, y + fy
+
+
+def special_force(special, sampler, parts, s, at, pull):
+    if special is None:
+        return NONE
+    x, y = flowing_force(special.flow, sampler.clay, special, parts, s.clay.laws, at.v, pull)
+    px, py = springs_force(special.springs, sampler, s.clay.laws.elastic, at.p)
+    return x + px, y + py
+
+
+def flowing_force(flow, clay, special, parts, state, v, pull):  # noqa: PLR0913
+    if flow is None:
+        return NONE
+    return force_in_motion(clay, flow, special.groove, parts.grain, state.flow, v, pull)
+
+
+def force_in_motion(clay, flow, groove, grain, felt, v, pull):  # noqa: PLR0913
+    """Force of clay that yields, beside b v, on a handle in motion; none at rest.
+
+    Where the clay acts itself, it is what holds it.
+    """
+    if clay is None:
+        law = law_now(groove, felt, v)
+        x, y = viscous.along(grain, v[0], v[1])
+        x, y = yielding_law.motion_force(law, flow.along is not None, x, y)
+        return viscous.across(grain, x, y)
+    return pull
+
+
+def law_now(groove, felt, v):
+    """Fy, K, n of x and y of clay that yields, in a direction."""
+    if groove is None:
+        return felt.law
+    return grooves.law_along(groove, v[0], v[1])
+
+
+def springs_force(part, sampler, elastic, p):
+    if part is None:
+        return NONE
+    return sprung_force(part.rendered, sampler, elastic, p)
+
+
+def sprung_force(rendered, sampler, elastic, p):
+    if rendered is None:
+        return elastic.force
+    return measured_pull(sampler.encoder, elastic, p)
+
+
+def measured_pull(encoder, x, p):
+    """Force of the springs that the motors render, at a place as an encoder reads it, (x, y) [N].
+
+    What gave way and what relaxed since goes by the true place.
+    """
+    if encoder is None:
+        return x.force
+    (a, b), rest, stretch, at = x.numbers, x.rest, x.stretch, x.at
+    return (
+        axis_pull(a, rest[0], stretch[0], at[0], p[0]), axis_pull(b, rest[1], stretch[1], at[1], p[1])
+    )  # fmt: skip
+
+
+def axis_pull(n, rest, stretch, at, p):
+    _, f, _, _ = spring_law.spring_step(n[0], n[1], n[5], rest, p)
+    # the second spring is as long as when the handle was last seen, and what was misread
+    _, f1, _, _ = spring_law.spring_step(n[2], INF, n[5], at - stretch, p)
+    return f + f1
+
+
+def outputs(formed, form, m, f):
+    """Output of the compensators at a sample under a net force, (x, y) [m]."""
+    if formed is None:
+        return m.x.delta, m.y.delta
+    z = m.form
+    return (
+        shown_axis(form, 0, z.x, z.start[0] + form_feed(form, 0) * f[0]),
+        shown_axis(form, 1, z.y, z.start[1] + form_feed(form, 1) * f[1]),
+    )
+
+
+def form_feed(form, i):
+    """What each unit of force adds to the output of a compensator at once [m/N]."""
+    return form.gain[i] * float(form.numbers[compensator.FORM * i + 24])
+
+
+def shown_axis(form, i, z, out):
+    c, o = form.numbers, compensator.FORM * i + 20
+    for j in range(compensator.ORDER):
+        out += float(c[o + j]) * z[j]
+    return out
+
+
+def servo_torques(parts, m, at, delta, f):
+    """Torques of the servo, beside a net force on the handle [N.m]."""
+    (sx, sy), x, y, p, v, c = parts.servo, m.x, m.y, at.p, at.v, at.c
+    ax, _ = controller.feedback_law(sx, delta[0], x.y, x.yrate, p[0], v[0], c[0])
+    ay, _ = controller.feedback_law(sy, delta[1], y.y, y.yrate, p[1], v[1], c[1])
+    xx, xy, yy = servo.servo_mobility(parts.shaping, parts.servo, at.W)
+    ax, ay = ax + xx * f[0] + xy * f[1], ay + xy * f[0] + yy * f[1]
+    return link_torques(parts.arm.links, at.u, arm.joint_velocity(ax, ay, at.u, 1.0), f)
+
+
+def held_torques(clay, at, tau, fe):
+    """Torques that render the clay too, where it is not there [N.m]."""
+    if clay is None:
+        x, y = arm.joint_torques(fe[0], fe[1], at.u)
+        return tau[0] - x, tau[1] - y
+    return tau
+
+
+def driven_torques(part, limits, tau):
+    """Torques of the motors, within their limits and behind the converter [N.m]."""
+    return hardware.converted(part, clipped(tau, limits))
+
+
+def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
+    """What the controller makes of a sample.
+
+    Args:
+        chance: random effects.
+        sampler: the machine.
+        parts: the scene.
+        s: the state.
+        at: the handle.
+        w: joint rates [rad/s].
+        f: force of the operator as the sensor tells it [N].
+        pull: force of physical clay that yields [N].
+    """
+    if chance is None:
+        return heard(sampler.own, sampler, parts, s, at, w, f, pull)
+    m = s.loop.machine
+    if float(chance[hardware.CHANCE * m.samples.k + 1]) > 0.0:  # lost
+        delta = m.x.delta, m.y.delta
+        return Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
+    return heard(sampler.own, sampler, parts, s, at, w, f, pull)
+
+
+def heard(own, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
+    """The same of a sample that is not lost: of the paper's controller, or the user's own."""
+    m = s.loop.machine
+    q = hardware.encoded(sampler.encoder, s.body.q)
+    w, rates = hardware.differenced(sampler.difference, m.rates, m.samples.k, sampler.Ts, q, w)
+    if own is None:
+        at = hardware.handle_seen(sampler.encoder, sampler.difference, parts.arm, at, q, w)
+        return computed(sampler, parts, s, at, f, pull, rates)
+    tau, state = asked_law(own, s.clock.t, q, w, f, m.own)
+    if not is_refused(tau):
+        tau = driven_torques(sampler.dac, parts.limits, tau)
+    none, pull = hardware.nothing(sampler.passivity), hardware.no_pull(sampler.coupling)
+    hold = Hold(tau, NONE, none, pull)
+    return Answer(1.0, hold, m.force, NONE, state, rates, m.guard, m.tool)
+
+
+def computed(sampler, parts, s, at, f, pull, rates):
+    """What compensator and servo make of a sample."""
+    m, state, Ts = s.loop.machine, s.clay.laws, sampler.Ts
+    fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, pull)
+    b = viscous.now(parts.clay, s.clay, False, s.clock.t)
+    fe, pulled, tool = hardware.coupled(
+        sampler.coupling, parts.special, state, m.tool, at, b, fe, Ts
+    )
+    fe, added, guard = hardware.guarded(sampler.passivity, m.guard, at, fe, Ts)
+    f = f[0] - fe[0], f[1] - fe[1]
+    delta = outputs(sampler.formed, parts.form, m, f)
+    tau = held_torques(sampler.clay, at, servo_torques(parts, m, at, delta, f), fe)
+    hold = Hold(driven_torques(sampler.dac, parts.limits, tau), fe, added, pulled)
+    return Answer(1.0, hold, f, delta, m.own, rates, guard, tool)
+
+
+# ---- compensator and reference model at the next sample ---------------------------------------------
+
+
+def advanced(own, sampler, parts, m, f, shift):
+    """The loops of x and y, and states of other compensators, a sample later."""
+    if own is None:
+        return advanced_by(sampler.memory, sampler, parts, m, f, shift)
+    return m.x, m.y, m.form
+
+
+def advanced_by(memory, sampler, parts, m, f, shift):
+    if memory is None:
+        return advanced_form(sampler.formed, parts.form, m, f, shift)
+    x, y = memory
+    return over_sample(x, m.x, f[0], shift[0]), over_sample(y, m.y, f[1], shift[1]), m.form
+
+
+def over_sample(m, z, f, shift):
+    """One axis a sample later, under a force that is held."""
+    (
+        a00, a01, a02, a03, b0, a10, a11, a12, a13, b1,
+        a20, a21, a22, a23, b2, a30, a31, a32, a33, b3,
+    ) = m  # fmt: skip
+    d, e, y, r = z
+    return Axis(
+        a00 * d + a01 * e + a02 * y + a03 * r + b0 * f + shift,
+        a10 * d + a11 * e + a12 * y + a13 * r + b1 * f,
+        a20 * d + a21 * e + a22 * y + a23 * r + b2 * f,
+        a30 * d + a31 * e + a32 * y + a33 * r + b3 * f,
+    )
+
+
+def advanced_form(memory, form, m, f, shift):
+    z = m.form
+    x, zx = form_over_sample(memory, form, 0, m.x, z.x, z.start[0], f[0], shift[0])
+    y, zy = form_over_sample(memory, form, 1, m.y, z.y, z.start[1], f[1], shift[1])
+    return x, y, Formed(zx, zy, (z.start[0] + shift[0], z.start[1] + shift[1]))
+
+
+def form_over_sample(memory, form, i, x, z, start, f, shift):  # noqa: PLR0913
+    """Loop and states of one axis a sample later."""
+    o, at = FORM_MEMORY * i, (x.y, x.yrate, start, f)
+    a, b = form_row(memory, o, z, at), form_row(memory, o + 8, z, at)
+    c, d = form_row(memory, o + 16, z, at), form_row(memory, o + 24, z, at)
+    z1 = a, b, c, d
+    delta = shown_axis(form, i, z1, start + shift + form_feed(form, i) * f)
+    y, rate = form_row(memory, o + 32, z, at), form_row(memory, o + 40, z, at)
+    return Axis(delta, 0.0, y, rate), z1
+
+
+def form_row(m, o, z, at):
+    out = float(m[o + 4]) * at[0] + float(m[o + 5]) * at[1]
+    out += float(m[o + 6]) * at[2] + float(m[o + 7]) * at[3]
+    for j in range(compensator.ORDER):
+        out += float(m[o + j]) * z[j]
+    return out
+
+
+def shift_of(command, t, Ts):
+    """Change of the command over a sample, (x, y) [m]."""
+    if command is None:
+        return NONE
+    return command_change(command, t, t + Ts, 0.0)
+
+
+# ---- an event ------------------------------------------------------------------------------------
+
+
+def samples_from(sampler, dt, k):
+    """The times of sample k and the one after it."""
+    when, then = k * sampler.ratio * dt, (k + 1) * sampler.ratio * dt
+    chance = sampler.chance
+    return Samples(k, when + hardware.late(chance, k), then + hardware.late(chance, k + 1))
+
+
+def acted(sampler, parts, s):
+    """The state with what the controller does at the beginning of a step; as it was elsewhere."""
+    if sampler is None:
+        return s
+    m, dt = s.loop.machine, parts.time.dt
+    now = s.clock.t + SLACK * dt
+    acts = m.samples.when <= now
+    if acts or hardware.is_due(sampler.delay, m.queue, now):
+        return with_event(s, event(sampler, parts, s, acts, now))
+    return with_event(s, past(s.loop.event))
+
+
+def with_event(s, e):
+    loop = Sampled(s.loop.machine, e)
+    return State(s.clock, s.body, loop, s.clay, s.work, s.status, s.filled)
+
+
+def past(e):
+    """An event that is over."""
+    return Event(
+        0.0, e.at, e.w, e.reaction, e.fh, e.work, e.delta, e.shown, e.asked, e.machine
+    )  # fmt: skip
+
+
+def event(sampler, parts, s, acts, now):
+    """An event: the kick that leads to it, what is measured there, and what the motors then hold."""
+    clock, m, hand, w = s.clock, s.loop.machine, parts.hand, s.body.w
+    at, uh = handle_at(parts.arm, s.body, 0.0), mean_push(parts.push, clock.t, 0.0)
+    left, work, fh, seen, tau = s.clay.reaction, s.work, NONE, w, NONE
+    if clock.before > 0.0:
+        step = step_around(clock.before, 0.0)
+        k = pushed(sampler, parts, clock, step, at, w, s.clay, m.hold)
+        left, fh = k.motion.reaction, rows.hand_force(hand, k)
+        work = rows.with_work(parts, work, k, w)
+        tau, w, u = friction.on_joints(k.loop.slip, m.hold.tau), k.w, k.motion.u
+        seen = rates_of(at, u, soft_velocity(sampler.special, sampler, parts, s, at, k), w)
+    late = at_rates(at, w)
+    sight = late if seen == w else at_rates(at, seen)
+    pull = reaction(sampler.special, sampler, parts, s, left, sight, tau, uh)
+    f = on_sensor(hand, sampler, parts, s, sight, tau, uh, pull)
+    machine, a = sampled(sampler, parts, s, sight, seen, f, pull, acts)
+    hold, queue = hardware.queued(sampler.delay, m, a.hold, a.shown, now)
+    machine = with_hold(machine, hold, queue)
+    return Event(1.0, late, w, left, fh, work, a.delta, a.shown, a.hold, machine)
+
+
+def with_hold(m, hold, queue):
+    return Machine(
+        m.x, m.y, m.form, m.own, hold, m.samples, m.force, m.rates, m.filtered, m.guard, m.tool,
+        queue,
+    )  # fmt: skip
+
+
+def sampled(sampler, parts, s, at, w, f, pull, acts):  # noqa: PLR0913
+    """Controller and hardware behind a sample, but for what the motors hold; and its answer.
+
+    Where it is none, as they were.
+    """
+    m = s.loop.machine
+    if not acts:
+        delta = m.x.delta, m.y.delta
+        return m, Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
+    f = hardware.noise(sampler.chance, m.samples.k, f)
+    f, filtered = hardware.filtered(sampler.filter, m.filtered, f)
+    f = hardware.converted(sampler.adc, f)
+    a = answer(sampler.chance, sampler, parts, s, at, w, f, pull)
+    shift = shift_of(sampler.command, s.clock.t, sampler.Ts)
+    x, y, form = advanced(sampler.own, sampler, parts, m, a.force, shift)
+    samples = samples_from(sampler, parts.time.dt, m.samples.k + 1)
+    return Machine(
+        x, y, form, a.own, m.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
+    ), a
+
+
+# ---- the path ------------------------------------------------------------------------------------
+
+
+def before_event(sampler, dt, s, target, after):
+    """The next stop of the path and the step to it [s]: an event between the samples, if any."""
+    if sampler is None:
+        return target, after
+    return before_uneven(sampler.uneven, sampler, dt, s, target, after)
+
+
+def before_uneven(uneven, sampler, dt, s, target, after):
+    if uneven is None:
+        return target, after
+    t, near = s.clock.t, SLACK * dt
+    if after <= 0.0:
+        return target, after
+    x = s.loop.machine.samples
+    stop = first_after(t + near, x.when, first_after(t + near, x.then, INF))
+    stop = first_due(sampler.delay, s.loop.machine, t + near, stop)
+    if stop < target - near:
+        return stop, stop - t
+    return target, after
+
+
+def first_after(t, event_, stop):
+    return event_ if t < event_ < stop else stop
+
+
+def first_due(delay, m, t, stop):
+    if delay is None:
+        return stop
+    stop = first_after(t, m.samples.when + delay.delay, stop)
+    return first_after(t, m.queue.due, first_after(t, m.queue.then, stop))
+
+
+def acting_laws(sampler, special):
+    """Laws of the clay that act on the handle."""
+    if sampler is None:
+        return special
+    return sampler.special
+
+
+def without_event(sampler, s):
+    """The state as it is for a kick that no event begins."""
+    if sampler is None:
+        return s
+    return with_event(s, past(s.loop.event))
+
+
+def is_early(s, after):
+    """Whether a kick leads to an event before that of a step of length `after`."""
+    return s.loop.event.on > 0.0 and after > 0.0
+
+
+def shown(sampler, parts, s, k, after, v, f):
+    """What a row shows beside the kick: force of the hand [N], compensator output [m], force of
+    clay that yields at velocity v [N].
+    """
+    if sampler is None:
+        return rows.hand_force(parts.hand, k), k.delta, f
+    f, e, m, share = rows.hand_force(parts.hand, k), s.loop.event, s.loop.machine, 0.0
+    delta = m.x.delta, m.y.delta
+    if is_early(s, after):
+        delta, before = e.delta, s.clock.before
+        if before > 0.0:  # the means of both kicks, half of each step, interpolated at the sample
+            share = after / (before + after)
+            f = f[0] + share * (e.fh[0] - f[0]), f[1] + share * (e.fh[1] - f[1])
+    return f, delta, felt_at(parts.special, sampler, parts, s, k, share, v)
+
+
+def felt_at(special, sampler, parts, s, k, share, v):  # noqa: PLR0913
+    if special is None:
+        return NONE
+    return flow_at(special.flow, sampler.clay, parts, s, k, share, v)
+
+
+def flow_at(flow, clay, parts, s, k, share, v):  # noqa: PLR0913
+    if flow is None:
+        return NONE
+    x, old = k.motion.reaction.felt.f, s.loop.event.reaction.felt.f
+    x = x[0] + share * (old[0] - x[0]), x[1] + share * (old[1] - x[1])
+    return force_in_motion(clay, flow, parts.special.groove, parts.grain, s.clay.laws.flow, v, x)
+
+
+def write_held(sampler, parts, e, i, k):
+    """Writes the force of the clay that the motors hold, where they do."""
+    if sampler is None:
+        return
+    write_rendered(sampler.rendered, e, i, k)
+
+
+def write_rendered(rendered, e, i, k):
+    if rendered is None:
+        return
+    put(e.rendered, 3 * i, k.loop.hold.force)
+
+
+def ledger(sampler, s, after):
+    """The ledger before the kick that leads on, and the joint rates there [rad/s]."""
+    if sampler is None:
+        return s.work, s.body.w
+    if is_early(s, after):
+        return s.loop.event.work, s.loop.event.w
+    return s.work, s.body.w
+
+
+def noted_early(sampler, e, s, n):
+    """Special laws of the clay before the kick that leads on; stops noted in that to an event."""
+    if sampler is None:
+        return s.clay.reaction, n
+    return noted_in(sampler.special, e, s, n)
+
+
+def noted_in(special, e, s, n):
+    if special is None:
+        return s.clay.reaction, n
+    n = noted_event(special.flow, e, s, n)
+    return s.loop.event.reaction if is_early(s, 1.0) else s.clay.reaction, n
+
+
+def noted_event(flow, e, s, n):
+    if flow is None:
+        return n
+    if is_early(s, 1.0):
+        now, was = s.loop.event.reaction.felt, s.clay.reaction.felt
+        return yielding.noted(flow, e, now, was, s.clock.t, n)
+    return n
+
+
+def stepped_arm(sampler, parts, e, s, k, after):
+    """Steps the engine to the rates of a kick, and of that to an event; joint angles and rates."""
+    before = s.clock.before
+    if sampler is None:
+        return moved_arm(parts, e, before, s.body.w, k, after)
+    return moved_arm(parts, e, -1.0, s.body.w, k, after)
+
+
+def taken(sampler, parts, s, k):
+    """The loop behind a step that is taken."""
+    if sampler is None:
+        return k.loop
+    loop, e, x = s.loop, s.loop.event, s.status
+    if e.on == 0.0:
+        return loop
+    if e.shown > 0.0:
+        q = hardware.encoded(sampler.encoder, s.body.q)
+        hardware.note_angles(sampler.difference, loop.machine, q)
+        hardware.note_force(sampler.passivity, e.machine, e.asked.force)
+        hardware.note_hold(sampler.delay, loop.machine, e.machine, e.asked)
+    return Sampled(e.machine, past(e))
+
+
+def status_behind(sampler, s):
+    """Status behind a step that is taken."""
+    if sampler is None:
+        return s.status
+    return status_of(sampler.own, s.status, s.loop.event)
+
+
+def status_of(own, x, e):
+    """The run is over where the user's own controller asks for torques that are not finite."""
+    if own is None:
+        return x
+    if e.on > 0.0 and e.shown > 0.0 and is_refused(e.asked.tau):
+        return Status(NOT_FINITE, x.closing, x.careful, x.landings, x.seen)
+    return x
