@@ -36,11 +36,14 @@ from ..model import (
 from ..stepping import cache, monitor
 from ..stepping.run import cache_folder
 from ..stepping.engine import mujoco
+from . import hardware as wires
 from . import (
     begin,
     borders,
+    drive,
     energy,
     engine_step,
+    friction,
     grooves,
     hand,
     hits,
@@ -51,9 +54,12 @@ from . import (
     path,
     run,
     rows,
+    sampled,
+    sampled_controller,
     servo,
     springs,
     stiff,
+    torque,
     viscous,
     yielding,
 )
@@ -61,7 +67,8 @@ from . import (
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
-    engine_step, begin, energy, laws, many, monitor,
+    engine_step, begin, energy, laws, many, monitor, drive, friction, sampled, sampled_controller, torque,
+    wires,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
