@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from ..model import regions
 from . import grooves, springs, viscous
-from .kick import kick, place_after
+from .march import TOUCH, place_behind, worked
 from .state import Clay, Felt, Growth, Hit, Region, Special, State, Status
 
-TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 
 
 def side(p, low, high):
@@ -122,10 +121,9 @@ def passed_alike(parts, s, here, p):
 # ---- the step that ends on a border --------------------------------------------------------------
 
 
-def beyond(h, parts, s, i, border):
+def beyond(h, probe, parts, s, i, border):
     """Distance by which a step of length h would pass a border of coordinate i [m]."""
-    k = kick(parts, s.clock, s.body, s.loop, s.clay, h)
-    x, y = place_after(parts.arm, s.body.q, k, h)
+    x, y = place_behind(probe, parts, s, worked(probe, parts, s, h), h)
     return (y if i else x) - border
 
 
@@ -163,14 +161,14 @@ def find_root(f, b, fb, *args):
     return b
 
 
-def first_border(parts, s, after, p, sx, sy):
+def first_border(probe, parts, s, after, p, sx, sy):
     """The step that ends on the first border in its way: its length [s], coordinate, side."""
     span, axis, up = after, -1, 0
     for i in range(2):
         at = sy if i else sx
         if at != 0:
             border = border_of(s.clay.region, i, at)
-            length = find_root(beyond, after, (p[1] if i else p[0]) - border, parts, s, i, border)
+            length = find_root(beyond, after, (p[1] if i else p[0]) - border, probe, parts, s, i, border)
             if axis < 0 or length < span:
                 span, axis, up = length, i, at
     return span, axis, up

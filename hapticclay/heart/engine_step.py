@@ -2,7 +2,33 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from ..model import arm
+
+
+class Probe(NamedTuple):
+    """What the accurate method has of the engine.
+
+    Attributes:
+        forward: mj_forward.
+        model: the model.
+        data: its data.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        acceleration: joint accelerations [rad/s^2].
+        ctrl: torques of the motors [N.m] and dampers [N.s/m].
+        push: applied joint torques [N.m].
+    """
+
+    forward: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    acceleration: Any
+    ctrl: Any
+    push: Any
 
 
 def put(array, i, values):
@@ -45,3 +71,14 @@ def moved_arm(parts, e, before, w, k, h):
     a1, a2 = (n[0] - w[0]) / h, (n[0] + n[1] - w[0] - w[1]) / h
     push = links[2] * a1 + links[3] * a2 - tau[0], links[3] * a2 - tau[1]
     return step_engine(e, parts.clay, tau, push, (0.0, 0.0), h)
+
+
+def accelerations(probe, clay, z, now):
+    """Joint accelerations that the engine gives at a point of a step [rad/s^2]."""
+    put(probe.q, 0, z.q)
+    put(probe.w, 0, z.w)
+    put(probe.ctrl, 0, now.tau)
+    with_dampers(clay, probe, now.b)
+    put(probe.push, 0, now.push)
+    probe.forward(probe.model, probe.data)
+    return pair(probe.acceleration)

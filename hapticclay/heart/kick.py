@@ -41,10 +41,14 @@ def handle_at(part, body, half):
 
 def muscle_force(push, t, step):
     """Mean muscle force over a kick at t, (x, y) [N]."""
-    since, x, y, rx, ry = push.steady
     t = t + 0.25 * (step.after - step.before)
-    f = x + (t - since) * rx, y + (t - since) * ry
-    return with_signal(push.muscle, f, t, 0.5 * step.H)
+    return with_signal(push.muscle, steady_force(push, t), t, 0.5 * step.H)
+
+
+def steady_force(push, t):
+    """Muscle force but for signals, (x, y) [N]."""
+    since, x, y, rx, ry = push.steady
+    return x + (t - since) * rx, y + (t - since) * ry
 
 
 def with_signal(table, f, t, h):

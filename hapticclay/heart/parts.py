@@ -205,6 +205,36 @@ class Groove(NamedTuple):
     removed: Any
 
 
+class Modal(NamedTuple):
+    """Clay that yields, in the accurate method.
+
+    Attributes:
+        along: None where each axis yields by itself, 1 along the motion.
+        grain: as Parts.grain; None along the motion.
+        lightness: largest acceleration per unit of force, by way of C too [1/kg].
+        dt: length of a sample [s].
+    """
+
+    along: Any
+    grain: Any
+    lightness: float
+    dt: float
+
+
+class Accurate(NamedTuple):
+    """The accurate method.
+
+    Attributes:
+        substeps: engine steps a sample.
+        blocks: the same by block of samples, where the clay grows.
+        modal: clay that yields.
+    """
+
+    substeps: int
+    blocks: Any
+    modal: Any
+
+
 class Parts(NamedTuple):
     """A scene.
 

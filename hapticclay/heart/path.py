@@ -7,9 +7,9 @@ search for a border works out as many as it likes; the run takes the last.
 from __future__ import annotations
 
 from ..model import regions
-from . import borders, grooves, hits, rows, springs, viscous, yielding
+from . import borders, ends, grooves, hits, march, rows, springs, viscous, yielding
 from .engine_step import moved_arm, put
-from .kick import command_change, handle_at, is_calm_end, is_finite, kick, place, place_after, velocity
+from .kick import command_change, handle_at, is_calm_end, is_finite, kick, place, velocity
 from .parts import INF
 from .state import (
     FINISHED,
@@ -108,11 +108,11 @@ def commanded(table, loop, t0, t1, h):
     return Loop(x, y, loop.form)
 
 
-def noted(special, e, before, k, t, n):
-    """Notes stops of the handle in a kick; how many are then noted."""
+def noted(special, e, before, state, t, n):
+    """Notes stops of the handle in a step; how many are then noted."""
     if special is None:
         return n
-    return yielding.noted(special.flow, e, k.motion.special.felt, before.felt, t, n)
+    return yielding.noted(special.flow, e, state.felt, before.felt, t, n)
 
 
 def held_arm(special, e, state, w):
@@ -125,40 +125,81 @@ def held_arm(special, e, state, w):
     return w
 
 
-def clay_behind(parts, clay, k, q, w, h):
-    """The clay behind a step of length h after a kick, which led the arm to q, w."""
+def clay_behind(parts, clay, hit, state, body, h):
+    """The clay behind a step of length h, which led the arm there.
+
+    Args:
+        parts: the scene.
+        clay: before it.
+        hit: a hit, behind it.
+        state: of the special laws, behind its kick.
+        body: the arm.
+        h: its length [s].
+    """
     if parts.clay is None:
         return clay
-    growth, state = same_growth(parts.clay.growth, clay.growth), k.motion.special
-    hit = hits.after_kick(parts.hits, parts, clay.hit, k)
+    growth = same_growth(parts.clay.growth, clay.growth)
     clay = Clay(clay.region, clay.b, clay.b, growth, hit, state)
-    return special_behind(parts.special, parts, clay, q, w, h)
+    return special_behind(parts.special, parts, clay, body.q, body.w, h)
+
+
+def kicked(parts, s, e, k, after):
+    """The state behind a kick and the step after it, but for the clock; the engine makes it."""
+    special, clock, x, state = parts.special, s.clock, s.filled, k.motion.special
+    q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
+    w = held_arm(special, e, state, w)
+    body = Body(q, w, k.g)
+    stops = noted(special, e, s.clay.special, state, clock.t, x.stops)
+    hit = hits.after_kick(parts.hits, parts, s.clay.hit, k)
+    clay = clay_behind(parts, s.clay, hit, state, body, after)
+    loop = commanded(parts.command, k.loop, clock.t, clock.t + after, 0.5 * parts.time.dt)
+    x = Filled(x.steps + 1, x.rows, x.crossings, stops)
+    return State(clock, body, loop, clay, s.work, s.status, x)
+
+
+def marched(accurate, parts, s, e, k, after):
+    """The same of either method."""
+    if accurate is None:
+        return kicked(parts, s, e, k, after)
+    x, body, special = s.filled, Body(k.q, k.w, s.body.g), parts.special
+    put(e.q, 0, k.q)
+    put(e.w, 0, k.w)
+    state = march.stuck_in(special, s.clay.special, s.loop.modes)
+    stops = noted(special, e, s.clay.special, state, s.clock.t, x.stops)
+    clay = clay_behind(parts, s.clay, s.clay.hit, state, body, after)
+    x = Filled(x.steps + 1, x.rows, x.crossings, stops)
+    return State(s.clock, body, k.loop, clay, k.work, s.status, x)
 
 
 def stepped(parts, s, e, k, after, target):
-    """The state after the step behind a kick."""
-    special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
-    q, w = moved_arm(parts, e, clock.before, s.body.w, k, after)
-    w = held_arm(special, e, k.motion.special, w)
-    stops = noted(special, e, s.clay.special, k, clock.t, x.stops)
-    clay = clay_behind(parts, s.clay, k, q, w, after)
-    t, i = clock.t + after, clock.i
-    loop = commanded(parts.command, k.loop, clock.t, t, 0.5 * dt)
-    if target - t <= 1e-9 * dt:
+    """The state after a step."""
+    t, i = s.clock.t + after, s.clock.i
+    if target - t <= 1e-9 * parts.time.dt:
         t, i = target, i + 1
-    clock, x = Clock(t, i, after), Filled(x.steps + 1, x.rows, x.crossings, stops)
-    return State(clock, Body(q, w, k.g), loop, clay, s.work, s.status, x)
+    s = marched(parts.accurate, parts, s, e, k, after)
+    return State(Clock(t, i, after), s.body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
 # ---- what is kept --------------------------------------------------------------------------------
 
 
-def kept(parts, s, e, k, after, shows):
-    """The state with what is kept of a kick: its row, if now is a sample, and its works."""
+def kept(accurate, parts, s, e, k, after, shows):
+    """The state with what is kept of a step: its row, if now is a sample, and its works."""
+    if accurate is None:
+        return kick_kept(parts, s, e, k, after, shows)
+    x = s.filled
+    if shows:
+        march.write_now(parts.special, e, x.rows, s.body, k.now)
+        x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
+    return with_filled(s, x)
+
+
+def kick_kept(parts, s, e, k, after, shows):
+    """The same of a kick."""
     x = s.filled
     if shows:
         if after == 0.0:
-            v = arrival(parts.special, parts, s)
+            v = kick_arrival(parts, s)
         else:
             v = velocity(parts.special, parts.grain, k)
         b = clay_now(parts.clay, s.clay, after == 0.0, s.clock.t)
@@ -181,9 +222,16 @@ def clay_now(part, clay, before, t):
 # ---- borders -------------------------------------------------------------------------------------
 
 
-def arrival(special, parts, s):
+def arrival(accurate, parts, s):
     """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
-    k = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
+    if accurate is None:
+        return kick_arrival(parts, s)
+    return handle_at(parts.arm, s.body, 0.0).v
+
+
+def kick_arrival(parts, s):
+    """The same where kicks lead."""
+    special, k = parts.special, kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
     return slow_arrival(special, parts, s, velocity(special, parts.grain, k))
 
 
@@ -209,7 +257,7 @@ def crossed(parts, s, e, i, up):
     border, x = borders.border_of(s.clay.region, i, up), s.filled
     speed = 0.0
     if s.clock.before > 0.0:
-        v = arrival(parts.special, parts, s)
+        v = arrival(parts.accurate, parts, s)
         speed = v[1] if i else v[0]
     put(e.crossings, 4 * x.crossings, (float(i), border, s.clock.t, speed))
     closes = i == 0 and up > 0 and border == parts.table[regions.END]
@@ -227,10 +275,11 @@ def shortened(special, state, after):
     return springs.longest(special.springs, state.elastic, after)
 
 
-def towards(parts, s, after, over, first):
-    """The kick that leads on, with the step after it shortened to the first border in its way.
+def towards(probe, parts, s, after, over, first):
+    """The step that leads on, shortened to the first border in its way.
 
     Args:
+        probe: of the engine, for the accurate method.
         parts: the scene.
         s: the state.
         after: length that the step may have [s].
@@ -239,7 +288,7 @@ def towards(parts, s, after, over, first):
         first: whether other clay has been met since the last look.
 
     Returns:
-        The state, in the region of the step; the kick; length of the step [s]; coordinate of the
+        The state, in the region of the step; the step, by its kick; length of the step [s]; coordinate of the
         border that it ends on, or that is to be crossed without a step, -1 for none; its side;
         whether without a step.
     """
@@ -252,11 +301,12 @@ def towards(parts, s, after, over, first):
         elif first:
             after = hits.longest(parts.hits, s.clay.hit, after)
             s, after = hits.struck(parts.hits, parts, s, after)
-        first = False
-        k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
+            s, after = ends.acted(parts.accurate, parts, s, after)
+        first, k = False, march.worked(probe, parts, s, after)
+        k, after = ends.met(probe, parts, s, k, after, axis >= 0)
         if after == 0.0 or axis >= 0 or not is_finite(k):
             return s, k, after, axis, up, False
-        p = place_after(parts.arm, s.body.q, k, after)
+        p = march.place_behind(probe, parts, s, k, after)
         sx, sy = borders.sides(s.clay.region, p)
         if sx == 0 and sy == 0:
             return s, k, after, axis, up, False
@@ -272,7 +322,7 @@ def towards(parts, s, after, over, first):
         elif s.status.landings >= LANDINGS:
             return s, k, after, axis, up, False
         else:
-            length, i, side = borders.first_border(parts, s, after, p, sx, sy)
+            length, i, side = borders.first_border(probe, parts, s, after, p, sx, sy)
         if borders.is_same_beyond(parts.table, s.clay.region, i, side):
             s = borders.moved_on(parts, s, here, i, side, 0.0)
         elif standing:
@@ -285,11 +335,12 @@ def careful(parts, s, e):
     """The state after one step with a look at its end, which lies on a border if one is in the way."""
     target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
+    s, most = march.paced(parts.accurate, s, target, most, on_grid)
     if s.status.code != OPEN:
         return s
     over, after, first = (0, 0), most, True
     while True:
-        s, k, after, axis, up, standing = towards(parts, s, after, over, first)
+        s, k, after, axis, up, standing = towards(e.probe, parts, s, after, over, first)
         if not standing:
             break
         over = (up, over[1]) if axis == 0 else (over[0], up)
@@ -298,7 +349,7 @@ def careful(parts, s, e):
             return ended(s, s.status.closing)
     closing = s.status.closing
     if s.clock.before > 0.0 or closing == OPEN:
-        s = kept(parts, s, e, k, after, on_grid or closing != OPEN)
+        s = kept(parts.accurate, parts, s, e, k, after, on_grid or closing != OPEN)
     if closing != OPEN:
         return ended(halted_arm(s, k), closing)
     if not is_finite(k):
@@ -312,7 +363,7 @@ def careful(parts, s, e):
 
 def halted_arm(s, k):
     """The state with the joint rates behind its last kick."""
-    body = Body(s.body.q, k.w, k.g)
+    body = Body(s.body.q, k.w, s.body.g)
     return State(s.clock, body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
@@ -336,21 +387,44 @@ def has_room(e, x, room):
     return x.rows < room and x.crossings < e.most_crossings and x.stops < e.most_stops
 
 
-def glide(parts, s, e, room):
+def glide(accurate, parts, s, e, room):
     """Whole steps within one region, up to one that `careful` has to look at."""
+    if accurate is None:
+        return glide_kicks(parts, s, e, room)
+    c = s.clock
+    if c.t != c.i * parts.time.dt or c.i >= parts.time.last or s.status.closing != OPEN:
+        return s
+    s, fine = ends.acted(accurate, parts, s, INF)
+    while has_room(e, s.filled, room) and s.clock.i < parts.time.last:
+        target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+        if on_grid:
+            s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
+        s, after = march.paced(accurate, s, target, after, on_grid)
+        if s.status.code != OPEN or fine < after:
+            break
+        k = march.march(e.probe, parts, s, after)
+        if not march.is_calm(accurate, parts, s, k, after):
+            break
+        s = kept(accurate, parts, s, e, k, after, on_grid)
+        s = stepped(parts, s, e, k, after, target)
+    return s
+
+
+def glide_kicks(parts, s, e, room):
+    """The same of the fast method."""
     dt = parts.time.dt
     while has_room(e, s.filled, room) and may_glide(parts, s):
         k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
         if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
             break
-        s = stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
+        s = stepped(parts, kick_kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
     return s
 
 
 def advance(parts, s, e, room):
     """Steps until rows, crossings or stops are full, or the run is over."""
     while s.status.code == OPEN and has_room(e, s.filled, room):
-        s = glide(parts, s, e, room)
+        s = glide(parts.accurate, parts, s, e, room)
         if has_room(e, s.filled, room):
             s = careful(parts, s, e)
     return s

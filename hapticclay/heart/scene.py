@@ -10,10 +10,13 @@ import numpy as np
 from ..model import arm, compensator, groove, regions
 from ..model.constants import B_MAX
 from ..model.scenario import Scenario
-from ..stepping import engine
+from ..stepping import engine, runge_kutta
 from ..stepping.engine import mujoco
 from ..stepping.run import spring_step
 from . import borders, grooves, kick, parts as p_, path, state as s_
+from .engine_step import Probe
+from .march import GROWTH_BLOCK
+from .modes import SUBSTEPS
 from .parts import INF
 from .state import OPEN
 
@@ -36,6 +39,7 @@ class Engine(NamedTuple):
     rendered: Any
     most_crossings: int
     most_stops: int
+    probe: Any
 
 
 def hand_parts(s: Scenario):
@@ -78,12 +82,37 @@ def clay_part(s: Scenario):
             g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
-    b = stiffness(s)
+    b = stiffness(s) if s.integrator == "fast" else 0.0
     stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
     hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block)
     special = special if any(x is not None for x in special) else None
     return p_.Clay(1 if clay.grows else None), grain, hits, special
+
+
+def accurate_part(s: Scenario):
+    if s.integrator == "fast":
+        return None
+    runge_kutta.check_explicit(s)
+    blocks = modal = None
+    if s.clay and s.clay.grows:
+        blocks = substeps_of_blocks(s)
+    if s.clay and s.clay.yields:
+        along, grain = (1, None) if s.clay.isotropic else (None, clay_part(s)[1])
+        modal = p_.Modal(along, grain, float(runge_kutta.largest_lightness(s)), float(s.dt))
+    return p_.Accurate(runge_kutta.parts_of_sample(s, 0), blocks, modal)
+
+
+def substeps_of_blocks(s: Scenario):
+    """Engine steps a sample, by block; they grow, and after SUBSTEPS all are as many."""
+    count = math.floor(s.t_max / s.dt + 1e-6) // GROWTH_BLOCK + 1
+    blocks = np.empty(count, dtype=np.int64)
+    for j in range(count):
+        blocks[j] = runge_kutta.parts_of_sample(s, j * GROWTH_BLOCK)
+        if blocks[j] > SUBSTEPS:
+            blocks[j:] = SUBSTEPS + 1
+            break
+    return blocks
 
 
 def parts_of(s: Scenario):
@@ -97,7 +126,7 @@ def parts_of(s: Scenario):
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
         hand_parts(s), p_.Push((0.0, float(x), float(y), 0.0, 0.0), None), None,
-        tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay_part(s), None, None,
+        tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay_part(s), None, accurate_part(s),
     )  # fmt: skip
 
 
@@ -113,6 +142,9 @@ def first_loop(parts, s):
             for c, x, v in zip(s.compensators, parts.servo, s.velocity, strict=True)
         )
         axes = [s_.Axis(a.delta, 0.0, a.y, a.yrate) for a in axes]
+    if parts.accurate is not None:
+        modes = s_.Modes((1.0, 1.0), NONE, NONE, NONE, INF) if parts.accurate.modal else None
+        return s_.Course(*axes, form, 0, 0.0, modes)
     return s_.Loop(*axes, form)
 
 
@@ -174,7 +206,13 @@ def make_engine(s: Scenario):
         np.zeros(CHUNK * 16), np.zeros(CROSSINGS * 4), stops, rendered,
     )  # fmt: skip
     bounds = CROSSINGS - 3, len(stops) // 3 - 8 if len(stops) else 1
-    plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds)
+    probe = None
+    if s.integrator == "accurate":
+        probe = Probe(
+            mujoco.mj_forward, model, data,
+            *map(memoryview, (data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied)),
+        )  # fmt: skip
+    plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds, probe)
     return plain, arrays, bounds, model, data
 
 
