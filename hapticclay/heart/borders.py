@@ -123,7 +123,7 @@ def passed_alike(parts, s, here, p):
 
 def beyond(h, probe, parts, s, i, border):
     """Distance by which a step of length h would pass a border of coordinate i [m]."""
-    x, y = place_behind(probe, parts, s, worked(probe, parts, s, h), h)
+    x, y = place_behind(probe, parts.arm, s.body.q, worked(probe, parts, s, h), h)
     return (y if i else x) - border
 
 

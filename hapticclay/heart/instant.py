@@ -28,19 +28,19 @@ def under_torques(links, at, tau):
 
 def instant(parts, t, z, clay, modes):
     """The loop at a point of a step."""
-    links, limit, modal = parts.arm.links, parts.limits, parts.accurate.modal
+    links, limit, modal = parts.arm.links, parts.limits, parts.modal
     at = m_.without_rest(modes, modal, handle_at(parts.arm, Body(z.q, z.w, NONE), 0.0))
-    uh, v, felt = steady_force(parts.push, t), at.v, clay.special
+    uh, v = steady_force(parts.push, t), at.v
     b = viscous.now(parts.clay, parts.special, parts.table, clay, t, at.p)
     x, y = viscous.force(parts.grain, b, v)
     load = hand.with_hand_now(parts.hand, Load((uh[0] - x, uh[1] - y), (0.0, 0.0, 0.0)), at)
     law, delta, feed, drive, pushes = servo.law_now(parts, at, z)
-    a = m_.answer(modal, modes, felt, law, load, at)
+    a = m_.answer(modal, modes, law, load, at)
     tau = wanted(links, at, a)
     if abs(tau[0]) > limit[0] or abs(tau[1]) > limit[1]:
-        tau = held_torques(modes, parts, felt, law, load, at, tau)
+        tau = held_torques(modes, parts, law, load, at, tau)
         tau = clipped(tau, limit)
-        a = m_.answer(modal, modes, felt, under_torques(links, at, tau), load, at)
+        a = m_.answer(modal, modes, under_torques(links, at, tau), load, at)
     f, r, w = a.f, a.r, z.w
     (ddx, ddy), form = servo.rates_now(parts.form, parts.lag, z, f)
     dx, dy = hand.dampers(parts.hand)
@@ -62,38 +62,38 @@ def instant(parts, t, z, clay, modes):
 # ---- motors at their limits while clay holds -----------------------------------------------------
 
 
-def held_torques(modes, parts, felt, law, load, at, tau):
+def held_torques(modes, parts, law, load, at, tau):
     """Torques that the servo asks for, with the force of clay that holds an axis [N.m]."""
     if modes is None:
         return tau
     if m_.has_mode(modes, 1):
-        return by_shaping(parts.shaping, parts, modes, felt, law, load, at, tau)
+        return by_shaping(parts.shaping, parts, modes, law, load, at, tau)
     return tau
 
 
-def by_shaping(shaping, parts, modes, felt, law, load, at, tau):
+def by_shaping(shaping, parts, modes, law, load, at, tau):
     """The same: they depend on that force where inertia is shaped or C passes it on."""
     if shaping is None:
-        return by_form(parts.form, parts, modes, felt, law, load, at, tau)
-    return torques_that_hold(parts, modes, felt, law, load, at)
+        return by_form(parts.form, parts, modes, law, load, at, tau)
+    return torques_that_hold(parts, modes, law, load, at)
 
 
-def by_form(form, parts, modes, felt, law, load, at, tau):
+def by_form(form, parts, modes, law, load, at, tau):
     if form is None:
         return tau
-    return torques_that_hold(parts, modes, felt, law, load, at)
+    return torques_that_hold(parts, modes, law, load, at)
 
 
-def torques_that_hold(parts, modes, felt, law, load, at):
+def torques_that_hold(parts, modes, law, load, at):
     """Torques of motors at their limits while clay holds an axis [N.m].
 
     The servo answers the force of the clay, and that depends on the torques. Of the nine cases,
     each motor free or at either limit, one agrees with itself.
     """
     limit1, limit2 = parts.limits
-    b1, b2 = wanted_under(parts, modes, felt, law, load, at, (0.0, 0.0))
-    xx, yx = wanted_under(parts, modes, felt, law, load, at, (1.0, 0.0))
-    xy, yy = wanted_under(parts, modes, felt, law, load, at, (0.0, 1.0))
+    b1, b2 = wanted_under(parts, modes, law, load, at, (0.0, 0.0))
+    xx, yx = wanted_under(parts, modes, law, load, at, (1.0, 0.0))
+    xy, yy = wanted_under(parts, modes, law, load, at, (0.0, 1.0))
     xx, yx, xy, yy = xx - b1, yx - b2, xy - b1, yy - b2
     best1, best2, least = 0.0, 0.0, INF
     for case in range(9):
@@ -116,9 +116,9 @@ def torques_that_hold(parts, modes, felt, law, load, at):
     return best1, best2
 
 
-def wanted_under(parts, modes, felt, law, load, at, tau):
+def wanted_under(parts, modes, law, load, at, tau):
     """Torques that the servo asks for where clay holds an axis under other torques [N.m]."""
-    links, modal = parts.arm.links, parts.accurate.modal
-    r = m_.answer(modal, modes, felt, under_torques(links, at, tau), load, at).r
+    links = parts.arm.links
+    r = m_.answer(parts.modal, modes, under_torques(links, at, tau), load, at).r
     load = Load((load.f[0] - r[0], load.f[1] - r[1]), load.d)
     return wanted(links, at, m_.plain_answer(law, load))

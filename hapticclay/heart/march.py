@@ -9,26 +9,25 @@ from __future__ import annotations
 import math
 
 from . import modes as m_
-from . import viscous
 from .engine_step import accelerations, put
 from .instant import instant
-from .kick import kick, place, place_after
+from .kick import is_finite, kick, place, place_after
 from .parts import INF
 from .rows import ROW
 from .state import (
     UNRESOLVED,
     Axis,
-    Body,
-    Clay,
     Course,
-    Felt,
+    Modes,
     Point,
-    Special,
+    Shown,
     State,
     Status,
     Stride,
+    Sums,
     Work,
 )
+from .yielding import note
 
 GROWTH_BLOCK = 64  # samples for which the steps of clay that grows are chosen at once
 NO_END = (0.0, 0.0)
@@ -46,7 +45,7 @@ def substeps(blocks, count, i):
     return int(blocks[i // GROWTH_BLOCK])
 
 
-def paced(accurate, s, target, after, on_grid):
+def paced(accurate, modal, s, target, after, on_grid):
     """The state, and the length of the next step towards a sample, `after` away [s]."""
     if accurate is None:
         return s, after
@@ -62,7 +61,7 @@ def paced(accurate, s, target, after, on_grid):
     s = State(s.clock, s.body, loop, s.clay, s.work, status, s.filled)
     if after == 0.0:
         return s, after
-    return s, anywhere(accurate.modal, dt, n, share if left > 1 else dt)
+    return s, anywhere(modal, dt, n, share if left > 1 else dt)
 
 
 def anywhere(modal, rest, n, after):
@@ -75,21 +74,9 @@ def anywhere(modal, rest, n, after):
 
 # ---- a step --------------------------------------------------------------------------------------
 
-
-def arm_accelerations(probe, parts, z, now, modes):
-    """Joint accelerations at a point of a step; none of an arm that clay holds [rad/s^2]."""
-    a = accelerations(probe, parts.clay, z, now)
-    if m_.has_mode(modes, 2):  # but for the engine's rounding
-        return 0.0, 0.0
-    return a
-
-
-def stage(probe, parts, t, z, clay, modes, before):
-    """The loop and joint accelerations at a point of a step; before: the stage before it."""
-    if not abs(z.w[0]) + abs(z.w[1]) < INF:
-        return before, z.w
-    now = instant(parts, t, z, clay, modes)
-    return now, arm_accelerations(probe, parts, z, now, modes)
+# of the stages: where each and the next one is, weights in Sums.first, Sums.last and the other sums
+AT, AHEAD = (0.0, 0.5, 0.5, 1.0), (0.5, 0.5, 1.0, 0.0)
+FIRST, LAST, WEIGHT = (1.0, 1.0, 1.0, 0.0), (0.0, 1.0, 1.0, 1.0), (1.0, 2.0, 2.0, 1.0)
 
 
 def moved(start, z, now, a, h):
@@ -108,83 +95,97 @@ def moved_axis(x, z, a, h):
 
 def moved_form(x, rate, h):
     if x is None:
-        return None
-    return moved_states(x[0], rate[0], h), moved_states(x[1], rate[1], h)
+        return x
+    return added_states(x[0], h, rate[0]), added_states(x[1], h, rate[1])
 
 
-def moved_states(x, rate, h):
-    (a, b, c, d), (p, q, r, s) = x, rate
-    return a + h * p, b + h * q, c + h * r, d + h * s
+def added_states(x, h, a):
+    return x[0] + h * a[0], x[1] + h * a[1], x[2] + h * a[2], x[3] + h * a[3]
 
 
-def finished(x, v, a, b, c, d, h):
-    """A coordinate and its rate at the end of a step, from its accelerations at the stages."""
-    first, k = a + b + c, h / 6.0
-    return x + h * (v + k * first), v + k * (first + (b + c + d))
+def no_sums(form):
+    """Sums over no stage."""
+    six = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return Sums(six, six, no_form(form), (0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def finished_axis(x, a, b, c, d, h):
-    delta, rate = finished(x.delta, x.rate, a[0], b[0], c[0], d[0], h)
-    y, yrate = finished(x.y, x.yrate, a[1], b[1], c[1], d[1], h)
-    return Axis(delta, rate, y, yrate)
+def no_form(form):
+    if form is None:
+        return form
+    return (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
 
 
-def finished_form(x, a, b, c, d, h):
-    if x is None:
-        return None
-    return finished_states(x[0], a[0], b[0], c[0], d[0], h), finished_states(
-        x[1], a[1], b[1], c[1], d[1], h
-    )
+def with_stage(sums, i, now, a):
+    """The sums with those of a stage."""
+    f, g, h, k, m, p, n = sums.first, sums.last, FIRST[i], LAST[i], WEIGHT[i], now.power, sums.power
+    (b, c), x, y = a, now.x, now.y
+    first = f[0] + h * b, f[1] + h * c, f[2] + h * x[0], f[3] + h * x[1], f[4] + h * y[0], f[5] + h * y[1]
+    last = g[0] + k * b, g[1] + k * c, g[2] + k * x[0], g[3] + k * x[1], g[4] + k * y[0], g[5] + k * y[1]
+    power = (
+        n[0] + m * p[0], n[1] + m * p[1], n[2] + m * p[2], n[3] + m * p[3], n[4] + m * p[4],
+    )  # fmt: skip
+    return Sums(first, last, moved_form(sums.form, now.form, m), power)
 
 
-def finished_states(x, a, b, c, d, h):
-    k = h / 6.0
-    return (
-        x[0] + k * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
-        x[1] + k * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
-        x[2] + k * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
-        x[3] + k * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3]),
-    )
+def finished(x, v, sums, i, h):
+    """A coordinate and its rate at the end of a step."""
+    k, f = h / 6.0, sums.first[i]
+    return x + h * (v + k * f), v + k * (f + sums.last[i])
 
 
-def with_works(x, a, b, c, d, h):
-    """The ledger behind a step, from the powers at its stages."""
+def end_of(start, sums, h):
+    """The end of a step."""
+    (q1, q2), (w1, w2), x, y = start.q, start.w, start.x, start.y
+    (q1, w1), (q2, w2) = finished(q1, w1, sums, 0, h), finished(q2, w2, sums, 1, h)
+    (dx, ex), (yx, vx) = finished(x.delta, x.rate, sums, 2, h), finished(x.y, x.yrate, sums, 3, h)
+    (dy, ey), (yy, vy) = finished(y.delta, y.rate, sums, 4, h), finished(y.y, y.yrate, sums, 5, h)
+    form = moved_form(start.form, sums.form, h / 6.0)
+    return Point((q1, q2), (w1, w2), Axis(dx, ex, yx, vx), Axis(dy, ey, yy, vy), form)
+
+
+def with_works(a, p, h):
+    """The ledger behind a step."""
     k = h / 6.0
     return Work(
-        x.muscle + k * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
-        x.motors + k * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
-        x.clay + k * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
-        x.hand + k * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3]),
-        x.through + k * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4]),
-    )
+        a.muscle + k * p[0], a.motors + k * p[1], a.clay + k * p[2], a.hand + k * p[3],
+        a.through + k * p[4],
+    )  # fmt: skip
+
+
+def point_of(body, loop):
+    return Point(body.q, body.w, loop.x, loop.y, loop.form)
 
 
 def march(probe, parts, s, h):
     """The step of length h; of length 0 its start alone."""
-    t, body, x, clay, modes = s.clock.t, s.body, s.loop, s.clay, s.loop.modes
-    start = Point(body.q, body.w, x.x, x.y, x.form)
-    n0 = instant(parts, t, start, clay, modes)
-    if h == 0.0:
-        return Stride(n0, n0.grip, body.q, body.w, x, s.work)
-    a0 = arm_accelerations(probe, parts, start, n0, modes)
-    z = moved(start, start, n0, a0, 0.5 * h)
-    n1, a1 = stage(probe, parts, t + 0.5 * h, z, clay, modes, n0)
-    z = moved(start, z, n1, a1, 0.5 * h)
-    n2, a2 = stage(probe, parts, t + 0.5 * h, z, clay, modes, n1)
-    z = moved(start, z, n2, a2, h)
-    n3, a3 = stage(probe, parts, t + h, z, clay, modes, n2)
-    (qx, qy), (wx, wy) = body.q, body.w
-    qx, wx = finished(qx, wx, a0[0], a1[0], a2[0], a3[0], h)
-    qy, wy = finished(qy, wy, a0[1], a1[1], a2[1], a3[1], h)
-    q, w = m_.back_to_rest(modes, parts.accurate.modal, parts.arm, (qx, qy), (wx, wy))
-    loop = Course(
-        finished_axis(x.x, n0.x, n1.x, n2.x, n3.x, h),
-        finished_axis(x.y, n0.y, n1.y, n2.y, n3.y, h),
-        finished_form(x.form, n0.form, n1.form, n2.form, n3.form, h),
-        x.left - 1, x.share, m_.with_end(modes, NO_END),
-    )  # fmt: skip
-    work = with_works(s.work, n0.power, n1.power, n2.power, n3.power, h)
-    return Stride(n0, n3.grip, q, w, loop, work)
+    t, clay, modes, start = s.clock.t, s.clay, s.loop.modes, point_of(s.body, s.loop)
+    z, sums, still = start, no_sums(start.form), m_.has_mode(modes, 2)
+    for i in range(4):
+        now = instant(parts, t + AT[i] * h, z, clay, modes)
+        if i == 0:
+            first = now
+            if h == 0.0:
+                break
+        a = accelerations(probe, parts.clay, z, now)
+        if still:  # but for the engine's rounding
+            a = 0.0, 0.0
+        sums = with_stage(sums, i, now, a)
+        z = moved(start, z, now, a, AHEAD[i] * h)
+        if not is_finite_point(z):
+            break
+    end = end_of(start, sums, h)
+    if not is_finite_point(z):
+        end = z
+    elif h > 0.0:
+        end = m_.back_to_rest(modes, parts.modal, parts.arm, end)
+    x = first
+    shown = Shown(x.p, x.v, x.fh, x.tau, x.delta, x.b, x.fe)
+    return Stride(shown, x.grip, now.grip, end, NO_END, with_works(s.work, sums.power, h))
+
+
+def is_finite_point(z):
+    """Whether the joint rates of a point are finite."""
+    return abs(z.w[0]) + abs(z.w[1]) < INF
 
 
 # ---- a step of either method ---------------------------------------------------------------------
@@ -197,40 +198,45 @@ def worked(probe, parts, s, after):
     return march(probe, parts, s, after)
 
 
-def place_behind(probe, parts, s, k, after):
-    """Position of the handle at its end, (x, y) [m]."""
+def place_behind(probe, part, q, k, after):
+    """Position of the handle at its end, (x, y) [m]; q are the joint angles at its start."""
     if probe is None:
-        return place_after(parts.arm, s.body.q, k, after)
-    return place(parts.arm, k.q)
+        return place_after(part, q, k, after)
+    return place(part, k.end.q)
 
 
-def is_calm(accurate, parts, s, k, h):
-    """Whether a step ends within its region, and with its modes."""
-    if not abs(k.w[0]) + abs(k.w[1]) < INF:
+def is_sound(probe, k):
+    """Whether it ends with finite rates."""
+    if probe is None:
+        return is_finite(k)
+    return is_finite_point(k.end)
+
+
+def is_calm(modal, part, r, modes, k, h):
+    """Whether a step ends within its region r, and with its modes."""
+    if not is_finite_point(k.end):
         return False
-    p, r = place(parts.arm, k.q), s.clay.region
+    p = place(part, k.end.q)
     within = r.low[0] - TOUCH <= p[0] <= r.high[0] + TOUCH
     if not (within and r.low[1] - TOUCH <= p[1] <= r.high[1] + TOUCH):
         return False
-    return keeps_modes(accurate.modal, parts, s, k, h)
+    return keeps_modes(modal, part, modes, k, h)
 
 
-def keeps_modes(modal, parts, s, k, h):
+def keeps_modes(modal, part, modes, k, h):
     if modal is None:
         return True
-    m, v = s.loop.modes, m_.velocity(modal, parts.arm, k.q, k.w)
-    return m.mode[0] != m_.TURNED_IN and m_.goes_on(
-        modal, m, s.clay.special.felt.law, h, v, k.now.grip, k.grip
-    )
+    v = m_.velocity(modal, part, k.end.q, k.end.w)
+    return modes.mode[0] != m_.TURNED_IN and m_.goes_on(modal, modes, h, v, k.begin, k.last)
 
 
 # ---- what is kept of it --------------------------------------------------------------------------
 
 
-def write_now(special, e, i, body, now):
+def write_shown(modal, e, i, body, x):
     """Writes the row of a sample."""
-    (q1, q2), (w1, w2), p, v, fh, tau = body.q, body.w, now.p, now.v, now.fh, now.tau
-    delta, b = now.delta, now.b
+    (q1, q2), (w1, w2), p, v, fh, tau = body.q, body.w, x.p, x.v, x.fh, x.tau
+    delta, b = x.delta, x.b
     put(
         e.rows, ROW * i,
         (
@@ -238,38 +244,41 @@ def write_now(special, e, i, body, now):
             b[0], b[1], w1, w2,
         ),
     )  # fmt: skip
-    write_felt(special, e, i, now.fe)
+    write_felt(modal, e, i, x.fe)
 
 
-def write_felt(special, e, i, fe):
-    if special is None:
-        return
-    write_yielding(special.flow, e, i, fe)
-
-
-def write_yielding(flow, e, i, fe):
-    if flow is None:
+def write_felt(modal, e, i, fe):
+    if modal is None:
         return
     put(e.rendered, 3 * i, fe)
 
 
-def stuck_in(special, state, modes):
-    """State of the special laws with the axes that rest."""
-    if special is None:
-        return state
-    return flow_stuck_in(special.flow, state, modes)
+def course_behind(x, k):
+    """The controller behind a step."""
+    z = k.end
+    return Course(z.x, z.y, z.form, x.left - 1, x.share, modes_behind(x.modes, k.ended))
 
 
-def flow_stuck_in(flow, x, modes):
-    if flow is None:
-        return x
-    f = x.felt
-    stuck = stopped(modes, f.law, 0), stopped(modes, f.law, 1)
-    felt = Felt(f.law, f.old, f.mean, f.v, f.f, stuck, f.anchor, f.still, f.times)
-    return Special(x.owed, x.split, felt, x.elastic, x.cut)
+def modes_behind(m, ended):
+    if m is None:
+        return m
+    stuck = m_.stopped(m, 0), m_.stopped(m, 1)
+    return Modes(m.law, m.mode, m.way, m.anchor, ended, stuck, m.fine)
 
 
-def stopped(modes, law, i):
-    """Whether an axis rests in clay that can bring it to rest, 1.0 or 0.0."""
-    thins = law[3 * i + 1] > 0.0 and law[3 * i + 2] < 1.0
-    return 1.0 if modes.mode[i] == 0.0 and (law[3 * i] > 0.0 or thins) else 0.0
+def noted(modal, e, was, now, t, n):
+    """Notes where clay that yields stops the handle or lets it go; how many are then noted."""
+    if modal is None:
+        return n
+    if now.stuck[0] != was.stuck[0]:
+        n = note(e.stops, n, axis_of(modal.along), now.stuck[0], t)
+    if now.stuck[1] != was.stuck[1] and axis_of(modal.along) == 0.0:
+        n = note(e.stops, n, 1.0, now.stuck[1], t)
+    return n
+
+
+def axis_of(along):
+    """Coordinate of the first axis in a note."""
+    if along is None:
+        return 0.0
+    return 2.0

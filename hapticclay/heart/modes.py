@@ -17,7 +17,7 @@ from . import viscous
 from .kick import place
 from .parts import INF
 from .servo import net, solve
-from .state import Answer, Grip, Handle, Modes
+from .state import Answer, Grip, Handle, Modes, Point
 from .yielding import turned_matrix
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
@@ -80,18 +80,11 @@ def holding_force(modal, law, i):
 
 
 def with_mode(m, x, y):
-    return Modes((x, y), m.way, m.anchor, m.ended, m.fine)
+    return Modes(m.law, (x, y), m.way, m.anchor, m.ended, m.stuck, m.fine)
 
 
-def with_way(m, way):
-    return Modes(m.mode, way, m.anchor, m.ended, m.fine)
-
-
-def with_end(m, ended):
-    """The modes behind a step that ends so."""
-    if m is None:
-        return m
-    return Modes(m.mode, m.way, m.anchor, ended, m.fine)
+def with_way(m, x, way):
+    return Modes(m.law, (x, x), way, m.anchor, m.ended, m.stuck, m.fine)
 
 
 # ---- at an instant -------------------------------------------------------------------------------
@@ -120,15 +113,10 @@ def plain_answer(law, load):
     return Answer(g, net(load, g, NONE), NONE, None)
 
 
-def answer(modal, modes, special, law, load, at):
-    """The same in any clay, of which `special` is the state."""
+def answer(modal, modes, law, load, at):
+    """The same in any clay, in the modes of the step."""
     if modal is None:
         return plain_answer(law, load)
-    return resisted(modal, modes, special.felt.law, law, load, at)
-
-
-def resisted(modal, modes, force, law, load, at):
-    """The same in clay that yields, in the modes of the step."""
     grain, c, g = modal.grain, at.c, solve(law, load)
     B = turned_matrix(grain, controller.velocity_per_force(law.n, law.W, load.d))
     v = viscous.along(grain, at.v[0], at.v[1])
@@ -136,7 +124,7 @@ def resisted(modal, modes, force, law, load, at):
     if modes.mode[0] == 0.0 and modes.mode[1] == 0.0:
         f, left = holding(B, a), NONE
     else:
-        f, left = resisting(modal.along, modes, force, B, v, a)
+        f, left = resisting(modal.along, modes, B, v, a)
     r, left = viscous.across(grain, f[0], f[1]), viscous.across(grain, left[0], left[1])
     g = left[0] + c[0], left[1] + c[1]
     return Answer(g, net(load, g, r), r, Grip(a, B, v, f))
@@ -154,15 +142,15 @@ def left_of(a, B, f):
     return a[0] - B[0] * f[0] - B[1] * f[1], a[1] - B[2] * f[0] - B[3] * f[1]
 
 
-def resisting(along, modes, law, B, v, a):
+def resisting(along, modes, B, v, a):
     """Force of clay in which the handle slides [N], and the acceleration that it leaves [m/s^2]."""
     if along is None:
-        return resisting_axes(modes.mode, law, B, v, a)
-    return resisting_along(modes, law, B, v, a)
+        return resisting_axes(modes, B, v, a)
+    return resisting_along(modes, B, v, a)
 
 
-def resisting_axes(mode, law, B, v, a):
-    sx, sy = mode
+def resisting_axes(modes, B, v, a):
+    (sx, sy), law = modes.mode, modes.law
     fx, fy = sx * strength(law, 0, sx * v[0]), sy * strength(law, 1, sy * v[1])
     if sx == 0.0:
         fx = (a[0] - B[1] * fy) / B[0]
@@ -172,8 +160,8 @@ def resisting_axes(mode, law, B, v, a):
     return (fx, fy), (0.0 if sx == 0.0 else x, 0.0 if sy == 0.0 else y)
 
 
-def resisting_along(modes, law, B, v, a):
-    slides = modes.mode[0] == SLIDING
+def resisting_along(modes, B, v, a):
+    law, slides = modes.law, modes.mode[0] == SLIDING
     m, (ex, ey) = v[0] * modes.way[0] + v[1] * modes.way[1], modes.way
     if slides:
         m, (ex, ey) = way_of(modes, v)
@@ -229,20 +217,25 @@ def place_of(modal, part, q):
     return viscous.along(modal.grain, p[0], p[1])
 
 
-def back_to_rest(modes, modal, part, q, w):
-    """Takes an axis that rests back to where it does: one step of Newton's, of the step's error."""
+def stopped(modes, i):
+    """Whether an axis rests in clay that can bring it to rest, 1.0 or 0.0."""
+    Fy, K, n = modes.law[3 * i], modes.law[3 * i + 1], modes.law[3 * i + 2]
+    return 1.0 if modes.mode[i] == 0.0 and (Fy > 0.0 or (K > 0.0 and n < 1.0)) else 0.0
+
+
+def back_to_rest(modes, modal, part, z):
+    """A point with an axis that rests back where it does: one step of Newton's, of a step's error."""
     if modes is None:
-        return q, w
-    (sx, sy), anchor = modes.mode, modes.anchor
+        return z
+    (sx, sy), anchor, q = modes.mode, modes.anchor, z.q
     if (sx == 0.0) == (sy == 0.0):
-        return q, w
-    x, y = place_of(modal, part, q)
-    v = velocity(modal, part, q, w)
+        return z
+    (x, y), v = place_of(modal, part, q), velocity(modal, part, q, z.w)
     lead = anchor[0] - x if sx == 0.0 else 0.0, anchor[1] - y if sy == 0.0 else 0.0
     a = joint_rates(modal, part, q, lead)
     q = q[0] + a[0], q[1] + a[1]
     w = joint_rates(modal, part, q, (0.0 if sx == 0.0 else v[0], 0.0 if sy == 0.0 else v[1]))
-    return q, w
+    return Point(q, w, z.x, z.y, z.form)
 
 
 # ---- bounds of a step ----------------------------------------------------------------------------
@@ -258,25 +251,25 @@ def share_of_speed(share, m, rate):
     return share * m / rate if rate > 0.0 else INF
 
 
-def longest_step(along, modes, law, x, v):
+def longest_step(along, modes, x, v):
     """The longest step that clay that yields allows, from its grip, at a velocity v [s]."""
     if along is None:
-        a, g = longest_of_axis(modes, law, x, v, 0), longest_of_axis(modes, law, x, v, 1)
-        return min(a, g)
-    return longest_along(modes, law, x, v)
+        return min(longest_of_axis(modes, x, v, 0), longest_of_axis(modes, x, v, 1))
+    return longest_along(modes, x, v)
 
 
-def longest_of_axis(modes, law, x, v, i):
+def longest_of_axis(modes, x, v, i):
+    law, m = modes.law, abs(v[i])
     if modes.mode[i] == 0.0 or not is_active(law, i):
         return INF
-    m = abs(v[i])
     most = share_of_speed(STABLE_STEP, 1.0, steepness(law, i, m) * x.B[3 * i])
     if is_rough(law, i):
         most = min(most, share_of_speed(GRADE, m, abs(acceleration(x)[i])))
     return most
 
 
-def longest_along(modes, law, x, v):
+def longest_along(modes, x, v):
+    law = modes.law
     if modes.mode[0] == REST_MODE or not is_active(law, 0):
         return INF
     (m, e), B, slides = way_of(modes, v), x.B, modes.mode[0] == SLIDING
@@ -289,58 +282,52 @@ def longest_along(modes, law, x, v):
     return most
 
 
-def goes_on(modal, modes, law, h, v, begin, x):
+def goes_on(modal, modes, h, v, begin, x):
     """Whether a step keeps its modes to its end, and the next one may be as long: a cheap look.
 
     Args:
         modal: the part.
         modes: of the step.
-        law: Fy, K, n of x, then of y.
         h: its length [s].
         v: velocity at its end [m/s].
-        begin: grip at its start.
-        x: grip at its last stage.
+        begin: what the clay does at its start.
+        x: the same at its last stage.
     """
-    return stays(modal.along, modal, modes, law, v, begin, x) and (
-        longest_step(modal.along, modes, law, x, v) >= h
+    return stays(modal.along, modal, modes, v, begin.f, x.f) and (
+        longest_step(modal.along, modes, x, v) >= h
     )
 
 
-def stays(along, modal, modes, law, v, begin, x):
-    """Whether no mode ends."""
+def stays(along, modal, modes, v, begin, f):
+    """Whether no mode ends; begin, f: force at the start and at the last stage [N]."""
     if along is None:
-        stays = axis_stays(modal, modes, law, v, begin, x, 0)
-        return stays and axis_stays(modal, modes, law, v, begin, x, 1)
+        return axis_stays(modal, modes, v, begin, f, 0) and axis_stays(modal, modes, v, begin, f, 1)
     if modes.mode[0] != REST_MODE:
         return True
     # the last stage is not quite the end: by half of the change more
-    (ax, ay), (bx, by), f = begin.f, x.f, holding_force(modal, law, 0)
-    ax, ay = 1.5 * bx - 0.5 * ax, 1.5 * by - 0.5 * ay
-    return ax * ax + ay * ay <= f * f
+    x, y = 1.5 * f[0] - 0.5 * begin[0], 1.5 * f[1] - 0.5 * begin[1]
+    most = holding_force(modal, modes.law, 0)
+    return x * x + y * y <= most * most
 
 
-def axis_stays(modal, modes, law, v, begin, x, i):
-    s, f = modes.mode[i], x.f[i]
-    if not is_active(law, i):
+def axis_stays(modal, modes, v, begin, f, i):
+    s, f = modes.mode[i], f[i]
+    if not is_active(modes.law, i):
         return True
     if s == 0.0:
-        return abs(f) + 0.5 * abs(f - begin.f[i]) <= holding_force(modal, law, i)
+        return abs(f) + 0.5 * abs(f - begin[i]) <= holding_force(modal, modes.law, i)
     return s * v[i] > 0.0
 
 
-def gap(along, modal, modes, law, x, i):
+def gap(along, modal, modes, x, i):
     """What is left until the mode of an axis, or of clay along the motion, ends; negative beyond."""
     if along is None:
-        return gap_of_axis(modal, modes, law, x, i)
+        v, f = modes.mode[i] * x.v[i], abs(x.f[i])
+        return gap_of_hold(holding_force(modal, modes.law, i), f) if modes.mode[i] == 0.0 else v
     if modes.mode[0] == REST_MODE:
-        return gap_of_hold(holding_force(modal, law, 0), math.sqrt(x.f[0] * x.f[0] + x.f[1] * x.f[1]))
+        f = math.sqrt(x.f[0] * x.f[0] + x.f[1] * x.f[1])
+        return gap_of_hold(holding_force(modal, modes.law, 0), f)
     return modes.way[0] * x.v[0] + modes.way[1] * x.v[1]
-
-
-def gap_of_axis(modal, modes, law, x, i):
-    if modes.mode[i] == 0.0:
-        return gap_of_hold(holding_force(modal, law, i), abs(x.f[i]))
-    return modes.mode[i] * x.v[i]
 
 
 def gap_of_hold(most, f):
@@ -350,9 +337,9 @@ def gap_of_hold(most, f):
 # ---- what a mode demands -------------------------------------------------------------------------
 
 
-def misfit(modal, modes, law, x, i):
+def misfit(modal, modes, x, i):
     """How far an axis without velocity is from what its mode demands, 0 or less where it is not."""
-    s = modes.mode[i]
+    s, law = modes.mode[i], modes.law
     if s == 0.0:
         f = holding_force(modal, law, i)
         return (abs(x.f[i]) - f) / (1e-12 + f)
@@ -393,9 +380,9 @@ def nearly_rests(modal, law, i, m, forward, size, need):
     return strength(law, i, 0.5 * m) < need <= holding_force(modal, law, i)
 
 
-def set_out(modes, law, x):
+def set_out(modes, x):
     """Direction in which a handle begins to slide in clay along the motion, from its grip at rest."""
-    e = flow.slowed(x.B, x.a[0], x.a[1], 1.0, law[0], 0.0, 1.0)
+    e = flow.slowed(x.B, x.a[0], x.a[1], 1.0, modes.law[0], 0.0, 1.0)
     ex, ey = x.f if e[0] == 0.0 and e[1] == 0.0 else e
     m = math.sqrt(ex * ex + ey * ey)
     if m > 0.0:

@@ -227,12 +227,10 @@ class Accurate(NamedTuple):
     Attributes:
         substeps: engine steps a sample.
         blocks: the same by block of samples, where the clay grows.
-        modal: clay that yields.
     """
 
     substeps: int
     blocks: Any
-    modal: Any
 
 
 class Parts(NamedTuple):
@@ -256,6 +254,7 @@ class Parts(NamedTuple):
         special: laws of the clay beside plain viscous damping that every step resolves.
         sampler: sampled control.
         accurate: the accurate method.
+        modal: clay that yields in it; special has no flow then.
     """
 
     time: Time
@@ -275,3 +274,4 @@ class Parts(NamedTuple):
     special: Any
     sampler: Any
     accurate: Any
+    modal: Any

@@ -161,14 +161,14 @@ def marched(accurate, parts, s, e, k, after):
     """The same of either method."""
     if accurate is None:
         return kicked(parts, s, e, k, after)
-    x, body, special = s.filled, Body(k.q, k.w, s.body.g), parts.special
-    put(e.q, 0, k.q)
-    put(e.w, 0, k.w)
-    state = march.stuck_in(special, s.clay.special, s.loop.modes)
-    stops = noted(special, e, s.clay.special, state, s.clock.t, x.stops)
-    clay = clay_behind(parts, s.clay, s.clay.hit, state, body, after)
+    x, body, c = s.filled, Body(k.end.q, k.end.w, s.body.g), s.clay
+    put(e.q, 0, body.q)
+    put(e.w, 0, body.w)
+    loop = march.course_behind(s.loop, k)
+    stops = march.noted(parts.modal, e, s.loop.modes, loop.modes, s.clock.t, x.stops)
+    clay = clay_behind(parts, c, c.hit, c.special, body, after)
     x = Filled(x.steps + 1, x.rows, x.crossings, stops)
-    return State(s.clock, body, k.loop, clay, k.work, s.status, x)
+    return State(s.clock, body, loop, clay, k.work, s.status, x)
 
 
 def stepped(parts, s, e, k, after, target):
@@ -189,7 +189,7 @@ def kept(accurate, parts, s, e, k, after, shows):
         return kick_kept(parts, s, e, k, after, shows)
     x = s.filled
     if shows:
-        march.write_now(parts.special, e, x.rows, s.body, k.now)
+        march.write_shown(parts.modal, e, x.rows, s.body, k.shown)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     return with_filled(s, x)
 
@@ -301,12 +301,12 @@ def towards(probe, parts, s, after, over, first):
         elif first:
             after = hits.longest(parts.hits, s.clay.hit, after)
             s, after = hits.struck(parts.hits, parts, s, after)
-            s, after = ends.acted(parts.accurate, parts, s, after)
+            s, after = ends.acted(parts.modal, parts, s, after)
         first, k = False, march.worked(probe, parts, s, after)
-        k, after = ends.met(probe, parts, s, k, after, axis >= 0)
-        if after == 0.0 or axis >= 0 or not is_finite(k):
+        k, after = ends.met(parts.modal, probe, parts, s, k, after, axis >= 0)
+        if after == 0.0 or axis >= 0 or not march.is_sound(probe, k):
             return s, k, after, axis, up, False
-        p = march.place_behind(probe, parts, s, k, after)
+        p = march.place_behind(probe, parts.arm, s.body.q, k, after)
         sx, sy = borders.sides(s.clay.region, p)
         if sx == 0 and sy == 0:
             return s, k, after, axis, up, False
@@ -335,7 +335,7 @@ def careful(parts, s, e):
     """The state after one step with a look at its end, which lies on a border if one is in the way."""
     target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
-    s, most = march.paced(parts.accurate, s, target, most, on_grid)
+    s, most = march.paced(parts.accurate, parts.modal, s, target, most, on_grid)
     if s.status.code != OPEN:
         return s
     over, after, first = (0, 0), most, True
@@ -351,8 +351,8 @@ def careful(parts, s, e):
     if s.clock.before > 0.0 or closing == OPEN:
         s = kept(parts.accurate, parts, s, e, k, after, on_grid or closing != OPEN)
     if closing != OPEN:
-        return ended(halted_arm(s, k), closing)
-    if not is_finite(k):
+        return ended(halted_arm(parts.accurate, s, k), closing)
+    if not march.is_sound(e.probe, k):
         return ended(s, NOT_FINITE)
     put(e.w, 0, s.body.w)  # after a hit it starts from the velocity behind half a kick
     s = stepped(parts, s, e, k, after, target)
@@ -361,10 +361,13 @@ def careful(parts, s, e):
     return s
 
 
-def halted_arm(s, k):
+def halted_arm(accurate, s, k):
     """The state with the joint rates behind its last kick."""
-    body = Body(s.body.q, k.w, s.body.g)
-    return State(s.clock, body, s.loop, s.clay, s.work, s.status, s.filled)
+    if accurate is None:
+        return State(
+            s.clock, Body(s.body.q, k.w, k.g), s.loop, s.clay, s.work, s.status, s.filled
+        )
+    return s
 
 
 def is_calm(special, state):
@@ -394,16 +397,16 @@ def glide(accurate, parts, s, e, room):
     c = s.clock
     if c.t != c.i * parts.time.dt or c.i >= parts.time.last or s.status.closing != OPEN:
         return s
-    s, fine = ends.acted(accurate, parts, s, INF)
+    s, fine = ends.acted(parts.modal, parts, s, INF)
     while has_room(e, s.filled, room) and s.clock.i < parts.time.last:
         target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
         if on_grid:
             s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
-        s, after = march.paced(accurate, s, target, after, on_grid)
+        s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)
         if s.status.code != OPEN or fine < after:
             break
         k = march.march(e.probe, parts, s, after)
-        if not march.is_calm(accurate, parts, s, k, after):
+        if not march.is_calm(parts.modal, parts.arm, s.clay.region, s.loop.modes, k, after):
             break
         s = kept(accurate, parts, s, e, k, after, on_grid)
         s = stepped(parts, s, e, k, after, target)

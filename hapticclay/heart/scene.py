@@ -71,7 +71,10 @@ def clay_part(s: Scenario):
     if clay is None:
         return None, None, None, None
     grain = (math.cos(clay.angle), math.sin(clay.angle)) if clay.angle else None
-    flow = p_.Flow(1 if clay.isotropic or clay.groove else None) if clay.yields else None
+    fast = s.integrator == "fast"
+    flow = None
+    if clay.yields and fast:
+        flow = p_.Flow(1 if clay.isotropic or clay.groove else None)
     springy = block = None
     if clay.springs:
         held = s.control == "sampled" and s.render == "held"
@@ -82,7 +85,7 @@ def clay_part(s: Scenario):
             g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
-    b = stiffness(s) if s.integrator == "fast" else 0.0
+    b = stiffness(s) if fast else 0.0
     stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
     hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block)
@@ -90,9 +93,10 @@ def clay_part(s: Scenario):
     return p_.Clay(1 if clay.grows else None), grain, hits, special
 
 
-def accurate_part(s: Scenario):
+def accurate_parts(s: Scenario):
+    """The accurate method, and clay that yields in it."""
     if s.integrator == "fast":
-        return None
+        return None, None
     runge_kutta.check_explicit(s)
     blocks = modal = None
     if s.clay and s.clay.grows:
@@ -100,7 +104,7 @@ def accurate_part(s: Scenario):
     if s.clay and s.clay.yields:
         along, grain = (1, None) if s.clay.isotropic else (None, clay_part(s)[1])
         modal = p_.Modal(along, grain, float(runge_kutta.largest_lightness(s)), float(s.dt))
-    return p_.Accurate(runge_kutta.parts_of_sample(s, 0), blocks, modal)
+    return p_.Accurate(runge_kutta.parts_of_sample(s, 0), blocks), modal
 
 
 def substeps_of_blocks(s: Scenario):
@@ -126,7 +130,7 @@ def parts_of(s: Scenario):
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
         hand_parts(s), p_.Push((0.0, float(x), float(y), 0.0, 0.0), None), None,
-        tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay_part(s), None, accurate_part(s),
+        tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay_part(s), None, *accurate_parts(s),
     )  # fmt: skip
 
 
@@ -143,7 +147,10 @@ def first_loop(parts, s):
         )
         axes = [s_.Axis(a.delta, 0.0, a.y, a.yrate) for a in axes]
     if parts.accurate is not None:
-        modes = s_.Modes((1.0, 1.0), NONE, NONE, NONE, INF) if parts.accurate.modal else None
+        modes = None
+        if parts.modal:
+            law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
+            modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, INF)
         return s_.Course(*axes, form, 0, 0.0, modes)
     return s_.Loop(*axes, form)
 

@@ -434,18 +434,22 @@ class Modes(NamedTuple):
     the motion.
 
     Attributes:
+        law: Fy, K, n of x, then of y.
         mode: of each axis, 0.0 where it rests, or the sign of its velocity; along the motion see
             modes.REST_MODE.
         way: along which a handle slides that is slow or begins, (x, y).
         anchor: where an axis that rests came to rest [m].
         ended: what ended the step before, see modes.RESTS.
+        stuck: whether x and y are noted as stopped, 1.0 or 0.0.
         fine: longest step that they allow [s].
     """
 
+    law: Any
     mode: Any
     way: Any
     anchor: Any
     ended: Any
+    stuck: Any
     fine: float
 
 
@@ -553,21 +557,59 @@ class Instant(NamedTuple):
     grip: Any
 
 
+class Sums(NamedTuple):
+    """Sums over the stages of a step.
+
+    Attributes:
+        first: accelerations over all but the last: of the joints, delta and y of x, of y; six.
+        last: the same over all but the first.
+        form: rates of compensators of another shape, weighted.
+        power: as Instant.power, weighted.
+    """
+
+    first: Any
+    last: Any
+    form: Any
+    power: Any
+
+
+class Shown(NamedTuple):
+    """What a record has of an instant, as Instant.
+
+    Attributes:
+        p: position [m].
+        v: velocity [m/s].
+        fh: force of the hand [N].
+        tau: torques [N.m].
+        delta: compensator output [m].
+        b: damping of the clay [N.s/m].
+        fe: force of the clay [N].
+    """
+
+    p: Any
+    v: Any
+    fh: Any
+    tau: Any
+    delta: Any
+    b: Any
+    fe: Any
+
+
 class Stride(NamedTuple):
     """A step of the accurate method.
 
     Attributes:
-        now: its start.
-        grip: clay that yields at its last stage.
-        q: joint angles at its end [rad].
-        w: joint rates there [rad/s].
-        loop: the Course there.
+        shown: its start.
+        begin: clay that yields at its start.
+        last: the same at its last stage.
+        end: its end.
+        ended: what ends a mode there, as Modes.ended.
         work: the ledger there.
     """
 
-    now: Instant
-    grip: Any
-    q: Any
-    w: Any
-    loop: Any
+    shown: Shown
+    begin: Any
+    last: Any
+    end: Point
+    ended: Any
     work: Work
