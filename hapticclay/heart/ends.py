@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from ..model import regions
 from . import modes as m_
-from .borders import find_root
 from .instant import instant
-from .march import axis_of, is_finite_point, march, point_of
+from .march import axis_of, point_of
 from .modes import FREE, NONE, RESTS, SLIDING, TURNED_IN
 from .parts import INF
-from .state import Body, Course, Grip, Modes, State, Stride
+from .search import MODE_X, felt_behind, find_root
+from .state import Body, Course, Grip, Modes, State
 
 
 def with_modes(s, modes):
@@ -49,10 +49,10 @@ def acted(modal, parts, s, after):
         return s, after
     m = s.loop.modes
     law = law_of(parts.table, s.clay.region.index)
-    m = Modes(law, m.mode, m.way, m.anchor, m.ended, m.stuck, m.fine)
+    m = Modes(law, m.mode, m.way, m.anchor, m.ended, NONE, m.stuck, m.fine)
     body, m, x = chosen(modal.along, parts, s, m)
     fine = max(m_.longest_step(modal.along, m, x, x.v), m_.shortest_step(modal.dt, s.clock.t))
-    m = Modes(law, m.mode, m.way, m.anchor, m.ended, m.stuck, fine)
+    m = Modes(law, m.mode, m.way, m.anchor, m.ended, NONE, m.stuck, fine)
     s = with_modes(State(s.clock, body, s.loop, s.clay, s.work, s.status, s.filled), m)
     return s, min(after, fine)
 
@@ -97,7 +97,7 @@ def chosen_axes(parts, s, m):
     anchor = at[0] if restx and x != 0.0 else anchor[0], at[1] if resty and y != 0.0 else anchor[1]
     if (restx and v[0] != 0.0) or (resty and v[1] != 0.0):
         body = moving(modal, parts.arm, body, (0.0 if restx else v[0], 0.0 if resty else v[1]))
-    m = Modes(m.law, m.mode, m.way, anchor, m.ended, m.stuck, m.fine)
+    m = Modes(m.law, m.mode, m.way, anchor, m.ended, m.ends, m.stuck, m.fine)
     m, grip = fitting(parts, s, body, m, restx, resty)
     return body, m, grip
 
@@ -166,17 +166,6 @@ def chosen_way(parts, s, m):
 # ---- where they end ------------------------------------------------------------------------------
 
 
-def felt_behind(parts, s, k, h):
-    """What clay that yields does at the end of a step of length h, in its modes."""
-    return instant(parts, s.clock.t + h, k.end, s.clay, s.loop.modes).grip
-
-
-def gap_behind(h, probe, parts, s, i):
-    """As modes.gap, at the end of a step of length h."""
-    grip = felt_behind(parts, s, march(probe, parts, s, h), h)
-    return m_.gap(parts.modal.along, parts.modal, s.loop.modes, grip, i)
-
-
 def strays(modal, part, m, k):
     """Whether a step along the motion turns back, or leaves the speeds of its mode."""
     v, mode = m_.velocity(modal, part, k.end.q, k.end.w), m.mode[0]
@@ -189,8 +178,17 @@ def strays(modal, part, m, k):
     return m_.TURN * along > 2.0 * m_.TURNING * modal.dt * turns
 
 
-def met(modal, probe, parts, s, k, after, lands):
-    """A step shortened to where a mode first ends, which its end tells; its length [s].
+def ending(modal, s, ends):
+    """The state with what ends the step."""
+    if modal is None:
+        return s
+    m = s.loop.modes
+    m = Modes(m.law, m.mode, m.way, m.anchor, m.ended, ends, m.stuck, m.fine)
+    return with_modes(s, m)
+
+
+def met(modal, probe, parts, s, k, after):
+    """A step shortened to where a mode first ends, which its end tells.
 
     Args:
         modal: the part.
@@ -199,29 +197,41 @@ def met(modal, probe, parts, s, k, after, lands):
         s: the state.
         k: the step.
         after: its length [s].
-        lands: whether it ends on a border, and is not to be shortened.
+
+    Returns:
+        The state with what ends the step; length of the step [s]; whether that is another one.
     """
     if modal is None:
-        return k, after
+        return s, after, False
     m, shortest = s.loop.modes, m_.shortest_step(modal.dt, s.clock.t)
-    if lands or after == 0.0 or not is_finite_point(k.end):
-        return k, after
-    while strays_along(modal.along, modal, parts.arm, m, k) and after > shortest:
-        after = max(0.5 * after, shortest)
-        k = march(probe, parts, s, after)
-    v, x, y, grip = m_.velocity(modal, parts.arm, k.end.q, k.end.w), INF, INF, k.last
-    watchx, watchy = may_end(modal.along, m, v, 0), may_end(modal.along, m, v, 1)
-    if watchx or watchy:
-        grip = felt_behind(parts, s, k, after)
+    if m.ends[0] != 0.0 or m.ends[1] != 0.0:
+        return s, after, False
+    if after > shortest and strays_along(modal.along, modal, parts.arm, m, k):
+        return s, max(0.5 * after, shortest), True
+    v = m_.velocity(modal, parts.arm, k.end.q, k.end.w)
+    watched = may_end(modal.along, m, v, 0), may_end(modal.along, m, v, 1)
+    if not (watched[0] or watched[1]):
+        return s, after, False
+    grip, span, ends = felt_behind(parts, s, k, after), INF, NONE
     for i in range(2):
-        if watchy if i else watchx:
-            gap = m_.gap(modal.along, modal, m, grip, i)
-            if gap < 0.0:
-                h = find_root(gap_behind, after, gap, probe, parts, s, i)
-                x, y = (x, h) if i else (h, y)
-    if min(x, y) == INF:
-        return k, after
-    return first_end(probe, parts, s, x, y, shortest, after)
+        gap = m_.gap(modal.along, modal, m, grip, i) if watched[i] else 0.0
+        if gap < 0.0:
+            h = find_root(after, gap, probe, parts, s, MODE_X + i, 0.0)
+            if h < span:
+                span, end = h, end_of_mode(modal.along, m, grip, i)
+                ends = (end, 0.0) if i == 0 else (0.0, end)
+    if span == INF:
+        return s, after, False
+    return ending(modal, s, ends), min(max(span, shortest), after), True
+
+
+def end_of_mode(along, m, grip, i):
+    """What ends the mode of an axis, which the clay at the end of a longer step tells."""
+    if m.mode[i] != 0.0:
+        return RESTS
+    if axis_of(along) > 0.0 or grip.f[i] > 0.0:
+        return FREE
+    return -FREE
 
 
 def strays_along(along, modal, part, m, k):
@@ -236,15 +246,3 @@ def may_end(along, m, v, i):
     if along is None:
         return m_.is_active(m.law, i) and (m.mode[i] == 0.0 or m.mode[i] * v[i] < 0.0)
     return i == 0 and m_.is_active(m.law, 0) and m.mode[0] != SLIDING
-
-
-def first_end(probe, parts, s, x, y, shortest, after):
-    """The step to the first of two ends of modes; its length [s]."""
-    span = min(max(min(x, y), shortest), after)
-    k = march(probe, parts, s, span)
-    i, end, along = 0 if x <= y else 1, RESTS, axis_of(parts.modal.along) > 0.0
-    if s.loop.modes.mode[i] == 0.0:
-        grip = felt_behind(parts, s, k, span)
-        end = FREE if along or grip.f[i] > 0.0 else -FREE
-    ended = (end, 0.0) if i == 0 else (0.0, end)
-    return Stride(k.shown, k.begin, k.last, k.end, ended, k.work), span

@@ -30,7 +30,6 @@ from .state import (
 from .yielding import note
 
 GROWTH_BLOCK = 64  # samples for which the steps of clay that grows are chosen at once
-NO_END = (0.0, 0.0)
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 NEAR = 1e-6  # of a step: so close to its end is at its end
 
@@ -180,7 +179,7 @@ def march(probe, parts, s, h):
         end = m_.back_to_rest(modes, parts.modal, parts.arm, end)
     x = first
     shown = Shown(x.p, x.v, x.fh, x.tau, x.delta, x.b, x.fe)
-    return Stride(shown, x.grip, now.grip, end, NO_END, with_works(s.work, sums.power, h))
+    return Stride(shown, x.grip, now.grip, end, with_works(s.work, sums.power, h))
 
 
 def is_finite_point(z):
@@ -256,14 +255,14 @@ def write_felt(modal, e, i, fe):
 def course_behind(x, k):
     """The controller behind a step."""
     z = k.end
-    return Course(z.x, z.y, z.form, x.left - 1, x.share, modes_behind(x.modes, k.ended))
+    return Course(z.x, z.y, z.form, x.left - 1, x.share, modes_behind(x.modes))
 
 
-def modes_behind(m, ended):
+def modes_behind(m):
     if m is None:
         return m
     stuck = m_.stopped(m, 0), m_.stopped(m, 1)
-    return Modes(m.law, m.mode, m.way, m.anchor, ended, stuck, m.fine)
+    return Modes(m.law, m.mode, m.way, m.anchor, m.ends, (0.0, 0.0), stuck, m.fine)
 
 
 def noted(modal, e, was, now, t, n):

@@ -80,11 +80,11 @@ def holding_force(modal, law, i):
 
 
 def with_mode(m, x, y):
-    return Modes(m.law, (x, y), m.way, m.anchor, m.ended, m.stuck, m.fine)
+    return Modes(m.law, (x, y), m.way, m.anchor, m.ended, m.ends, m.stuck, m.fine)
 
 
 def with_way(m, x, way):
-    return Modes(m.law, (x, x), way, m.anchor, m.ended, m.stuck, m.fine)
+    return Modes(m.law, (x, x), way, m.anchor, m.ended, m.ends, m.stuck, m.fine)
 
 
 # ---- at an instant -------------------------------------------------------------------------------

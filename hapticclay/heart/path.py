@@ -303,9 +303,11 @@ def towards(probe, parts, s, after, over, first):
             s, after = hits.struck(parts.hits, parts, s, after)
             s, after = ends.acted(parts.modal, parts, s, after)
         first, k = False, march.worked(probe, parts, s, after)
-        k, after = ends.met(parts.modal, probe, parts, s, k, after, axis >= 0)
         if after == 0.0 or axis >= 0 or not march.is_sound(probe, k):
             return s, k, after, axis, up, False
+        s, after, again = ends.met(parts.modal, probe, parts, s, k, after)
+        if again:
+            continue
         p = march.place_behind(probe, parts.arm, s.body.q, k, after)
         sx, sy = borders.sides(s.clay.region, p)
         if sx == 0 and sy == 0:
@@ -328,7 +330,7 @@ def towards(probe, parts, s, after, over, first):
         elif standing:
             return s, k, after, i, side, True
         else:
-            after, axis, up = length, i, side
+            s, after, axis, up = ends.ending(parts.modal, s, (0.0, 0.0)), length, i, side
 
 
 def careful(parts, s, e):

@@ -150,7 +150,7 @@ def first_loop(parts, s):
         modes = None
         if parts.modal:
             law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
-            modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, INF)
+            modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, NONE, INF)
         return s_.Course(*axes, form, 0, 0.0, modes)
     return s_.Loop(*axes, form)
 

@@ -440,6 +440,7 @@ class Modes(NamedTuple):
         way: along which a handle slides that is slow or begins, (x, y).
         anchor: where an axis that rests came to rest [m].
         ended: what ended the step before, see modes.RESTS.
+        ends: what ends this one.
         stuck: whether x and y are noted as stopped, 1.0 or 0.0.
         fine: longest step that they allow [s].
     """
@@ -449,6 +450,7 @@ class Modes(NamedTuple):
     way: Any
     anchor: Any
     ended: Any
+    ends: Any
     stuck: Any
     fine: float
 
@@ -603,7 +605,6 @@ class Stride(NamedTuple):
         begin: clay that yields at its start.
         last: the same at its last stage.
         end: its end.
-        ended: what ends a mode there, as Modes.ended.
         work: the ledger there.
     """
 
@@ -611,5 +612,4 @@ class Stride(NamedTuple):
     begin: Any
     last: Any
     end: Point
-    ended: Any
     work: Work
