@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from ..model import regions
 from . import grooves, springs, viscous
-from .drive import kick
-from .kick import place_after
+from .march import TOUCH
+from .search import find_root
 from .state import Clay, Flow, Growth, Hit, Laws, Region, State, Status
 
-TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 
 
 def side(p, low, high):
@@ -121,55 +120,14 @@ def passed_alike(parts, s, here, p):
 # ---- the step that ends on a border --------------------------------------------------------------
 
 
-def beyond(h, parts, s, i, border):
-    """Distance by which a step of length h would pass a border of coordinate i [m]."""
-    k = kick(parts, s.clock, s.body, s.loop, s.clay, h)
-    x, y = place_after(parts.arm, s.body.q, k, h)
-    return (y if i else x) - border
-
-
-def find_root(f, b, fb, *args):
-    """Root of f between 0 and b, to rounding (false position, Illinois).
-
-    f may vanish at 0 itself, as when a handle enters stiff clay, stops and returns; the root of f/x
-    is then found. Where f does not change its sign, the result lies next to 0.
-    """
-    first, end, leaves = 1e-9 * b, b, False
-    a, fa = 0.0, 0.0
-    for i in range(100):
-        a = first if i == 0 else 8.0 * a
-        if a > 0.5 * b:
-            return first
-        fa = f(a, *args)
-        if fa != 0.0 and (fa > 0.0) != (fb > 0.0):
-            break
-        leaves = True
-    if leaves:
-        fa, fb = fa / a, fb / b
-    for _ in range(60):
-        h = b - fb * (b - a) / (fb - fa)
-        fh = f(h, *args)
-        small = abs(fh) < 4e-16  # rounding of a position
-        if leaves:
-            fh /= h
-        if (fh > 0.0) != (fb > 0.0):
-            a, fa = b, fb
-        else:
-            fa *= 0.5
-        b, fb = h, fh
-        if abs(b - a) <= 1e-12 * end or small:
-            break
-    return b
-
-
-def first_border(parts, s, after, p, sx, sy):
+def first_border(probe, parts, s, after, p, sx, sy):
     """The step that ends on the first border in its way: its length [s], coordinate, side."""
     span, axis, up = after, -1, 0
     for i in range(2):
         at = sy if i else sx
         if at != 0:
             border = border_of(s.clay.region, i, at)
-            length = find_root(beyond, after, (p[1] if i else p[0]) - border, parts, s, i, border)
+            length = find_root(after, p[i] - border, probe, parts, s, i, border)
             if axis < 0 or length < span:
                 span, axis, up = length, i, at
     return span, axis, up

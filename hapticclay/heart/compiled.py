@@ -41,21 +41,26 @@ from . import (
     begin,
     borders,
     drive,
+    ends,
     energy,
     engine_step,
     friction,
     grooves,
     hand,
     hits,
+    instant,
     kick,
     lacking,
     laws,
     many,
+    march,
+    modes,
     path,
     run,
     rows,
     sampled,
     sampled_controller,
+    search,
     servo,
     springs,
     stiff,
@@ -68,7 +73,7 @@ SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
     engine_step, begin, energy, laws, many, monitor, drive, friction, sampled, sampled_controller, torque,
-    wires,
+    wires, ends, instant, march, modes, search,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -256,7 +261,7 @@ def function(name: str) -> Any:
     return found
 
 
-STEP, RESET = function("mj_step"), function("mj_resetData")
+STEP, FORWARD, RESET = map(function, ("mj_step", "mj_forward", "mj_resetData"))
 
 
 # ---- kernels -------------------------------------------------------------------------------------
@@ -294,14 +299,14 @@ def natively(r: run.Run, room: int) -> None:
             met[kind] = met.get(kind, 0) + 1
 
 
-def calls(model: Any, data: Any) -> tuple[Any, Any, Any]:
-    """mj_step, model and data as compiled code calls them.
+def calls(model: Any, data: Any) -> tuple[Any, ...]:
+    """mj_step, mj_forward, model and data as compiled code calls them.
 
     Args:
         model: of the engine.
         data: of the engine.
     """
-    return STEP, model._address, data._address
+    return STEP, FORWARD, model._address, data._address
 
 
 KERNEL = run.Kernel(natively, calls, QUIET)

@@ -7,6 +7,30 @@ from typing import Any, NamedTuple
 from ..model import arm
 
 
+class Probe(NamedTuple):
+    """What the accurate method has of the engine.
+
+    Attributes:
+        forward: mj_forward.
+        model: the model.
+        data: its data.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        acceleration: joint accelerations [rad/s^2].
+        ctrl: torques of the motors [N.m] and dampers [N.s/m].
+        push: applied joint torques [N.m].
+    """
+
+    forward: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    acceleration: Any
+    ctrl: Any
+    push: Any
+
+
 class Engine(NamedTuple):
     """The engine, and the arrays that a run fills: memoryviews, or addresses for compiled steps.
 
@@ -27,6 +51,7 @@ class Engine(NamedTuple):
             a row.
         most_crossings: from which on they are full.
         most_stops: from which on they are full.
+        probe: for the accurate method.
     """
 
     step: Any
@@ -43,6 +68,7 @@ class Engine(NamedTuple):
     rendered: Any
     most_crossings: int
     most_stops: int
+    probe: Any
 
 
 def put(array, i, values):
@@ -85,3 +111,14 @@ def moved_arm(parts, e, before, w, k, h):
     a1, a2 = (n[0] - w[0]) / h, (n[0] + n[1] - w[0] - w[1]) / h
     push = links[2] * a1 + links[3] * a2 - tau[0], links[3] * a2 - tau[1]
     return step_engine(e, parts.clay, tau, push, (0.0, 0.0), h)
+
+
+def accelerations(probe, clay, z, now):
+    """Joint accelerations that the engine gives at a point of a step [rad/s^2]."""
+    put(probe.q, 0, z.q)
+    put(probe.w, 0, z.w)
+    put(probe.ctrl, 0, now.tau)
+    with_dampers(clay, probe, now.b)
+    put(probe.push, 0, now.push)
+    probe.forward(probe.model, probe.data)
+    return pair(probe.acceleration)

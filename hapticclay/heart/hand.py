@@ -34,6 +34,16 @@ def span(longer, step):
     return max(step.before, step.after)
 
 
+def with_hand_now(hand, load, at):
+    """The load at an instant with that of the operator's arm."""
+    if hand is None:
+        return load
+    (hx, hy), f, p, v, c = hand, load.f, at.p, at.v, at.c
+    fx = hx.spring * p[0] - hx.mass * c[0] + hx.damper * v[0]
+    fy = hy.spring * p[1] - hy.mass * c[1] + hy.damper * v[1]
+    return Load((f[0] - fx, f[1] - fy), (hx.mass, hy.mass, 0.0))
+
+
 def dampers(hand):
     """Dampers of the hand, (x, y) [N.s/m]."""
     if hand is None:

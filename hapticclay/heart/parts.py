@@ -352,6 +352,34 @@ class Coupling(NamedTuple):
     damper: float
 
 
+class Modal(NamedTuple):
+    """Clay that yields, in the accurate method.
+
+    Attributes:
+        along: None where each axis yields by itself, 1 along the motion.
+        grain: as Parts.grain; None along the motion.
+        lightness: largest acceleration per unit of force, by way of C too [1/kg].
+        dt: length of a sample [s].
+    """
+
+    along: Any
+    grain: Any
+    lightness: float
+    dt: float
+
+
+class Accurate(NamedTuple):
+    """The accurate method.
+
+    Attributes:
+        substeps: engine steps a sample.
+        blocks: the same by block of samples, where the clay grows.
+    """
+
+    substeps: int
+    blocks: Any
+
+
 class Parts(NamedTuple):
     """A scene.
 
@@ -373,6 +401,7 @@ class Parts(NamedTuple):
         special: laws of the clay beside plain viscous damping that every step resolves.
         sampler: sampled control.
         accurate: the accurate method.
+        modal: clay that yields in it; special has no flow then.
     """
 
     time: Time
@@ -392,3 +421,4 @@ class Parts(NamedTuple):
     special: Any
     sampler: Any
     accurate: Any
+    modal: Any

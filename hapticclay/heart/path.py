@@ -7,10 +7,11 @@ search for a border works out as many as it likes; the run takes the last.
 from __future__ import annotations
 
 from ..model import regions
-from . import borders, grooves, hits, laws, rows, sampled, springs, viscous, yielding
+from . import borders, ends, grooves, hits, laws, march, rows, sampled, springs, viscous, yielding
 from .drive import kick
 from .engine_step import put
-from .kick import commanded, handle_at, is_calm_end, is_finite, place, place_after, velocity
+from .kick import commanded, handle_at, is_calm_end, is_finite, place, velocity
+from .parts import INF
 from .state import (
     FINISHED,
     NOT_FINITE,
@@ -90,11 +91,11 @@ def same_growth(part, growth):
     return Growth(growth.rate, growth.rate)
 
 
-def noted(special, e, before, k, t, n):
+def noted(special, e, before, after, t, n):
     """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
         return n
-    return yielding.noted(special.flow, e, k.motion.reaction.felt, before.felt, t, n)
+    return yielding.noted(special.flow, e, after.felt, before.felt, t, n)
 
 
 def held_arm(special, e, reaction, w):
@@ -107,20 +108,29 @@ def held_arm(special, e, reaction, w):
     return w
 
 
-def clay_behind(parts, clay, k, q, w, h):
-    """The clay behind a step of length h after a kick, which led the arm to q, w."""
+def clay_behind(parts, clay, hit, reaction, body, h):
+    """The clay behind a step of length h, which led the arm there.
+
+    Args:
+        parts: the scene.
+        clay: before it.
+        hit: a hit, behind it.
+        reaction: of its kick.
+        body: the arm.
+        h: its length [s].
+    """
     if parts.clay is None:
         return clay
     growth = same_growth(parts.clay.growth, clay.growth)
-    hit, c = hits.after_kick(parts.hits, parts, clay.hit, k), clay
-    clay = Clay(c.region, c.b, c.b, growth, hit, k.motion.reaction, c.laws)
-    return laws_behind(parts.special, parts, clay, q, w, h)
+    c = clay
+    clay = Clay(c.region, c.b, c.b, growth, hit, reaction, c.laws)
+    return laws_behind(parts.special, parts, clay, body, h)
 
 
-def laws_behind(special, parts, c, q, w, h):
+def laws_behind(special, parts, c, body, h):
     if special is None:
         return c
-    x, table, at = c.laws, parts.table, handle_at(parts.arm, Body(q, w, (0.0, 0.0)), 0.0)
+    x, table, at = c.laws, parts.table, handle_at(parts.arm, body, 0.0)
     elastic = springs.moved(special.springs, x.elastic, c.region, table, at.p, h)
     b, old, cut = grooves.moved(special.groove, x.cut, c, at.p, at.v)
     more = laws.moved(special.more, x.more, at, h)
@@ -129,29 +139,60 @@ def laws_behind(special, parts, c, q, w, h):
     return viscous.at_place(special.smooth, table, c, at.p)
 
 
-def stepped(parts, s, e, k, after, target, work, filled):
-    """The state after the step behind a kick; rows filled and the ledger are given."""
-    special, clock, x, dt = parts.special, s.clock, s.filled, parts.time.dt
+def kicked(parts, s, e, k, after, work, filled):
+    """The state behind a kick and the step after it, but for the clock; the engine makes it."""
+    special, clock, x, reaction = parts.special, s.clock, s.filled, k.motion.reaction
     q, w = sampled.stepped_arm(parts.sampler, parts, e, s, k, after)
-    w = held_arm(special, e, k.motion.reaction, w)
+    body = Body(q, held_arm(special, e, reaction, w), k.g)
     before, stops = sampled.noted_early(parts.sampler, e, s, x.stops)
-    stops = noted(special, e, before, k, clock.t, stops)
-    clay = clay_behind(parts, s.clay, k, q, w, after)
-    t, i = clock.t + after, clock.i
+    stops = noted(special, e, before, reaction, clock.t, stops)
+    hit = hits.after_kick(parts.hits, parts, s.clay.hit, k)
+    clay = clay_behind(parts, s.clay, hit, reaction, body, after)
     loop = sampled.taken(parts.sampler, parts, s, k)
-    loop = commanded(parts.command, loop, dt, clock, k.step)
-    if target - t <= 1e-9 * dt:
+    loop = commanded(parts.command, loop, parts.time.dt, clock, k.step)
+    x, status = Filled(x.steps + 1, filled, x.crossings, stops), sampled.status_behind(parts.sampler, s)
+    return State(clock, body, loop, clay, work, status, x)
+
+
+def moved_on(accurate, parts, s, e, k, after, work, filled):
+    """The same of either method."""
+    if accurate is None:
+        return kicked(parts, s, e, k, after, work, filled)
+    x, body, c = s.filled, Body(k.end.q, k.end.w, s.body.g), s.clay
+    put(e.q, 0, body.q)
+    put(e.w, 0, body.w)
+    loop = march.course_behind(s.loop, k)
+    stops = march.noted(parts.modal, e, s.loop.modes, loop.modes, s.clock.t, x.stops)
+    clay = clay_behind(parts, c, c.hit, c.reaction, body, after)
+    x = Filled(x.steps + 1, filled, x.crossings, stops)
+    return State(s.clock, body, loop, clay, k.work, s.status, x)
+
+
+def stepped(parts, s, e, k, after, target, work, filled):
+    """The state after a step; rows filled and the ledger are given."""
+    t, i = s.clock.t + after, s.clock.i
+    if target - t <= 1e-9 * parts.time.dt:
         t, i = target, i + 1 if target == grid_after(parts.time, i) else i
-    clock, x = Clock(t, i, after), Filled(x.steps + 1, filled, x.crossings, stops)
-    status = sampled.status_behind(parts.sampler, s)
-    return State(clock, Body(q, w, k.g), loop, clay, work, status, x)
+    s = moved_on(parts.accurate, parts, s, e, k, after, work, filled)
+    return State(Clock(t, i, after), s.body, s.loop, s.clay, s.work, s.status, s.filled)
 
 
 # ---- what is kept --------------------------------------------------------------------------------
 
 
-def kept(parts, s, e, k, after, shows):
-    """The state with what is kept of a kick: its row, if now is a sample, and its works."""
+def kept(accurate, parts, s, e, k, after, shows):
+    """The state with what is kept of a step: its row, if now is a sample, and its works."""
+    if accurate is None:
+        return kick_kept(parts, s, e, k, after, shows)
+    x = s.filled
+    if shows:
+        march.write_shown(parts.modal, e, x.rows, s.body, k.shown)
+        x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
+    return with_filled(s, x)
+
+
+def kick_kept(parts, s, e, k, after, shows):
+    """The same of a kick."""
     x = s.filled
     if shows:
         write_row(parts, s, e, k, after)
@@ -178,8 +219,15 @@ def write_row(parts, s, e, k, after):
 # ---- borders -------------------------------------------------------------------------------------
 
 
-def arrival(parts, s):
+def arrival(accurate, parts, s):
     """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
+    if accurate is None:
+        return kick_arrival(parts, s)
+    return handle_at(parts.arm, s.body, 0.0).v
+
+
+def kick_arrival(parts, s):
+    """The same where kicks lead."""
     special = sampled.acting_laws(parts.sampler, parts.special)
     k = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0)
     v = velocity(special, parts.grain, k)
@@ -213,7 +261,7 @@ def crossed(parts, s, e, i, up):
     border, x = borders.border_of(s.clay.region, i, up), s.filled
     speed = 0.0
     if s.clock.before > 0.0:
-        v = arrival(parts, s)
+        v = arrival(parts.accurate, parts, s)
         speed = v[1] if i else v[0]
     put(e.crossings, 4 * x.crossings, (float(i), border, s.clock.t, speed))
     closes = i == 0 and up > 0 and border == parts.table[regions.END]
@@ -231,10 +279,11 @@ def shortened(special, laws_, after):
     return springs.longest(special.springs, laws_.elastic, after)
 
 
-def towards(parts, s, after, over, first):
-    """The kick that leads on, with the step after it shortened to the first border in its way.
+def towards(probe, parts, s, after, over, first):
+    """The step that leads on, shortened to the first border in its way.
 
     Args:
+        probe: of the engine, for the accurate method.
         parts: the scene.
         s: the state.
         after: length that the step may have [s].
@@ -243,7 +292,7 @@ def towards(parts, s, after, over, first):
         first: whether other clay has been met since the last look.
 
     Returns:
-        The state, in the region of the step; the kick; length of the step [s]; coordinate of the
+        The state, in the region of the step; the step, by its kick; length of the step [s]; coordinate of the
         border that it ends on, or that is to be crossed without a step, -1 for none; its side;
         whether without a step.
     """
@@ -257,11 +306,14 @@ def towards(parts, s, after, over, first):
             s = sampled.acted(parts.sampler, parts, s)
             after = hits.longest(parts.hits, s.clay.hit, after)
             s, after = hits.struck(parts.hits, parts, s, after)
-        first = False
-        k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
-        if after == 0.0 or axis >= 0 or not is_finite(k):
+            s, after = ends.acted(parts.modal, parts, s, after)
+        first, k = False, march.worked(probe, parts, s, after)
+        if after == 0.0 or axis >= 0 or not march.is_sound(probe, k):
             return s, k, after, axis, up, False
-        p = place_after(parts.arm, s.body.q, k, after)
+        s, after, again = ends.met(parts.modal, probe, parts, s, k, after)
+        if again:
+            continue
+        p = march.place_behind(probe, parts.arm, s.body.q, k, after)
         sx, sy = borders.sides(s.clay.region, p)
         if sx == 0 and sy == 0:
             return s, k, after, axis, up, False
@@ -277,13 +329,13 @@ def towards(parts, s, after, over, first):
         elif s.status.landings >= LANDINGS:
             return s, k, after, axis, up, False
         else:
-            length, i, side = borders.first_border(parts, s, after, p, sx, sy)
+            length, i, side = borders.first_border(probe, parts, s, after, p, sx, sy)
         if borders.is_same_beyond(parts.table, s.clay.region, i, side):
             s = borders.moved_on(parts, s, here, i, side, 0.0)
         elif standing:
             return s, k, after, i, side, True
         else:
-            after, axis, up = length, i, side
+            s, after, axis, up = ends.ending(parts.modal, s, (0.0, 0.0)), length, i, side
 
 
 def careful(parts, s, e):
@@ -291,11 +343,12 @@ def careful(parts, s, e):
     target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
     target, most = sampled.before_event(parts.sampler, parts.time.dt, s, target, most)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
+    s, most = march.paced(parts.accurate, parts.modal, s, target, most, on_grid)
     if s.status.code != OPEN:
         return s
     over, after, first = (0, 0), most, True
     while True:
-        s, k, after, axis, up, standing = towards(parts, s, after, over, first)
+        s, k, after, axis, up, standing = towards(e.probe, parts, s, after, over, first)
         if not standing:
             break
         over = (up, over[1]) if axis == 0 else (over[0], up)
@@ -304,10 +357,10 @@ def careful(parts, s, e):
             return ended(s, s.status.closing)
     closing = s.status.closing
     if s.clock.before > 0.0 or closing == OPEN:
-        s = kept(parts, s, e, k, after, on_grid or closing != OPEN)
+        s = kept(parts.accurate, parts, s, e, k, after, on_grid or closing != OPEN)
     if closing != OPEN:
-        return ended(halted_arm(s, k), closing)
-    if not is_finite(k):
+        return ended(halted_arm(parts.accurate, s, k), closing)
+    if not march.is_sound(e.probe, k):
         return ended(s, NOT_FINITE)
     put(e.w, 0, s.body.w)  # after a hit it starts from the velocity behind half a kick
     s = stepped(parts, s, e, k, after, target, s.work, s.filled.rows)
@@ -316,10 +369,12 @@ def careful(parts, s, e):
     return s
 
 
-def halted_arm(s, k):
+def halted_arm(accurate, s, k):
     """The state behind its last kick, at its sample."""
-    body, c = Body(s.body.q, k.w, k.g), s.clock
-    return State(Clock(c.t, c.i, 0.0), body, s.loop, s.clay, s.work, s.status, s.filled)
+    if accurate is None:
+        body, c = Body(s.body.q, k.w, k.g), s.clock
+        return State(Clock(c.t, c.i, 0.0), body, s.loop, s.clay, s.work, s.status, s.filled)
+    return s
 
 
 def is_calm(special, laws_):
@@ -358,6 +413,35 @@ def whole_step(parts, s, e):
 
 def glide(parts, s, e, room):
     """Whole steps within one region, up to one that `careful` has to look at."""
+    return glide_by(parts.accurate, parts, s, e, room)
+
+
+def glide_by(accurate, parts, s, e, room):
+    if accurate is None:
+        return glide_kicks(parts, s, e, room)
+    c = s.clock
+    if c.t != c.i * parts.time.dt or c.i >= parts.time.last or s.status.closing != OPEN:
+        return s
+    s, fine = ends.acted(parts.modal, parts, s, INF)
+    while s.clock.i < parts.time.last:
+        target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+        if on_grid:
+            if not has_room(e, s.filled, room):
+                break
+            s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
+        s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)
+        if s.status.code != OPEN or fine < after:
+            break
+        k = march.march(e.probe, parts, s, after)
+        if not march.is_calm(parts.modal, parts.arm, s.clay.region, s.loop.modes, k, after):
+            break
+        s = kept(accurate, parts, s, e, k, after, on_grid)
+        s = stepped(parts, s, e, k, after, target, s.work, s.filled.rows)
+    return s
+
+
+def glide_kicks(parts, s, e, room):
+    """The same of the fast method."""
     made = True
     while made and has_room(e, s.filled, room) and may_glide(parts, s):
         made, s = whole_step(parts, s, e)
@@ -365,11 +449,10 @@ def glide(parts, s, e, room):
 
 
 def step(parts, s, e):
-    """The state after one step."""
-    made = False
-    if may_glide(parts, s):
-        made, s = whole_step(parts, s, e)
-    return s if made else careful(parts, s, e)
+    """The state after one step, or after those to the next sample."""
+    made = s.filled.steps
+    s = glide(parts, s, e, s.filled.rows + 1)
+    return careful(parts, s, e) if s.filled.steps == made else s
 
 
 def advance(parts, s, e, room):

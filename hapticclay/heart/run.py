@@ -20,7 +20,7 @@ from ..model.scenario import Scenario
 from ..stepping import engine, monitor
 from ..stepping.engine import mujoco
 from . import begin, energy, path, rows, scene, viscous
-from .engine_step import Engine
+from .engine_step import Engine, Probe
 from .parts import Parts, Signal
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
@@ -73,12 +73,12 @@ class Kernel(NamedTuple):
 
     Attributes:
         advance: makes steps, called with (run, room).
-        calls: mj_step, model and data as compiled code calls them; None if there is none.
+        calls: mj_step, mj_forward, model and data as compiled code calls them; None for none.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
     """
 
     advance: Callable[[Run, int], None]
-    calls: Callable[[Any, Any], tuple[Any, Any, Any]] | None = None
+    calls: Callable[[Any, Any], tuple[Any, ...]] | None = None
     quiet: Callable[..., bool] | None = None
 
 
@@ -160,7 +160,8 @@ class EngineStore:
             data: of the engine.
         """
         special = parts.special
-        if special is not None and special.flow is not None and not len(self.stops):
+        flows = parts.modal is not None or (special is not None and special.flow is not None)
+        if flows and not len(self.stops):
             self.stops = np.empty((STOPS, 3))
         if scene.tells(parts) and not len(self.rendered):
             self.rendered = np.empty((CHUNK - 1, 3))
@@ -168,11 +169,18 @@ class EngineStore:
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
         arrays = [*own, *(x.reshape(-1) for x in kept)]
         bounds = CROSSINGS - 3, max(len(self.stops) - 8, 1)
-        plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds)
+        felt: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
+        probe = native = None
+        if parts.accurate is not None:
+            probe = Probe(mujoco.mj_forward, model, data, *map(memoryview, felt))
+        plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds, probe)
         if self.kernel.calls is None:
             return plain, None
+        step, forward, *engine_ = self.kernel.calls(model, data)
+        if parts.accurate is not None:
+            native = Probe(forward, *engine_, *(x.ctypes.data for x in felt))
         addresses = [x.ctypes.data for x in arrays]
-        return plain, Engine(*self.kernel.calls(model, data), *addresses, *bounds)
+        return plain, Engine(step, *engine_, *addresses, *bounds, native)
 
 
 _idle: dict[Kernel, list[EngineStore]] = {}  # engines that no run uses

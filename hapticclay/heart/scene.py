@@ -10,14 +10,16 @@ from ..model import compensator, groove, hardware as interface, regions
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, LawCaller
 from ..model.scenario import Scenario
+from ..stepping import runge_kutta
 from ..stepping.run import spring_step
 from ..stepping.sampled import delay_in_samples, formed_memory, held_memory
 from . import begin, hardware, kick, laws, parts as p_, rows, sampled, state as s_
 from .engine_step import put
+from .march import GROWTH_BLOCK
+from .modes import SUBSTEPS
 from .parts import INF
 
 NONE = (0.0, 0.0)
-TOLD = [None]
 
 
 def hand_parts(s: Scenario):
@@ -56,7 +58,10 @@ def clay_part(s: Scenario):
     if clay is None:
         return None, None, None, None
     grain = (math.cos(clay.angle), math.sin(clay.angle)) if clay.angle else None
-    flow = p_.Flow(1 if clay.isotropic or clay.groove else None) if clay.yields else None
+    fast = s.integrator == "fast" or s.control == "sampled"
+    flow = None
+    if clay.yields and fast:
+        flow = p_.Flow(1 if clay.isotropic or clay.groove else None)
     springy = block = None
     if clay.springs:
         springy = p_.Springs(float(spring_step(s)), 1 if is_held(s) else None)
@@ -66,7 +71,7 @@ def clay_part(s: Scenario):
             g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
-    b = 0.0 if is_held(s) else stiffness(s)
+    b = stiffness(s) if fast and not is_held(s) else 0.0
     stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
     hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 and s.control != "sampled" else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
@@ -83,6 +88,32 @@ def steady_force(s: Scenario) -> tuple[float, float]:
     return float(x), float(y)
 
 
+def accurate_parts(s: Scenario):
+    """The accurate method, and clay that yields in it."""
+    if s.integrator == "fast" or s.control == "sampled":
+        return None, None
+    runge_kutta.check_explicit(s)
+    blocks = modal = None
+    if s.clay and s.clay.grows:
+        blocks = substeps_of_blocks(s)
+    if s.clay and s.clay.yields:
+        along, grain = (1, None) if s.clay.isotropic else (None, clay_part(s)[1])
+        modal = p_.Modal(along, grain, float(runge_kutta.largest_lightness(s)), float(s.dt))
+    return p_.Accurate(runge_kutta.parts_of_sample(s, 0), blocks), modal
+
+
+def substeps_of_blocks(s: Scenario):
+    """Engine steps a sample, by block; they grow, and after SUBSTEPS all are as many."""
+    count = math.floor(s.t_max / s.dt + 1e-6) // GROWTH_BLOCK + 1
+    blocks = np.empty(count, dtype=np.int64)
+    for j in range(count):
+        blocks[j] = runge_kutta.parts_of_sample(s, j * GROWTH_BLOCK)
+        if blocks[j] > SUBSTEPS:
+            blocks[j:] = SUBSTEPS + 1
+            break
+    return blocks
+
+
 def parts_of(s: Scenario):
     lag, form = compensators(s)
     clay = clay_part(s)
@@ -92,7 +123,7 @@ def parts_of(s: Scenario):
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
         hand_parts(s), p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
-        sampler(s, *clay[::3]), None,
+        sampler(s, *clay[::3]), *accurate_parts(s),
     )  # fmt: skip
 
 
@@ -234,7 +265,18 @@ def start(parts, s: Scenario, e):
     """The state at the start of a run."""
     p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
     state = begin.begun(parts, blocks(parts, s), e, p, v)
+    if parts.accurate is not None:
+        return first_course(parts, state)
     return state if parts.sampler is None else first_sampled(parts.sampler, parts, s, state)
+
+
+def first_course(parts, state):
+    """The state of an accurate run at its start."""
+    loop, modes = state.loop, None
+    if parts.modal:
+        law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
+        modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, NONE, INF)
+    return state._replace(loop=s_.Course(loop.x, loop.y, loop.form, 0, 0.0, modes))
 
 
 def written(parts):
@@ -273,5 +315,5 @@ def viewed(part):
 
 def tells(parts):
     """Whether the force of the clay is recorded: b v does not tell it."""
-    own = parts.special is not None and rows.tells(parts.special)
+    own = parts.modal is not None or (parts.special is not None and rows.tells(parts.special))
     return own or (parts.sampler is not None and parts.sampler.rendered is not None)

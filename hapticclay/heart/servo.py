@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..model import arm, compensator
+from ..model import arm, compensator, controller
 from .state import Axis, Law, Load, Loop
 
 # ---- the compensator -----------------------------------------------------------------------------
@@ -75,6 +75,39 @@ def state_after(form, i, z, f):
     )
 
 
+def output_now(form, z):
+    """Output at an instant without the net force [m], and what each unit adds [m/N]."""
+    if form is None:
+        return (z.x.delta, z.y.delta), (0.0, 0.0)
+    (x, feedx), (y, feedy) = axis_now(form, 0, z.form[0]), axis_now(form, 1, z.form[1])
+    return (z.x.delta + x, z.y.delta + y), (feedx, feedy)
+
+
+def axis_now(form, i, z):
+    c, o = form.numbers, compensator.FORM * i + 20
+    out = c[o] * z[0] + c[o + 1] * z[1] + c[o + 2] * z[2] + c[o + 3] * z[3]
+    return out, form.gain[i] * c[o + 4]
+
+
+def rates_now(form, lag, z, f):
+    """delta'' of x and y [m/s^2], and the rates of compensators of another shape."""
+    if form is None:
+        (x, y) = lag
+        return (x.K * f[0] - x.pole * z.x.rate, y.K * f[1] - y.pole * z.y.rate), None
+    return (0.0, 0.0), (form_rates(form, 0, z.form[0], f[0]), form_rates(form, 1, z.form[1], f[1]))
+
+
+def form_rates(form, i, z, f):
+    a, o, f = form.numbers, compensator.FORM * i, form.gain[i] * f
+    p, q, r, s = z
+    return (
+        a[o] * p + a[o + 1] * q + a[o + 2] * r + a[o + 3] * s + a[o + 16] * f,
+        a[o + 4] * p + a[o + 5] * q + a[o + 6] * r + a[o + 7] * s + a[o + 17] * f,
+        a[o + 8] * p + a[o + 9] * q + a[o + 10] * r + a[o + 11] * s + a[o + 18] * f,
+        a[o + 12] * p + a[o + 13] * q + a[o + 14] * r + a[o + 15] * s + a[o + 19] * f,
+    )
+
+
 # ---- the continuous law --------------------------------------------------------------------------
 
 
@@ -109,6 +142,20 @@ def servo_law(parts, step, at, loop):
     W = with_feed(parts.form, W, nx * tx * feed[0], ny * ty * feed[1])
     law = Law((nx, ny), (ax, ay), (ax - mx, ay - my), W)
     return law, delta, feed, (rx, ry), (tx * feed[0], ty * feed[1])
+
+
+def law_now(parts, at, z):
+    """The law at an instant, where u is the acceleration; the rest as of `servo_law`, with the
+    accelerations of the reference models.
+    """
+    delta, feed = output_now(parts.form, z)
+    (sx, sy), v, p, c, x, y = parts.servo, at.v, at.p, at.c, z.x, z.y
+    ax, yx = controller.feedback_law(sx, delta[0], x.y, x.yrate, p[0], v[0], c[0])
+    ay, yy = controller.feedback_law(sy, delta[1], y.y, y.yrate, p[1], v[1], c[1])
+    pushx, pushy = sx.stiffness * sx.ratio * feed[0], sy.stiffness * sy.ratio * feed[1]
+    W = servo_mobility(parts.shaping, parts.servo, at.W)
+    W = with_feed(parts.form, W, pushx, pushy)
+    return Law((1.0, 1.0), (ax, ay), (ax, ay), W), delta, feed, (yx, yy), (pushx, pushy)
 
 
 def servo_mobility(shaping, servo, W):

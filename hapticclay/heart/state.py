@@ -692,3 +692,192 @@ class Kick(NamedTuple):
     tau: Any
     delta: Any
     loop: Any
+
+
+# ---- the accurate method -------------------------------------------------------------------------
+
+
+class Modes(NamedTuple):
+    """How clay that yields acts in a step: the mode of each axis, of the first where it resists along
+    the motion.
+
+    Attributes:
+        law: Fy, K, n of x, then of y.
+        mode: of each axis, 0.0 where it rests, or the sign of its velocity; along the motion see
+            modes.REST_MODE.
+        way: along which a handle slides that is slow or begins, (x, y).
+        anchor: where an axis that rests came to rest [m].
+        ended: what ended the step before, see modes.RESTS.
+        ends: what ends this one.
+        stuck: whether x and y are noted as stopped, 1.0 or 0.0.
+        fine: longest step that they allow [s].
+    """
+
+    law: Any
+    mode: Any
+    way: Any
+    anchor: Any
+    ended: Any
+    ends: Any
+    stuck: Any
+    fine: float
+
+
+class Course(NamedTuple):
+    """The controller in the accurate method, in place of a Loop.
+
+    Attributes:
+        x: loop of x; its command is not in delta.
+        y: loop of y.
+        form: states of compensators of another shape, of x and of y.
+        left: steps to the next sample; 0 where they are to be counted anew.
+        share: length of each but the last [s].
+        modes: of clay that yields.
+    """
+
+    x: Axis
+    y: Axis
+    form: Any
+    left: int
+    share: float
+    modes: Any
+
+
+class Point(NamedTuple):
+    """Where a stage of a step is.
+
+    Attributes:
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        x: loop of x.
+        y: loop of y.
+        form: states of compensators of another shape.
+    """
+
+    q: Any
+    w: Any
+    x: Axis
+    y: Axis
+    form: Any
+
+
+class Grip(NamedTuple):
+    """What clay that yields does at an instant; along its axes where each yields by itself.
+
+    Attributes:
+        a: acceleration of the handle without its force [m/s^2].
+        B: acceleration that each unit of it takes (xx, xy, yx, yy) [1/kg].
+        v: velocity [m/s].
+        f: its force [N].
+    """
+
+    a: Any
+    B: Any
+    v: Any
+    f: Any
+
+
+class Response(NamedTuple):
+    """How the handle answers forces.
+
+    Attributes:
+        g: its acceleration and centripetal acceleration [m/s^2].
+        f: net force [N].
+        r: force of yielding [N].
+        grip: clay that yields.
+    """
+
+    g: Any
+    f: Any
+    r: Any
+    grip: Any
+
+
+class Instant(NamedTuple):
+    """The loop at an instant.
+
+    Attributes:
+        p: position [m].
+        v: velocity [m/s].
+        b: damping of the clay [N.s/m].
+        fe: force of the clay [N].
+        fh: force of the hand [N].
+        tau: torques [N.m].
+        push: joint torques of the rest of the hand force [N.m].
+        delta: compensator output [m].
+        x: delta'' and y'' of x [m/s^2].
+        y: the same of y.
+        form: rates of compensators of another shape.
+        power: of muscle, motors, clay, the damper of the hand, and the sum of the magnitudes [W].
+        grip: clay that yields.
+    """
+
+    p: Any
+    v: Any
+    b: Any
+    fe: Any
+    fh: Any
+    tau: Any
+    push: Any
+    delta: Any
+    x: Any
+    y: Any
+    form: Any
+    power: Any
+    grip: Any
+
+
+class Sums(NamedTuple):
+    """Sums over the stages of a step.
+
+    Attributes:
+        first: accelerations over all but the last: of the joints, delta and y of x, of y; six.
+        last: the same over all but the first.
+        form: rates of compensators of another shape, weighted.
+        power: as Instant.power, weighted.
+    """
+
+    first: Any
+    last: Any
+    form: Any
+    power: Any
+
+
+class Shown(NamedTuple):
+    """What a record has of an instant, as Instant.
+
+    Attributes:
+        p: position [m].
+        v: velocity [m/s].
+        fh: force of the hand [N].
+        tau: torques [N.m].
+        delta: compensator output [m].
+        b: damping of the clay [N.s/m].
+        fe: force of the clay [N].
+    """
+
+    p: Any
+    v: Any
+    fh: Any
+    tau: Any
+    delta: Any
+    b: Any
+    fe: Any
+
+
+class Stride(NamedTuple):
+    """A step of the accurate method.
+
+    Attributes:
+        shown: its start.
+        begin: clay that yields at its start.
+        last: the same at its last stage.
+        end: its end.
+        work: the ledger there.
+    """
+
+    shown: Shown
+    begin: Any
+    last: Any
+    end: Point
+    work: Work

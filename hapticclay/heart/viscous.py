@@ -90,11 +90,31 @@ def with_clay(part, grain, load, k, v):
     return load, (x, y), (xx, yy, xy)
 
 
+def at_instant(part, special, table, clay, t, p):
+    """Damping at an instant, (x, y) [N.s/m]."""
+    if part is None:
+        return clay.b
+    return placed(special, table, grown(part.growth, clay.b, clay.growth, 0, t), p)
+
+
+def placed(special, table, b, p):
+    if special is None:
+        return b
+    return smooth_damping(special.smooth, table, b, p)
+
+
+def smooth_damping(smooth, table, b, p):
+    """Damping at a place, (x, y) [N.s/m]."""
+    if smooth is None:
+        return b
+    return regions.smooth_clay(table, smooth, p[0], p[1], b[0], b[1])
+
+
 def at_place(smooth, table, clay, p):
     """The clay at a place, where it is smooth: that before the sample too."""
     if smooth is None:
         return clay
-    x, y = regions.smooth_clay(table, smooth, p[0], p[1], clay.b[0], clay.b[1])
+    x, y = smooth_damping(smooth, table, clay.b, p)
     o = clay.old
     old = (x, o[1]) if smooth == 1 else (o[0], y) if smooth == 2 else (x, y)
     growth, c = without_growth(clay.growth, smooth), clay
