@@ -18,7 +18,7 @@ def stored(parts: Parts, state: State) -> tuple[float, float]:
         parts: the scene.
         state: of the run.
     """
-    (w1, w2), (q1, q2), h = state.body.w, state.body.q, state.clock.before
+    (w1, w2), (q1, q2), h = state.body.w, state.body.q, lead(parts.accurate, state.clock.before)
     links, a = parts.arm.links, parts.arm
     u = arm.jacobian(q1 - h * w1, q2 - h * w2, links)  # where that kick was
     x, y = u[1] + u[3] - a.ox, -a.oy - u[0] - u[2]
@@ -26,6 +26,13 @@ def stored(parts: Parts, state: State) -> tuple[float, float]:
     (kx, ky), (mx, my) = hand.springs(parts.hand), hand.masses(parts.hand)
     at_hand = 0.5 * (mx * vx * vx + my * vy * vy + kx * x * x + ky * y * y)
     return 0.5 * (links[2] * w1 * w1 + links[3] * (w1 + w2) * (w1 + w2)), at_hand
+
+
+def lead(accurate, before):
+    """Time that the place of a state is ahead of its rates [s]."""
+    if accurate is None:
+        return before
+    return 0.0
 
 
 def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def with_works(a, p, h):
     k = h / 6.0
     return Work(
         a.muscle + k * p[0], a.motors + k * p[1], a.clay + k * p[2], a.hand + k * p[3],
-        a.through + k * p[4],
+        a.through + k * p[4], a.hardware,
     )  # fmt: skip
 
 
