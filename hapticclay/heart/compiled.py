@@ -34,9 +34,8 @@ from ..model import (
     spring,
 )
 from ..stepping import cache, monitor
-from ..stepping.run import cache_folder
 from ..stepping.engine import mujoco
-from . import hardware as wires
+from ..stepping.run import cache_folder
 from . import (
     begin,
     borders,
@@ -56,8 +55,8 @@ from . import (
     march,
     modes,
     path,
-    run,
     rows,
+    run,
     sampled,
     sampled_controller,
     search,
@@ -68,6 +67,7 @@ from . import (
     viscous,
     yielding,
 )
+from . import hardware as wires
 
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,

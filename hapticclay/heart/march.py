@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from . import modes as m_
+from .drive import kick
 from .engine_step import accelerations, put
 from .instant import instant
-from .drive import kick
 from .kick import is_finite, place, place_after
 from .parts import INF
 from .rows import ROW

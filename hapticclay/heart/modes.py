@@ -17,7 +17,7 @@ from . import viscous
 from .kick import place
 from .parts import INF
 from .servo import net, solve
-from .state import Response, Grip, Handle, Modes, Point
+from .state import Grip, Handle, Modes, Point, Response
 from .yielding import turned_matrix
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
@@ -63,12 +63,16 @@ def is_rough(law, i):
     return law[3 * i + 1] > 0.0 and n != math.floor(n)
 
 
-def slowest(modal, law, i):
-    """Speed of an axis below which clay of n < 1 is too stiff for SUBSTEPS a sample [m/s]."""
-    K, n = law[3 * i + 1], law[3 * i + 2]
+def creep_speed(lightness, dt, K, n):
+    """Speed below which clay of n < 1 is too stiff for SUBSTEPS a sample [m/s]; else 0."""
     if K <= 0.0 or n >= 1.0:
         return 0.0
-    return (modal.dt * modal.lightness * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
+    return (dt * lightness * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
+
+
+def slowest(modal, law, i):
+    """As `creep_speed`, of an axis."""
+    return creep_speed(modal.lightness, modal.dt, law[3 * i + 1], law[3 * i + 2])
 
 
 def holding_force(modal, law, i):

@@ -10,7 +10,7 @@ from ..model import regions
 from . import borders, ends, grooves, hits, laws, march, rows, sampled, springs, viscous, yielding
 from .drive import kick
 from .engine_step import put
-from .kick import commanded, handle_at, is_calm_end, is_finite, place, velocity
+from .kick import commanded, handle_at, is_calm_end, place, velocity
 from .parts import INF
 from .state import (
     FINISHED,

@@ -6,16 +6,17 @@ import math
 
 import numpy as np
 
-from ..model import compensator, groove, hardware as interface, regions
+from ..model import compensator, groove, regions
+from ..model import hardware as interface
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, LawCaller
 from ..model.scenario import Scenario
-from ..stepping import runge_kutta
-from ..stepping.run import spring_step
-from ..stepping.sampled import delay_in_samples, formed_memory, held_memory
-from . import begin, hardware, kick, laws, parts as p_, rows, sampled, state as s_
+from . import begin, hardware, kick, laws, pace, rows, sampled
+from . import parts as p_
+from . import state as s_
 from .engine_step import put
 from .march import GROWTH_BLOCK
+from .memories import delay_in_samples, formed_memory, held_memory
 from .modes import SUBSTEPS
 from .parts import INF
 
@@ -64,7 +65,7 @@ def clay_part(s: Scenario):
         flow = p_.Flow(1 if clay.isotropic or clay.groove else None)
     springy = block = None
     if clay.springs:
-        springy = p_.Springs(float(spring_step(s)), 1 if is_held(s) else None)
+        springy = p_.Springs(float(pace.spring_step(s)), 1 if is_held(s) else None)
     if clay.groove:
         g = clay.groove
         block = p_.Groove(
@@ -92,14 +93,14 @@ def accurate_parts(s: Scenario):
     """The accurate method, and clay that yields in it."""
     if s.integrator == "fast" or s.control == "sampled":
         return None, None
-    runge_kutta.check_explicit(s)
+    pace.check_explicit(s)
     blocks = modal = None
     if s.clay and s.clay.grows:
         blocks = substeps_of_blocks(s)
     if s.clay and s.clay.yields:
         along, grain = (1, None) if s.clay.isotropic else (None, clay_part(s)[1])
-        modal = p_.Modal(along, grain, float(runge_kutta.largest_lightness(s)), float(s.dt))
-    return p_.Accurate(runge_kutta.parts_of_sample(s, 0), blocks), modal
+        modal = p_.Modal(along, grain, float(pace.largest_lightness(s)), float(s.dt))
+    return p_.Accurate(pace.parts_of_sample(s, 0), blocks), modal
 
 
 def substeps_of_blocks(s: Scenario):
@@ -107,7 +108,7 @@ def substeps_of_blocks(s: Scenario):
     count = math.floor(s.t_max / s.dt + 1e-6) // GROWTH_BLOCK + 1
     blocks = np.empty(count, dtype=np.int64)
     for j in range(count):
-        blocks[j] = runge_kutta.parts_of_sample(s, j * GROWTH_BLOCK)
+        blocks[j] = pace.parts_of_sample(s, j * GROWTH_BLOCK)
         if blocks[j] > SUBSTEPS:
             blocks[j:] = SUBSTEPS + 1
             break
