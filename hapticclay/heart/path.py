@@ -57,6 +57,13 @@ def next_sample(time, t, i):
     return target, after if after > 1e-9 * dt else 0.0, on_grid
 
 
+def next_stop(parts, s):
+    """As `next_sample`, with events of sampled control between the samples."""
+    target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+    target, after = sampled.before_event(parts.sampler, parts.time.dt, s, target, after)
+    return target, after, on_grid
+
+
 # ---- status --------------------------------------------------------------------------------------
 
 
@@ -295,8 +302,7 @@ def towards(parts, s, after, over, first):
 
 def careful(parts, s, e):
     """The state after one step with a look at its end, which lies on a border if one is in the way."""
-    target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
-    target, most = sampled.before_event(parts.sampler, parts.time.dt, s, target, most)
+    target, most, on_grid = next_stop(parts, s)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
     if s.status.code != OPEN:
         return s
@@ -337,13 +343,11 @@ def is_calm(special, state):
 
 
 def may_glide(parts, s):
-    """Whether a whole step may follow without a look at more than its end."""
-    c, clay = s.clock, s.clay
-    whole = c.before == parts.time.dt and c.t == c.i * parts.time.dt and c.i < parts.time.last
-    calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.special)
-    dt, target, x = parts.time.dt, (c.i + 1) * parts.time.dt, s.status
-    _, after = sampled.before_event(parts.sampler, dt, s, target, dt)
-    return whole and calm and after == dt and x.code == OPEN and x.closing == OPEN
+    """Whether a step may follow without a look at more than its end."""
+    x = s.status
+    calm = hits.is_over(parts.hits, s.clay.hit) and is_calm(parts.special, s.clay.special)
+    follows = sampled.may_follow(parts.sampler, parts.time, s.clock)
+    return follows and calm and x.code == OPEN and x.closing == OPEN
 
 
 def has_room(e, x, room):
@@ -352,14 +356,16 @@ def has_room(e, x, room):
 
 
 def glide(parts, s, e, room):
-    """Whole steps within one region, up to one that `careful` has to look at."""
-    dt = parts.time.dt
+    """Steps within one region, up to one that `careful` has to look at."""
     while has_room(e, s.filled, room) and may_glide(parts, s):
+        target, after, on_grid = next_stop(parts, s)
+        if after < parts.time.dt:
+            s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
         s = sampled.acted(parts.sampler, parts, s)
-        k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
-        if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
+        k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
+        if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, after):
             break
-        s = stepped(parts, kept(parts, s, e, k, dt, True), e, k, dt, (s.clock.i + 1) * dt)
+        s = stepped(parts, kept(parts, s, e, k, after, on_grid), e, k, after, target)
     return s
 
 

@@ -170,20 +170,22 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
 # ---- sense ---------------------------------------------------------------------------------------
 
 
-def soft_velocity(special, sampler, parts, s, at, early):
-    """Velocity at a sample, (x, y) [m/s]: behind the early kick, but in stiff clay."""
+def soft_velocity(special, sampler, parts, s, at, u):
+    """Velocity at a sample, (x, y) [m/s]: u, behind the kick that leads to it, but in stiff clay."""
     if special is None:
-        return early.motion.u
-    return stiff_velocity(special.stiff, sampler, parts, s, at, early)
+        return u
+    return stiff_velocity(special.stiff, sampler, parts, s, at, u)
 
 
-def stiff_velocity(part, sampler, parts, s, at, early):
+def stiff_velocity(part, sampler, parts, s, at, u):
     """As `soft_velocity`: half a kick holds too little of stiff clay; the velocity is that of a
     whole kick, with the step before it repeated.
     """
     if part is None:
-        return early.motion.u
-    t, before, u = s.clock.t, s.clock.before, early.motion.u
+        return u
+    t, before = s.clock.t, s.clock.before
+    if before == 0.0:
+        return u
     step = step_around(before, before)
     _, state = viscous.damping(sampler.clay, sampler.special, s.clay, t, parts.hand, step)
     soft = state.split.soft
@@ -192,14 +194,6 @@ def stiff_velocity(part, sampler, parts, s, at, early):
     k = pushed(sampler, parts, t, step, at, s.body.w, s.clay, s.loop.machine.hold)
     x, y = velocity(sampler.special, parts.grain, k)
     return x if soft[0] > 0.0 else u[0], y if soft[1] > 0.0 else u[1]
-
-
-def rates_of(at, u, v, w):
-    """Joint rates of a handle velocity v [rad/s]; w where it is u, of which they are."""
-    if v == u:
-        return w
-    r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
-    return r1, r2 - r1
 
 
 # ---- compute -------------------------------------------------------------------------------------
@@ -482,24 +476,36 @@ def past(e):
 
 def event(sampler, parts, s, acts, now):
     """An event: the kick that leads to it, what is measured there, and what the motors then hold."""
-    clock, m, hand, w = s.clock, s.loop.machine, parts.hand, s.body.w
-    at, uh = handle_at(parts.arm, s.body, 0.0), mean_push(parts.push, clock.t, 0.0)
-    special, work, fh, seen, tau = s.clay.special, s.work, NONE, w, NONE
+    clock, m, w = s.clock, s.loop.machine, s.body.w
+    at = handle_at(parts.arm, s.body, 0.0)
+    special, work, fh, u, tau = s.clay.special, s.work, NONE, at.v, NONE
     if clock.before > 0.0:
         step = step_around(clock.before, 0.0)
         k = pushed(sampler, parts, clock.t, step, at, w, s.clay, m.hold)
-        special, fh = k.motion.special, rows.hand_force(hand, k)
+        special, fh = k.motion.special, rows.hand_force(parts.hand, k)
         work = rows.with_work(parts, work, k, w)
         tau, w, u = friction.on_joints(k.loop.slip, m.hold.tau), k.w, k.motion.u
-        seen = rates_of(at, u, soft_velocity(sampler.special, sampler, parts, s, at, k), w)
     late = at_rates(at, w)
-    sight = late if seen == w else at_rates(at, seen)
-    pull = reaction(sampler.special, sampler, parts, s, special, sight, tau, uh)
-    f = on_sensor(hand, sampler, parts, s, sight, tau, uh, pull)
-    machine, a = sampled(sampler, parts, s, sight, seen, f, pull, acts)
-    hold, queue = hardware.queued(sampler.delay, m, a.hold, a.shown, now)
-    machine = with_hold(machine, hold, queue)
-    return Event(1.0, late, w, special, fh, work, a.delta, a.shown, a.hold, machine)
+    delta, shown_, hold = (m.x.delta, m.y.delta), 0.0, m.hold
+    machine = m
+    if acts:
+        v = soft_velocity(sampler.special, sampler, parts, s, at, u)
+        sight, seen = seen_handle(late, w, u, v)
+        machine, a = sampled(sampler, parts, s, sight, seen, special, tau)
+        delta, shown_, hold = a.delta, a.shown, a.hold
+    held, queue = hardware.queued(sampler.delay, m, hold, shown_, now)
+    return Event(
+        1.0, late, w, special, fh, work, delta, shown_, hold, with_hold(machine, held, queue)
+    )  # fmt: skip
+
+
+def seen_handle(at, w, u, v):
+    """The handle at velocity v, and its joint rates [rad/s]; as given where v is that behind them."""
+    if v == u:
+        return at, w
+    r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
+    w = r1, r2 - r1
+    return at_rates(at, w), w
 
 
 def with_hold(m, hold, queue):
@@ -509,15 +515,21 @@ def with_hold(m, hold, queue):
     )  # fmt: skip
 
 
-def sampled(sampler, parts, s, at, w, f, pull, acts):  # noqa: PLR0913
+def sampled(sampler, parts, s, at, w, special, tau):
     """Controller and hardware behind a sample, but for what the motors hold; and its answer.
 
-    Where it is none, as they were.
+    Args:
+        sampler: the machine.
+        parts: the scene.
+        s: the state.
+        at: the handle.
+        w: joint rates [rad/s].
+        special: laws of the clay behind the kick that leads to the sample.
+        tau: torques on the joints in it [N.m].
     """
-    m = s.loop.machine
-    if not acts:
-        delta = m.x.delta, m.y.delta
-        return m, Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
+    m, uh = s.loop.machine, mean_push(parts.push, s.clock.t, 0.0)
+    pull = reaction(sampler.special, sampler, parts, s, special, at, tau, uh)
+    f = on_sensor(parts.hand, sampler, parts, s, at, tau, uh, pull)
     f = hardware.noise(sampler.chance, m.samples.k, f)
     f, filtered = hardware.filtered(sampler.filter, m.filtered, f)
     f = hardware.converted(sampler.adc, f)
@@ -538,6 +550,21 @@ def before_event(sampler, dt, s, target, after):
     if sampler is None:
         return target, after
     return before_uneven(sampler.uneven, sampler, dt, s, target, after)
+
+
+def may_follow(sampler, time, c):
+    """Whether a step may follow that needs no look at more than its end: a whole one between whole
+    ones; where events lie between the samples, any but the first and the last.
+    """
+    if sampler is None:
+        return c.before == time.dt and c.t == c.i * time.dt and c.i < time.last
+    return follows(sampler.uneven, time, c)
+
+
+def follows(uneven, time, c):
+    if uneven is None:
+        return c.before == time.dt and c.t == c.i * time.dt and c.i < time.last
+    return c.before > 0.0 and c.i < time.last
 
 
 def before_uneven(uneven, sampler, dt, s, target, after):
