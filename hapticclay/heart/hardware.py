@@ -22,7 +22,7 @@ def late(chance, k):
     """How late a sample is [s]."""
     if chance is None:
         return 0.0
-    return float(chance[CHANCE * k])
+    return chance[CHANCE * k]
 
 
 def noise(chance, k, f):
@@ -30,7 +30,7 @@ def noise(chance, k, f):
     if chance is None:
         return f
     i = CHANCE * k + 2
-    return f[0] + float(chance[i]), f[1] + float(chance[i + 1])
+    return f[0] + chance[i], f[1] + chance[i + 1]
 
 
 # ---- force ---------------------------------------------------------------------------------------
@@ -68,9 +68,9 @@ def differenced(part, x, k, Ts, q, w):
     if part is None:
         return w, x
     ring, row, k = part.ring, 3 * x.oldest, float(k)
-    then = float(ring[row]), float(ring[row + 1]), float(ring[row + 2])
+    then = ring[row], ring[row + 1], ring[row + 2]
     w = law.velocity_difference(then[0], (then[1], then[2]), k, q, Ts)
-    newest = float(ring[3 * ((x.oldest - 1) % part.window)])
+    newest = ring[3 * ((x.oldest - 1) % part.window)]
     w = smoothed(part.cutoff, x.w, w, (k - newest) * Ts)
     return w, Rates(w, (x.oldest + 1) % part.window)
 
@@ -153,8 +153,8 @@ def guarded(part, x, at, f, Ts):
     n, p, W, share = part.whole + 2, at.p, at.W, part.share
     # since the last sample the motors have held one force, then another
     a, b = 2 * ((x.newest - part.whole) % n), 2 * ((x.newest - part.whole - 1) % n)
-    meanx = (1.0 - share) * float(part.ring[a]) + share * float(part.ring[b])
-    meany = (1.0 - share) * float(part.ring[a + 1]) + share * float(part.ring[b + 1])
+    meanx = (1.0 - share) * part.ring[a] + share * part.ring[b]
+    meany = (1.0 - share) * part.ring[a + 1] + share * part.ring[b + 1]
     taken = (
         x.energy[0] + meanx * (p[0] - x.place[0]), x.energy[1] + meany * (p[1] - x.place[1])
     )  # fmt: skip
@@ -207,7 +207,7 @@ def queued(part, machine, asked, shown, now):
 
 
 def time_of(part, row):
-    return float(part.ring[QUEUED * (row % part.rows)])
+    return part.ring[QUEUED * (row % part.rows)]
 
 
 def entry(part, first, n, i, shown, time):
@@ -226,7 +226,7 @@ def hold_of(part, like, row):
 
 
 def two(x, i):
-    return float(x[i]), float(x[i + 1])
+    return x[i], x[i + 1]
 
 
 def guard_of(like, x, i):

@@ -288,13 +288,13 @@ def outputs(formed, form, m, f):
 
 def form_feed(form, i):
     """What each unit of force adds to the output of a compensator at once [m/N]."""
-    return form.gain[i] * float(form.numbers[compensator.FORM * i + 24])
+    return form.gain[i] * form.numbers[compensator.FORM * i + 24]
 
 
 def shown_axis(form, i, z, out):
     c, o = form.numbers, compensator.FORM * i + 20
     for j in range(compensator.ORDER):
-        out += float(c[o + j]) * z[j]
+        out += c[o + j] * z[j]
     return out
 
 
@@ -337,7 +337,7 @@ def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
     if chance is None:
         return heard(sampler.own, sampler, parts, s, at, w, f, pull)
     m = s.loop.machine
-    if float(chance[hardware.CHANCE * m.samples.k + 1]) > 0.0:  # lost
+    if chance[hardware.CHANCE * m.samples.k + 1] > 0.0:  # lost
         delta = m.x.delta, m.y.delta
         return Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
     return heard(sampler.own, sampler, parts, s, at, w, f, pull)
@@ -388,22 +388,18 @@ def advanced(own, sampler, parts, m, f, shift):
 def advanced_by(memory, sampler, parts, m, f, shift):
     if memory is None:
         return advanced_form(sampler.formed, parts.form, m, f, shift)
-    x, y = memory
-    return over_sample(x, m.x, f[0], shift[0]), over_sample(y, m.y, f[1], shift[1]), m.form
+    x = over_sample(memory, 0, m.x, f[0], shift[0])
+    return x, over_sample(memory, 20, m.y, f[1], shift[1]), m.form
 
 
-def over_sample(m, z, f, shift):
+def over_sample(m, o, z, f, shift):
     """One axis a sample later, under a force that is held."""
-    (
-        a00, a01, a02, a03, b0, a10, a11, a12, a13, b1,
-        a20, a21, a22, a23, b2, a30, a31, a32, a33, b3,
-    ) = m  # fmt: skip
     d, e, y, r = z
     return Axis(
-        a00 * d + a01 * e + a02 * y + a03 * r + b0 * f + shift,
-        a10 * d + a11 * e + a12 * y + a13 * r + b1 * f,
-        a20 * d + a21 * e + a22 * y + a23 * r + b2 * f,
-        a30 * d + a31 * e + a32 * y + a33 * r + b3 * f,
+        m[o] * d + m[o + 1] * e + m[o + 2] * y + m[o + 3] * r + m[o + 4] * f + shift,
+        m[o + 5] * d + m[o + 6] * e + m[o + 7] * y + m[o + 8] * r + m[o + 9] * f,
+        m[o + 10] * d + m[o + 11] * e + m[o + 12] * y + m[o + 13] * r + m[o + 14] * f,
+        m[o + 15] * d + m[o + 16] * e + m[o + 17] * y + m[o + 18] * r + m[o + 19] * f,
     )
 
 
@@ -426,10 +422,10 @@ def form_over_sample(memory, form, i, x, z, start, f, shift):  # noqa: PLR0913
 
 
 def form_row(m, o, z, at):
-    out = float(m[o + 4]) * at[0] + float(m[o + 5]) * at[1]
-    out += float(m[o + 6]) * at[2] + float(m[o + 7]) * at[3]
+    out = m[o + 4] * at[0] + m[o + 5] * at[1]
+    out += m[o + 6] * at[2] + m[o + 7] * at[3]
     for j in range(compensator.ORDER):
-        out += float(m[o + j]) * z[j]
+        out += m[o + j] * z[j]
     return out
 
 
@@ -500,7 +496,7 @@ def event(sampler, parts, s, acts, now):
 
 
 def seen_handle(at, w, u, v):
-    """The handle at velocity v, and its joint rates [rad/s]; as given where v is that behind them."""
+    """The handle at velocity v, and its joint rates [rad/s]; as given where v is u."""
     if v == u:
         return at, w
     r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
@@ -699,7 +695,7 @@ def taken(sampler, parts, s, k):
     """The loop behind a step that is taken."""
     if sampler is None:
         return k.loop
-    loop, e, x = s.loop, s.loop.event, s.status
+    loop, e = s.loop, s.loop.event
     if e.on == 0.0:
         return loop
     if e.shown > 0.0:

@@ -121,7 +121,7 @@ def sampler(s: Scenario, clay, special):
     lags = [c.lag for c in s.compensators]
     memory = formed = own = None
     if all(x and x[0] == 1.0 for x in lags):
-        memory = tuple(tuple(held_memory(*axis, Ts).tolist()) for axis in axes)
+        memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
     else:
         formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
     if s.controller is not None:
@@ -277,6 +277,16 @@ def make_engine(s: Scenario):
     return plain, arrays, bounds, model, data
 
 
+def viewed(part):
+    """Parts whose arrays are memoryviews, which CPython reads as plain floats."""
+    if isinstance(part, np.ndarray):
+        return memoryview(part)
+    if isinstance(part, tuple):
+        x = [viewed(each) for each in part]
+        return type(part)(*x) if hasattr(part, "_fields") else tuple(x)
+    return part
+
+
 def run(s: Scenario, advance=None, engine_of=None):
     e, arrays, bounds, model, data = make_engine(s)
     parts = parts_of(s)
@@ -285,6 +295,8 @@ def run(s: Scenario, advance=None, engine_of=None):
         e = engine_of(model, data, arrays, bounds)
     rows, crossings, stops, told = [], [], [], []
     go = advance or path.advance
+    if not engine_of:
+        parts = viewed(parts)
     while st.status.code == OPEN:
         st = go(parts, st, e, CHUNK - 1)
         x = st.filled
