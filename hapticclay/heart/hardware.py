@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..model import hardware as law
 from .kick import at_rates, handle_at
 from .parts import INF
-from .state import Body, Guard, Hold, Pull, Queue, Rates
+from .state import Body, Guard, Hold, Machine, Pull, Queue, Rates
 
 NONE = (0.0, 0.0)
 QUEUED = 11  # numbers of an entry: time, then torques, force, guard, pull and velocity of its tool
@@ -120,7 +120,7 @@ def no_pull(part):
 
 
 def coupled(part, special, state, tool, at, b, f, Ts):  # noqa: PLR0913
-    """Force of the clay by way of the coupling, (x, y) [N]; the pull; the tool behind the sample."""
+    """Force of the clay by way of the coupling [N]; the pull; the tool behind the sample."""
     if part is None:
         return f, part, tool
     return coupled_in_clay(special, part, state, tool, at, b, Ts)
@@ -181,29 +181,32 @@ def is_due(part, queue, now):
     return queue.due <= now
 
 
-def queued(part, machine, asked, shown, now):
-    """What the motors hold from now on, and the queue behind it.
+def queued(part, machine, after, shown, now):
+    """The machine behind an event, with the queue moved on and what the motors then hold.
 
     Args:
         part: the delay.
         machine: before the event.
-        asked: what the sample asks for.
-        shown: 1.0 where there is such a sample.
+        after: behind it without the delay.
+        shown: 1.0 where a sample asks for torques.
         now: [s].
     """
     if part is None:
-        return asked, part
-    q, time, n = machine.queue, machine.samples.when + part.delay, 0
+        return after
+    q, time, n, m = machine.queue, machine.samples.when + part.delay, 0, after
     while n < q.n and time_of(part, q.first + n) <= now:
         n += 1
     hold = machine.hold
     if n == q.n and shown > 0.0 and time <= now:
-        hold, shown = asked, 0.0
+        hold, shown = after.hold, 0.0
     elif n > 0:
         hold = hold_of(part, hold, q.first + n - 1)
     first, left = q.first + n, q.n - n
     due, then = entry(part, first, left, 0, shown, time), entry(part, first, left, 1, shown, time)
-    return hold, Queue(first, left + 1 if shown > 0.0 else left, due, then)
+    return Machine(
+        m.x, m.y, m.form, m.own, hold, m.samples, m.force, m.rates, m.filtered, m.guard, m.tool,
+        Queue(first, left + 1 if shown > 0.0 else left, due, then),
+    )  # fmt: skip
 
 
 def time_of(part, row):

@@ -157,12 +157,11 @@ def stepped(parts, s, e, k, after, target):
     stops = noted(special, e, before, k, clock.t, stops)
     clay = clay_behind(parts, s.clay, k, q, w, after)
     t, i = clock.t + after, clock.i
-    loop = sampled.taken(parts.sampler, parts, s, k)
+    loop, status = sampled.taken(parts.sampler, parts, s, k)
     loop = commanded(parts.command, loop, clock.t, t, 0.5 * dt)
     if target - t <= 1e-9 * dt:
         t, i = target, i + 1 if target == grid_after(parts.time, i) else i
     clock, x = Clock(t, i, after), Filled(x.steps + 1, x.rows, x.crossings, stops)
-    status = sampled.status_behind(parts.sampler, s)
     return State(clock, Body(q, w, k.g), loop, clay, s.work, status, x)
 
 

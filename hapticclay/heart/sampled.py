@@ -47,7 +47,7 @@ REACTION = 1e-9  # [s] so long after a sample a force is that at it
 FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
 
 
-# ---- the operator's force on the sensor, and that of clay that yields, at an instant ---------------
+# ---- the operator's force on the sensor, and that of clay that yields, at an instant -------------
 
 
 def masses(hand):
@@ -77,18 +77,14 @@ def resisted(hand, uh, at):
     )
 
 
-def outer_force(part, sampler, parts, s, uh, at):
-    """All forces on the handle at an instant but that of clay that yields, (x, y) [N].
-
-    Of the clay before the sample.
-    """
-    x, y = resisted(parts.hand, uh, at)
+def without_clay(part, sampler, grain, s, v, f):
+    """A force without that of the clay before the sample that does not yield, (x, y) [N]."""
     if part is None:
-        return x, y
+        return f
     b = viscous.now(part, s.clay, True, s.clock.t)
-    bx, by = viscous.force(parts.grain, b, at.v)
+    bx, by = viscous.force(grain, b, v)
     px, py = sprung_before(sampler.special, s.clay.special)
-    return x - bx - px, y - by - py
+    return f[0] - bx - px, f[1] - by - py
 
 
 def sprung_before(special, state):
@@ -126,7 +122,8 @@ def reaction(special, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
 def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
     if flow is None:
         return NONE
-    f = outer_force(sampler.clay, sampler, parts, s, uh, at)
+    f = resisted(parts.hand, uh, at)
+    f = without_clay(sampler.clay, sampler, parts.grain, s, at.v, f)
     ax, ay = instant_acceleration(parts, at, tau, f)
     x, y = masses(parts.hand)
     xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), at.W, (x, y, 0.0))
@@ -161,9 +158,9 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
         return uh
     if s.clock.before == 0.0:
         return resisted(hand, uh, Handle(at.u, at.p, at.W, at.v, NONE))
-    x, y = outer_force(sampler.clay, sampler, parts, s, uh, at)
-    ax, ay = instant_acceleration(parts, at, tau, (x - pull[0], y - pull[1]))
     x, y = resisted(hand, uh, at)
+    fx, fy = without_clay(sampler.clay, sampler, parts.grain, s, at.v, (x, y))
+    ax, ay = instant_acceleration(parts, at, tau, (fx - pull[0], fy - pull[1]))
     return x - hand[0].mass * ax, y - hand[1].mass * ay
 
 
@@ -171,7 +168,7 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
 
 
 def soft_velocity(special, sampler, parts, s, at, u):
-    """Velocity at a sample, (x, y) [m/s]: u, behind the kick that leads to it, but in stiff clay."""
+    """Velocity at a sample [m/s]: u, behind the kick that leads to it, but in stiff clay."""
     if special is None:
         return u
     return stiff_velocity(special.stiff, sampler, parts, s, at, u)
@@ -199,11 +196,10 @@ def stiff_velocity(part, sampler, parts, s, at, u):
 # ---- compute -------------------------------------------------------------------------------------
 
 
-def rendered_clay(part, special, sampler, parts, s, at, pull):  # noqa: PLR0913
-    """Force of the clay as the controller takes it, (x, y) [N]; pull is that of yielding."""
+def rendered_clay(part, special, sampler, parts, s, at, b, pull):  # noqa: PLR0913
+    """Force of clay with damping b as the controller takes it [N]; pull is that of yielding."""
     if part is None:
         return NONE
-    b = viscous.now(part, s.clay, False, s.clock.t)
     x, y = viscous.force(parts.grain, b, at.v)
     fx, fy = special_force(special, sampler, parts, s, at, pull)
     return x + fx, y + fy
@@ -264,8 +260,9 @@ def measured_pull(encoder, x, p):
         return x.force
     (a, b), rest, stretch, at = x.numbers, x.rest, x.stretch, x.at
     return (
-        axis_pull(a, rest[0], stretch[0], at[0], p[0]), axis_pull(b, rest[1], stretch[1], at[1], p[1])
-    )  # fmt: skip
+        axis_pull(a, rest[0], stretch[0], at[0], p[0]),
+        axis_pull(b, rest[1], stretch[1], at[1], p[1]),
+    )
 
 
 def axis_pull(n, rest, stretch, at, p):
@@ -362,8 +359,8 @@ def heard(own, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
 def computed(sampler, parts, s, at, f, pull, rates):
     """What compensator and servo make of a sample."""
     m, state, Ts = s.loop.machine, s.clay.special, sampler.Ts
-    fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, pull)
     b = viscous.now(parts.clay, s.clay, False, s.clock.t)
+    fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, b, pull)
     fe, pulled, tool = hardware.coupled(
         sampler.coupling, parts.special, state, m.tool, at, b, fe, Ts
     )
@@ -375,7 +372,7 @@ def computed(sampler, parts, s, at, f, pull, rates):
     return Answer(1.0, hold, f, delta, m.own, rates, guard, tool)
 
 
-# ---- compensator and reference model at the next sample ---------------------------------------------
+# ---- compensator and reference model at the next sample ------------------------------------------
 
 
 def advanced(own, sampler, parts, m, f, shift):
@@ -455,6 +452,8 @@ def acted(sampler, parts, s):
     acts = m.samples.when <= now
     if acts or hardware.is_due(sampler.delay, m.queue, now):
         return with_event(s, event(sampler, parts, s, acts, now))
+    if s.loop.event.on == 0.0:
+        return s
     return with_event(s, past(s.loop.event))
 
 
@@ -471,7 +470,7 @@ def past(e):
 
 
 def event(sampler, parts, s, acts, now):
-    """An event: the kick that leads to it, what is measured there, and what the motors then hold."""
+    """An event: the kick that leads to it, what is measured, and what the motors then hold."""
     clock, m, w = s.clock, s.loop.machine, s.body.w
     at = handle_at(parts.arm, s.body, 0.0)
     special, work, fh, u, tau = s.clay.special, s.work, NONE, at.v, NONE
@@ -482,17 +481,14 @@ def event(sampler, parts, s, acts, now):
         work = rows.with_work(parts, work, k, w)
         tau, w, u = friction.on_joints(k.loop.slip, m.hold.tau), k.w, k.motion.u
     late = at_rates(at, w)
-    delta, shown_, hold = (m.x.delta, m.y.delta), 0.0, m.hold
-    machine = m
+    delta, shown_, hold, machine = (m.x.delta, m.y.delta), 0.0, m.hold, m
     if acts:
         v = soft_velocity(sampler.special, sampler, parts, s, at, u)
         sight, seen = seen_handle(late, w, u, v)
         machine, a = sampled(sampler, parts, s, sight, seen, special, tau)
         delta, shown_, hold = a.delta, a.shown, a.hold
-    held, queue = hardware.queued(sampler.delay, m, hold, shown_, now)
-    return Event(
-        1.0, late, w, special, fh, work, delta, shown_, hold, with_hold(machine, held, queue)
-    )  # fmt: skip
+    machine = hardware.queued(sampler.delay, m, machine, shown_, now)
+    return Event(1.0, late, w, special, fh, work, delta, shown_, hold, machine)
 
 
 def seen_handle(at, w, u, v):
@@ -504,15 +500,8 @@ def seen_handle(at, w, u, v):
     return at_rates(at, w), w
 
 
-def with_hold(m, hold, queue):
-    return Machine(
-        m.x, m.y, m.form, m.own, hold, m.samples, m.force, m.rates, m.filtered, m.guard, m.tool,
-        queue,
-    )  # fmt: skip
-
-
 def sampled(sampler, parts, s, at, w, special, tau):
-    """Controller and hardware behind a sample, but for what the motors hold; and its answer.
+    """Controller and hardware behind a sample, without delay; and its answer.
 
     Args:
         sampler: the machine.
@@ -534,7 +523,7 @@ def sampled(sampler, parts, s, at, w, special, tau):
     x, y, form = advanced(sampler.own, sampler, parts, m, a.force, shift)
     samples = samples_from(sampler, parts.time.dt, m.samples.k + 1)
     return Machine(
-        x, y, form, a.own, m.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
+        x, y, form, a.own, a.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
     ), a
 
 
@@ -692,31 +681,28 @@ def stepped_arm(sampler, parts, e, s, k, after):
 
 
 def taken(sampler, parts, s, k):
-    """The loop behind a step that is taken."""
+    """Loop and status behind a step that is taken."""
     if sampler is None:
-        return k.loop
+        return k.loop, s.status
     loop, e = s.loop, s.loop.event
     if e.on == 0.0:
-        return loop
+        return loop, s.status
     if e.shown > 0.0:
-        q = hardware.encoded(sampler.encoder, s.body.q)
-        hardware.note_angles(sampler.difference, loop.machine, q)
-        hardware.note_force(sampler.passivity, e.machine, e.asked.force)
-        hardware.note_hold(sampler.delay, loop.machine, e.machine, e.asked)
-    return Sampled(e.machine, past(e))
+        note(sampler, s.body.q, loop.machine, e)
+    return Sampled(e.machine, past(e)), status_of(sampler.own, s.status, e)
 
 
-def status_behind(sampler, s):
-    """Status behind a step that is taken."""
-    if sampler is None:
-        return s.status
-    return status_of(sampler.own, s.status, s.loop.event)
+def note(sampler, q, machine, e):
+    """Notes a sample in the rings of the hardware."""
+    hardware.note_angles(sampler.difference, machine, hardware.encoded(sampler.encoder, q))
+    hardware.note_force(sampler.passivity, e.machine, e.asked.force)
+    hardware.note_hold(sampler.delay, machine, e.machine, e.asked)
 
 
 def status_of(own, x, e):
     """The run is over where the user's own controller asks for torques that are not finite."""
     if own is None:
         return x
-    if e.on > 0.0 and e.shown > 0.0 and is_refused(e.asked.tau):
+    if e.shown > 0.0 and is_refused(e.asked.tau):
         return Status(NOT_FINITE, x.closing, x.careful, x.landings, x.seen)
     return x

@@ -177,7 +177,8 @@ def first_machine(part, parts, s: Scenario, q, w):
         for i in range(n):  # before the start the joints have turned so for long
             j = i - n
             then = q[0] + j * part.Ts * w[0], q[1] + j * part.Ts * w[1]
-            ring[3 * i : 3 * i + 3] = float(j), *hardware.encoded(part.encoder, then)
+            ring[3 * i] = float(j)
+            ring[3 * i + 1], ring[3 * i + 2] = hardware.encoded(part.encoder, then)
         rates = s_.Rates(w, 0)
     hold = s_.Hold(
         NONE, NONE, hardware.nothing(part.passivity), hardware.no_pull(part.coupling)
