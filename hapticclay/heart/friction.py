@@ -84,7 +84,7 @@ def torque_of(rate, limit, *args):
     slides against the limit.
 
     Args:
-        rate: of the joint after the kick [rad/s], function of (torque of its friction [N.m], *args).
+        rate: of the joint after the kick [rad/s], by the torque of its friction [N.m] and args.
         limit: of the torque [N.m].
         args: further arguments of rate.
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..model import hardware as law
 from .kick import at_rates, handle_at
 from .parts import INF
-from .state import Body, Guard, Hold, Pull, Queue, Rates
+from .state import Body, Guard, Hold, Machine, Pull, Queue, Rates
 
 NONE = (0.0, 0.0)
 QUEUED = 11  # numbers of an entry: time, then torques, force, guard, pull and velocity of its tool
@@ -22,7 +22,7 @@ def late(chance, k):
     """How late a sample is [s]."""
     if chance is None:
         return 0.0
-    return float(chance[CHANCE * k])
+    return chance[CHANCE * k]
 
 
 def noise(chance, k, f):
@@ -30,7 +30,7 @@ def noise(chance, k, f):
     if chance is None:
         return f
     i = CHANCE * k + 2
-    return f[0] + float(chance[i]), f[1] + float(chance[i + 1])
+    return f[0] + chance[i], f[1] + chance[i + 1]
 
 
 # ---- force ---------------------------------------------------------------------------------------
@@ -68,9 +68,9 @@ def differenced(part, x, k, Ts, q, w):
     if part is None:
         return w, x
     ring, row, k = part.ring, 3 * x.oldest, float(k)
-    then = float(ring[row]), float(ring[row + 1]), float(ring[row + 2])
+    then = ring[row], ring[row + 1], ring[row + 2]
     w = law.velocity_difference(then[0], (then[1], then[2]), k, q, Ts)
-    newest = float(ring[3 * ((x.oldest - 1) % part.window)])
+    newest = ring[3 * ((x.oldest - 1) % part.window)]
     w = smoothed(part.cutoff, x.w, w, (k - newest) * Ts)
     return w, Rates(w, (x.oldest + 1) % part.window)
 
@@ -120,7 +120,7 @@ def no_pull(part):
 
 
 def coupled(part, special, state, tool, at, b, f, Ts):  # noqa: PLR0913
-    """Force of the clay by way of the coupling, (x, y) [N]; the pull; the tool behind the sample."""
+    """Force of the clay by way of the coupling [N]; the pull; the tool behind the sample."""
     if part is None:
         return f, part, tool
     return coupled_in_clay(special, part, state, tool, at, b, Ts)
@@ -153,8 +153,8 @@ def guarded(part, x, at, f, Ts):
     n, p, W, share = part.whole + 2, at.p, at.W, part.share
     # since the last sample the motors have held one force, then another
     a, b = 2 * ((x.newest - part.whole) % n), 2 * ((x.newest - part.whole - 1) % n)
-    meanx = (1.0 - share) * float(part.ring[a]) + share * float(part.ring[b])
-    meany = (1.0 - share) * float(part.ring[a + 1]) + share * float(part.ring[b + 1])
+    meanx = (1.0 - share) * part.ring[a] + share * part.ring[b]
+    meany = (1.0 - share) * part.ring[a + 1] + share * part.ring[b + 1]
     taken = (
         x.energy[0] + meanx * (p[0] - x.place[0]), x.energy[1] + meany * (p[1] - x.place[1])
     )  # fmt: skip
@@ -181,33 +181,36 @@ def is_due(part, queue, now):
     return queue.due <= now
 
 
-def queued(part, machine, asked, shown, now):
-    """What the motors hold from now on, and the queue behind it.
+def queued(part, machine, after, shown, now):
+    """The machine behind an event, with the queue moved on and what the motors then hold.
 
     Args:
         part: the delay.
         machine: before the event.
-        asked: what the sample asks for.
-        shown: 1.0 where there is such a sample.
+        after: behind it without the delay.
+        shown: 1.0 where a sample asks for torques.
         now: [s].
     """
     if part is None:
-        return asked, part
-    q, time, n = machine.queue, machine.samples.when + part.delay, 0
+        return after
+    q, time, n, m = machine.queue, machine.samples.when + part.delay, 0, after
     while n < q.n and time_of(part, q.first + n) <= now:
         n += 1
     hold = machine.hold
     if n == q.n and shown > 0.0 and time <= now:
-        hold, shown = asked, 0.0
+        hold, shown = after.hold, 0.0
     elif n > 0:
         hold = hold_of(part, hold, q.first + n - 1)
     first, left = q.first + n, q.n - n
     due, then = entry(part, first, left, 0, shown, time), entry(part, first, left, 1, shown, time)
-    return hold, Queue(first, left + 1 if shown > 0.0 else left, due, then)
+    return Machine(
+        m.x, m.y, m.form, m.own, hold, m.samples, m.force, m.rates, m.filtered, m.guard, m.tool,
+        Queue(first, left + 1 if shown > 0.0 else left, due, then),
+    )  # fmt: skip
 
 
 def time_of(part, row):
-    return float(part.ring[QUEUED * (row % part.rows)])
+    return part.ring[QUEUED * (row % part.rows)]
 
 
 def entry(part, first, n, i, shown, time):
@@ -226,7 +229,7 @@ def hold_of(part, like, row):
 
 
 def two(x, i):
-    return float(x[i]), float(x[i + 1])
+    return x[i], x[i + 1]
 
 
 def guard_of(like, x, i):

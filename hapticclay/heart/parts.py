@@ -233,7 +233,7 @@ class Sampler(NamedTuple):
         clay: the clay that acts on the handle; None where the motors render it.
         special: its laws beside plain viscous damping.
         rendered: 1 where the force that the motors hold is recorded.
-        memory: rows (A, B) of controller.held_compensator of x and of y.
+        memory: rows (A, B) of controller.held_compensator of x, then of y.
         formed: compensators of another shape.
         own: the user's own controller.
         command: table of the command's signal.

@@ -55,6 +55,13 @@ def next_sample(time, t, i):
     return target, after if after > 1e-9 * dt else 0.0, on_grid
 
 
+def next_stop(parts, s):
+    """As `next_sample`, with events of sampled control between the samples."""
+    target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
+    target, after = sampled.before_event(parts.sampler, parts.time.dt, s, target, after)
+    return target, after, on_grid
+
+
 # ---- status --------------------------------------------------------------------------------------
 
 
@@ -148,9 +155,9 @@ def kicked(parts, s, e, k, after, work, filled):
     stops = noted(special, e, before, reaction, clock.t, stops)
     hit = hits.after_kick(parts.hits, parts, s.clay.hit, k)
     clay = clay_behind(parts, s.clay, hit, reaction, body, after)
-    loop = sampled.taken(parts.sampler, parts, s, k)
+    loop, status = sampled.taken(parts.sampler, parts, s, k)
     loop = commanded(parts.command, loop, parts.time.dt, clock, k.step)
-    x, status = Filled(x.steps + 1, filled, x.crossings, stops), sampled.status_behind(parts.sampler, s)
+    x = Filled(x.steps + 1, filled, x.crossings, stops)
     return State(clock, body, loop, clay, work, status, x)
 
 
@@ -340,8 +347,7 @@ def towards(probe, parts, s, after, over, first):
 
 def careful(parts, s, e):
     """The state after one step with a look at its end, which lies on a border if one is in the way."""
-    target, most, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
-    target, most = sampled.before_event(parts.sampler, parts.time.dt, s, target, most)
+    target, most, on_grid = next_stop(parts, s)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
     s, most = march.paced(parts.accurate, parts.modal, s, target, most, on_grid)
     if s.status.code != OPEN:
@@ -385,13 +391,11 @@ def is_calm(special, laws_):
 
 
 def may_glide(parts, s):
-    """Whether a whole step may follow without a look at more than its end."""
-    c, clay = s.clock, s.clay
-    whole = c.before == parts.time.dt and c.t == c.i * parts.time.dt and c.i < parts.time.last
-    calm = hits.is_over(parts.hits, clay.hit) and is_calm(parts.special, clay.laws)
-    dt, target, x = parts.time.dt, (c.i + 1) * parts.time.dt, s.status
-    _, after = sampled.before_event(parts.sampler, dt, s, target, dt)
-    return whole and calm and after == dt and x.code == OPEN and x.closing == OPEN
+    """Whether a step may follow without a look at more than its end."""
+    x = s.status
+    calm = hits.is_over(parts.hits, s.clay.hit) and is_calm(parts.special, s.clay.laws)
+    follows = sampled.may_follow(parts.sampler, parts.time, s.clock)
+    return follows and calm and x.code == OPEN and x.closing == OPEN
 
 
 def has_room(e, x, room):
@@ -399,16 +403,21 @@ def has_room(e, x, room):
     return x.rows < room and x.crossings < e.most_crossings and x.stops < e.most_stops
 
 
-def whole_step(parts, s, e):
-    """A whole step within one region: whether it could be made, and the state after it."""
-    dt, s = parts.time.dt, sampled.acted(parts.sampler, parts, s)
-    k = kick(parts, s.clock, s.body, s.loop, s.clay, dt)
-    if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, dt):
+def glided(parts, s, e):
+    """A step within one region: whether it could be made, and the state after it."""
+    target, after, on_grid = next_stop(parts, s)
+    if after < parts.time.dt:
+        s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
+    s, n = sampled.acted(parts.sampler, parts, s), s.filled.rows
+    k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
+    if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, after):
         return False, s
-    write_row(parts, s, e, k, dt)
-    work, w = sampled.ledger(parts.sampler, s, dt)
-    work, n = rows.with_work(parts, work, k, w), s.filled.rows + 1
-    return True, stepped(parts, s, e, k, dt, (s.clock.i + 1) * dt, work, n)
+    if on_grid:
+        write_row(parts, s, e, k, after)
+        n += 1
+    work, w = sampled.ledger(parts.sampler, s, after)
+    work = rows.with_work(parts, work, k, w)
+    return True, stepped(parts, s, e, k, after, target, work, n)
 
 
 def glide(parts, s, e, room):
@@ -444,7 +453,7 @@ def glide_kicks(parts, s, e, room):
     """The same of the fast method."""
     made = True
     while made and has_room(e, s.filled, room) and may_glide(parts, s):
-        made, s = whole_step(parts, s, e)
+        made, s = glided(parts, s, e)
     return s
 
 

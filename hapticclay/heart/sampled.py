@@ -47,7 +47,7 @@ REACTION = 1e-9  # [s] so long after a sample a force is that at it
 FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
 
 
-# ---- the operator's force on the sensor, and that of clay that yields, at an instant ---------------
+# ---- the operator's force on the sensor, and that of clay that yields, at an instant -------------
 
 
 def masses(hand):
@@ -77,18 +77,14 @@ def resisted(hand, uh, at):
     )
 
 
-def outer_force(part, sampler, parts, s, uh, at):
-    """All forces on the handle at an instant but that of clay that yields, (x, y) [N].
-
-    Of the clay before the sample.
-    """
-    x, y = resisted(parts.hand, uh, at)
+def without_clay(part, sampler, grain, s, v, f):
+    """A force without that of the clay before the sample that does not yield, (x, y) [N]."""
     if part is None:
-        return x, y
+        return f
     b = viscous.now(part, s.clay, True, s.clock.t)
-    bx, by = viscous.force(parts.grain, b, at.v)
+    bx, by = viscous.force(grain, b, v)
     px, py = sprung_before(sampler.special, s.clay.laws)
-    return x - bx - px, y - by - py
+    return f[0] - bx - px, f[1] - by - py
 
 
 def sprung_before(special, state):
@@ -126,7 +122,8 @@ def reaction(special, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
 def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
     if flow is None:
         return NONE
-    f = outer_force(sampler.clay, sampler, parts, s, uh, at)
+    f = resisted(parts.hand, uh, at)
+    f = without_clay(sampler.clay, sampler, parts.grain, s, at.v, f)
     ax, ay = instant_acceleration(parts, at, tau, f)
     x, y = masses(parts.hand)
     xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), at.W, (x, y, 0.0))
@@ -162,29 +159,31 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
         return uh
     if s.clock.before == 0.0:
         return resisted(hand, uh, Handle(at.u, at.p, at.W, at.v, NONE))
-    x, y = outer_force(sampler.clay, sampler, parts, s, uh, at)
-    ax, ay = instant_acceleration(parts, at, tau, (x - pull[0], y - pull[1]))
     x, y = resisted(hand, uh, at)
+    fx, fy = without_clay(sampler.clay, sampler, parts.grain, s, at.v, (x, y))
+    ax, ay = instant_acceleration(parts, at, tau, (fx - pull[0], fy - pull[1]))
     return x - hand[0].mass * ax, y - hand[1].mass * ay
 
 
 # ---- sense ---------------------------------------------------------------------------------------
 
 
-def soft_velocity(special, sampler, parts, s, at, early):
-    """Velocity at a sample, (x, y) [m/s]: behind the early kick, but in stiff clay."""
+def soft_velocity(special, sampler, parts, s, at, u):
+    """Velocity at a sample [m/s]: u, behind the kick that leads to it, but in stiff clay."""
     if special is None:
-        return early.motion.u
-    return stiff_velocity(special.stiff, sampler, parts, s, at, early)
+        return u
+    return stiff_velocity(special.stiff, sampler, parts, s, at, u)
 
 
-def stiff_velocity(part, sampler, parts, s, at, early):
+def stiff_velocity(part, sampler, parts, s, at, u):
     """As `soft_velocity`: half a kick holds too little of stiff clay; the velocity is that of a
     whole kick, with the step before it repeated.
     """
     if part is None:
-        return early.motion.u
-    t, before, u = s.clock.t, s.clock.before, early.motion.u
+        return u
+    t, before = s.clock.t, s.clock.before
+    if before == 0.0:
+        return u
     step = step_around(before, before)
     _, split = viscous.damping(sampler.clay, sampler.special, s.clay, t, parts.hand, step)
     soft = split.soft
@@ -195,22 +194,13 @@ def stiff_velocity(part, sampler, parts, s, at, early):
     return x if soft[0] > 0.0 else u[0], y if soft[1] > 0.0 else u[1]
 
 
-def rates_of(at, u, v, w):
-    """Joint rates of a handle velocity v [rad/s]; w where it is u, of which they are."""
-    if v == u:
-        return w
-    r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
-    return r1, r2 - r1
-
-
 # ---- compute -------------------------------------------------------------------------------------
 
 
-def rendered_clay(part, special, sampler, parts, s, at, pull):  # noqa: PLR0913
-    """Force of the clay as the controller takes it, (x, y) [N]; pull is that of yielding."""
+def rendered_clay(part, special, sampler, parts, s, at, b, pull):  # noqa: PLR0913
+    """Force of clay with damping b as the controller takes it [N]; pull is that of yielding."""
     if part is None:
         return NONE
-    b = viscous.now(part, s.clay, False, s.clock.t)
     x, y = viscous.force(parts.grain, b, at.v)
     fx, fy = special_force(special, sampler, parts, s, at, pull)
     return x + fx, y + fy
@@ -271,8 +261,9 @@ def measured_pull(encoder, x, p):
         return x.force
     (a, b), rest, stretch, at = x.numbers, x.rest, x.stretch, x.at
     return (
-        axis_pull(a, rest[0], stretch[0], at[0], p[0]), axis_pull(b, rest[1], stretch[1], at[1], p[1])
-    )  # fmt: skip
+        axis_pull(a, rest[0], stretch[0], at[0], p[0]),
+        axis_pull(b, rest[1], stretch[1], at[1], p[1]),
+    )
 
 
 def axis_pull(n, rest, stretch, at, p):
@@ -295,13 +286,13 @@ def outputs(formed, form, m, f):
 
 def form_feed(form, i):
     """What each unit of force adds to the output of a compensator at once [m/N]."""
-    return form.gain[i] * float(form.numbers[compensator.FORM * i + 24])
+    return form.gain[i] * form.numbers[compensator.FORM * i + 24]
 
 
 def shown_axis(form, i, z, out):
     c, o = form.numbers, compensator.FORM * i + 20
     for j in range(compensator.ORDER):
-        out += float(c[o + j]) * z[j]
+        out += c[o + j] * z[j]
     return out
 
 
@@ -344,7 +335,7 @@ def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
     if chance is None:
         return heard(sampler.own, sampler, parts, s, at, w, f, pull)
     m = s.loop.machine
-    if float(chance[hardware.CHANCE * m.samples.k + 1]) > 0.0:  # lost
+    if chance[hardware.CHANCE * m.samples.k + 1] > 0.0:  # lost
         delta = m.x.delta, m.y.delta
         return Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
     return heard(sampler.own, sampler, parts, s, at, w, f, pull)
@@ -369,8 +360,8 @@ def heard(own, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
 def computed(sampler, parts, s, at, f, pull, rates):
     """What compensator and servo make of a sample."""
     m, state, Ts = s.loop.machine, s.clay.laws, sampler.Ts
-    fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, pull)
     b = viscous.now(parts.clay, s.clay, False, s.clock.t)
+    fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, b, pull)
     fe, pulled, tool = hardware.coupled(
         sampler.coupling, parts.special, state, m.tool, at, b, fe, Ts
     )
@@ -382,7 +373,7 @@ def computed(sampler, parts, s, at, f, pull, rates):
     return Answer(1.0, hold, f, delta, m.own, rates, guard, tool)
 
 
-# ---- compensator and reference model at the next sample ---------------------------------------------
+# ---- compensator and reference model at the next sample ------------------------------------------
 
 
 def advanced(own, sampler, parts, m, f, shift):
@@ -395,22 +386,18 @@ def advanced(own, sampler, parts, m, f, shift):
 def advanced_by(memory, sampler, parts, m, f, shift):
     if memory is None:
         return advanced_form(sampler.formed, parts.form, m, f, shift)
-    x, y = memory
-    return over_sample(x, m.x, f[0], shift[0]), over_sample(y, m.y, f[1], shift[1]), m.form
+    x = over_sample(memory, 0, m.x, f[0], shift[0])
+    return x, over_sample(memory, 20, m.y, f[1], shift[1]), m.form
 
 
-def over_sample(m, z, f, shift):
+def over_sample(m, o, z, f, shift):
     """One axis a sample later, under a force that is held."""
-    (
-        a00, a01, a02, a03, b0, a10, a11, a12, a13, b1,
-        a20, a21, a22, a23, b2, a30, a31, a32, a33, b3,
-    ) = m  # fmt: skip
     d, e, y, r = z
     return Axis(
-        a00 * d + a01 * e + a02 * y + a03 * r + b0 * f + shift,
-        a10 * d + a11 * e + a12 * y + a13 * r + b1 * f,
-        a20 * d + a21 * e + a22 * y + a23 * r + b2 * f,
-        a30 * d + a31 * e + a32 * y + a33 * r + b3 * f,
+        m[o] * d + m[o + 1] * e + m[o + 2] * y + m[o + 3] * r + m[o + 4] * f + shift,
+        m[o + 5] * d + m[o + 6] * e + m[o + 7] * y + m[o + 8] * r + m[o + 9] * f,
+        m[o + 10] * d + m[o + 11] * e + m[o + 12] * y + m[o + 13] * r + m[o + 14] * f,
+        m[o + 15] * d + m[o + 16] * e + m[o + 17] * y + m[o + 18] * r + m[o + 19] * f,
     )
 
 
@@ -433,10 +420,10 @@ def form_over_sample(memory, form, i, x, z, start, f, shift):  # noqa: PLR0913
 
 
 def form_row(m, o, z, at):
-    out = float(m[o + 4]) * at[0] + float(m[o + 5]) * at[1]
-    out += float(m[o + 6]) * at[2] + float(m[o + 7]) * at[3]
+    out = m[o + 4] * at[0] + m[o + 5] * at[1]
+    out += m[o + 6] * at[2] + m[o + 7] * at[3]
     for j in range(compensator.ORDER):
-        out += float(m[o + j]) * z[j]
+        out += m[o + j] * z[j]
     return out
 
 
@@ -466,6 +453,8 @@ def acted(sampler, parts, s):
     acts = m.samples.when <= now
     if acts or hardware.is_due(sampler.delay, m.queue, now):
         return with_event(s, event(sampler, parts, s, acts, now))
+    if s.loop.event.on == 0.0:
+        return s
     return with_event(s, past(s.loop.event))
 
 
@@ -482,43 +471,51 @@ def past(e):
 
 
 def event(sampler, parts, s, acts, now):
-    """An event: the kick that leads to it, what is measured there, and what the motors then hold."""
-    clock, m, hand, w = s.clock, s.loop.machine, parts.hand, s.body.w
-    at, uh = handle_at(parts.arm, s.body, 0.0), mean_push(parts.push, clock.t, 0.0)
-    left, work, fh, seen, tau = s.clay.reaction, s.work, NONE, w, NONE
+    """An event: the kick that leads to it, what is measured, and what the motors then hold."""
+    clock, m, w = s.clock, s.loop.machine, s.body.w
+    at = handle_at(parts.arm, s.body, 0.0)
+    left, work, fh, u, tau = s.clay.reaction, s.work, NONE, at.v, NONE
     if clock.before > 0.0:
         step = step_around(clock.before, 0.0)
         k = pushed(sampler, parts, clock, step, at, w, s.clay, m.hold)
-        left, fh = k.motion.reaction, rows.hand_force(hand, k)
+        left, fh = k.motion.reaction, rows.hand_force(parts.hand, k)
         work = rows.with_work(parts, work, k, w)
         tau, w, u = friction.on_joints(k.loop.slip, m.hold.tau), k.w, k.motion.u
-        seen = rates_of(at, u, soft_velocity(sampler.special, sampler, parts, s, at, k), w)
     late = at_rates(at, w)
-    sight = late if seen == w else at_rates(at, seen)
-    pull = reaction(sampler.special, sampler, parts, s, left, sight, tau, uh)
-    f = on_sensor(hand, sampler, parts, s, sight, tau, uh, pull)
-    machine, a = sampled(sampler, parts, s, sight, seen, f, pull, acts)
-    hold, queue = hardware.queued(sampler.delay, m, a.hold, a.shown, now)
-    machine = with_hold(machine, hold, queue)
-    return Event(1.0, late, w, left, fh, work, a.delta, a.shown, a.hold, machine)
+    delta, shown_, hold, machine = (m.x.delta, m.y.delta), 0.0, m.hold, m
+    if acts:
+        v = soft_velocity(sampler.special, sampler, parts, s, at, u)
+        sight, seen = seen_handle(late, w, u, v)
+        machine, a = sampled(sampler, parts, s, sight, seen, left, tau)
+        delta, shown_, hold = a.delta, a.shown, a.hold
+    machine = hardware.queued(sampler.delay, m, machine, shown_, now)
+    return Event(1.0, late, w, left, fh, work, delta, shown_, hold, machine)
 
 
-def with_hold(m, hold, queue):
-    return Machine(
-        m.x, m.y, m.form, m.own, hold, m.samples, m.force, m.rates, m.filtered, m.guard, m.tool,
-        queue,
-    )  # fmt: skip
+def seen_handle(at, w, u, v):
+    """The handle at velocity v, and its joint rates [rad/s]; as given where v is u."""
+    if v == u:
+        return at, w
+    r1, r2 = arm.joint_velocity(v[0], v[1], at.u, 1.0)
+    w = r1, r2 - r1
+    return at_rates(at, w), w
 
 
-def sampled(sampler, parts, s, at, w, f, pull, acts):  # noqa: PLR0913
-    """Controller and hardware behind a sample, but for what the motors hold; and its answer.
+def sampled(sampler, parts, s, at, w, special, tau):
+    """Controller and hardware behind a sample, without delay; and its answer.
 
-    Where it is none, as they were.
+    Args:
+        sampler: the machine.
+        parts: the scene.
+        s: the state.
+        at: the handle.
+        w: joint rates [rad/s].
+        special: laws of the clay behind the kick that leads to the sample.
+        tau: torques on the joints in it [N.m].
     """
-    m = s.loop.machine
-    if not acts:
-        delta = m.x.delta, m.y.delta
-        return m, Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
+    m, uh = s.loop.machine, mean_push(parts.push, s.clock.t, 0.0)
+    pull = reaction(sampler.special, sampler, parts, s, special, at, tau, uh)
+    f = on_sensor(parts.hand, sampler, parts, s, at, tau, uh, pull)
     f = hardware.noise(sampler.chance, m.samples.k, f)
     f, filtered = hardware.filtered(sampler.filter, m.filtered, f)
     f = hardware.converted(sampler.adc, f)
@@ -527,7 +524,7 @@ def sampled(sampler, parts, s, at, w, f, pull, acts):  # noqa: PLR0913
     x, y, form = advanced(sampler.own, sampler, parts, m, a.force, shift)
     samples = samples_from(sampler, parts.time.dt, m.samples.k + 1)
     return Machine(
-        x, y, form, a.own, m.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
+        x, y, form, a.own, a.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
     ), a
 
 
@@ -539,6 +536,21 @@ def before_event(sampler, dt, s, target, after):
     if sampler is None:
         return target, after
     return before_uneven(sampler.uneven, sampler, dt, s, target, after)
+
+
+def may_follow(sampler, time, c):
+    """Whether a step may follow that needs no look at more than its end: a whole one between whole
+    ones; where events lie between the samples, any but the first and the last.
+    """
+    if sampler is None:
+        return c.before == time.dt and c.t == c.i * time.dt and c.i < time.last
+    return follows(sampler.uneven, time, c)
+
+
+def follows(uneven, time, c):
+    if uneven is None:
+        return c.before == time.dt and c.t == c.i * time.dt and c.i < time.last
+    return c.before > 0.0 and c.i < time.last
 
 
 def before_uneven(uneven, sampler, dt, s, target, after):
@@ -669,31 +681,28 @@ def stepped_arm(sampler, parts, e, s, k, after):
 
 
 def taken(sampler, parts, s, k):
-    """The loop behind a step that is taken."""
+    """Loop and status behind a step that is taken."""
     if sampler is None:
-        return k.loop
-    loop, e, x = s.loop, s.loop.event, s.status
+        return k.loop, s.status
+    loop, e = s.loop, s.loop.event
     if e.on == 0.0:
-        return loop
+        return loop, s.status
     if e.shown > 0.0:
-        q = hardware.encoded(sampler.encoder, s.body.q)
-        hardware.note_angles(sampler.difference, loop.machine, q)
-        hardware.note_force(sampler.passivity, e.machine, e.asked.force)
-        hardware.note_hold(sampler.delay, loop.machine, e.machine, e.asked)
-    return Sampled(e.machine, past(e))
+        note(sampler, s.body.q, loop.machine, e)
+    return Sampled(e.machine, past(e)), status_of(sampler.own, s.status, e)
 
 
-def status_behind(sampler, s):
-    """Status behind a step that is taken."""
-    if sampler is None:
-        return s.status
-    return status_of(sampler.own, s.status, s.loop.event)
+def note(sampler, q, machine, e):
+    """Notes a sample in the rings of the hardware."""
+    hardware.note_angles(sampler.difference, machine, hardware.encoded(sampler.encoder, q))
+    hardware.note_force(sampler.passivity, e.machine, e.asked.force)
+    hardware.note_hold(sampler.delay, machine, e.machine, e.asked)
 
 
 def status_of(own, x, e):
     """The run is over where the user's own controller asks for torques that are not finite."""
     if own is None:
         return x
-    if e.on > 0.0 and e.shown > 0.0 and is_refused(e.asked.tau):
+    if e.shown > 0.0 and is_refused(e.asked.tau):
         return Status(NOT_FINITE, x.closing, x.careful, x.landings, x.seen)
     return x

@@ -138,7 +138,7 @@ def sampler(s: Scenario, clay, special):
     lags = [c.lag for c in s.compensators]
     memory = formed = own = None
     if all(x and x[0] == 1.0 for x in lags):
-        memory = tuple(tuple(held_memory(*axis, Ts).tolist()) for axis in axes)
+        memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
     else:
         formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
     if s.controller is not None:
