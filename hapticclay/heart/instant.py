@@ -6,7 +6,8 @@ It is a kick of one second from rest, in which the velocity after it is the acce
 from __future__ import annotations
 
 from ..model import arm
-from . import hand, modes as m_, servo, viscous
+from . import hand, servo, viscous
+from . import modes as m_
 from .kick import clipped, handle_at, link_torques, steady_force
 from .parts import INF
 from .state import Body, Handle, Instant, Load, Step
