@@ -8,7 +8,6 @@ from .march import TOUCH
 from .search import find_root
 from .state import Clay, Flow, Growth, Hit, Laws, Region, State, Status
 
-
 def side(p, low, high):
     """1 beyond the upper border, -1 beyond the lower, 0 within; a NaN is within."""
     return 1 if p > high + TOUCH else -1 if p < low - TOUCH else 0

@@ -135,7 +135,7 @@ def fitting(parts, s, body, m, restx, resty):
 
 
 def chosen_way(parts, s, m):
-    """The same of clay that resists along the motion; a slow handle keeps the direction of its push."""
+    """The same of clay that resists along the motion; a slow handle keeps to its push."""
     modal, body, ended = parts.modal, s.body, m.ended[0]
     v, active = m_.velocity(modal, parts.arm, body.q, body.w), m_.is_active(m.law, 0)
     rests = active and (m.mode[0] == 0.0 or ended != 0.0 or (v[0] == 0.0 and v[1] == 0.0))

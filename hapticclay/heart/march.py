@@ -56,8 +56,8 @@ def paced(accurate, modal, s, target, after, on_grid):
         left, share = n, after / n
     loop = Course(x.x, x.y, x.form, left, share, x.modes)
     if n > m_.SUBSTEPS:
-        x = status
-        status = Status(UNRESOLVED, x.closing, x.careful, x.landings, x.seen)
+        was = status
+        status = Status(UNRESOLVED, was.closing, was.careful, was.landings, was.seen)
     s = State(s.clock, s.body, loop, s.clay, s.work, status, s.filled)
     if after == 0.0:
         return s, after
@@ -117,14 +117,20 @@ def no_form(form):
 
 def with_stage(sums, i, now, a):
     """The sums with those of a stage."""
-    f, g, h, k, m, p, n = sums.first, sums.last, FIRST[i], LAST[i], WEIGHT[i], now.power, sums.power
-    (b, c), x, y = a, now.x, now.y
-    first = f[0] + h * b, f[1] + h * c, f[2] + h * x[0], f[3] + h * x[1], f[4] + h * y[0], f[5] + h * y[1]
-    last = g[0] + k * b, g[1] + k * c, g[2] + k * x[0], g[3] + k * x[1], g[4] + k * y[0], g[5] + k * y[1]
+    six = a[0], a[1], now.x[0], now.x[1], now.y[0], now.y[1]
+    m, n, p = WEIGHT[i], sums.power, now.power
     power = (
         n[0] + m * p[0], n[1] + m * p[1], n[2] + m * p[2], n[3] + m * p[3], n[4] + m * p[4],
     )  # fmt: skip
+    first, last = added_six(sums.first, FIRST[i], six), added_six(sums.last, LAST[i], six)
     return Sums(first, last, moved_form(sums.form, now.form, m), power)
+
+
+def added_six(x, h, a):
+    return (
+        x[0] + h * a[0], x[1] + h * a[1], x[2] + h * a[2], x[3] + h * a[3], x[4] + h * a[4],
+        x[5] + h * a[5],
+    )  # fmt: skip
 
 
 def finished(x, v, sums, i, h):
@@ -180,7 +186,13 @@ def march(probe, parts, s, h):
         end = m_.back_to_rest(modes, parts.modal, parts.arm, end)
     x = first
     shown = Shown(x.p, x.v, x.fh, x.tau, x.delta, x.b, x.fe)
-    return Stride(shown, x.grip, now.grip, end, with_works(s.work, sums.power, h))
+    return Stride(shown, force_of(x.grip), now.grip, end, with_works(s.work, sums.power, h))
+
+
+def force_of(grip):
+    if grip is None:
+        return grip
+    return grip.f
 
 
 def is_finite_point(z):

@@ -228,7 +228,7 @@ def stopped(modes, i):
 
 
 def back_to_rest(modes, modal, part, z):
-    """A point with an axis that rests back where it does: one step of Newton's, of a step's error."""
+    """A point with an axis that rests back where it does: one step of Newton's method."""
     if modes is None:
         return z
     (sx, sy), anchor, q = modes.mode, modes.anchor, z.q
@@ -294,10 +294,10 @@ def goes_on(modal, modes, h, v, begin, x):
         modes: of the step.
         h: its length [s].
         v: velocity at its end [m/s].
-        begin: what the clay does at its start.
-        x: the same at its last stage.
+        begin: force of yielding at its start [N].
+        x: what the clay does at its last stage.
     """
-    return stays(modal.along, modal, modes, v, begin.f, x.f) and (
+    return stays(modal.along, modal, modes, v, begin, x.f) and (
         longest_step(modal.along, modes, x, v) >= h
     )
 
@@ -324,7 +324,7 @@ def axis_stays(modal, modes, v, begin, f, i):
 
 
 def gap(along, modal, modes, x, i):
-    """What is left until the mode of an axis, or of clay along the motion, ends; negative beyond."""
+    """What is left until a mode ends, negative beyond; i: the axis, 0 along the motion."""
     if along is None:
         v, f = modes.mode[i] * x.v[i], abs(x.f[i])
         return gap_of_hold(holding_force(modal, modes.law, i), f) if modes.mode[i] == 0.0 else v
@@ -385,7 +385,7 @@ def nearly_rests(modal, law, i, m, forward, size, need):
 
 
 def set_out(modes, x):
-    """Direction in which a handle begins to slide in clay along the motion, from its grip at rest."""
+    """Direction in which a handle at rest begins to slide in clay along the motion."""
     e = flow.slowed(x.B, x.a[0], x.a[1], 1.0, modes.law[0], 0.0, 1.0)
     ex, ey = x.f if e[0] == 0.0 and e[1] == 0.0 else e
     m = math.sqrt(ex * ex + ey * ey)

@@ -299,9 +299,9 @@ def towards(probe, parts, s, after, over, first):
         first: whether other clay has been met since the last look.
 
     Returns:
-        The state, in the region of the step; the step, by its kick; length of the step [s]; coordinate of the
-        border that it ends on, or that is to be crossed without a step, -1 for none; its side;
-        whether without a step.
+        The state, in the region of the step; the step, by its kick; length of the step [s];
+        coordinate of the border that it ends on, or that is to be crossed without a step, -1 for
+        none; its side; whether without a step.
     """
     axis, up, special = -1, 0, parts.special
     here = place(parts.arm, s.body.q)
@@ -346,7 +346,7 @@ def towards(probe, parts, s, after, over, first):
 
 
 def careful(parts, s, e):
-    """The state after one step with a look at its end, which lies on a border if one is in the way."""
+    """The state after one step with a look at its end, on a border if one is in the way."""
     target, most, on_grid = next_stop(parts, s)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
     s, most = march.paced(parts.accurate, parts.modal, s, target, most, on_grid)
@@ -363,7 +363,8 @@ def careful(parts, s, e):
             return ended(s, s.status.closing)
     closing = s.status.closing
     if s.clock.before > 0.0 or closing == OPEN:
-        s = kept(parts.accurate, parts, s, e, k, after, on_grid or closing != OPEN)
+        shows = on_grid or closing != OPEN
+        s = kept(parts.accurate, parts, s, e, k, after, shows)
     if closing != OPEN:
         return ended(halted_arm(parts.accurate, s, k), closing)
     if not march.is_sound(e.probe, k):

@@ -92,9 +92,12 @@ def axis_now(form, i, z):
 def rates_now(form, lag, z, f):
     """delta'' of x and y [m/s^2], and the rates of compensators of another shape."""
     if form is None:
-        (x, y) = lag
-        return (x.K * f[0] - x.pole * z.x.rate, y.K * f[1] - y.pole * z.y.rate), None
+        return (rate_of_lag(lag[0], z.x, f[0]), rate_of_lag(lag[1], z.y, f[1])), None
     return (0.0, 0.0), (form_rates(form, 0, z.form[0], f[0]), form_rates(form, 1, z.form[1], f[1]))
+
+
+def rate_of_lag(lag, z, f):
+    return lag.K * f - lag.pole * z.rate
 
 
 def form_rates(form, i, z, f):

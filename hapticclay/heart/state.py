@@ -698,8 +698,7 @@ class Kick(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """How clay that yields acts in a step: the mode of each axis, of the first where it resists along
-    the motion.
+    """How clay that yields acts in a step; along the motion the first of each pair counts.
 
     Attributes:
         law: Fy, K, n of x, then of y.
@@ -870,8 +869,8 @@ class Stride(NamedTuple):
 
     Attributes:
         shown: its start.
-        begin: clay that yields at its start.
-        last: the same at its last stage.
+        begin: force of yielding at its start, as Grip.f.
+        last: clay that yields at its last stage.
         end: its end.
         work: the ledger there.
     """
