@@ -23,10 +23,10 @@ except ImportError:  # Windows: no locks, so ratios of run times are disturbed t
     fcntl = None
 
 # a background job and its children ignore the one, what nohup starts the other
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-if getattr(signal, "SIGHUP", None) and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.SIG_DFL)):
+    number = getattr(signal, name, None)  # Windows has no SIGHUP
+    if number and signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, handler)
 
 # deterministic in CI, no deadline: run times on shared machines mean nothing
 settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)

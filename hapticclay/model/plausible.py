@@ -28,10 +28,15 @@ def warn_of(scenario: Scenario) -> None:
         scenario: what is to be run.
     """
     for text in implausible(scenario):
-        level, frame = 1, sys._getframe()
-        while frame and frame.f_globals.get("__name__", "").startswith("hapticclay."):
-            level, frame = level + 1, frame.f_back
-        warnings.warn(text, Warning, stacklevel=level)
+        warnings.warn(text, Warning, stacklevel=_users_level())
+
+
+def _users_level() -> int:
+    """`stacklevel` that names the user's line, of a warning that the caller issues."""
+    level, frame = 0, sys._getframe()
+    while frame and frame.f_globals.get("__name__", "").startswith("hapticclay."):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def implausible(scenario: Scenario) -> Iterator[str]:

@@ -44,10 +44,8 @@ class RecordPlots:
         self.record = record
 
     def __call__(self) -> Figure:
-        """The first figure that `hapticclay run` draws: velocity, or in a maneuver the force."""
-        figures = self.all()
-        main = "force" if self.record.scenario.muscle is not None else "velocity"
-        return figures.get(main) or next(iter(figures.values()))
+        """The main figure that `hapticclay run` draws: velocity, in a maneuver the force."""
+        return self.velocity() if self.record.scenario.muscle is None else self.force()
 
     def __repr__(self) -> str:
         return f"<plots of {self.record!r}: plot(), .velocity(), .force(), .path(), .energy()>"
