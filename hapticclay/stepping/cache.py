@@ -23,8 +23,9 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from .machine_code import MARK
+
 DIGEST = hashlib.sha256().digest_size
-MARKS = "*Run.*"  # files that say for which kinds of run a folder has machine code
 lost: set[Path] = set()  # folders that machine code could not be written to
 on_miss: contextvars.ContextVar[Callable[[], object]] = contextvars.ContextVar("on_miss")
 
@@ -76,7 +77,7 @@ class FileCache(_Cache):
                     return CompileResult._rebuild(target_context, *payload)
         except Exception:  # written whole, but by what this process cannot read
             pass
-        for stale in (file, *self.folder.glob(MARKS)):  # the marks would promise what is gone
+        for stale in (file, *self.folder.glob("*" + MARK)):  # the marks would promise what is gone
             with contextlib.suppress(OSError):
                 stale.unlink()
         return None

@@ -1,0 +1,128 @@
+"""The start of a run: the arm at its place, the clay around it, the controller in step with both."""
+
+from __future__ import annotations
+
+from ..model import arm, regions
+from . import borders, grooves, yielding
+from .engine_step import put
+from .kick import handle_at, place
+from .state import (
+    OPEN,
+    Axis,
+    Body,
+    Clay,
+    Clock,
+    Filled,
+    Growth,
+    Laws,
+    Loop,
+    Region,
+    State,
+    Status,
+)
+
+NONE = (0.0, 0.0)
+
+
+def arm_at(parts, e, p, v):
+    """The arm with its handle at p, moving with v."""
+    part = parts.arm
+    q = arm.inverse_kinematics(part.ox + p[0], part.oy + p[1], part.links)
+    r1, r2 = arm.joint_velocity(v[0], v[1], arm.jacobian(q[0], q[1], part.links), 1.0)
+    w = r1, r2 - r1
+    put(e.q, 0, q)
+    put(e.w, 0, w)
+    return Body(q, w, NONE)
+
+
+def axis_at(servo, p, v):
+    """Compensator and reference model of an axis that has long moved with v."""
+    return Axis((p + servo.damping / servo.stiffness * v) / servo.ratio, v / servo.ratio, p, v)
+
+
+def loop_at(form, loop, servo, p, v):
+    """The controller of a handle at p that has long moved with v; `loop` has the states of form."""
+    x, y = axis_at(servo[0], p[0], v[0]), axis_at(servo[1], p[1], v[1])
+    if form is None:
+        return Loop(x, y, loop.form)
+    x, y = Axis(x.delta, 0.0, x.y, x.yrate), Axis(y.delta, 0.0, y.y, y.yrate)
+    return Loop(x, y, loop.form)
+
+
+def clay_at(parts, blocks, body, p):
+    """The clay around a handle at p; `blocks` are those of its laws before it has been anywhere."""
+    index = regions.region_of(parts.table, p)
+    clay = Clay(Region(index, NONE, NONE), NONE, NONE, blocks.growth, blocks.hit, blocks.reaction, blocks.laws)
+    at = handle_at(parts.arm, body, 0.0)
+    clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 0.0)
+    growth = same_growth(blocks.growth, clay.growth)
+    clay = Clay(clay.region, clay.b, clay.b, growth, clay.hit, clay.reaction, clay.laws)
+    return cut_at(parts.special, clay, at)
+
+
+def same_growth(blocks, growth):
+    if blocks is None:
+        return growth
+    return Growth(growth.rate, growth.rate)
+
+
+def cut_at(special, clay, at):
+    """The clay behind the first cut of the tool, and before the first sample."""
+    if special is None:
+        return clay
+    x = clay.laws
+    b, old, cut = grooves.moved(special.groove, x.cut, clay, at.p, at.v)
+    x = Laws(yielding.behind(special.flow, x.flow), x.elastic, cut, x.more)
+    return Clay(clay.region, b, old, clay.growth, clay.hit, clay.reaction, x)
+
+
+def begun(parts, blocks, e, p, v):
+    """The state of a run at its start.
+
+    Args:
+        parts: the scene.
+        blocks: a state, for the blocks of the parts that it has; see scene.blocks.
+        e: the engine.
+        p: place of the handle, (x, y) [m].
+        v: its velocity [m/s].
+    """
+    body = arm_at(parts, e, p, v)
+    loop = loop_at(parts.form, blocks.loop, parts.servo, p, v)
+    clay = clay_at(parts, blocks.clay, body, p)
+    ix, iy = clay.region.index
+    status = Status(OPEN, OPEN, 0, 0, (ix, ix, iy, iy))
+    return State(Clock(0.0, 0, 0.0), body, loop, clay, blocks.work, status, Filled(0, 0, 0, 0))
+
+
+def changed(parts, blocks, s, before):
+    """The state that goes on in a scene that has changed between the same borders; in CPython only.
+
+    Laws of the clay that stay keep their state, new ones begin.
+
+    Args:
+        parts: the scene.
+        blocks: from scene.blocks.
+        s: the state so far.
+        before: the scene so far.
+    """
+    p = place(parts.arm, s.body.q)
+    clay = blocks.clay._replace(region=s.clay.region)
+    fresh = borders.clay_in(parts, clay, s.clay.region.index, s.clock.t, p, -1, 0.0)
+    old = s.clay
+    reaction = kept_blocks(fresh.reaction, old.reaction)
+    laws = kept_blocks(fresh.laws, old.laws)
+    if laws is not None:
+        laws = laws._replace(flow=fresh.laws.flow, elastic=fresh.laws.elastic)
+    hit = old.hit if fresh.hit and old.hit else fresh.hit
+    fresh = fresh._replace(old=old.old, hit=hit, reaction=reaction, laws=laws)
+    if fresh.growth is not None and old.growth is not None:
+        fresh = fresh._replace(growth=Growth(fresh.growth.rate, old.growth.old))
+    return s._replace(clay=fresh, loop=s.loop._replace(form=s.loop.form or blocks.loop.form))
+
+
+def kept_blocks(fresh, before):
+    """Blocks of a new scene, which go on as before where they did."""
+    if fresh is None or before is None:
+        return fresh
+    pairs = zip(fresh, before, strict=True)
+    return type(fresh)(*(new if new is None or old is None else old for new, old in pairs))

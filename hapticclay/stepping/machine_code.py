@@ -1,0 +1,65 @@
+"""Machine code as it is known without numba: where it is kept, and of which kinds of scene."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder of the machine code, in NUMBA_CACHE_DIR or the user's cache.
+
+    It is named by all that the code depends on: sources, versions, processor.
+    """
+    packages = [version(x) for x in ("numba", "llvmlite", "mujoco", "numpy")]
+    digest = hashlib.sha256(repr((sys.version, packages, _processor())).encode())
+    package = Path(__file__).resolve().parents[1]
+    for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
+        digest.update(file.read_bytes())
+    root = (
+        os.environ.get("NUMBA_CACHE_DIR")
+        or os.environ.get("XDG_CACHE_HOME")
+        or Path.home() / ".cache"
+    )
+    return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+def _processor() -> str:
+    """Name and abilities of the processor."""
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return "".join(sorted({x for x in lines if x.startswith(("model name", "flags", "Feat"))}))
+    return f"{platform.machine()} {platform.processor()}"
+
+
+def kind_of(part: Any) -> Any:
+    """What scenes have in common whose steps are made by the same machine code.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        return type(part), *map(kind_of, part)
+    return None if part is None else type(part)
+
+
+def mark(kind: Any) -> Path:
+    """A file that says that machine code of a kind is kept.
+
+    Args:
+        kind: from `kind_of`.
+
+    Raises:
+        OSError, RuntimeError: there is no home, so that nothing is kept.
+    """
+    return cache_folder() / (hashlib.sha256(repr(kind).encode()).hexdigest()[:16] + MARK)

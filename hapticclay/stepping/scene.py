@@ -1,0 +1,320 @@
+"""A scene compiled of the parts that it has, and the state at its start."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..model import compensator, groove, regions
+from ..model import hardware as interface
+from ..model.constants import B_MAX
+from ..model.sampled_controller import DESK, LawCaller
+from ..model.scenario import Scenario
+from . import begin, hardware, kick, laws, pace, rows, sampled
+from . import parts as p_
+from . import state as s_
+from .engine_step import put
+from .march import GROWTH_BLOCK
+from .memories import delay_in_samples, formed_memory, held_memory
+from .modes import SUBSTEPS
+from .parts import INF
+
+NONE = (0.0, 0.0)
+
+
+def hand_parts(s: Scenario):
+    if not any(s.operators):
+        return None
+    longer = 1 if s.control == "sampled" else None
+    none = p_.Hand(0.0, 0.0, 0.0, longer)
+    return tuple(p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators)
+
+
+def compensators(s: Scenario):
+    lags = [c.lag for c in s.compensators]
+    if all(x and x[0] == 1.0 for x in lags):
+        return tuple(p_.Lag(float(K), float(x[1])) for K, x in zip(s.gain, lags, strict=True)), None
+    numbers = np.array([x for c in s.compensators for x in compensator.form_numbers(c)])
+    work = np.append(np.zeros(2 * compensator.KICK), (-1.0, -1.0))
+    return None, p_.Form(
+        tuple(map(float, s.gain)), max(1, *(c.order for c in s.compensators)), numbers, work,
+        np.zeros(compensator.WORK),
+    )  # fmt: skip
+
+
+def is_held(s: Scenario) -> bool:
+    """Whether the motors render the clay."""
+    return s.control == "sampled" and s.render == "held"
+
+
+def stiffness(s: Scenario) -> float:
+    """Largest share of its velocity that a step of explicit damping would take from the handle."""
+    b = B_MAX if s.clay.grows else s.clay.largest
+    return b * s.dt * max(s.mobility, s.arm.links[4])
+
+
+def clay_part(s: Scenario):
+    clay = s.clay
+    if clay is None:
+        return None, None, None, None
+    grain = (math.cos(clay.angle), math.sin(clay.angle)) if clay.angle else None
+    fast = s.integrator == "fast" or s.control == "sampled"
+    flow = None
+    if clay.yields and fast:
+        flow = p_.Flow(1 if clay.isotropic or clay.groove else None)
+    springy = block = None
+    if clay.springs:
+        springy = p_.Springs(float(pace.spring_step(s)), 1 if is_held(s) else None)
+    if clay.groove:
+        g = clay.groove
+        block = p_.Groove(
+            g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
+            np.zeros(groove.RIM), np.zeros(2),
+        )  # fmt: skip
+    b = stiffness(s) if fast and not is_held(s) else 0.0
+    stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
+    hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 and s.control != "sampled" else None
+    special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
+    special = special if any(x is not None for x in special) else None
+    return p_.Clay(1 if clay.grows else None), grain, hits, special
+
+
+def steady_force(s: Scenario) -> tuple[float, float]:
+    """The constant part of the muscle force, (x, y) [N]."""
+    (x, y), muscle = s.force, s.muscle
+    if muscle is not None and not muscle.varies:
+        more = muscle(0.0)
+        x, y = x + more[0], y + more[1]
+    return float(x), float(y)
+
+
+def accurate_parts(s: Scenario):
+    """The accurate method, and clay that yields in it."""
+    if s.integrator == "fast" or s.control == "sampled":
+        return None, None
+    pace.check_explicit(s)
+    blocks = modal = None
+    if s.clay and s.clay.grows:
+        blocks = substeps_of_blocks(s)
+    if s.clay and s.clay.yields:
+        along, grain = (1, None) if s.clay.isotropic else (None, clay_part(s)[1])
+        modal = p_.Modal(along, grain, float(pace.largest_lightness(s)), float(s.dt))
+    return p_.Accurate(pace.parts_of_sample(s, 0), blocks), modal
+
+
+def substeps_of_blocks(s: Scenario):
+    """Engine steps a sample, by block; they grow, and after SUBSTEPS all are as many."""
+    count = math.floor(s.t_max / s.dt + 1e-6) // GROWTH_BLOCK + 1
+    blocks = np.empty(count, dtype=np.int64)
+    for j in range(count):
+        blocks[j] = pace.parts_of_sample(s, j * GROWTH_BLOCK)
+        if blocks[j] > SUBSTEPS:
+            blocks[j:] = SUBSTEPS + 1
+            break
+    return blocks
+
+
+def parts_of(s: Scenario):
+    lag, form = compensators(s)
+    clay = clay_part(s)
+    return p_.Parts(
+        p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
+        p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
+        tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
+        hand_parts(s), p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
+        tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
+        sampler(s, *clay[::3]), *accurate_parts(s),
+    )  # fmt: skip
+
+
+def sampler(s: Scenario, clay, special):
+    """Sampled control and its hardware."""
+    if s.control != "sampled":
+        return None
+    ratio, io = round((s.Ts or s.dt) / s.dt), s.interface
+    Ts = ratio * float(s.dt)
+    axes = list(zip(s.servo, s.compensators, s.gain, strict=True))
+    lags = [c.lag for c in s.compensators]
+    memory = formed = own = None
+    if all(x and x[0] == 1.0 for x in lags):
+        memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
+    else:
+        formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
+    if s.controller is not None:
+        state = s.controller.state
+        desk = np.array([0.0] * DESK + [*state, *state, *s.controller.params])
+        own = p_.Own(LawCaller(s.controller, desk), memoryview(desk), len(state))
+    physical = (None, None) if is_held(s) else (clay, special)
+    told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
+    first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
+    return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
+
+
+def hardware_parts(s: Scenario, io, Ts):
+    """The parts of a Sampler from `chance` on."""
+    chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
+    if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
+        n = int(s.t_max / Ts) + 8
+        chance = interface.SampleNoise(io).table(0, n).ravel()
+    if io.velocity == "difference":
+        cutoff = float(io.velocity_filter) if io.velocity_filter else None
+        difference = p_.Difference(io.window, cutoff, np.zeros(3 * io.window))
+    if io.force_filter is not None:
+        lag = interface.butterworth(io.force_filter, io.filter_order, Ts)
+    if io.adc_bits:
+        adc = p_.Converter(io.adc_bits, (float(io.adc_range), float(io.adc_range)))
+    if io.dac_bits:
+        dac = p_.Converter(io.dac_bits, tuple(map(float, io.dac_range or s.torque_limit)))
+    whole, share = delay_in_samples(io.delay, Ts)
+    if io.delay > 0.0:
+        delay = p_.Delay(float(io.delay), whole + 4, np.zeros(hardware.QUEUED * (whole + 4)))
+    if any(io.friction):
+        friction = tuple(map(float, io.friction))
+    if io.passivity:
+        passivity = p_.Passivity(whole, float(share), np.zeros(2 * (whole + 2)))
+    if io.coupling is not None:
+        coupling = p_.Coupling(float(io.coupling.spring), float(io.coupling.damper))
+    uneven = 1 if io.jitter > 0.0 or io.delay > 0.0 else None
+    return chance, uneven, io.encoder or None, difference, lag, adc, dac, delay, friction, passivity, coupling
+
+
+def first_machine(part, parts, s: Scenario, loop, q, w):
+    """Controller and hardware at the start; the past of the sensors goes into their rings."""
+    p = tuple(map(float, s.start))
+    x, y, form = loop.x, loop.y, None
+    own = tuple(map(float, s.controller.state)) if s.controller else None
+    if own is not None:
+        x = y = s_.Axis(0.0, 0.0, 0.0, 0.0)
+    if loop.form is not None:
+        form = s_.Formed(*loop.form, (x.delta, y.delta))
+    rates = None
+    if part.difference:
+        ring, n = part.difference.ring, part.difference.window
+        for i in range(n):  # before the start the joints have turned so for long
+            j = i - n
+            then = q[0] + j * part.Ts * w[0], q[1] + j * part.Ts * w[1]
+            put(ring, 3 * i, (float(j), *hardware.encoded(part.encoder, then)))
+        rates = s_.Rates(w, 0)
+    hold = s_.Hold(
+        NONE, NONE, hardware.nothing(part.passivity), hardware.no_pull(part.coupling)
+    )  # fmt: skip
+    return s_.Machine(
+        x, y, form, own, hold, sampled.samples_from(part, parts.time.dt, 0), NONE, rates,
+        (0.0,) * 4 if part.filter else None, s_.Guard(NONE, p, 0) if part.passivity else None,
+        p if part.coupling else None, s_.Queue(0, 0, INF, INF) if part.delay else None,
+    )  # fmt: skip
+
+
+def first_sampled(part, parts, s: Scenario, state):
+    """The state of a sampled run at its start."""
+    body, reaction, work = state.body, state.clay.reaction, state.work
+    machine = first_machine(part, parts, s, state.loop, body.q, body.w)
+    hold, at = machine.hold, kick.handle_at(parts.arm, body, 0.0)
+    event = s_.Event(0.0, at, body.w, reaction, NONE, work, NONE, 0.0, hold, machine)
+    return state._replace(loop=s_.Sampled(machine, event))
+
+
+def first_reaction(special):
+    """What clay left to the first kick."""
+    if special is None:
+        return None
+    felt = s_.Felt(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
+    split = s_.Split(0.0, NONE, NONE) if special.stiff else None
+    return s_.Reaction(NONE, split, felt if special.flow else None)
+
+
+def first_laws(special, p):
+    """State of the laws before the handle has been anywhere."""
+    if special is None:
+        return None
+    law, none = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (0.0,) * 6
+    return s_.Laws(
+        s_.Flow(law, law) if special.flow else None,
+        s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF) if special.springs else None,
+        s_.Cut((math.nan, math.nan), NONE, NONE, 0.0) if special.groove else None,
+        laws.start(special.more, p),
+    )  # fmt: skip
+
+
+def first_form(parts, s):
+    """States of compensators of another shape, of a handle that has long moved evenly."""
+    if parts.form is None:
+        return None
+    both = zip(s.compensators, parts.servo, s.velocity, strict=True)
+    return tuple(tuple(compensator.moving_states(c, v / x.ratio)) for c, x, v in both)
+
+
+def blocks(parts, s: Scenario):
+    """A state with the blocks of all parts, before the handle has been anywhere."""
+    axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
+    growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
+    hit = s_.Hit(INF, 0.0) if parts.hits else None
+    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.interface and parts.sampler else None
+    clay = s_.Clay(
+        s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
+        first_reaction(parts.special), first_laws(parts.special, NONE),
+    )
+    return s_.State(
+        s_.Clock(0.0, 0, 0.0), s_.Body(NONE, NONE, NONE), s_.Loop(axis, axis, first_form(parts, s)),
+        clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0, works), s_.Status(0, 0, 0, 0, (0, 0, 0, 0)),
+        s_.Filled(0, 0, 0, 0),
+    )  # fmt: skip
+
+
+def start(parts, s: Scenario, e):
+    """The state at the start of a run."""
+    p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
+    state = begin.begun(parts, blocks(parts, s), e, p, v)
+    if parts.accurate is not None:
+        return first_course(parts, state)
+    return state if parts.sampler is None else first_sampled(parts.sampler, parts, s, state)
+
+
+def first_course(parts, state):
+    """The state of an accurate run at its start."""
+    loop, modes = state.loop, None
+    if parts.modal:
+        law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
+        modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, NONE, INF)
+    return state._replace(loop=s_.Course(loop.x, loop.y, loop.form, 0, 0.0, modes))
+
+
+def written(parts):
+    """Arrays of a scene that steps write into."""
+    out = [parts.table]
+    if parts.special is not None and parts.special.groove is not None:
+        g = parts.special.groove
+        out += [g.ground, g.rim, g.removed]
+    return out + ([] if parts.sampler is None else rings(parts.sampler))
+
+
+def rings(sampler):
+    """Arrays in which the hardware keeps past samples."""
+    parts = sampler.difference, sampler.delay, sampler.passivity
+    return [x.ring for x in parts if x is not None]
+
+
+def beyond(parts):
+    """Why no step can go on from an arm beyond floating point."""
+    return "the arm is stretched or folded"
+
+
+def viewed(part):
+    """Parts with memoryviews in place of arrays: CPython reads plain floats from them, and sooner.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, np.ndarray):
+        return memoryview(part)
+    if isinstance(part, tuple):
+        made = map(viewed, part)
+        return type(part)._make(made) if hasattr(part, "_make") else tuple(made)
+    return part
+
+
+def tells(parts):
+    """Whether the force of the clay is recorded: b v does not tell it."""
+    own = parts.modal is not None or (parts.special is not None and rows.tells(parts.special))
+    return own or (parts.sampler is not None and parts.sampler.rendered is not None)
