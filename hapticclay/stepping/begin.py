@@ -117,7 +117,7 @@ def changed(parts, blocks, s, before):
     fresh = fresh._replace(old=old.old, hit=hit, reaction=reaction, laws=laws)
     if fresh.growth is not None and old.growth is not None:
         fresh = fresh._replace(growth=Growth(fresh.growth.rate, old.growth.old))
-    return s._replace(clay=fresh, loop=s.loop._replace(form=s.loop.form or blocks.loop.form))
+    return s._replace(clay=fresh)
 
 
 def kept_blocks(fresh, before):

@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import inspect
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -67,7 +69,8 @@ from . import (
 )
 from . import hardware as wires
 from .engine import mujoco
-from .machine_code import cache_folder, kind_of
+from .machine_code import cache_folder, compile_time, mark
+from .notice import Notice
 
 SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
@@ -267,6 +270,8 @@ STEP, FORWARD, RESET = map(function, ("mj_step", "mj_forward", "mj_resetData"))
 # ---- kernels -------------------------------------------------------------------------------------
 
 QUIET = entry(monitor.is_quiet)
+ready: set[Any] = set()  # kinds of scene whose whole steps are compiled in this process, or loaded
+complete: set[Any] = set()  # those whose careful steps are, too
 met: dict[Any, int] = {}  # careful steps that CPython has made, by kind of scene
 
 
@@ -277,15 +282,80 @@ def natively(r: run.Run, room: int) -> None:
         r: the run.
         room: rows that it may have.
     """
-    kind = kind_of(r.parts)
+    kind = r.kind
     while r.state.status.code == run.OPEN and path.has_room(r.e, r.state.filled, room):
         if met.get(kind, 0) > CAREFUL:
-            r.state = ADVANCE(r.parts, r.state, r.native, room)
+            with first_call(complete, kind, "borders and hits of such runs"):
+                r.state = ADVANCE(r.parts, r.state, r.native, room)
             continue
-        r.state = GLIDE(r.parts, r.state, r.native, room)
+        with first_call(ready, kind, "runs of this kind"):
+            r.state = GLIDE(r.parts, r.state, r.native, room)
         if path.has_room(r.e, r.state.filled, room):
             run.one_plainly(r, path.careful)
             met[kind] = met.get(kind, 0) + 1
+
+
+@contextlib.contextmanager
+def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
+    """A first call, which compiles or takes from the disk; Ctrl-C waits for the end of it.
+
+    Args:
+        kinds: that are ready; this one is, in the end.
+        kind: of the scene.
+        what: is compiled, in words.
+    """
+    with Notice(what, compile_time(kind)) as notice, interrupts_held():
+        if not isinstance(GLIDE._cache, cache.FileCache):  # without a home none can miss it
+            notice.begin()
+        before = cache.on_miss.set(notice.begin)
+        try:
+            yield
+        finally:
+            cache.on_miss.reset(before)
+        kinds.add(kind)
+        keep_mark(kind)
+
+
+def first_call(kinds: set[Any], kind: Any, what: str) -> contextlib.AbstractContextManager[None]:
+    """As `compiling` before the first call of a kind; nothing before the others."""
+    return contextlib.nullcontext() if kind in kinds else compiling(kinds, kind, what)
+
+
+@contextlib.contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits for the end of this block."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[object] = []
+    before = signal.signal(signal.SIGINT, lambda *what: caught.append(what))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if caught:
+        raise KeyboardInterrupt
+
+
+def keep_mark(kind: Any) -> None:
+    """Notes on the disk that machine code of a kind is kept.
+
+    Args:
+        kind: of the scene.
+    """
+    with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep it
+        if cache_folder() not in cache.lost:
+            mark(kind).touch()
+
+
+def warm(scenario: Scenario) -> None:
+    """Compiles what steps of a scene need, or takes it from the disk, before the first run.
+
+    Args:
+        scenario: the scene.
+    """
+    with run.borrowed_store() as store:
+        run.Run(scenario, 1, KERNEL, store).advance(1)
 
 
 def calls(model: Any, data: Any) -> tuple[Any, ...]:
@@ -298,4 +368,4 @@ def calls(model: Any, data: Any) -> tuple[Any, ...]:
     return STEP, FORWARD, model._address, data._address
 
 
-KERNEL = run.Kernel(natively, calls, QUIET)
+KERNEL = run.Kernel(natively, calls, lambda x: x.ctypes.data, QUIET)

@@ -89,6 +89,12 @@ def ended(s, code):
     return with_status(s, Status(code, x.closing, x.careful, x.landings, x.seen))
 
 
+def closed(s):
+    """The state of a run whose next row is the last."""
+    x = s.status
+    return with_status(s, Status(x.code, FINISHED, x.careful, x.landings, x.seen))
+
+
 # ---- a step --------------------------------------------------------------------------------------
 
 
@@ -274,8 +280,7 @@ def crossed(parts, s, e, i, up):
     closes = i == 0 and up > 0 and border == parts.table[regions.END]
     s = with_filled(s, Filled(x.steps, x.rows, x.crossings + 1, x.stops))
     if closes:
-        x = s.status
-        return with_status(s, Status(x.code, FINISHED, x.careful, x.landings, x.seen))
+        return closed(s)
     return borders.moved_on(parts, s, place(parts.arm, s.body.q), i, up, 1.0)
 
 

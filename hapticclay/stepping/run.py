@@ -14,12 +14,12 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError
-from ..model import regions
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
 from .engine_step import Engine, Probe
+from .machine_code import kind_of
 from .parts import Parts, Signal
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
@@ -72,12 +72,14 @@ class Kernel(NamedTuple):
 
     Attributes:
         advance: makes steps, called with (run, room).
-        calls: mj_step, mj_forward, model and data as compiled code calls them; None for none.
+        calls: mj_step, mj_forward, model and data as these steps call them.
+        place: an array as they write into it: a memoryview, or its address.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
     """
 
     advance: Callable[[Run, int], None]
-    calls: Callable[[Any, Any], tuple[Any, ...]] | None = None
+    calls: Callable[[Any, Any], tuple[Any, ...]]
+    place: Callable[[Any], Any]
     quiet: Callable[..., bool] | None = None
 
 
@@ -109,7 +111,9 @@ def plainly(run: Run, room: int) -> None:
         one_plainly(run, path.step)
 
 
-PLAIN = Kernel(plainly)
+PLAIN = Kernel(
+    plainly, lambda model, data: (mujoco.mj_step, mujoco.mj_forward, model, data), memoryview
+)
 
 
 class NeedsMonitor(Exception):
@@ -117,14 +121,9 @@ class NeedsMonitor(Exception):
 
 
 class EngineStore:
-    """Engines and arrays that run after run uses: engines with clay and without.
+    """Engines and arrays that run after run uses: engines with clay and without."""
 
-    Args:
-        kernel: of the runs.
-    """
-
-    def __init__(self, kernel: Kernel):
-        self.kernel = kernel
+    def __init__(self):
         self.engines: dict[Any, tuple[Any, Any]] = {}
         self.rows = np.empty((CHUNK - 1, rows.ROW))
         self.crossings = np.empty((CROSSINGS, 4))
@@ -150,13 +149,11 @@ class EngineStore:
         mujoco.mj_resetData(model, data)
         return model, data
 
-    def arrays(self, parts: Parts, model: Any, data: Any) -> tuple[Engine, Engine | None]:
-        """Arrays of a run for CPython, and for compiled steps.
+    def room_for(self, parts: Parts) -> None:
+        """Makes the arrays for what a scene shows beside its rows.
 
         Args:
             parts: the scene.
-            model: of the engine.
-            data: of the engine.
         """
         special = parts.special
         flows = parts.modal is not None or (special is not None and special.flow is not None)
@@ -164,41 +161,41 @@ class EngineStore:
             self.stops = np.empty((STOPS, 3))
         if scene.tells(parts) and not len(self.rendered):
             self.rendered = np.empty((CHUNK - 1, 3))
+
+    def arrays(self, parts: Parts, model: Any, data: Any, kernel: Kernel) -> Engine:
+        """The engine and the arrays that a run fills.
+
+        Args:
+            parts: the scene.
+            model: of the engine.
+            data: of the engine.
+            kernel: how the steps are made.
+        """
+        self.room_for(parts)
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
-        arrays = [*own, *(x.reshape(-1) for x in kept)]
-        bounds = CROSSINGS - 3, max(len(self.stops) - 8, 1)
         felt: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
-        probe = native = None
+        step, forward, *engine_ = kernel.calls(model, data)
+        probe = None
         if parts.accurate is not None:
-            probe = Probe(mujoco.mj_forward, model, data, *map(memoryview, felt))
-        plain = Engine(mujoco.mj_step, model, data, *map(memoryview, arrays), *bounds, probe)
-        if self.kernel.calls is None:
-            return plain, None
-        step, forward, *engine_ = self.kernel.calls(model, data)
-        if parts.accurate is not None:
-            native = Probe(forward, *engine_, *(x.ctypes.data for x in felt))
-        addresses = [x.ctypes.data for x in arrays]
-        return plain, Engine(step, *engine_, *addresses, *bounds, native)
+            probe = Probe(forward, *engine_, *map(kernel.place, felt))
+        places = map(kernel.place, [*own, *(x.reshape(-1) for x in kept)])
+        bounds = CROSSINGS - 3, max(len(self.stops) - 8, 1)
+        return Engine(step, *engine_, *places, *bounds, probe)
 
 
-_idle: dict[Kernel, list[EngineStore]] = {}  # engines that no run uses
+_idle: list[EngineStore] = []  # engines that no run uses
 
 
 @contextlib.contextmanager
-def borrowed_store(kernel: Kernel) -> Iterator[EngineStore]:
-    """Engines for one run, made anew only while others are in use.
-
-    Args:
-        kernel: of the run.
-    """
-    idle = _idle.setdefault(kernel, [])
+def borrowed_store() -> Iterator[EngineStore]:
+    """Engines for one run, made anew only while others are in use."""
     try:
-        store = idle.pop()
+        store = _idle.pop()
     except IndexError:
-        store = EngineStore(kernel)
+        store = EngineStore()
     yield store
-    idle.append(store)  # but not after an exception
+    _idle.append(store)  # but not after an exception
 
 
 class Saved(NamedTuple):
@@ -251,6 +248,7 @@ class Run:
     Attributes:
         parts: the scenario, compiled of its parts.
         views: the same, for CPython.
+        e: the engine and the arrays that it fills, for CPython.
         state: between two steps.
         pause: index of the sample to pause at.
     """
@@ -268,11 +266,9 @@ class Run:
             bound = "the engine must be free of control callbacks"
             raise ParameterError("mjcb_control", mujoco.get_mjcb_control(), bound)
         self.scenario, self.every, self.kernel = scenario, every, kernel
-        self.store = store or EngineStore(kernel)
+        self.store = store or EngineStore()
         self.model, self.data = self.store.engine(scenario)
-        self.parts: Parts = scene.parts_of(scenario)
-        self.e, self.native = self.store.arrays(self.parts, self.model, self.data)
-        self.views: Parts = scene.viewed(self.parts)
+        self._equip(scene.parts_of(scenario))
         self.state: State = scene.start(self.views, scenario, self.e)
         self.drives = _drives(scenario)
         self.muscle, self.command = self.drives.get("muscle"), self.drives.get("command")
@@ -362,7 +358,23 @@ class Run:
         Args:
             parts: these.
         """
-        self.parts, self.views = parts, scene.viewed(parts)
+        self.parts: Parts = parts
+        self.views: Parts = scene.viewed(parts)
+        self._kind = self._native = None
+
+    @property
+    def kind(self) -> Any:
+        """What scenes have in common whose steps the same machine code makes."""
+        if self._kind is None:
+            self._kind = kind_of(self.parts)
+        return self._kind
+
+    @property
+    def native(self) -> Engine:
+        """The engine as compiled steps call it."""
+        if self._native is None:
+            self._native = self.store.arrays(self.parts, self.model, self.data, self.kernel)
+        return self._native
 
     def _note_events(self, crossings: int, stops: int) -> None:
         """Takes the crossings and stops of the steps just made."""
@@ -412,7 +424,7 @@ class Run:
         """
         if x.scenario != self.scenario:
             self.scenario = x.scenario
-            self.take(scene.parts_of(x.scenario))
+            self._equip(scene.parts_of(x.scenario))
         self.restore(x.saved)
         self._saved, n = x.before, len(x.rows)
         self.store.rows[:n], self.store.rendered[: len(x.rendered)] = x.rows, x.rendered
@@ -425,12 +437,16 @@ class Run:
         Args:
             scenario: with these.
         """
-        before, table = self.parts, self.parts.table
-        self.scenario = self.watch.scenario = scenario
+        before = self.parts
         parts = scene.parts_of(scenario)
-        regions.keep_entries(parts.table, table)
-        self.take(parts)
+        scene.keep_written(parts, before)
+        self.scenario = self.watch.scenario = scenario
+        self._equip(parts)
         self.state = begin.changed(self.views, scene.blocks(parts, scenario), self.state, before)
+
+    def _equip(self, parts: Parts) -> None:
+        self.take(parts)
+        self.e = self.store.arrays(parts, self.model, self.data, PLAIN)
 
     def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
         """Runs to the end, until progress returns True, or until sample `pause`.
@@ -459,7 +475,14 @@ class Run:
             force: (x, y) [N].
         """
         self.scenario = replace(self.scenario, force=force)
-        steady = 0.0, *scene.steady_force(self.scenario), 0.0, 0.0
+        self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
+
+    def push_evenly(self, steady: tuple[float, ...]) -> None:
+        """Goes on under a muscle force that changes evenly.
+
+        Args:
+            steady: as Push.steady.
+        """
         self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
 
     def position(self, h: float = 0.0) -> tuple[float, float]:

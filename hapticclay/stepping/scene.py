@@ -289,6 +289,13 @@ def written(parts):
     return out + ([] if parts.sampler is None else rings(parts.sampler))
 
 
+def keep_written(parts, before):
+    """Takes over what steps have written into the arrays of a scene whose numbers change."""
+    regions.keep_entries(parts.table, before.table)
+    for new, old in zip(written(parts)[1:], written(before)[1:], strict=True):
+        new[:] = old
+
+
 def rings(sampler):
     """Arrays in which the hardware keeps past samples."""
     parts = sampler.difference, sampler.delay, sampler.passivity
