@@ -19,6 +19,21 @@ from .groove import Groove
 from .spring import Spring
 
 
+def halved_damping(b0, b1, L, R):
+    """Damping in a kick of clay that a step cannot overshoot: half of a step's on either side.
+
+    Args:
+        b0: damping before the sample, (x, y) [N.s/m].
+        b1: damping after the sample, (x, y) [N.s/m].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        Damping on the velocity before the kick, and on that after it, (x, y) each [N.s/m].
+    """
+    return (L * b0[0], L * b0[1]), (R * b1[0], R * b1[1])
+
+
 def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # plain numbers
     """Splits the clay's damping in one kick between the velocities before and after it.
 
@@ -45,8 +60,7 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # pla
         stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
     most = 1.0 / (H * W)
-    x0, y0 = L * b0[0], L * b0[1]
-    x1, y1 = R * b1[0], R * b1[1]
+    (x0, y0), (x1, y1) = halved_damping(b0, b1, L, R)
     stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
     if x0 > most or y0 > most or x1 > most or y1 > most:
         stiff = 1.0

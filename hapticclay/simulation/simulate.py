@@ -23,6 +23,7 @@ ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step, and in clay that stays cut [us]; to load it [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50.0, "sampled": 90.0, "accurate": 150.0}, 400.0
 LOADING = 0.8
+saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
 
@@ -114,20 +115,22 @@ def kernel_for(scenario: Scenario, engine: str) -> Kernel:
 
 
 def pays(scenario: Scenario, steps: float) -> bool:
-    """Whether compiled steps are likely to end a run sooner than Python, loading included.
+    """Whether machine code repays loading or compiling it: for what this process has run of a kind
+    of scene so far, and is about to run.
 
     Args:
         scenario: what to run.
-        steps: of all runs of its kind, to their t_max.
+        steps: how many steps of its kind are about to be made.
     """
-    compiled = sys.modules.get("hapticclay.stepping.compiled")
-    saved = 0.5e-6 * saved_in_a_step(scenario) * steps  # half: runs tend to end before t_max
-    if (compiled is None and saved < LOADING) or not has_numba():
-        return False
     kind = kind_of(scene.parts_of(scenario))
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
     if compiled is not None and kind in compiled.ready:
         return True
-    return saved >= (LOADING if is_kept(kind) else compile_time(kind))
+    # half: runs tend to end before t_max
+    saved[kind] = saved.get(kind, 0.0) + 0.5e-6 * saved_in_a_step(scenario) * steps
+    if saved[kind] < LOADING or not has_numba():
+        return False
+    return is_kept(kind) or saved[kind] >= compile_time(kind)
 
 
 def saved_in_a_step(scenario: Scenario) -> float:

@@ -31,6 +31,7 @@ from .simulate import ENGINES, kernel_for, pays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges
+TOLD = 1000  # steps after which to ask anew whether machine code pays
 LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
 
 
@@ -92,7 +93,7 @@ class Simulation:
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
         self._engine = choice("engine", engine, ENGINES)
-        self._lock, self._store = threading.Lock(), EngineStore()
+        self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
         self._closed = False
         self._begin(scenario)
 
@@ -100,7 +101,7 @@ class Simulation:
         warn_of(scenario)
         kernel = PLAIN if self._engine == "auto" else kernel_for(scenario, self._engine)
         self._run = Run(scenario, 1, kernel, self._store, watched=True)
-        self._given, self._wall, self._asked = scenario, 0.0, 0
+        self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
         self._forget()
 
@@ -130,7 +131,7 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, Any]:
         with self._alone() as run:
-            names = "_engine", "_torque", "_wall", "_asked", "_given"
+            names = "_engine", "_torque", "_wall", "_given"
             return {x: getattr(self, x) for x in names} | {"snapshot": run.snapshot()}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
@@ -138,7 +139,7 @@ class Simulation:
         if kept["_torque"] is not None:
             self._take_over(kept["_torque"])
         self._run.return_to(kept["snapshot"])
-        self._wall, self._asked = kept["_wall"], kept["_asked"]
+        self._wall = kept["_wall"]
 
     def close(self) -> None:
         """Ends the simulation, after which no step can be made."""
@@ -247,9 +248,11 @@ class Simulation:
     def _choose(self, n: int) -> None:
         """Takes machine code for the steps from now on, where it pays."""
         run = self._run
-        self._asked += n
-        if self._engine == "auto" and run.kernel is PLAIN and pays(run.scenario, self._asked):
-            run.kernel = kernel_for(run.scenario, "native")
+        self._untold += n
+        if self._engine == "auto" and run.kernel is PLAIN and self._untold >= TOLD:
+            if pays(run.scenario, self._untold):
+                run.kernel = kernel_for(run.scenario, "native")
+            self._untold = 0
 
     def reset(self, scenario: Scenario | None = None) -> None:
         """Begins anew.
@@ -258,11 +261,9 @@ class Simulation:
             scenario: what to run; None for the same.
         """
         with self._alone() as run:
-            asked, kernel = self._asked, run.kernel
-            self._begin(scenario or run.scenario)
-            self._asked = asked
-            if kernel is not PLAIN:
-                self._run.kernel = kernel
+            kernel = run.kernel
+            self._begin(scenario or self._given)
+            self._run.kernel = kernel
 
     def snapshot(self) -> Snapshot:
         """The run as it is now, to `restore`; it can be pickled."""

@@ -1,1 +1,55 @@
-"""How one run advances."""
+"""How a run advances: parts of a scene in, values of a kick out.
+
+`parts` and `state` name everything that is stepped; an argument named as one of their fields is that
+field. The other names mean the same in every module here:
+
+Names:
+    parts: the Parts of a scene.
+    part: that which the function is about; None where the scene lacks it.
+    s: the State of a run, or in `scene` the Scenario.
+    e: the Engine, with the arrays that a run fills.
+    k: the value of a Kick, or the Stride of the accurate method.
+    m: Modes, Motion or Machine.
+    z: a loop, or states of a compensator.
+    x: a block of the state, or an x component.
+    y: a y component.
+    i: index of an axis, sample, row or border.
+    n: weight, number or index.
+    o: offset into an array of numbers.
+    t: time [s].
+    h: length of a step [s].
+    dt: length of a whole step [s].
+    H: length of a kick [s].
+    L: share of a kick before its sample.
+    after: length of the step behind a sample [s].
+    before: length of the step before a sample [s], or the state before.
+    target: time of the next stop [s].
+    room: rows that may be filled.
+    q: joint angles [rad].
+    w: joint rates [rad/s].
+    g: link accelerations [rad/s^2].
+    p: position of the handle [m].
+    v: velocity of the handle [m/s].
+    u: velocity after a kick [m/s], or arm.jacobian [m].
+    c: centripetal acceleration [m/s^2], a Clock or a Clay.
+    a: what acts in a kick, or an acceleration [m/s^2].
+    f: force [N].
+    fe: force of the clay [N].
+    fh: force of the hand [N].
+    uh: muscle force [N].
+    tau: torques [N.m].
+    b: damping [N.s/m].
+    d: damping on the velocity after a kick [N.s/m].
+    W: acceleration per unit of force [1/kg].
+    B: velocity or acceleration per unit of force.
+    K: gain of a compensator [1/kg], or consistency of clay that yields.
+    law: what drives the handle, or the numbers of a clay law.
+    load: a Load.
+    at: a Handle.
+    links: arm.Arm.links.
+    r: a Region.
+    pull: force of the clay or of a coupling [N].
+    laws_: the Laws of the clay.
+    index: of a region, (x, y).
+    up: side of a border, 1 or -1.
+"""

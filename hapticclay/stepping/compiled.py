@@ -283,14 +283,14 @@ def natively(r: run.Run, room: int) -> None:
         room: rows that it may have.
     """
     kind = r.kind
-    while r.state.status.code == run.OPEN and path.has_room(r.e, r.state.filled, room):
+    while r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room):
         if met.get(kind, 0) > CAREFUL:
             with first_call(complete, kind, "borders and hits of such runs"):
                 r.state = ADVANCE(r.parts, r.state, r.native, room)
             continue
         with first_call(ready, kind, "runs of this kind"):
             r.state = GLIDE(r.parts, r.state, r.native, room)
-        if path.has_room(r.e, r.state.filled, room):
+        if path.has_room(r.parts.time, r.state, r.e, room):
             run.one_plainly(r, path.careful)
             met[kind] = met.get(kind, 0) + 1
 

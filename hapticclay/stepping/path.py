@@ -404,9 +404,11 @@ def may_glide(parts, s):
     return follows and calm and x.code == OPEN and x.closing == OPEN
 
 
-def has_room(e, x, room):
-    """Whether a step may write its row, crossings and stops."""
-    return x.rows < room and x.crossings < e.most_crossings and x.stops < e.most_stops
+def has_room(time, s, e, room):
+    """Whether a step may write its row, crossings and stops; between samples it has no row."""
+    x, c = s.filled, s.clock
+    fits = x.rows < room or c.t != c.i * time.dt
+    return fits and x.crossings < e.most_crossings and x.stops < e.most_stops
 
 
 def glided(parts, s, e):
@@ -441,7 +443,7 @@ def glide_by(accurate, parts, s, e, room):
     while s.clock.i < parts.time.last:
         target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
         if on_grid:
-            if not has_room(e, s.filled, room):
+            if not has_room(parts.time, s, e, room):
                 break
             s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
         s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)
@@ -458,7 +460,7 @@ def glide_by(accurate, parts, s, e, room):
 def glide_kicks(parts, s, e, room):
     """The same of the fast method."""
     made = True
-    while made and has_room(e, s.filled, room) and may_glide(parts, s):
+    while made and has_room(parts.time, s, e, room) and may_glide(parts, s):
         made, s = glided(parts, s, e)
     return s
 
@@ -466,14 +468,14 @@ def glide_kicks(parts, s, e, room):
 def step(parts, s, e):
     """The state after one step, or after those to the next sample."""
     made = s.filled.steps
-    s = glide(parts, s, e, s.filled.rows + 1)
+    s = glide(parts, s, e, s.filled.rows + 1)  # and what then lies between the samples
     return careful(parts, s, e) if s.filled.steps == made else s
 
 
 def advance(parts, s, e, room):
     """Steps until rows, crossings or stops are full, or the run is over."""
-    while s.status.code == OPEN and has_room(e, s.filled, room):
+    while s.status.code == OPEN and has_room(parts.time, s, e, room):
         s = glide(parts, s, e, room)
-        if has_room(e, s.filled, room):
+        if has_room(parts.time, s, e, room):
             s = careful(parts, s, e)
     return s

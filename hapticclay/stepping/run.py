@@ -107,7 +107,7 @@ def plainly(run: Run, room: int) -> None:
         run: the run.
         room: rows that it may have.
     """
-    while run.state.status.code == OPEN and path.has_room(run.e, run.state.filled, room):
+    while run.state.status.code == OPEN and path.has_room(run.parts.time, run.state, run.e, room):
         one_plainly(run, path.step)
 
 
@@ -125,7 +125,7 @@ class EngineStore:
 
     def __init__(self):
         self.engines: dict[Any, tuple[Any, Any]] = {}
-        self.rows = np.empty((CHUNK - 1, rows.ROW))
+        self.rows = np.empty((CHUNK, rows.ROW))  # one more where a run ends between samples
         self.crossings = np.empty((CROSSINGS, 4))
         self.stops, self.rendered = np.empty((0, 3)), np.empty((0, 3))
 
@@ -160,7 +160,7 @@ class EngineStore:
         if flows and not len(self.stops):
             self.stops = np.empty((STOPS, 3))
         if scene.tells(parts) and not len(self.rendered):
-            self.rendered = np.empty((CHUNK - 1, 3))
+            self.rendered = np.empty((CHUNK, 3))
 
     def arrays(self, parts: Parts, model: Any, data: Any, kernel: Kernel) -> Engine:
         """The engine and the arrays that a run fills.
@@ -457,7 +457,7 @@ class Run:
             progress: called now and then with (time [s], handle x [m]); True ends the run.
         """
         while self.outcome is None and self.i < self.pause:
-            self.advance(int(min(CHUNK - 1, self.pause - self.i + self.filled)))
+            self.advance(int(min(CHUNK - 1, self.pause - self.looked)))
             if self.filled >= CHUNK - 1 or self.outcome:
                 if progress and progress(self.t, self.position()[0]) and self.outcome is None:
                     self.outcome = monitor.Outcome("interrupted", self.t, self.i)

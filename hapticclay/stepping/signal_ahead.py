@@ -8,7 +8,8 @@ import numpy as np
 
 from ..model import pieces
 from ..model.signals import Signal
-from .path import NEAR
+
+NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
 
 
 class Drive:

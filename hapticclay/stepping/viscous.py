@@ -33,9 +33,9 @@ def special_damping(special, step, hand, b0, b1):
 
 
 def weighted(step, b0, b1):
-    """Damping in a kick: each step gives half of its clay to the kick before it and after it."""
-    L, R = step.L, step.R
-    return Viscous((L * b0[0], L * b0[1]), (R * b1[0], R * b1[1]))
+    """Damping in a kick that no step can overshoot."""
+    before, after = law.halved_damping(b0, b1, step.L, step.R)
+    return Viscous(before, after)
 
 
 def split_damping(stiff, step, hand, b0, b1):

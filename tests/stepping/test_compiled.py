@@ -23,7 +23,7 @@ from hapticclay.simulation import batch, record, simulate
 from hapticclay.simulation.record import Record
 from hapticclay.stepping import engine as engines
 from hapticclay.stepping import monitor, run
-from tests.stepping.test_leapfrog import CASES
+from tests.stepping.test_kick import CASES
 
 pytestmark = pytest.mark.usefixtures("silent_compiler")
 
