@@ -121,10 +121,11 @@ def held_arm(special, e, reaction, w):
     return w
 
 
-def clay_behind(parts, clay, hit, reaction, body, h):
+def clay_behind(part, parts, clay, hit, reaction, body, h):
     """The clay behind a step of length h, which led the arm there.
 
     Args:
+        part: the clay.
         parts: the scene.
         clay: before it.
         hit: a hit, behind it.
@@ -132,9 +133,9 @@ def clay_behind(parts, clay, hit, reaction, body, h):
         body: the arm.
         h: its length [s].
     """
-    if parts.clay is None:
+    if part is None:
         return clay
-    growth = same_growth(parts.clay.growth, clay.growth)
+    growth = same_growth(part.growth, clay.growth)
     c = clay
     clay = Clay(c.region, c.b, c.b, growth, hit, reaction, c.laws)
     return laws_behind(parts.special, parts, clay, body, h)
@@ -160,7 +161,7 @@ def kicked(parts, s, e, k, after, work, filled):
     before, stops = sampled.noted_early(parts.sampler, e, s, x.stops)
     stops = noted(special, e, before, reaction, clock.t, stops)
     hit = hits.after_kick(parts.hits, parts, s.clay.hit, k)
-    clay = clay_behind(parts, s.clay, hit, reaction, body, after)
+    clay = clay_behind(parts.clay, parts, s.clay, hit, reaction, body, after)
     loop, status = sampled.taken(parts.sampler, parts, s, k)
     loop = commanded(parts.command, loop, parts.time.dt, clock, k.step)
     x = Filled(x.steps + 1, filled, x.crossings, stops)
@@ -176,7 +177,7 @@ def moved_on(accurate, parts, s, e, k, after, work, filled):
     put(e.w, 0, body.w)
     loop = march.course_behind(s.loop, k)
     stops = march.noted(parts.modal, e, s.loop.modes, loop.modes, s.clock.t, x.stops)
-    clay = clay_behind(parts, c, c.hit, c.reaction, body, after)
+    clay = clay_behind(parts.clay, parts, c, c.hit, c.reaction, body, after)
     x = Filled(x.steps + 1, filled, x.crossings, stops)
     return State(s.clock, body, loop, clay, k.work, s.status, x)
 
