@@ -674,9 +674,8 @@ def noted_event(flow, e, s, n):
 
 def stepped_arm(sampler, parts, e, s, k, after):
     """Steps the engine to the rates of a kick, and of that to an event; joint angles and rates."""
-    before = s.clock.before
     if sampler is None:
-        return moved_arm(parts, e, before, s.body.w, k, after)
+        return moved_arm(parts, e, s.clock.before, s.body.w, k, after)
     return moved_arm(parts, e, -1.0, s.body.w, k, after)
 
 

@@ -3,7 +3,7 @@
 `Session` is the run, `Replay` plays a record in its place, `Player` advances either in real time,
 and `live_verdict` says whether the loop is stable. Nothing here draws: the window and the page tell
 the session where the hand pulls to, and a script can do the same. A slice is stepped as any run is,
-by the leapfrog.
+by kicks.
 """
 
 from __future__ import annotations
