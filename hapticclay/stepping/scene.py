@@ -11,16 +11,17 @@ from ..model import hardware as interface
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, LawCaller
 from ..model.scenario import Scenario
-from . import begin, hardware, kick, laws, pace, rows, sampled
+from . import begin, hardware, laws, pace, rows
 from . import parts as p_
 from . import state as s_
-from .engine_step import put
 from .march import GROWTH_BLOCK
 from .memories import delay_in_samples, formed_memory, held_memory
 from .modes import SUBSTEPS
 from .parts import INF
 
 NONE = (0.0, 0.0)
+QUEUE = 4  # rows of the queue of torques beyond the whole samples that they come late
+STIFF, HITTING = 1.0, 0.02  # stiffness of clay from which on it has a part Stiff, and Hits
 
 
 def hand_parts(s: Scenario):
@@ -50,8 +51,12 @@ def is_held(s: Scenario) -> bool:
 
 def stiffness(s: Scenario) -> float:
     """Largest share of its velocity that a step of explicit damping would take from the handle."""
-    b = B_MAX if s.clay.grows else s.clay.largest
-    return b * s.dt * max(s.mobility, s.arm.links[4])
+    return stiffness_of(s, B_MAX if s.clay.grows else s.clay.largest)
+
+
+def stiffness_of(s: Scenario, b: float) -> float:
+    """The same of a handle without a hand, the lightest, in clay of some damping [N.s/m]."""
+    return b * s.dt * s.arm.links[4]
 
 
 def clay_part(s: Scenario):
@@ -73,8 +78,8 @@ def clay_part(s: Scenario):
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
     b = stiffness(s) if fast and not is_held(s) else 0.0
-    stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
-    hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 and s.control != "sampled" else None
+    stiff = p_.Stiff(float(s.mobility)) if b > STIFF else None
+    hits = p_.Hits(HITTING / s.arm.links[4]) if b > HITTING and s.control != "sampled" else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
     special = special if any(x is not None for x in special) else None
     return p_.Clay(1 if clay.grows else None), grain, hits, special
@@ -144,7 +149,7 @@ def sampler(s: Scenario, clay, special):
     if s.controller is not None:
         state = s.controller.state
         desk = np.array([0.0] * DESK + [*state, *state, *s.controller.params])
-        own = p_.Own(LawCaller(s.controller, desk), memoryview(desk), len(state))
+        own = p_.Own(LawCaller(s.controller, desk), memoryview(desk), len(state), tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
     first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
@@ -168,51 +173,41 @@ def hardware_parts(s: Scenario, io, Ts):
         dac = p_.Converter(io.dac_bits, tuple(map(float, io.dac_range or s.torque_limit)))
     whole, share = delay_in_samples(io.delay, Ts)
     if io.delay > 0.0:
-        delay = p_.Delay(float(io.delay), whole + 4, np.zeros(hardware.QUEUED * (whole + 4)))
+        delay = late_torques(float(io.delay), whole)
     if any(io.friction):
         friction = tuple(map(float, io.friction))
     if io.passivity:
-        passivity = p_.Passivity(whole, float(share), np.zeros(2 * (whole + 2)))
+        passivity = guard(whole, float(share))
     if io.coupling is not None:
         coupling = p_.Coupling(float(io.coupling.spring), float(io.coupling.damper))
     uneven = 1 if io.jitter > 0.0 or io.delay > 0.0 else None
     return chance, uneven, io.encoder or None, difference, lag, adc, dac, delay, friction, passivity, coupling
 
 
-def first_machine(part, parts, s: Scenario, loop, q, w):
-    """Controller and hardware at the start; the past of the sensors goes into their rings."""
-    p = tuple(map(float, s.start))
-    x, y, form = loop.x, loop.y, None
-    own = tuple(map(float, s.controller.state)) if s.controller else None
-    if own is not None:
-        x = y = s_.Axis(0.0, 0.0, 0.0, 0.0)
-    if loop.form is not None:
-        form = s_.Formed(*loop.form, (x.delta, y.delta))
-    rates = None
-    if part.difference:
-        ring, n = part.difference.ring, part.difference.window
-        for i in range(n):  # before the start the joints have turned so for long
-            j = i - n
-            then = q[0] + j * part.Ts * w[0], q[1] + j * part.Ts * w[1]
-            put(ring, 3 * i, (float(j), *hardware.encoded(part.encoder, then)))
-        rates = s_.Rates(w, 0)
-    hold = s_.Hold(
-        NONE, NONE, hardware.nothing(part.passivity), hardware.no_pull(part.coupling)
-    )  # fmt: skip
-    return s_.Machine(
-        x, y, form, own, hold, sampled.samples_from(part, parts.time.dt, 0), NONE, rates,
-        (0.0,) * 4 if part.filter else None, s_.Guard(NONE, p, 0) if part.passivity else None,
-        p if part.coupling else None, s_.Queue(0, 0, INF, INF) if part.delay else None,
-    )  # fmt: skip
+def late_torques(delay: float, whole: int):
+    """Torques that come late by so many whole samples, and a rest."""
+    return p_.Delay(delay, whole + QUEUE, np.zeros(hardware.QUEUED * (whole + QUEUE)))
 
 
-def first_sampled(part, parts, s: Scenario, state):
-    """The state of a sampled run at its start."""
-    body, reaction, work = state.body, state.clay.reaction, state.work
-    machine = first_machine(part, parts, s, state.loop, body.q, body.w)
-    hold, at = machine.hold, kick.handle_at(parts.arm, body, 0.0)
-    event = s_.Event(0.0, at, body.w, reaction, NONE, work, NONE, 0.0, hold, machine)
-    return state._replace(loop=s_.Sampled(machine, event))
+def guard(whole: int, share: float):
+    """The passivity controller behind a delay of so many whole samples, and a rest."""
+    return p_.Passivity(whole, share, np.zeros(2 * (whole + 2)))
+
+
+def for_delays(parts, longest: float):
+    """The parts of a scene with rings for torques that come later than its own.
+
+    Args:
+        parts: of the scene.
+        longest: delay [s].
+    """
+    sampler = parts.sampler
+    if sampler is None:
+        return parts
+    whole, share = delay_in_samples(longest, sampler.Ts)
+    delay = late_torques(longest, whole) if sampler.delay else None
+    passivity = guard(whole, share) if sampler.passivity else None
+    return parts._replace(sampler=sampler._replace(delay=delay, passivity=passivity))
 
 
 def first_reaction(special):
@@ -265,19 +260,7 @@ def blocks(parts, s: Scenario):
 def start(parts, s: Scenario, e):
     """The state at the start of a run."""
     p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
-    state = begin.begun(parts, blocks(parts, s), e, p, v)
-    if parts.accurate is not None:
-        return first_course(parts, state)
-    return state if parts.sampler is None else first_sampled(parts.sampler, parts, s, state)
-
-
-def first_course(parts, state):
-    """The state of an accurate run at its start."""
-    loop, modes = state.loop, None
-    if parts.modal:
-        law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
-        modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, NONE, INF)
-    return state._replace(loop=s_.Course(loop.x, loop.y, loop.form, 0, 0.0, modes))
+    return begin.begun(parts, blocks(parts, s), e, p, v)
 
 
 def written(parts):
