@@ -1,4 +1,4 @@
-"""The start of a run: the arm at its place, the clay around it, the controller in step with both."""
+"""The start of a run: the arm at its place, the clay around it, the controller beside both."""
 
 from __future__ import annotations
 
@@ -63,7 +63,15 @@ def loop_at(form, loop, servo, p, v):
 def clay_at(parts, blocks, body, p):
     """The clay around a handle at p; `blocks` are those of its laws before it has been anywhere."""
     index = regions.region_of(parts.table, p)
-    clay = Clay(Region(index, NONE, NONE), NONE, NONE, blocks.growth, blocks.hit, blocks.reaction, blocks.laws)
+    clay = Clay(
+        Region(index, NONE, NONE),
+        NONE,
+        NONE,
+        blocks.growth,
+        blocks.hit,
+        blocks.reaction,
+        blocks.laws,
+    )
     at = handle_at(parts.arm, body, 0.0)
     clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 0.0)
     growth = same_growth(blocks.growth, clay.growth)

@@ -1,9 +1,9 @@
 """Many short runs in one call of compiled code: what runs share is set up once.
 
 A run of a hundred steps takes the engine 0.3 ms, and Python as long to set it up. Runs of one kind
-(see `kind_key`) have the same parts and differ in numbers alone. Each is a row of the numbers of its
-parts, put column by column; `carry` fills them in, begins the run, makes its steps and keeps its end.
-What it cannot judge, as an unstable run, is made again by `run`.
+(see `kind_key`) have the same parts and differ in numbers alone. Each is a row of the numbers of
+its parts, put column by column; `carry` fills them in, begins the run, makes its steps and keeps
+its end. What it cannot judge, as an unstable run, is made again by `run`.
 """
 
 from __future__ import annotations
@@ -285,14 +285,18 @@ class Pattern:
     Attributes:
         parts: of the scene.
         blocks: from scene.blocks.
-        kind: what the machine code of `carry` is compiled for.
+        scene: what the machine code of its steps is compiled for.
+        kind: what that of `carry` is compiled for.
+        is_made: whether `carry` makes such runs: not with compensators of another shape.
     """
 
     def __init__(self, scenario: Scenario):
         self.scenario = scenario  # kept: the identity of its parts is in the key
         self.parts: Parts = scene.parts_of(scenario)
         self.blocks: State = scene.blocks(self.parts, scenario)
-        self.kind = "carry", kind_of((self.parts, self.blocks))
+        self.scene = kind_of(self.parts)
+        self.kind = "carry", self.scene, kind_of(self.blocks)
+        self.is_made = self.parts.form is None
         self.row, self.at = np.array(numbers_of(self.parts)), places(self.parts)
 
     def roomy(self, jobs: Sequence[Scenario]) -> Parts:
@@ -384,6 +388,26 @@ class Pattern:
         return out
 
 
+class Patterns:
+    """The patterns of the last kinds of run."""
+
+    def __init__(self):
+        self.known: dict[Any, Pattern] = {}
+
+    def of(self, key: Any, scenario: Scenario) -> Pattern:
+        """The pattern of a kind.
+
+        Args:
+            key: from `kind_key`.
+            scenario: one of the kind.
+        """
+        if key not in self.known:
+            if len(self.known) >= PATTERNS:
+                del self.known[next(iter(self.known))]
+            self.known[key] = Pattern(scenario)
+        return self.known[key]
+
+
 class Lane:
     """Makes many runs; of one thread.
 
@@ -396,20 +420,7 @@ class Lane:
 
     def __init__(self, kernel: Kernel, store: EngineStore, carry: Callable[..., None], reset: Any):
         self.kernel, self.store, self.carry, self.reset = kernel, store, carry, reset
-        self.patterns: dict[Any, Pattern] = {}
-
-    def pattern(self, key: Any, scenario: Scenario) -> Pattern:
-        """The pattern of a kind.
-
-        Args:
-            key: from `kind_key`.
-            scenario: one of the kind.
-        """
-        if key not in self.patterns:
-            if len(self.patterns) >= PATTERNS:
-                del self.patterns[next(iter(self.patterns))]
-            self.patterns[key] = Pattern(scenario)
-        return self.patterns[key]
+        self.patterns = Patterns()
 
     def make(
         self, jobs: Sequence[Scenario], keys: Sequence[Any]
@@ -429,7 +440,7 @@ class Lane:
             kinds.setdefault(key, []).append(i)
         done, left = [], kinds.pop(None, [])
         for key, found in kinds.items():
-            if len(found) < FEWEST or not is_made(p := self.pattern(key, jobs[found[0]])):
+            if len(found) < FEWEST or not (p := self.patterns.of(key, jobs[found[0]])).is_made:
                 left += found
                 continue
             fields, good = self.group(p, [jobs[i] for i in found])
@@ -467,15 +478,6 @@ class Lane:
         return {name: x[good] for name, x in summary_columns(p.scenario, runs).items()}, good
 
 
-def is_made(p: Pattern) -> bool:
-    """Whether `carry` makes runs of a pattern: not with compensators of another shape.
-
-    Args:
-        p: the pattern.
-    """
-    return p.parts.form is None
-
-
 def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
     """The fields of summaries, arrays over runs.
 
@@ -499,5 +501,6 @@ def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
         code=np.where(codes == FINISHED, "finished", ends), axis=np.zeros(len(codes), "U1"),
         time=made.times, step=step, steps=steps, crossings=crossings,
         crossing_axis=crossed[:, :, 0].astype(np.int64), crossing_time=crossed[:, :, 1],
-        crossing_speed=crossed[:, :, 2], p=last[:, 2:4], v=v, fh=last[:, 6:8], fe=fe, b=b, **balance,
+        crossing_speed=crossed[:, :, 2], p=last[:, 2:4], v=v, fh=last[:, 6:8], fe=fe, b=b,
+        **balance,
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..model.scenario import Scenario
 from . import begin, hardware, laws, pace, rows
 from . import parts as p_
 from . import state as s_
+from .machine_code import kind_of
 from .march import GROWTH_BLOCK
 from .memories import delay_in_samples, formed_memory, held_memory
 from .modes import SUBSTEPS
@@ -29,7 +31,9 @@ def hand_parts(s: Scenario):
         return None
     longer = 1 if s.control == "sampled" else None
     none = p_.Hand(0.0, 0.0, 0.0, longer)
-    return tuple(p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators)
+    return tuple(
+        p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators
+    )
 
 
 def compensators(s: Scenario):
@@ -126,8 +130,9 @@ def parts_of(s: Scenario):
     return p_.Parts(
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
-        tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
-        hand_parts(s), p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
+        tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo),
+        1 if s.shaping else None, lag, form, hand_parts(s),
+        p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
         sampler(s, *clay[::3]), *accurate_parts(s),
     )  # fmt: skip
@@ -149,7 +154,9 @@ def sampler(s: Scenario, clay, special):
     if s.controller is not None:
         state = s.controller.state
         desk = np.array([0.0] * DESK + [*state, *state, *s.controller.params])
-        own = p_.Own(LawCaller(s.controller, desk), memoryview(desk), len(state), tuple(map(float, state)))
+        own = p_.Own(
+            LawCaller(s.controller, desk), memoryview(desk), len(state), tuple(map(float, state))
+        )
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
     first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
@@ -181,7 +188,8 @@ def hardware_parts(s: Scenario, io, Ts):
     if io.coupling is not None:
         coupling = p_.Coupling(float(io.coupling.spring), float(io.coupling.damper))
     uneven = 1 if io.jitter > 0.0 or io.delay > 0.0 else None
-    return chance, uneven, io.encoder or None, difference, lag, adc, dac, delay, friction, passivity, coupling
+    more = difference, lag, adc, dac, delay, friction, passivity, coupling
+    return chance, uneven, io.encoder or None, *more
 
 
 def late_torques(delay: float, whole: int):
@@ -224,9 +232,10 @@ def first_laws(special, p):
     if special is None:
         return None
     law, none = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (0.0,) * 6
+    elastic = s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)
     return s_.Laws(
         s_.Flow(law, law) if special.flow else None,
-        s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF) if special.springs else None,
+        elastic if special.springs else None,
         s_.Cut((math.nan, math.nan), NONE, NONE, 0.0) if special.groove else None,
         laws.start(special.more, p),
     )  # fmt: skip
@@ -249,7 +258,7 @@ def blocks(parts, s: Scenario):
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
         first_reaction(parts.special), first_laws(parts.special, NONE),
-    )
+    )  # fmt: skip
     return s_.State(
         s_.Clock(0.0, 0, 0.0), s_.Body(NONE, NONE, NONE), s_.Loop(axis, axis, first_form(parts, s)),
         clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0, works), s_.Status(0, 0, 0, 0, (0, 0, 0, 0)),
@@ -261,6 +270,36 @@ def start(parts, s: Scenario, e):
     """The state at the start of a run."""
     p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
     return begin.begun(parts, blocks(parts, s), e, p, v)
+
+
+def traits(s: Scenario) -> tuple[Any, ...]:
+    """What decides which parts a scene has: scenes alike in this share machine code.
+
+    Args:
+        s: the scenario.
+    """
+    clay, io, own, law, wires = s.clay, s.interface, s.controller, None, None
+    if clay is not None:
+        block, b = clay.groove, stiffness(s)
+        law = (
+            clay.grows, clay.smooth, clay.yields, clay.springs, bool(clay.angle), clay.isotropic,
+            block is not None and bool(block.damping), block is not None, b > STIFF, b > HITTING,
+        )  # fmt: skip
+    if io is not None:
+        random = io.jitter > 0.0, io.lost > 0.0 or io.force_noise > 0.0, io.delay > 0.0
+        order = io.filter_order if io.force_filter is not None else 0
+        wires = (
+            *random, order, io.velocity == "difference" and bool(io.velocity_filter), io.velocity,
+            *map(bool, (io.encoder, io.adc_bits, io.dac_bits, any(io.friction), io.passivity)),
+            io.coupling is not None,
+        )  # fmt: skip
+    driven = (x is not None and x.varies for x in (s.muscle, s.command))
+    forms = ((c.lag and c.lag[0], c.order) for c in s.compensators)
+    more = kind_of(laws.parts_of(s)) if laws.TABLE else None
+    return (
+        s.control, s.render, s.integrator, bool(s.shaping), any(s.operators), *driven, *forms, law,
+        wires, own and len(own.state), more,
+    )  # fmt: skip
 
 
 def written(parts):
