@@ -94,11 +94,14 @@ class Simulation:
             raise ParameterError("scenario", scenario, bound)
         self._engine = choice("engine", engine, ENGINES)
         self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
-        self._closed = False
+        self._closed, self._warned = False, ()
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:
-        warn_of(scenario)
+        place = scenario.clay, scenario.origin, scenario.arm, scenario.operators
+        if place != self._warned:  # of clay out of reach and the like, once
+            warn_of(scenario)
+            self._warned = place
         kernel = PLAIN if self._engine == "auto" else kernel_for(scenario, self._engine)
         self._run = Run(scenario, 1, kernel, self._store, watched=True)
         self._given, self._wall = scenario, 0.0

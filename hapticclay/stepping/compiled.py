@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
 import inspect
 import signal
 import sys
@@ -149,6 +150,21 @@ def load_pair(context, address):  # noqa: ARG001
 # ---- sources -------------------------------------------------------------------------------------
 
 
+@functools.cache
+def shape_of(kind: Any) -> lacking.Shape:
+    """What the type of an argument tells of the parts that it has.
+
+    Args:
+        kind: of numba.
+    """
+    if isinstance(kind, types.NoneType):
+        return None
+    if not isinstance(kind, types.BaseTuple):
+        return lacking.GIVEN
+    items = {i: shape_of(x) for i, x in enumerate(kind)}
+    return items | dict(zip(getattr(kind, "fields", ()), items.values(), strict=False))
+
+
 def choice(f: FunctionType) -> Callable[..., Any]:
     """What numba asks for the source of a function, which depends on the parts that are None.
 
@@ -158,15 +174,17 @@ def choice(f: FunctionType) -> Callable[..., Any]:
     names = list(inspect.signature(f).parameters)
 
     def choose(*arguments):
-        kinds = dict(zip(names, arguments, strict=False))
-        none = frozenset(x for x, kind in kinds.items() if isinstance(kind, types.NoneType))
-        return lacking.without(f, none, frozenset(kinds) - none)
+        shapes = dict(zip(names, map(shape_of, arguments), strict=False))
+        return lacking.without(f, shapes, stepped.__contains__)
 
     return choose
 
 
 OF_LAW = {"load": laws.load_of, "moved": laws.moved_of, "force": laws.force_of}
+OUTLINED = {driver.kick, search.find_root, path.towards, path.crossed, borders.clay_in, borders.first_border, path.careful, borders.passed_alike}
+ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, many.filled}
 laws_known: set[ModuleType] = set()
+stepped: set[FunctionType] = set()  # functions whose source numba finds
 
 
 def choice_of_law(name: str) -> Callable[..., Any]:
@@ -193,11 +211,13 @@ def register(modules: tuple[ModuleType, ...]) -> None:
     Args:
         modules: of the stepping.
     """
-    own = {*OF_LAW.values(), engine_step.put, engine_step.pair, many.filled}
     for module in modules:
         for f in list(vars(module).values()):
-            if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in own:
-                overload(f, jit_options=LAW, strict=False)(choice(f))
+            if isinstance(f, FunctionType) and f.__module__ == module.__name__ and f not in ATOMS:
+                inline = f not in OUTLINED
+                if inline:
+                    stepped.add(f)
+                overload(f, jit_options=LAW | {"forceinline": inline}, strict=False)(choice(f))
 
 
 def register_atoms() -> None:

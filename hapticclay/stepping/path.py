@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..model import regions
 from . import borders, ends, grooves, hits, laws, march, rows, sampled, springs, viscous, yielding
-from .driver import kick
+from .driver import kick, kick_by
 from .engine_step import put
 from .kick import commanded, handle_at, is_calm_end, place, velocity
 from .parts import INF
@@ -418,7 +418,7 @@ def glided(parts, s, e):
     if after < parts.time.dt:
         s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
     s, n = sampled.acted(parts.sampler, parts, s), s.filled.rows
-    k = kick(parts, s.clock, s.body, s.loop, s.clay, after)
+    k = kick_by(parts.sampler, parts, s.clock, s.body, s.loop, s.clay, after)
     if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, after):
         return False, s
     if on_grid:

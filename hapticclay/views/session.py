@@ -28,6 +28,7 @@ from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
+from ..simulation.simulate import has_numba, load_compiled, saved_in_a_step
 from ..simulation.stepwise import scaled
 from ..stepping import monitor, path
 from ..stepping.monitor import Outcome
@@ -44,6 +45,7 @@ LONGEST_SESSION = 3600.0  # [s]
 PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
 RECENT_FRAMES = 60  # over which the real-time factor is averaged
+KEEPS_UP = 0.4  # of real time, that steps may take; the rest is for the picture
 CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
 
 
@@ -314,7 +316,7 @@ class Session:
                 )
         self.given = scenario
         self.scenario = played(scenario, self.stiffness)
-        self.run = LiveRun(self.scenario, self.every)
+        self.run = LiveRun(self.scenario, self.every, live_kernel(self.scenario))
         self.paused, self.recording = False, True
         self.clock = Clock()
         self.point: tuple[float, float] | None = None
@@ -506,6 +508,21 @@ class Session:
         most = min(PULL_MARGIN[1], 0.25 * (stretched - folded))
         scale = min(max(r, folded + least), stretched - most) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
+
+
+def live_kernel(scenario: Scenario) -> Kernel:
+    """How the steps of a session are made: compiled where Python could not keep up with real time.
+
+    Args:
+        scenario: that is played.
+    """
+    if 1e-6 * saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
+        return PLAIN
+    compiled = load_compiled()
+    if compiled is None:
+        return PLAIN
+    compiled.warm(scenario)
+    return compiled.KERNEL
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:

@@ -209,10 +209,10 @@ def test_a_step_beyond_arithmetic_keeps_the_events_before_it(monkeypatch):
     assert len(whole.crossings) == 2 and whole.stops
     careful, last = path.careful, whole.stops[-1].start + s.dt
 
-    def breaking(m, now, e):
-        if now["t"] > last:
+    def breaking(parts, now, e):
+        if now.clock.t > last:
             raise ZeroDivisionError
-        careful(m, now, e)
+        return careful(parts, now, e)
 
     monkeypatch.setattr(path, "careful", breaking)
     broken = hc.simulate(s, engine="python")
