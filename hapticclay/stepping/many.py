@@ -1,20 +1,50 @@
 """Many short runs in one call of compiled code: what runs share is set up once.
 
 A run of a hundred steps takes the engine 0.3 ms, and Python as long to set it up. Runs of one kind
-have the same parts and differ in numbers alone. Each is a row of the numbers of its parts; `carry`
-fills them in, begins the run, makes its steps and keeps its end. What it cannot judge, as an
-unstable run, is made again by `run`.
+(see `kind_key`) have the same parts and differ in numbers alone. Each is a row of the numbers of
+its parts, put column by column; `carry` fills them in, begins the run, makes its steps and keeps
+its end. What it cannot judge, as an unstable run, is made again by `run`.
 """
 
 from __future__ import annotations
 
+import itertools
+import operator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from . import begin, energy, monitor, path, rows
-from .engine_step import put
-from .state import NOT_FINITE, OPEN, UNRESOLVED, Filled
+import numpy as np
 
+from ..model import controller, regions
+from ..model.clay import Profile
+from ..model.controller import Servo
+from ..model.operator import NO_HAND, mobility_with
+from ..model.scenario import Scenario
+from . import begin, energy, laws, monitor, path, rows, scene, viscous
+from .engine_step import put
+from .machine_code import kind_of
+from .memories import delay_in_samples
+from .parts import Parts
+from .run import EngineStore, Kernel
+from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
+
+WORKS = 10  # numbers of Runs.work
 SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
+LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so does Ctrl-C
+FEWEST = 4  # runs of a kind that repay its pattern
+PATTERNS = 64  # kinds that are kept
+SHARED = (
+    "jitter", "lost", "encoder", "velocity", "window", "velocity_filter", "adc_bits", "adc_range",
+    "force_noise", "force_filter", "filter_order", "dac_bits", "dac_range", "friction", "passivity",
+    "coupling",
+)  # fmt: skip  # of an interface, all but its delay; without noise its seed has no effect
+_scene = operator.attrgetter(
+    "control", "shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
+)
+_shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
+
+
+# ---- compiled ------------------------------------------------------------------------------------
 
 
 class Runs(NamedTuple):
@@ -23,25 +53,28 @@ class Runs(NamedTuple):
     Attributes:
         numbers: of their parts, see `numbers_of`, shape (n, m).
         tables: of their clay, shape (n, len(parts.table)).
+        memory: of their samplers, shape (n, len(sampler.memory)).
         starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
         limits: of the engine's motors, shape (2, 2).
         reset: mj_resetData.
-        rows: of the record, shape (m, rows.ROW).
+        rows: of the record, one more than are filled before a look at them, shape (m, rows.ROW).
         crossings: noted by steps, shape (m, 4).
         rendered: force of the clay [N] where b v does not tell it, shape (m, 3).
         good: 1 for a run that has nothing for the monitor, else 0, shape (n,).
         last: its last row, shape (n, rows.ROW).
-        force: of the clay there [N], shape (n, 2).
+        force: of the clay there [N], where b v does not tell it, shape (n, 2).
         crossed: the first ones: coordinate, time [s], speed [m/s], shape (n, SUMMARY_CROSSINGS, 3).
         counts: number of all crossings, engine steps, last sample, code, shape (n, 4).
         times: end of the run [s], shape (n,).
         seen: counts of the monitor, see monitor.is_quiet, shape (n, 4).
-        work: ledger, energies stored at the start and at the end [J], shape (n, 9).
+        work: ledger, energies stored at the start and at the end, taken by friction [J], shape
+            (n, WORKS).
         swings: workspace of monitor.is_quiet.
     """
 
     numbers: Any
     tables: Any
+    memory: Any
     starts: Any
     limits: Any
     reset: Any
@@ -59,17 +92,6 @@ class Runs(NamedTuple):
     swings: Any
 
 
-def numbers_of(part: Any) -> list[float]:
-    """The numbers of parts, in the order in which `filled` takes them.
-
-    Args:
-        part: the parts of a scene.
-    """
-    if isinstance(part, tuple):
-        return [x for each in part for x in numbers_of(each)]
-    return [float(part)] if isinstance(part, float | int) else []
-
-
 def filled(like, numbers, k):
     """The parts of run k, which differ from those of `like` in numbers alone; compiled only."""
     raise NotImplementedError
@@ -85,6 +107,15 @@ def readied(parts, e, runs, k):
             runs.swings[j, i] = 0.0
     runs.reset(e.model, e.data)
     put(e.timestep, 0, (parts.time.dt,))
+    remember(parts.sampler, runs, k)
+
+
+def remember(sampler, runs, k):
+    """Readies the compensators of sampled control for run k."""
+    if sampler is None:
+        return
+    for j in range(len(sampler.memory)):
+        sampler.memory[j] = runs.memory[k, j]
 
 
 def noted(runs, k, n):
@@ -116,24 +147,32 @@ def judged(parts, runs, k, s):
 
 def ended(parts, runs, k, s, first):
     """Keeps the end of a run."""
-    last, w = energy.stored(parts, s), s.work
-    work = w.muscle, w.motors, w.clay, w.hand, w.through, first[0], first[1], last[0], last[1]
-    for j in range(9):
-        runs.work[k, j] = work[j]
+    last, w, out = energy.stored(parts, s), s.work, runs.work[k]
+    out[0], out[1], out[2], out[3], out[4] = w.muscle, w.motors, w.clay, w.hand, w.through
+    out[5], out[6], out[7], out[8] = first[0], first[1], last[0], last[1]
+    out[9] = friction_of(w.hardware)
     runs.counts[k, 2], runs.counts[k, 3] = s.clock.i, s.status.code
     runs.times[k] = s.clock.t
+
+
+def friction_of(works):
+    """Energy that friction has taken [J]."""
+    if works is None:
+        return 0.0
+    return works.friction
 
 
 def carry(like, blocks, e, runs):
     """Makes runs one after the other.
 
     Args:
-        like: parts of their kind; the table and whatever else steps write into is used by all.
+        like: parts of their kind; the table and whatever else steps write into is used by all, and
+            its rings are long enough for each.
         blocks: from scene.blocks.
         e: the engine.
         runs: what to run.
     """
-    room = len(runs.rows)
+    room = len(runs.rows) - 1
     for k in range(len(runs.starts)):
         parts, x = filled(like, runs.numbers, k), runs.starts[k]
         readied(parts, e, runs, k)
@@ -150,3 +189,318 @@ def carry(like, blocks, e, runs):
             runs.counts[k, 1] += made.steps
         runs.good[k] = 1 if good else 0
         ended(parts, runs, k, s, first)
+
+
+# ---- which runs, and their numbers ---------------------------------------------------------------
+
+
+def kind_key(s: Scenario) -> tuple[Any, ...] | None:
+    """What runs of one kind have in common; None for a run that `carry` does not make.
+
+    Beside that they differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
+    and delay.
+
+    Args:
+        s: the scenario.
+    """
+    clay, wires, hand = s.clay, s.interface, s.operator
+    if (
+        s.muscle is not None
+        or s.command is not None
+        or s.controller is not None
+        or s.integrator != "fast"
+        or not s.stop
+        or s.t_max > LONGEST * s.dt
+        or (laws.TABLE and laws.parts_of(s) is not None)
+    ):
+        return None
+    law: Any = None
+    if clay is not None:
+        x, y = clay.x, clay.y
+        if clay.angle or clay.groove is not None or not (is_plain(x) and (y is x or is_plain(y))):
+            return None
+        law = x.edges, x.along, y.edges, y.along, y is x or y == x, *hardness(s, x, y)
+    parts: Any = None
+    if wires is not None:
+        if wires.jitter or wires.lost or wires.force_noise:
+            return None
+        parts = _shared(wires), wires.delay > 0.0
+    held = hand is not None and (not isinstance(hand, tuple) or any(hand))
+    # parts whose equality would cost more than it is worth are told by their identity
+    return *_scene(s), held, law, parts, id(s.arm), id(s.compensator)
+
+
+def is_plain(law: Any) -> bool:
+    """Whether clay of an axis damps alone, by the place along one coordinate.
+
+    Args:
+        law: of the axis.
+    """
+    return type(law) is Profile and not (law.growth or law.Fy or law.K or law.springs)
+
+
+def hardness(s: Scenario, x: Profile, y: Profile) -> tuple[bool, bool]:
+    """Whether clay is so stiff that it has the parts Stiff and Hits, where it acts on the handle.
+
+    Args:
+        s: the scenario.
+        x: its clay of x.
+        y: of y.
+    """
+    k = scene.stiffness_of(s, max(max(x.values), max(y.values)))
+    return k > scene.STIFF, k > scene.HITTING
+
+
+def numbers_of(part: Any) -> list[float]:
+    """The numbers of parts, in the order in which `filled` takes them.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        return [x for each in part for x in numbers_of(each)]
+    return [float(part)] if isinstance(part, float | int) else []
+
+
+def places(part: Any, count: Iterator[int] | None = None) -> Any:
+    """Parts whose numbers are their places in `numbers_of`; all else is None.
+
+    Args:
+        part: the parts of a scene.
+        count: of the numbers before; None for none.
+    """
+    count = count or itertools.count()
+    if isinstance(part, tuple):
+        made = [places(x, count) for x in part]
+        return type(part)._make(made) if hasattr(part, "_make") else tuple(made)
+    return next(count) if isinstance(part, float | int) else None
+
+
+class Pattern:
+    """A scene whose parts are those of all runs of its kind, but for some numbers.
+
+    Args:
+        scenario: the scene.
+
+    Attributes:
+        parts: of the scene.
+        blocks: from scene.blocks.
+        scene: what the machine code of its steps is compiled for.
+        kind: what that of `carry` is compiled for.
+        is_made: whether `carry` makes such runs: not with compensators of another shape.
+    """
+
+    def __init__(self, scenario: Scenario):
+        self.scenario = scenario  # kept: the identity of its parts is in the key
+        self.parts: Parts = scene.parts_of(scenario)
+        self.blocks: State = scene.blocks(self.parts, scenario)
+        self.scene = kind_of(self.parts)
+        self.kind = "carry", self.scene, kind_of(self.blocks)
+        self.is_made = self.parts.form is None
+        self.row, self.at = np.array(numbers_of(self.parts)), places(self.parts)
+
+    def roomy(self, jobs: Sequence[Scenario]) -> Parts:
+        """Parts whose arrays have room for each of some runs; those that they have are kept.
+
+        Args:
+            jobs: their scenarios.
+        """
+        longest = max((s.interface.delay for s in jobs if s.interface), default=0.0)
+        held = self.parts.sampler
+        if held and held.delay and longest > held.delay.delay:
+            self.parts = scene.for_delays(self.parts, longest)
+        return self.parts
+
+    def numbers(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """The numbers of their parts, shape (n, m).
+
+        Args:
+            jobs: scenarios.
+        """
+        at, out = self.at, np.tile(self.row, (len(jobs), 1))
+        out[:, at.arm.ox : at.arm.oy + 1] = [s.origin for s in jobs]
+        out[:, [x.K for x in at.lag]] = [s.gain for s in jobs]
+        out[:, at.push.steady[1:3]] = [s.force for s in jobs]
+        servo = jobs[0].servo
+        alike = all(s.servo is servo for s in jobs)
+        for i in (0, 1):
+            rows_ = servo[i].numbers if alike else [s.servo[i].numbers for s in jobs]
+            out[:, at.servo[i]] = rows_
+        if at.hand is not None:
+            self._put_hands(out, jobs)
+        if at.sampler is not None and at.sampler.delay is not None:
+            self._put_delays(out, [s.interface.delay for s in jobs if s.interface])
+        return out
+
+    def _put_hands(self, out: np.ndarray, jobs: Sequence[Scenario]) -> None:
+        """Puts the operators' arms into numbers, and the mobility with them."""
+        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
+        for i, x in enumerate(self.at.hand):
+            out[:, [x.mass, x.damper, x.spring]] = hands[:, i]
+        mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
+        for special in (self.at.special, self.at.sampler and self.at.sampler.special):
+            if special is not None and special.stiff is not None:
+                trace = self.scenario.arm.links[4]
+                out[:, special.stiff.mobility] = mobility_with(trace, mass)
+
+    def _put_delays(self, out: np.ndarray, delays: list[float]) -> None:
+        """Puts delays of the torques into numbers."""
+        at, Ts = self.at.sampler, self.parts.sampler.Ts
+        whole, share = np.array([delay_in_samples(x, Ts) for x in delays]).T
+        out[:, at.delay.delay], out[:, at.delay.rows] = delays, whole + scene.QUEUE
+        if at.passivity is not None:
+            out[:, at.passivity.whole], out[:, at.passivity.share] = whole, share
+
+    def tables(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """Their tables of the clay, shape (n, len(parts.table)).
+
+        Args:
+            jobs: scenarios.
+        """
+        table = self.parts.table
+        out = np.tile(table, (len(jobs), 1))
+        if self.scenario.clay is not None:
+            at = [int(table[regions.VALUES + i]) for i in (0, 1)]
+            for i in range(2 if at[0] != at[1] else 1):
+                values = [s.clay.laws[i].values for s in jobs if s.clay]
+                out[:, at[i] : at[i] + len(values[0])] = values
+        return out
+
+    def memory(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """Rows of controller.held_compensator of their axes, shape (n, 40); (n, 0) for none.
+
+        Args:
+            jobs: scenarios.
+        """
+        if self.parts.sampler is None:
+            return np.empty((len(jobs), 0))
+        return np.concatenate([self._memory(jobs, i) for i in (0, 1)], axis=1)
+
+    def _memory(self, jobs: Sequence[Scenario], i: int) -> np.ndarray:
+        Ts, shape = self.parts.sampler.Ts, jobs[0].compensators[i]
+        out, found = np.empty((len(jobs), 20)), dict[Servo, list[int]]()
+        for k, s in enumerate(jobs):
+            found.setdefault(s.servo[i], []).append(k)
+        for servo, at in found.items():
+            gains, which = np.unique([jobs[k].gain[i] for k in at], return_inverse=True)
+            A, B = controller.held_compensator(servo, shape, gains, Ts)
+            out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
+        return out
+
+
+class Patterns:
+    """The patterns of the last kinds of run."""
+
+    def __init__(self):
+        self.known: dict[Any, Pattern] = {}
+
+    def of(self, key: Any, scenario: Scenario) -> Pattern:
+        """The pattern of a kind.
+
+        Args:
+            key: from `kind_key`.
+            scenario: one of the kind.
+        """
+        if key not in self.known:
+            if len(self.known) >= PATTERNS:
+                del self.known[next(iter(self.known))]
+            self.known[key] = Pattern(scenario)
+        return self.known[key]
+
+
+class Lane:
+    """Makes many runs; of one thread.
+
+    Args:
+        kernel: how the steps are made, compiled.
+        store: engines to use.
+        carry: the function, compiled.
+        reset: mj_resetData as compiled code calls it.
+    """
+
+    def __init__(self, kernel: Kernel, store: EngineStore, carry: Callable[..., None], reset: Any):
+        self.kernel, self.store, self.carry, self.reset = kernel, store, carry, reset
+        self.patterns = Patterns()
+
+    def make(
+        self, jobs: Sequence[Scenario], keys: Sequence[Any]
+    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
+        """Makes those runs that it can.
+
+        Args:
+            jobs: scenarios.
+            keys: of each, from `kind_key`; None for one that is not to be made.
+
+        Returns:
+            Groups of runs: their places among jobs, and the fields of a summary, arrays over them;
+            and the places of all others.
+        """
+        kinds: dict[Any, list[int]] = {}
+        for i, key in enumerate(keys):
+            kinds.setdefault(key, []).append(i)
+        done, left = [], kinds.pop(None, [])
+        for key, found in kinds.items():
+            if len(found) < FEWEST or not (p := self.patterns.of(key, jobs[found[0]])).is_made:
+                left += found
+                continue
+            fields, good = self.group(p, [jobs[i] for i in found])
+            at = np.array(found)
+            done.append((at[good], fields))
+            left += at[~good].tolist()
+        return done, sorted(left)
+
+    def group(self, p: Pattern, jobs: list[Scenario]) -> tuple[dict[str, Any], np.ndarray]:
+        """Makes runs of one kind.
+
+        Args:
+            p: its pattern.
+            jobs: their scenarios.
+
+        Returns:
+            Fields of a summary of those that are good, and which are.
+        """
+        parts, n = p.roomy(jobs), len(jobs)
+        model, data = self.store.engine(p.scenario)
+        e = self.store.arrays(parts, model, data, self.kernel)
+        starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
+        crossed = np.full((n, SUMMARY_CROSSINGS, 3), np.nan)
+        crossed[:, :, 0] = -1.0
+        runs = Runs(
+            p.numbers(jobs), p.tables(jobs), p.memory(jobs), starts, model.actuator_ctrlrange,
+            self.reset, self.store.rows, self.store.crossings,
+            self.store.rendered if scene.tells(parts) else np.empty((0, 3)), np.zeros(n, np.int64),
+            np.empty((n, rows.ROW)), np.zeros((n, 2)), crossed, np.zeros((n, 4), np.int64),
+            np.zeros(n), np.tile(np.array([0, -1, -1, 0]), (n, 1)), np.empty((n, WORKS)),
+            np.zeros((2, monitor.QUIET)),
+        )  # fmt: skip
+        self.carry(parts, p.blocks, e, runs)
+        good = runs.good > 0
+        return {name: x[good] for name, x in summary_columns(p.scenario, runs).items()}, good
+
+
+def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
+    """The fields of summaries, arrays over runs.
+
+    Args:
+        like: a scenario of their kind.
+        made: the runs.
+    """
+    crossings, steps, step, codes = made.counts.T
+    seen, moved, unbound, _ = made.seen.T
+    saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
+    ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
+    work = made.work.T
+    balance = energy.balance(work[:5], work[5:7], work[7:9])
+    if like.interface is not None and any(like.interface.friction):
+        balance["residual"] = balance["residual"] - work[9]
+    last, crossed = made.last, made.crossed
+    v, b, fe = last[:, 4:6], last[:, 12:14], made.force
+    if not len(made.rendered):
+        fe = np.column_stack(viscous.force(None, b.T, v.T))
+    return dict(
+        code=np.where(codes == FINISHED, "finished", ends), axis=np.zeros(len(codes), "U1"),
+        time=made.times, step=step, steps=steps, crossings=crossings,
+        crossing_axis=crossed[:, :, 0].astype(np.int64), crossing_time=crossed[:, :, 1],
+        crossing_speed=crossed[:, :, 2], p=last[:, 2:4], v=v, fh=last[:, 6:8], fe=fe, b=b,
+        **balance,
+    )  # fmt: skip

@@ -279,11 +279,13 @@ class Own(NamedTuple):
         law: called with the desk.
         desk: the floats that it reads and writes, see sampled_controller.DESK.
         size: numbers of its state.
+        first: its state at the start.
     """
 
     law: Any
     desk: Any
     size: int
+    first: Any
 
 
 class Difference(NamedTuple):

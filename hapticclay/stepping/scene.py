@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +12,18 @@ from ..model import hardware as interface
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, LawCaller
 from ..model.scenario import Scenario
-from . import begin, hardware, kick, laws, pace, rows, sampled
+from . import begin, hardware, laws, pace, rows
 from . import parts as p_
 from . import state as s_
-from .engine_step import put
+from .machine_code import kind_of
 from .march import GROWTH_BLOCK
 from .memories import delay_in_samples, formed_memory, held_memory
 from .modes import SUBSTEPS
 from .parts import INF
 
 NONE = (0.0, 0.0)
+QUEUE = 4  # rows of the queue of torques beyond the whole samples that they come late
+STIFF, HITTING = 1.0, 0.02  # stiffness of clay from which on it has a part Stiff, and Hits
 
 
 def hand_parts(s: Scenario):
@@ -28,7 +31,9 @@ def hand_parts(s: Scenario):
         return None
     longer = 1 if s.control == "sampled" else None
     none = p_.Hand(0.0, 0.0, 0.0, longer)
-    return tuple(p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators)
+    return tuple(
+        p_.Hand(th.mass, th.damper, th.spring, longer) if th else none for th in s.operators
+    )
 
 
 def compensators(s: Scenario):
@@ -50,8 +55,12 @@ def is_held(s: Scenario) -> bool:
 
 def stiffness(s: Scenario) -> float:
     """Largest share of its velocity that a step of explicit damping would take from the handle."""
-    b = B_MAX if s.clay.grows else s.clay.largest
-    return b * s.dt * max(s.mobility, s.arm.links[4])
+    return stiffness_of(s, B_MAX if s.clay.grows else s.clay.largest)
+
+
+def stiffness_of(s: Scenario, b: float) -> float:
+    """The same of a handle without a hand, the lightest, in clay of some damping [N.s/m]."""
+    return b * s.dt * s.arm.links[4]
 
 
 def clay_part(s: Scenario):
@@ -73,8 +82,8 @@ def clay_part(s: Scenario):
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
     b = stiffness(s) if fast and not is_held(s) else 0.0
-    stiff = p_.Stiff(float(s.mobility)) if b > 1.0 else None
-    hits = p_.Hits(0.02 / s.arm.links[4]) if b > 0.02 and s.control != "sampled" else None
+    stiff = p_.Stiff(float(s.mobility)) if b > STIFF else None
+    hits = p_.Hits(HITTING / s.arm.links[4]) if b > HITTING and s.control != "sampled" else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
     special = special if any(x is not None for x in special) else None
     return p_.Clay(1 if clay.grows else None), grain, hits, special
@@ -121,8 +130,9 @@ def parts_of(s: Scenario):
     return p_.Parts(
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
-        tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo), 1 if s.shaping else None, lag, form,
-        hand_parts(s), p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
+        tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo),
+        1 if s.shaping else None, lag, form, hand_parts(s),
+        p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
         sampler(s, *clay[::3]), *accurate_parts(s),
     )  # fmt: skip
@@ -144,7 +154,9 @@ def sampler(s: Scenario, clay, special):
     if s.controller is not None:
         state = s.controller.state
         desk = np.array([0.0] * DESK + [*state, *state, *s.controller.params])
-        own = p_.Own(LawCaller(s.controller, desk), memoryview(desk), len(state))
+        own = p_.Own(
+            LawCaller(s.controller, desk), memoryview(desk), len(state), tuple(map(float, state))
+        )
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
     first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
@@ -168,51 +180,42 @@ def hardware_parts(s: Scenario, io, Ts):
         dac = p_.Converter(io.dac_bits, tuple(map(float, io.dac_range or s.torque_limit)))
     whole, share = delay_in_samples(io.delay, Ts)
     if io.delay > 0.0:
-        delay = p_.Delay(float(io.delay), whole + 4, np.zeros(hardware.QUEUED * (whole + 4)))
+        delay = late_torques(float(io.delay), whole)
     if any(io.friction):
         friction = tuple(map(float, io.friction))
     if io.passivity:
-        passivity = p_.Passivity(whole, float(share), np.zeros(2 * (whole + 2)))
+        passivity = guard(whole, float(share))
     if io.coupling is not None:
         coupling = p_.Coupling(float(io.coupling.spring), float(io.coupling.damper))
     uneven = 1 if io.jitter > 0.0 or io.delay > 0.0 else None
-    return chance, uneven, io.encoder or None, difference, lag, adc, dac, delay, friction, passivity, coupling
+    more = difference, lag, adc, dac, delay, friction, passivity, coupling
+    return chance, uneven, io.encoder or None, *more
 
 
-def first_machine(part, parts, s: Scenario, loop, q, w):
-    """Controller and hardware at the start; the past of the sensors goes into their rings."""
-    p = tuple(map(float, s.start))
-    x, y, form = loop.x, loop.y, None
-    own = tuple(map(float, s.controller.state)) if s.controller else None
-    if own is not None:
-        x = y = s_.Axis(0.0, 0.0, 0.0, 0.0)
-    if loop.form is not None:
-        form = s_.Formed(*loop.form, (x.delta, y.delta))
-    rates = None
-    if part.difference:
-        ring, n = part.difference.ring, part.difference.window
-        for i in range(n):  # before the start the joints have turned so for long
-            j = i - n
-            then = q[0] + j * part.Ts * w[0], q[1] + j * part.Ts * w[1]
-            put(ring, 3 * i, (float(j), *hardware.encoded(part.encoder, then)))
-        rates = s_.Rates(w, 0)
-    hold = s_.Hold(
-        NONE, NONE, hardware.nothing(part.passivity), hardware.no_pull(part.coupling)
-    )  # fmt: skip
-    return s_.Machine(
-        x, y, form, own, hold, sampled.samples_from(part, parts.time.dt, 0), NONE, rates,
-        (0.0,) * 4 if part.filter else None, s_.Guard(NONE, p, 0) if part.passivity else None,
-        p if part.coupling else None, s_.Queue(0, 0, INF, INF) if part.delay else None,
-    )  # fmt: skip
+def late_torques(delay: float, whole: int):
+    """Torques that come late by so many whole samples, and a rest."""
+    return p_.Delay(delay, whole + QUEUE, np.zeros(hardware.QUEUED * (whole + QUEUE)))
 
 
-def first_sampled(part, parts, s: Scenario, state):
-    """The state of a sampled run at its start."""
-    body, reaction, work = state.body, state.clay.reaction, state.work
-    machine = first_machine(part, parts, s, state.loop, body.q, body.w)
-    hold, at = machine.hold, kick.handle_at(parts.arm, body, 0.0)
-    event = s_.Event(0.0, at, body.w, reaction, NONE, work, NONE, 0.0, hold, machine)
-    return state._replace(loop=s_.Sampled(machine, event))
+def guard(whole: int, share: float):
+    """The passivity controller behind a delay of so many whole samples, and a rest."""
+    return p_.Passivity(whole, share, np.zeros(2 * (whole + 2)))
+
+
+def for_delays(parts, longest: float):
+    """The parts of a scene with rings for torques that come later than its own.
+
+    Args:
+        parts: of the scene.
+        longest: delay [s].
+    """
+    sampler = parts.sampler
+    if sampler is None:
+        return parts
+    whole, share = delay_in_samples(longest, sampler.Ts)
+    delay = late_torques(longest, whole) if sampler.delay else None
+    passivity = guard(whole, share) if sampler.passivity else None
+    return parts._replace(sampler=sampler._replace(delay=delay, passivity=passivity))
 
 
 def first_reaction(special):
@@ -229,9 +232,10 @@ def first_laws(special, p):
     if special is None:
         return None
     law, none = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (0.0,) * 6
+    elastic = s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF)
     return s_.Laws(
         s_.Flow(law, law) if special.flow else None,
-        s_.Elastic((none, none), NONE, NONE, p, NONE, NONE, 0.0, 0.0, INF) if special.springs else None,
+        elastic if special.springs else None,
         s_.Cut((math.nan, math.nan), NONE, NONE, 0.0) if special.groove else None,
         laws.start(special.more, p),
     )  # fmt: skip
@@ -254,7 +258,7 @@ def blocks(parts, s: Scenario):
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
         first_reaction(parts.special), first_laws(parts.special, NONE),
-    )
+    )  # fmt: skip
     return s_.State(
         s_.Clock(0.0, 0, 0.0), s_.Body(NONE, NONE, NONE), s_.Loop(axis, axis, first_form(parts, s)),
         clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0, works), s_.Status(0, 0, 0, 0, (0, 0, 0, 0)),
@@ -265,19 +269,37 @@ def blocks(parts, s: Scenario):
 def start(parts, s: Scenario, e):
     """The state at the start of a run."""
     p, v = tuple(map(float, s.start)), tuple(map(float, s.velocity))
-    state = begin.begun(parts, blocks(parts, s), e, p, v)
-    if parts.accurate is not None:
-        return first_course(parts, state)
-    return state if parts.sampler is None else first_sampled(parts.sampler, parts, s, state)
+    return begin.begun(parts, blocks(parts, s), e, p, v)
 
 
-def first_course(parts, state):
-    """The state of an accurate run at its start."""
-    loop, modes = state.loop, None
-    if parts.modal:
-        law = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
-        modes = s_.Modes(law, (1.0, 1.0), NONE, NONE, NONE, NONE, NONE, INF)
-    return state._replace(loop=s_.Course(loop.x, loop.y, loop.form, 0, 0.0, modes))
+def traits(s: Scenario) -> tuple[Any, ...]:
+    """What decides which parts a scene has: scenes alike in this share machine code.
+
+    Args:
+        s: the scenario.
+    """
+    clay, io, own, law, wires = s.clay, s.interface, s.controller, None, None
+    if clay is not None:
+        block, b = clay.groove, stiffness(s)
+        law = (
+            clay.grows, clay.smooth, clay.yields, clay.springs, bool(clay.angle), clay.isotropic,
+            block is not None and bool(block.damping), block is not None, b > STIFF, b > HITTING,
+        )  # fmt: skip
+    if io is not None:
+        random = io.jitter > 0.0, io.lost > 0.0 or io.force_noise > 0.0, io.delay > 0.0
+        order = io.filter_order if io.force_filter is not None else 0
+        wires = (
+            *random, order, io.velocity == "difference" and bool(io.velocity_filter), io.velocity,
+            *map(bool, (io.encoder, io.adc_bits, io.dac_bits, any(io.friction), io.passivity)),
+            io.coupling is not None,
+        )  # fmt: skip
+    driven = (x is not None and x.varies for x in (s.muscle, s.command))
+    forms = ((c.lag and c.lag[0], c.order) for c in s.compensators)
+    more = kind_of(laws.parts_of(s)) if laws.TABLE else None
+    return (
+        s.control, s.render, s.integrator, bool(s.shaping), any(s.operators), *driven, *forms, law,
+        wires, own and len(own.state), more,
+    )  # fmt: skip
 
 
 def written(parts):
