@@ -125,7 +125,7 @@ def pays(scenario: Scenario, steps: float) -> bool:
     kind = kind_of(scene.parts_of(scenario))
     compiled = sys.modules.get("hapticclay.stepping.compiled")
     if compiled is not None and kind in compiled.ready:
-        return True
+        return has_numba()
     # half: runs tend to end before t_max
     saved[kind] = saved.get(kind, 0.0) + 0.5e-6 * saved_in_a_step(scenario) * steps
     if saved[kind] < LOADING or not has_numba():

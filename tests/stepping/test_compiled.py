@@ -214,6 +214,7 @@ def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
     monkeypatch.delattr(stepping, "compiled", raising=False)
     r = hc.simulate(CASES["plain"], engine="native")
     assert capsys.readouterr().err.count("\n") == 1
+    monkeypatch.setattr(batch, "pays", lambda scenario, steps: True)
     (b,) = hc.simulate_batch([CASES["plain"]])
     assert capsys.readouterr().err.count("\n") == 1
     same(r, hc.simulate(CASES["plain"], engine="python"))
@@ -369,7 +370,7 @@ def test_nothing_that_a_scene_lacks_is_compiled(tmp_path):
     assert "hand" in with_hand and more > count
     assert with_hand - used <= {"hand", "operator"}
     hardware, _ = modules(
-        "hc.constant_cut(t_max=0.1, control='sampled', interface=hc.Interface(adc_bits=12))"
+        "hc.Scenario(t_max=0.1, control='sampled', interface=hc.Interface(force_filter=30.0))"
     )
     assert {"sampled", "hardware"} <= hardware and hardware.isdisjoint(lacks[3:])
 
