@@ -127,7 +127,7 @@ def simulate_batch(
 
     parts = map(plan.jobs, _in_parts(itertools.chain(first, todo), together))
     with warnings_caught():
-        _on_threads(parts, make, out.put, min(threads, len(first)))
+        _on_threads(parts, make, out.put, max(min(threads, len(first)), 1))
     return out.all()
 
 
