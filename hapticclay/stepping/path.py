@@ -200,7 +200,7 @@ def kept(accurate, parts, s, e, k, after, shows):
         return kick_kept(parts, s, e, k, after, shows)
     x = s.filled
     if shows:
-        march.write_shown(parts.modal, e, x.rows, s.body, k.shown)
+        march.write_shown(parts, e, x.rows, s.body, k.shown)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     return with_filled(s, x)
 
@@ -444,7 +444,8 @@ def glide_by(accurate, parts, s, e, room):
     while s.clock.i < parts.time.last:
         target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
         if on_grid:
-            if not has_room(parts.time, s, e, room):
+            even = march.is_even(accurate.ahead, s.clock.t, target)
+            if not (even and has_room(parts.time, s, e, room)):
                 break
             s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
         s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)

@@ -18,7 +18,8 @@ from .kick import (
     command_change,
     handle_at,
     link_torques,
-    mean_push,
+    push_now,
+    row_ahead,
     step_around,
     velocity,
 )
@@ -335,7 +336,7 @@ def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
     if chance is None:
         return heard(sampler.own, sampler, parts, s, at, w, f, pull)
     m = s.loop.machine
-    if chance[hardware.CHANCE * m.samples.k + 1] > 0.0:  # lost
+    if hardware.is_lost(chance, m.samples.k):
         delta = m.x.delta, m.y.delta
         return Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
     return heard(sampler.own, sampler, parts, s, at, w, f, pull)
@@ -427,11 +428,13 @@ def form_row(m, o, z, at):
     return out
 
 
-def shift_of(command, t, Ts):
-    """Change of the command over a sample, (x, y) [m]."""
+def shift_of(command, dt, clock, Ts):
+    """Change of the command over a control sample, (x, y) [m]."""
     if command is None:
         return NONE
-    return command_change(command, t, t + Ts, 0.0)
+    if clock.t == clock.i * dt:
+        return row_ahead(command, clock.i)
+    return command_change(command.table, clock.t, clock.t + Ts, 0.0)
 
 
 # ---- an event ------------------------------------------------------------------------------------
@@ -513,16 +516,17 @@ def sampled(sampler, parts, s, at, w, special, tau):
         special: laws of the clay behind the kick that leads to the sample.
         tau: torques on the joints in it [N.m].
     """
-    m, uh = s.loop.machine, mean_push(parts.push, s.clock.t, 0.0)
+    m, dt = s.loop.machine, parts.time.dt
+    uh = push_now(parts.push, dt, s.clock)
     pull = reaction(sampler.special, sampler, parts, s, special, at, tau, uh)
     f = on_sensor(parts.hand, sampler, parts, s, at, tau, uh, pull)
     f = hardware.noise(sampler.chance, m.samples.k, f)
     f, filtered = hardware.filtered(sampler.filter, m.filtered, f)
     f = hardware.converted(sampler.adc, f)
     a = answer(sampler.chance, sampler, parts, s, at, w, f, pull)
-    shift = shift_of(sampler.command, s.clock.t, sampler.Ts)
+    shift = shift_of(sampler.command, dt, s.clock, sampler.Ts)
     x, y, form = advanced(sampler.own, sampler, parts, m, a.force, shift)
-    samples = samples_from(sampler, parts.time.dt, m.samples.k + 1)
+    samples = samples_from(sampler, dt, m.samples.k + 1)
     return Machine(
         x, y, form, a.own, a.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
     ), a
