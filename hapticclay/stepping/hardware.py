@@ -124,7 +124,7 @@ def no_pull(part):
     return Pull(NONE, NONE)
 
 
-def coupled(part, special, state, tool, at, b, f, Ts):  # noqa: PLR0913
+def coupled(part, special, state, tool, at, b, f, Ts):
     """Force of the clay by way of the coupling [N]; the pull; the tool behind the sample."""
     if part is None:
         return f, part, tool

@@ -153,7 +153,7 @@ def sampler(s: Scenario, controller, clay, special):
         desk = np.array([0.0] * DESK + [*state, *state, *controller.params])
         own = p_.Own(LawCaller(controller, desk), desk, tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
-    told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
+    told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
     first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
     return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
 
