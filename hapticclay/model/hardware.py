@@ -365,6 +365,11 @@ class SampleNoise:
         self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
         self._first, self._rows = 0, np.zeros((0, 4))
 
+    @property
+    def first(self) -> int:
+        """Index of the first sample that is not forgotten."""
+        return self._first
+
     def forget(self, first: int) -> None:
         """Forgets the samples before one.
 

@@ -177,7 +177,7 @@ def first_form(formed, loop):
 def first_own(own):
     if own is None:
         return own
-    return own.first
+    return own.start
 
 
 def first_rates(part, sampler, body):

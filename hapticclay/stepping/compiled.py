@@ -36,6 +36,7 @@ from ..model import (
     regions,
     spring,
 )
+from ..model.scenario import Scenario
 from . import (
     begin,
     borders,
@@ -56,6 +57,7 @@ from . import (
     march,
     modes,
     monitor,
+    own_law,
     path,
     rows,
     run,
@@ -109,7 +111,7 @@ def store(context, address, i, values):  # noqa: ARG001
             builder.store(builder.extract_value(tuple_, j), place_of(builder, address, at))
         return context.get_dummy_value()
 
-    numbers = types.UniTuple(types.float64, len(values))
+    numbers = types.UniTuple(types.float64, len(values)) if len(values) else values
     return types.none(types.intp, types.intp, numbers), generate
 
 
@@ -182,7 +184,7 @@ def choice(f: FunctionType) -> Callable[..., Any]:
 
 OF_LAW = {"load": laws.load_of, "moved": laws.moved_of, "force": laws.force_of}
 OUTLINED = {driver.kick, search.find_root, path.towards, path.crossed, borders.clay_in, borders.first_border, path.careful, borders.passed_alike}
-ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, many.filled}
+ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, engine_step.numbers_at, many.filled}
 laws_known: set[ModuleType] = set()
 stepped: set[FunctionType] = set()  # functions whose source numba finds
 
@@ -228,6 +230,9 @@ def register_atoms() -> None:
         lambda array, i, values: lambda array, i, values: store(array, i, values)
     )
     overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
+    overload(engine_step.numbers_at, inline="always")(
+        lambda like, array, i: lambda like, array, i: fill(like, array + 8 * i)
+    )
     overload(many.filled, jit_options=LAW)(
         lambda like, numbers, k: lambda like, numbers, k: fill(like, numbers[k].ctypes.data)
     )
@@ -302,14 +307,14 @@ def natively(r: run.Run, room: int) -> None:
         r: the run.
         room: rows that it may have.
     """
-    kind = r.kind
+    kind, parts = r.kind, own_law.called(r.parts)
     while r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room):
         if met.get(kind, 0) > CAREFUL:
             with first_call(complete, kind, "borders and hits of such runs"):
-                r.state = ADVANCE(r.parts, r.state, r.native, room)
+                r.state = ADVANCE(parts, r.state, r.native, room)
             continue
         with first_call(ready, kind, "runs of this kind"):
-            r.state = GLIDE(r.parts, r.state, r.native, room)
+            r.state = GLIDE(parts, r.state, r.native, room)
         if path.has_room(r.parts.time, r.state, r.e, room):
             run.one_plainly(r, path.careful)
             met[kind] = met.get(kind, 0) + 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..model import regions
 from . import modes as m_
-from .instant import instant
+from .instant import instant, moment
 from .march import axis_of, point_of
 from .modes import FREE, NONE, RESTS, SLIDING, TURNED_IN
 from .parts import INF
@@ -28,7 +28,8 @@ def moving(modal, part, body, v):
 
 def feel(parts, s, body, modes):
     """What clay that yields does now, in these modes."""
-    return instant(parts, s.clock.t, point_of(body, s.loop), s.clay, modes).grip
+    when = moment(parts.accurate.ahead, s.clock.t, 0.0, -1)
+    return instant(parts, when, point_of(body, s.loop), s.clay, modes).grip
 
 
 # ---- where they begin ----------------------------------------------------------------------------

@@ -78,6 +78,11 @@ def put(array, i, values):
         i += 1
 
 
+def numbers_at(like, array, i):
+    """As many numbers of an array as a tuple has, from i on; compiled, `array` is its address."""
+    return tuple(array[i : i + len(like)])
+
+
 def pair(array):
     """The first two numbers of an array; compiled, `array` is its address."""
     return array[0], array[1]

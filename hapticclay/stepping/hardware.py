@@ -22,15 +22,20 @@ def late(chance, k):
     """How late a sample is [s]."""
     if chance is None:
         return 0.0
-    return chance[CHANCE * k]
+    return chance.numbers[CHANCE * (k - chance.first)]
+
+
+def is_lost(chance, k):
+    """Whether a sample is lost."""
+    return chance.numbers[CHANCE * (k - chance.first) + 1] > 0.0
 
 
 def noise(chance, k, f):
     """The force with the noise of a sample, (x, y) [N]."""
     if chance is None:
         return f
-    i = CHANCE * k + 2
-    return f[0] + chance[i], f[1] + chance[i + 1]
+    i = CHANCE * (k - chance.first) + 2
+    return f[0] + chance.numbers[i], f[1] + chance.numbers[i + 1]
 
 
 # ---- force ---------------------------------------------------------------------------------------
@@ -119,7 +124,7 @@ def no_pull(part):
     return Pull(NONE, NONE)
 
 
-def coupled(part, special, state, tool, at, b, f, Ts):  # noqa: PLR0913
+def coupled(part, special, state, tool, at, b, f, Ts):
     """Force of the clay by way of the coupling [N]; the pull; the tool behind the sample."""
     if part is None:
         return f, part, tool

@@ -5,12 +5,12 @@ It is a kick of one second from rest, in which the velocity after it is the acce
 
 from __future__ import annotations
 
-from ..model import arm
-from . import hand, servo, viscous
+from ..model import arm, pieces
+from . import hand, laws, servo, viscous
 from . import modes as m_
 from .kick import clipped, handle_at, link_torques, steady_force
 from .parts import INF
-from .state import Body, Handle, Instant, Load, Step
+from .state import Axis, Body, Handle, Instant, Load, Moment, Point, Step
 
 NONE = (0.0, 0.0)
 SECOND = Step(1.0, 0.5, 0.5, 1.0, 1.0)
@@ -27,14 +27,88 @@ def under_torques(links, at, tau):
     return servo.torque_law(links, SECOND, Handle(at.u, at.p, at.W, NONE, at.c), tau)
 
 
-def instant(parts, t, z, clay, modes):
+# ---- what changes with time ----------------------------------------------------------------------
+
+
+def moment(ahead, t, h, row):
+    """The moment h after the start of a step at t.
+
+    Args:
+        ahead: Accurate.ahead.
+        t: start of the step [s].
+        h: time since then [s].
+        row: of the signals ahead, -1 for none.
+    """
+    if ahead is None:
+        return Moment(t + h, t + h, -1, h)
+    return Moment(t + h, max(t + h - ahead.slack, t + ahead.slack), row, h)
+
+
+def muscle_at(push, when):
+    """Muscle force, (x, y) [N]."""
+    return with_muscle(push.muscle, steady_force(push, when.t), when)
+
+
+def with_muscle(signal, f, when):
+    if signal is None:
+        return f
+    if when.row >= 0:
+        x, y = row_at(signal, when.row)
+    else:
+        x, y = pieces.value_of_table(signal.table, when.t, when.near)
+    return f[0] + x, f[1] + y
+
+
+def row_at(signal, i):
+    return signal.ahead[i, 0], signal.ahead[i, 1]
+
+
+def commanded(signal, z, when):
+    """A point with the change of the command since t = 0 in the output of the compensators."""
+    if signal is None:
+        return z
+    if when.row >= 0:
+        dx, dy = row_at(signal, when.row)
+    else:
+        x0, y0 = pieces.mean_of_lines(signal.table, 0.0, 0.0)
+        x1, y1 = pieces.value_of_table(signal.table, when.t, when.near)
+        dx, dy = x1 - x0, y1 - y0
+    x, y = z.x, z.y
+    x, y = Axis(x.delta + dx, x.rate, x.y, x.yrate), Axis(y.delta + dy, y.rate, y.y, y.yrate)
+    return Point(z.q, z.w, x, y, z.form)
+
+
+# ---- laws that are modules of their own ----------------------------------------------------------
+
+
+def law_force(special, clay, at, when):
+    """Force of the laws of the clay that are modules of their own, (x, y) [N]."""
+    if special is None:
+        return NONE
+    return more_force(special.more, clay.laws.more, at, when)
+
+
+def more_force(more, states, at, when):
+    if more is None:
+        return NONE
+    if when.since > 0.0:
+        states = laws.moved(more, states, at, when.since)
+    return laws.force(more, states, at.p, at.v)
+
+
+# ---- the loop ------------------------------------------------------------------------------------
+
+
+def instant(parts, when, z, clay, modes):
     """The loop at a point of a step."""
     links, limit, modal = parts.arm.links, parts.limits, parts.modal
     at = m_.without_rest(modes, modal, handle_at(parts.arm, Body(z.q, z.w, NONE), 0.0))
-    uh, v = steady_force(parts.push, t), at.v
-    b = viscous.at_instant(parts.clay, parts.special, parts.table, clay, t, at.p)
+    uh, v, z = muscle_at(parts.push, when), at.v, commanded(parts.command, z, when)
+    b = viscous.at_instant(parts.clay, parts.special, parts.table, clay, when.t, at.p)
     x, y = viscous.force(parts.grain, b, v)
-    load = hand.with_hand_now(parts.hand, Load((uh[0] - x, uh[1] - y), (0.0, 0.0, 0.0)), at)
+    mx, my = law_force(parts.special, clay, at, when)
+    load = Load((uh[0] - x - mx, uh[1] - y - my), (0.0, 0.0, 0.0))
+    load = hand.with_hand_now(parts.hand, load, at)
     law, delta, feed, drive, pushes = servo.law_now(parts, at, z)
     a = m_.answer(modal, modes, law, load, at)
     tau = wanted(links, at, a)
@@ -47,7 +121,8 @@ def instant(parts, t, z, clay, modes):
     dx, dy = hand.dampers(parts.hand)
     muscle, motors = uh[0] * v[0] + uh[1] * v[1], tau[0] * w[0] + tau[1] * w[1]
     fx, fy = f[0] + x, f[1] + y  # on the engine's handle, whose dampers take what they do
-    push, x, y = arm.joint_torques(fx, fy, at.u), x + r[0], y + r[1]
+    push, r = arm.joint_torques(fx, fy, at.u), (mx + r[0], my + r[1])
+    x, y = x + r[0], y + r[1]
     return Instant(
         at.p, v, b, (x, y), (fx + r[0], fy + r[1]), tau, push,
         (delta[0] + feed[0] * f[0], delta[1] + feed[1] * f[1]),

@@ -59,25 +59,48 @@ def muscle_force(parts, clock, step):
     return with_signal(parts.push.muscle, f, parts.time.dt, clock, step)
 
 
-def mean_push(push, t, h):
-    """Mean muscle force over h before and after a time, (x, y) [N]."""
-    return with_mean(push.muscle, steady_force(push, t), t, h)
-
-
-def with_mean(signal, f, t, h):
-    if signal is None:
-        return f
-    x, y = pieces.mean_of_table(signal.table, t, h)
-    return f[0] + x, f[1] + y
-
-
 def with_signal(signal, f, dt, clock, step):
     if signal is None:
         return f
     if is_whole(dt, clock, step):
         x, y = row_ahead(signal, clock.i)
-        return f[0] + x, f[1] + y
-    return with_mean(signal, f, clock.t + 0.25 * (step.after - step.before), 0.5 * step.H)
+    else:
+        x, y = signal_in_half(signal.halves, signal, dt, clock, step)
+    return f[0] + x, f[1] + y
+
+
+def signal_in_half(halves, signal, dt, clock, step):
+    """Mean of a muscle force over a kick that is none of whole steps, (x, y) [N]."""
+    if halves is None:
+        return signal_in_kick(signal, clock, step)
+    if clock.t == clock.i * dt:
+        i = clock.i - signal.first
+        if step.before == dt and step.after == 0.0:
+            return halves[i, 0], halves[i, 1]
+        if step.before == 0.0 and step.after == dt:
+            return halves[i, 2], halves[i, 3]
+    return signal_in_kick(signal, clock, step)
+
+
+def signal_in_kick(signal, clock, step):
+    t = clock.t + 0.25 * (step.after - step.before)
+    return pieces.mean_of_table(signal.table, t, 0.5 * step.H)
+
+
+def push_now(push, dt, clock):
+    """Muscle force at the beginning of a step in sampled control, (x, y) [N]."""
+    return with_signal_now(push.muscle, steady_force(push, clock.t), dt, clock)
+
+
+def with_signal_now(signal, f, dt, clock):
+    if signal is None:
+        return f
+    if clock.t == clock.i * dt:
+        i = clock.i - signal.first
+        x, y = signal.halves[i, 4], signal.halves[i, 5]
+    else:
+        x, y = pieces.mean_of_table(signal.table, clock.t, 0.0)
+    return f[0] + x, f[1] + y
 
 
 def is_whole(dt, clock, step):

@@ -8,6 +8,13 @@ A law resists beside viscous damping. Its module has, of a named tuple `Part` in
     force(part, state, p, v)          its force at an instant, (x, y) [N]
     refuses(scenario)                 what it cannot be combined with, in words; "" for nothing
 All but the first, second and last are stepped: plain numbers and tuples, as everywhere here.
+
+The fast method and the physical clay of sampled control take `load` in their kicks, the accurate
+method and motors that render the clay `force`. The fast method stays of second order where `load`
+is, at the sample. The accurate one moves the state from the start of a step to each of its stages:
+it stays of fourth order where `moved` is exact for a path with the handle `at` its end, as of a
+state that follows from the place or the time, and is else of the order of `moved`. It does not
+divide its steps by the stiffness of a law.
 """
 
 from __future__ import annotations
@@ -16,6 +23,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
+from ..errors import ParameterError
 from ..model.scenario import Scenario
 
 TABLE: list[ModuleType] = []
@@ -35,11 +43,21 @@ def parts_of(scenario: Scenario) -> Any:
 
     Args:
         scenario: the scene.
+
+    Raises:
+        ParameterError: one of them cannot be combined with something in the scene.
     """
     laws = None
     for module in reversed(TABLE):
         part = module.part(scenario)
-        laws = laws if part is None else (part, laws)
+        if part is None:
+            continue
+        told = module.refuses(scenario)
+        if scenario.interface is not None and scenario.interface.coupling is not None:
+            told = told or "must be without a coupling, which renders viscous clay and its yielding"
+        if told:
+            raise ParameterError("clay", scenario.clay, told)
+        laws = part, laws
     return laws
 
 

@@ -11,7 +11,7 @@ import math
 from . import modes as m_
 from .driver import kick
 from .engine_step import accelerations, put
-from .instant import instant
+from .instant import instant, moment
 from .kick import is_finite, place, place_after
 from .parts import INF
 from .rows import ROW
@@ -33,6 +33,7 @@ from .yielding import note
 GROWTH_BLOCK = 64  # samples for which the steps of clay that grows are chosen at once
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
 NEAR = 1e-6  # of a step: so close to its end is at its end
+EVEN = 1e-4  # of the slack of signals: so close to a time worked out ahead is at it
 
 
 # ---- how a sample is divided ---------------------------------------------------------------------
@@ -49,6 +50,7 @@ def paced(accurate, modal, s, target, after, on_grid):
     """The state, and the length of the next step towards a sample, `after` away [s]."""
     if accurate is None:
         return s, after
+    target, after = before_break(accurate.ahead, s.clock.t, target, after)
     x, dt, status = s.loop, target - s.clock.t, s.status
     n = substeps(accurate.blocks, accurate.substeps, s.clock.i)
     left, share = x.left, x.share
@@ -64,6 +66,52 @@ def paced(accurate, modal, s, target, after, on_grid):
     return s, anywhere(modal, dt, n, share if left > 1 else dt)
 
 
+def place_in(times, t):
+    """Index of the first of ascending times behind a time."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) // 2
+        if times[middle] > t:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def next_break(ahead, t):
+    """The next time at which a signal jumps, INF for none [s]."""
+    return ahead.breaks[place_in(ahead.breaks, t + ahead.slack)]
+
+
+def before_break(ahead, t, target, after):
+    """The next stop of the steps, and the length up to it [s]: where a signal jumps before it."""
+    if ahead is None:
+        return target, after
+    stop = next_break(ahead, t)
+    if after > 0.0 and stop < target - ahead.slack:
+        return stop, stop - t
+    return target, after
+
+
+def is_even(ahead, t, target):
+    """Whether no signal jumps up to the next sample."""
+    if ahead is None:
+        return True
+    return next_break(ahead, t) >= target + ahead.slack
+
+
+def row_of(ahead, t, h):
+    """Row of the signals ahead for a step of length h, -1 for none."""
+    if ahead is None:
+        return -1
+    times, near = ahead.times, EVEN * ahead.slack
+    i = place_in(times, t - near)
+    if h == 0.0 or i + 2 >= len(times) or next_break(ahead, t) < t + h + ahead.slack:
+        return -1
+    far = max(abs(times[i] - t), abs(times[i + 1] - t - 0.5 * h), abs(times[i + 2] - t - h))
+    return i if far < near else -1
+
+
 def anywhere(modal, rest, n, after):
     """Length of the next of n steps a sample; those of clay that yields end anywhere."""
     if modal is None:
@@ -74,8 +122,9 @@ def anywhere(modal, rest, n, after):
 
 # ---- a step --------------------------------------------------------------------------------------
 
-# of the stages: where each and the next one is, weights in Sums.first, Sums.last and the other sums
-AT, AHEAD = (0.0, 0.5, 0.5, 1.0), (0.5, 0.5, 1.0, 0.0)
+# of the stages: where each and the next one is, rows of the signals ahead, weights in Sums.first,
+# Sums.last and the other sums
+AT, AHEAD, ROWS = (0.0, 0.5, 0.5, 1.0), (0.5, 0.5, 1.0, 0.0), (0, 1, 1, 2)
 FIRST, LAST, WEIGHT = (1.0, 1.0, 1.0, 0.0), (0.0, 1.0, 1.0, 1.0), (1.0, 2.0, 2.0, 1.0)
 
 
@@ -166,8 +215,11 @@ def march(probe, parts, s, h):
     """The step of length h; of length 0 its start alone."""
     t, clay, modes, start = s.clock.t, s.clay, s.loop.modes, point_of(s.body, s.loop)
     z, sums, still = start, no_sums(start.form), m_.has_mode(modes, 2)
+    ahead = parts.accurate.ahead
+    row = row_of(ahead, t, h)
     for i in range(4):
-        now = instant(parts, t + AT[i] * h, z, clay, modes)
+        when = moment(ahead, t, AT[i] * h, row + ROWS[i] if row >= 0 else row)
+        now = instant(parts, when, z, clay, modes)
         if i == 0:
             first = now
             if h == 0.0:
@@ -245,7 +297,7 @@ def keeps_modes(modal, part, modes, k, h):
 # ---- what is kept of it --------------------------------------------------------------------------
 
 
-def write_shown(modal, e, i, body, x):
+def write_shown(parts, e, i, body, x):
     """Writes the row of a sample."""
     (q1, q2), (w1, w2), p, v, fh, tau = body.q, body.w, x.p, x.v, x.fh, x.tau
     delta, b = x.delta, x.b
@@ -256,11 +308,24 @@ def write_shown(modal, e, i, body, x):
             b[0], b[1], w1, w2,
         ),
     )  # fmt: skip
-    write_felt(modal, e, i, x.fe)
+    write_felt(parts.modal, parts.special, e, i, x.fe)
 
 
-def write_felt(modal, e, i, fe):
+def write_felt(modal, special, e, i, fe):
+    """Writes the force of the clay where b v does not tell it."""
     if modal is None:
+        return write_more(special, e, i, fe)
+    put(e.rendered, 3 * i, fe)
+
+
+def write_more(special, e, i, fe):
+    if special is None:
+        return
+    write_own(special.more, e, i, fe)
+
+
+def write_own(more, e, i, fe):
+    if more is None:
         return
     put(e.rendered, 3 * i, fe)
 

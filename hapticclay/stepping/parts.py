@@ -111,13 +111,18 @@ class Signal(NamedTuple):
     Attributes:
         table: of it, see model.pieces.
         ahead: of whole steps, a row a sample: its mean around the sample of a muscle force [N], its
-            change to the next sample of a command [m]; (x, y).
+            change to the next sample of a command [m], to the next control sample where control is
+            sampled; of the accurate method a row a time of Ahead: its value there, of a command its
+            change since t = 0; (x, y).
         first: sample of the first row.
+        halves: of a muscle force in sampled control, a row a sample: its mean over half a step
+            before it, and behind it, its value at it [N]; (x, y) each.
     """
 
     table: Any
     ahead: Any
     first: int
+    halves: Any = None
 
 
 class Push(NamedTuple):
@@ -236,8 +241,8 @@ class Sampler(NamedTuple):
         memory: rows (A, B) of controller.held_compensator of x, then of y.
         formed: compensators of another shape.
         own: the user's own controller.
-        command: table of the command's signal.
-        chance: random effects, four numbers a sample, see hardware.SampleNoise.
+        command: the command's Signal.
+        chance: random effects.
         uneven: 1 where events may lie between the steps.
         encoder: counts per turn.
         difference: joint rates by difference.
@@ -277,15 +282,26 @@ class Own(NamedTuple):
 
     Attributes:
         law: called with the desk.
-        desk: the floats that it reads and writes, see sampled_controller.DESK.
-        size: numbers of its state.
-        first: its state at the start.
+        desk: the floats that it reads and writes, see sampled_controller.DESK; compiled, their
+            address.
+        start: its state at the first sample.
     """
 
     law: Any
     desk: Any
-    size: int
-    first: Any
+    start: Any
+
+
+class Chance(NamedTuple):
+    """Random effects on the samples that come next.
+
+    Attributes:
+        numbers: four a sample, see hardware.SampleNoise.
+        first: sample of the first four.
+    """
+
+    numbers: Any
+    first: int
 
 
 class Difference(NamedTuple):
@@ -370,16 +386,32 @@ class Modal(NamedTuple):
     dt: float
 
 
+class Ahead(NamedTuple):
+    """Times of the accurate method where signals drive a run.
+
+    Attributes:
+        times: starts and middles of the steps that come next, ascending [s].
+        breaks: times at which a step must end, ascending; the last is INF [s].
+        slack: a time so close to another one is that [s].
+    """
+
+    times: Any
+    breaks: Any
+    slack: float
+
+
 class Accurate(NamedTuple):
     """The accurate method.
 
     Attributes:
         substeps: engine steps a sample.
         blocks: the same by block of samples, where the clay grows.
+        ahead: times where signals drive the run.
     """
 
     substeps: int
     blocks: Any
+    ahead: Any = None
 
 
 class Parts(NamedTuple):

@@ -162,10 +162,10 @@ def kicked(parts, s, e, k, after, work, filled):
     stops = noted(special, e, before, reaction, clock.t, stops)
     hit = hits.after_kick(parts.hits, parts, s.clay.hit, k)
     clay = clay_behind(parts.clay, parts, s.clay, hit, reaction, body, after)
-    loop, status = sampled.taken(parts.sampler, parts, s, k)
+    loop = sampled.taken(parts.sampler, parts, s, k)
     loop = commanded(parts.command, loop, parts.time.dt, clock, k.step)
     x = Filled(x.steps + 1, filled, x.crossings, stops)
-    return State(clock, body, loop, clay, work, status, x)
+    return State(clock, body, loop, clay, work, s.status, x)
 
 
 def moved_on(accurate, parts, s, e, k, after, work, filled):
@@ -200,7 +200,7 @@ def kept(accurate, parts, s, e, k, after, shows):
         return kick_kept(parts, s, e, k, after, shows)
     x = s.filled
     if shows:
-        march.write_shown(parts.modal, e, x.rows, s.body, k.shown)
+        march.write_shown(parts, e, x.rows, s.body, k.shown)
         x = Filled(x.steps, x.rows + 1, x.crossings, x.stops)
     return with_filled(s, x)
 
@@ -226,7 +226,7 @@ def write_row(parts, s, e, k, after):
     b = viscous.now(parts.clay, s.clay, after == 0.0, s.clock.t)
     fh, delta, f = sampled.shown(sampler, parts, s, k, after, v, f)
     rows.write(e.rows, i, s.body.q, k, v, b, fh, delta)
-    rows.write_force(parts.special, parts.grain, e, i, k, s.clay.laws, f, v, b)
+    rows.write_force(parts.special, parts.grain, e, i, k, s.clay.laws, (f, v, b))
     sampled.write_held(sampler, parts, e, i, k)
 
 
@@ -367,6 +367,8 @@ def careful(parts, s, e):
         s, first = crossed(parts, s, e, axis, up), True
         if s.status.closing != OPEN and s.clock.before == 0.0:
             return ended(s, s.status.closing)
+    if s.status.code != OPEN:
+        return s
     closing = s.status.closing
     if s.clock.before > 0.0 or closing == OPEN:
         shows = on_grid or closing != OPEN
@@ -418,6 +420,8 @@ def glided(parts, s, e):
     if after < parts.time.dt:
         s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
     s, n = sampled.acted(parts.sampler, parts, s), s.filled.rows
+    if s.status.code != OPEN:
+        return False, s
     k = kick_by(parts.sampler, parts, s.clock, s.body, s.loop, s.clay, after)
     if not is_calm_end(parts.arm, s.clay.region, s.body.q, k.w, after):
         return False, s
@@ -444,7 +448,8 @@ def glide_by(accurate, parts, s, e, room):
     while s.clock.i < parts.time.last:
         target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
         if on_grid:
-            if not has_room(parts.time, s, e, room):
+            even = march.is_even(accurate.ahead, s.clock.t, target)
+            if not (even and has_room(parts.time, s, e, room)):
                 break
             s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
         s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)

@@ -17,7 +17,7 @@ def hand_force(part, k):
     return k.motion.f[0] + k.fe[0], k.motion.f[1] + k.fe[1]
 
 
-def write(rows, i, q, k, v, b, fh, delta):  # noqa: PLR0913
+def write(rows, i, q, k, v, b, fh, delta):
     """Writes the row of a sample."""
     p, tau = k.at.p, k.tau
     r1, r2 = arm.joint_velocity(v[0], v[1], k.at.u, 1.0)
@@ -35,10 +35,21 @@ def tells(special):
     return not (special.flow is None and special.springs is None and special.more is None)
 
 
-def write_force(special, grain, e, i, k, states, f, v, b):  # noqa: PLR0913
-    """Writes the force of the clay where b v does not tell it; f of it is that of yielding [N]."""
+def write_force(special, grain, e, i, k, states, seen):
+    """Writes the force of the clay where b v does not tell it.
+
+    Args:
+        special: laws of the clay.
+        grain: as Parts.grain.
+        e: the engine.
+        i: the row.
+        k: the kick.
+        states: of the laws.
+        seen: force of yielding [N], velocity [m/s] and damping [N.s/m] at the sample, (x, y) each.
+    """
     if special is None:
         return
+    f, v, b = seen
     if special.flow is None and special.springs is None and special.more is None:
         return
     x, y = viscous.force(grain, b, v)

@@ -14,13 +14,15 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError
+from ..model import hardware
 from ..model.constants import AXES
+from ..model.sampled_controller import Controller
 from ..model.scenario import Scenario
 from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
 from .engine_step import Engine, Probe
 from .machine_code import kind_of
-from .parts import Parts, Signal
+from .parts import Chance, Parts
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
 CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
@@ -268,10 +270,11 @@ class Run:
         self.scenario, self.every, self.kernel = scenario, every, kernel
         self.store = store or EngineStore()
         self.model, self.data = self.store.engine(scenario)
+        self._controller: Controller | None = None  # in place of the scenario's
         self._equip(scene.parts_of(scenario))
         self.state: State = scene.start(self.views, scenario, self.e)
         self.drives = _drives(scenario)
-        self.muscle, self.command = self.drives.get("muscle"), self.drives.get("command")
+        self._noise: hardware.SampleNoise | None = None
         self.steps = 0
         self.pause = math.inf
         self.watch = monitor.StabilityMonitor(scenario)
@@ -330,27 +333,44 @@ class Run:
             self.finish("finished" if code == FINISHED else "time limit")
 
     def _make(self, room: int) -> None:
-        if self.drives:
-            self._prepare(min(room - self.filled, max(self.parts.time.last - self.i, 0)) + 1)
+        ready = max(min(room - self.filled, self.parts.time.last - self.i), 0) + 1
+        if self.parts.sampler is not None and self.parts.sampler.chance is not None:
+            self._draw(ready)
+        if self.drives is not None:
+            parts, n = self.drives.prepared(self.parts, self.i, ready)
+            self.take(parts)
+            room = room if n == ready else min(room, self.filled + n)
         self.kernel.advance(self, room)
+        if (law := scene.own_law(self.parts)) is not None:
+            law.check()
         made = self.state.filled
         self._note_events(made.crossings, made.stops)
         self.steps += made.steps
         self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
 
-    def _prepare(self, n: int) -> None:
-        """Readies the signals for the next n whole steps."""
-        dt, i, t_max = self.scenario.dt, self.i, self.scenario.t_max
-        for drive in self.drives.values():
-            drive.prepare(max(i - 1, 0) * dt, min((i + n + 2) * dt, t_max))
-        t, parts = (i + np.arange(n + 1)) * dt, self.parts
-        if self.muscle:
-            ahead = Signal(self.muscle.table, self.muscle.mean(t[:n], 0.5 * dt), i)
-            parts = parts._replace(push=parts.push._replace(muscle=ahead))
-        if self.command:
-            change = np.diff(self.command.around(t, 0.5 * dt), axis=0)
-            parts = parts._replace(command=Signal(self.command.table, change, i))
-        self.take(parts)
+    def _draw(self, n: int) -> None:
+        """Draws the random effects on the control samples of the next n whole steps."""
+        x, k, io = self.parts.sampler.chance, self.state.loop.machine.samples.k, self.scenario.interface
+        most = n // self.parts.sampler.ratio + 8  # and a look ahead
+        if x.first <= k and k + most <= x.first + len(x.numbers) // 4:
+            return
+        if self._noise is None or k < self._noise.first:
+            self._noise = hardware.SampleNoise(io)
+        chance = Chance(self._noise.table(k, most + scene.NOISE_AHEAD).ravel(), k)
+        self._noise.forget(k)
+        self.take(self.parts._replace(sampler=self.parts.sampler._replace(chance=chance)))
+
+    def take_over(self, controller: Controller) -> None:
+        """Lets a controller of the user's own act, before the first step of a sampled run.
+
+        Args:
+            controller: that one.
+        """
+        self._controller = controller
+        self._equip(scene.parts_of(self.scenario, controller))
+        self.state = scene.start(self.views, self.scenario, self.e)
+        self.rendered = scene.tells(self.parts)
+        self._saved = self.saved()
 
     def take(self, parts: Parts) -> None:
         """Goes on with other numbers in the same parts.
@@ -424,7 +444,7 @@ class Run:
         """
         if x.scenario != self.scenario:
             self.scenario = x.scenario
-            self._equip(scene.parts_of(x.scenario))
+            self._equip(scene.parts_of(x.scenario, self._controller))
         self.restore(x.saved)
         self._saved, n = x.before, len(x.rows)
         self.store.rows[:n], self.store.rendered[: len(x.rendered)] = x.rows, x.rendered
@@ -438,7 +458,7 @@ class Run:
             scenario: with these.
         """
         before = self.parts
-        parts = scene.parts_of(scenario)
+        parts = scene.parts_of(scenario, self._controller)
         scene.keep_written(parts, before)
         self.scenario = self.watch.scenario = scenario
         self._equip(parts)
@@ -705,18 +725,13 @@ class Run:
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
 
 
-def _drives(scenario: Scenario) -> dict[str, Any]:
-    """The Drive of the muscle and of the command, where they vary."""
+def _drives(scenario: Scenario) -> Any:
+    """The signals of a run; None where none varies."""
     if not scenario.driven:
-        return {}
-    from .signal_ahead import Drive  # only a run that has one pays for it
+        return None
+    from .signal_ahead import Drives  # only a run that has one pays for it
 
-    both = {"muscle": scenario.muscle, "command": scenario.command}
-    return {
-        name: Drive(signal, scenario.dt, name == "command")
-        for name, signal in both.items()
-        if signal is not None and signal.varies
-    }
+    return Drives(scenario)
 
 
 def _columns(made: np.ndarray) -> np.ndarray:

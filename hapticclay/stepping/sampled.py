@@ -9,7 +9,7 @@ from __future__ import annotations
 from ..model import arm, compensator, controller, operator
 from ..model import flow as yielding_law
 from ..model import spring as spring_law
-from . import friction, grooves, hardware, rows, servo, viscous, yielding
+from . import friction, grooves, hardware, laws, rows, servo, viscous, yielding
 from .driver import behind, pushed
 from .engine_step import moved_arm, put
 from .kick import (
@@ -18,7 +18,8 @@ from .kick import (
     command_change,
     handle_at,
     link_torques,
-    mean_push,
+    push_now,
+    row_ahead,
     step_around,
     velocity,
 )
@@ -77,20 +78,22 @@ def resisted(hand, uh, at):
     )
 
 
-def without_clay(part, sampler, grain, s, v, f):
+def without_clay(part, sampler, grain, s, at, f):
     """A force without that of the clay before the sample that does not yield, (x, y) [N]."""
     if part is None:
         return f
     b = viscous.now(part, s.clay, True, s.clock.t)
-    bx, by = viscous.force(grain, b, v)
-    px, py = sprung_before(sampler.special, s.clay.laws)
+    bx, by = viscous.force(grain, b, at.v)
+    px, py = special_before(sampler.special, s.clay.laws, at)
     return f[0] - bx - px, f[1] - by - py
 
 
-def sprung_before(special, state):
+def special_before(special, state, at):
     if special is None:
         return NONE
-    return elastic_before(special.springs, state)
+    x, y = elastic_before(special.springs, state)
+    fx, fy = laws.force(special.more, state.more, at.p, at.v)
+    return x + fx, y + fy
 
 
 def elastic_before(springs, state):
@@ -99,7 +102,7 @@ def elastic_before(springs, state):
     return state.elastic.before
 
 
-def reaction(special, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
+def reaction(special, sampler, parts, s, felt, at, tau, uh):
     """Force of physical clay that yields at an instant, (x, y) [N].
 
     Where clay holds the handle it is what keeps it from accelerating.
@@ -119,11 +122,11 @@ def reaction(special, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
     return reaction_of(special.flow, sampler, parts, s, felt, at, tau, uh)
 
 
-def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
+def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):
     if flow is None:
         return NONE
     f = resisted(parts.hand, uh, at)
-    f = without_clay(sampler.clay, sampler, parts.grain, s, at.v, f)
+    f = without_clay(sampler.clay, sampler, parts.grain, s, at, f)
     ax, ay = instant_acceleration(parts, at, tau, f)
     x, y = masses(parts.hand)
     xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), at.W, (x, y, 0.0))
@@ -140,7 +143,7 @@ def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):  # noqa: PLR0913
     return viscous.across(grain, fs[0], fs[1])
 
 
-def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
+def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):
     """Force of the operator on the sensor at an instant, (x, y) [N].
 
     At the start the handle does not accelerate.
@@ -160,7 +163,7 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):  # noqa: PLR0913
     if s.clock.before == 0.0:
         return resisted(hand, uh, Handle(at.u, at.p, at.W, at.v, NONE))
     x, y = resisted(hand, uh, at)
-    fx, fy = without_clay(sampler.clay, sampler, parts.grain, s, at.v, (x, y))
+    fx, fy = without_clay(sampler.clay, sampler, parts.grain, s, at, (x, y))
     ax, ay = instant_acceleration(parts, at, tau, (fx - pull[0], fy - pull[1]))
     return x - hand[0].mass * ax, y - hand[1].mass * ay
 
@@ -197,7 +200,7 @@ def stiff_velocity(part, sampler, parts, s, at, u):
 # ---- compute -------------------------------------------------------------------------------------
 
 
-def rendered_clay(part, special, sampler, parts, s, at, b, pull):  # noqa: PLR0913
+def rendered_clay(part, special, sampler, parts, s, at, b, pull):
     """Force of clay with damping b as the controller takes it [N]; pull is that of yielding."""
     if part is None:
         return NONE
@@ -211,16 +214,17 @@ def special_force(special, sampler, parts, s, at, pull):
         return NONE
     x, y = flowing_force(special.flow, sampler.clay, special, parts, s.clay.laws, at.v, pull)
     px, py = springs_force(special.springs, sampler, s.clay.laws.elastic, at.p)
-    return x + px, y + py
+    fx, fy = laws.force(special.more, s.clay.laws.more, at.p, at.v)
+    return x + px + fx, y + py + fy
 
 
-def flowing_force(flow, clay, special, parts, state, v, pull):  # noqa: PLR0913
+def flowing_force(flow, clay, special, parts, state, v, pull):
     if flow is None:
         return NONE
     return force_in_motion(clay, flow, special.groove, parts.grain, state.flow, v, pull)
 
 
-def force_in_motion(clay, flow, groove, grain, felt, v, pull):  # noqa: PLR0913
+def force_in_motion(clay, flow, groove, grain, felt, v, pull):
     """Force of clay that yields, beside b v, on a handle in motion; none at rest.
 
     Where the clay acts itself, it is what holds it.
@@ -319,7 +323,7 @@ def driven_torques(part, limits, tau):
     return hardware.converted(part, clipped(tau, limits))
 
 
-def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
+def answer(chance, sampler, parts, s, at, w, f, pull):
     """What the controller makes of a sample.
 
     Args:
@@ -335,13 +339,13 @@ def answer(chance, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
     if chance is None:
         return heard(sampler.own, sampler, parts, s, at, w, f, pull)
     m = s.loop.machine
-    if chance[hardware.CHANCE * m.samples.k + 1] > 0.0:  # lost
+    if hardware.is_lost(chance, m.samples.k):
         delta = m.x.delta, m.y.delta
         return Answer(0.0, m.hold, m.force, delta, m.own, m.rates, m.guard, m.tool)
     return heard(sampler.own, sampler, parts, s, at, w, f, pull)
 
 
-def heard(own, sampler, parts, s, at, w, f, pull):  # noqa: PLR0913
+def heard(own, sampler, parts, s, at, w, f, pull):
     """The same of a sample that is not lost: of the paper's controller, or the user's own."""
     m = s.loop.machine
     q = hardware.encoded(sampler.encoder, s.body.q)
@@ -408,7 +412,7 @@ def advanced_form(memory, form, m, f, shift):
     return x, y, Formed(zx, zy, (z.start[0] + shift[0], z.start[1] + shift[1]))
 
 
-def form_over_sample(memory, form, i, x, z, start, f, shift):  # noqa: PLR0913
+def form_over_sample(memory, form, i, x, z, start, f, shift):
     """Loop and states of one axis a sample later."""
     o, at = FORM_MEMORY * i, (x.y, x.yrate, start, f)
     a, b = form_row(memory, o, z, at), form_row(memory, o + 8, z, at)
@@ -427,11 +431,13 @@ def form_row(m, o, z, at):
     return out
 
 
-def shift_of(command, t, Ts):
-    """Change of the command over a sample, (x, y) [m]."""
+def shift_of(command, dt, clock, Ts):
+    """Change of the command over a control sample, (x, y) [m]."""
     if command is None:
         return NONE
-    return command_change(command, t, t + Ts, 0.0)
+    if clock.t == clock.i * dt:
+        return row_ahead(command, clock.i)
+    return command_change(command.table, clock.t, clock.t + Ts, 0.0)
 
 
 # ---- an event ------------------------------------------------------------------------------------
@@ -452,10 +458,24 @@ def acted(sampler, parts, s):
     now = s.clock.t + SLACK * dt
     acts = m.samples.when <= now
     if acts or hardware.is_due(sampler.delay, m.queue, now):
-        return with_event(s, event(sampler, parts, s, acts, now))
+        e = event(sampler, parts, s, acts, now)
+        return with_event(unless_refused(sampler.own, s, e), e)
     if s.loop.event.on == 0.0:
         return s
     return with_event(s, past(s.loop.event))
+
+
+def unless_refused(own, s, e):
+    """The state; of a run that is over where the user's own controller asks for torques that are not
+    finite: limits would hide it, and a delay put it off.
+    """
+    if own is None:
+        return s
+    if e.shown > 0.0 and is_refused(e.asked.tau):
+        x = s.status
+        x = Status(NOT_FINITE, x.closing, x.careful, x.landings, x.seen)
+        return State(s.clock, s.body, s.loop, s.clay, s.work, x, s.filled)
+    return s
 
 
 def with_event(s, e):
@@ -513,16 +533,17 @@ def sampled(sampler, parts, s, at, w, special, tau):
         special: laws of the clay behind the kick that leads to the sample.
         tau: torques on the joints in it [N.m].
     """
-    m, uh = s.loop.machine, mean_push(parts.push, s.clock.t, 0.0)
+    m, dt = s.loop.machine, parts.time.dt
+    uh = push_now(parts.push, dt, s.clock)
     pull = reaction(sampler.special, sampler, parts, s, special, at, tau, uh)
     f = on_sensor(parts.hand, sampler, parts, s, at, tau, uh, pull)
     f = hardware.noise(sampler.chance, m.samples.k, f)
     f, filtered = hardware.filtered(sampler.filter, m.filtered, f)
     f = hardware.converted(sampler.adc, f)
     a = answer(sampler.chance, sampler, parts, s, at, w, f, pull)
-    shift = shift_of(sampler.command, s.clock.t, sampler.Ts)
+    shift = shift_of(sampler.command, dt, s.clock, sampler.Ts)
     x, y, form = advanced(sampler.own, sampler, parts, m, a.force, shift)
-    samples = samples_from(sampler, parts.time.dt, m.samples.k + 1)
+    samples = samples_from(sampler, dt, m.samples.k + 1)
     return Machine(
         x, y, form, a.own, a.hold, samples, a.force, a.rates, filtered, a.guard, a.tool, m.queue
     ), a
@@ -613,13 +634,13 @@ def shown(sampler, parts, s, k, after, v, f):
     return f, delta, felt_at(parts.special, sampler, parts, s, k, share, v)
 
 
-def felt_at(special, sampler, parts, s, k, share, v):  # noqa: PLR0913
+def felt_at(special, sampler, parts, s, k, share, v):
     if special is None:
         return NONE
     return flow_at(special.flow, sampler.clay, parts, s, k, share, v)
 
 
-def flow_at(flow, clay, parts, s, k, share, v):  # noqa: PLR0913
+def flow_at(flow, clay, parts, s, k, share, v):
     if flow is None:
         return NONE
     x, old = k.motion.reaction.felt.f, s.loop.event.reaction.felt.f
@@ -680,15 +701,15 @@ def stepped_arm(sampler, parts, e, s, k, after):
 
 
 def taken(sampler, parts, s, k):
-    """Loop and status behind a step that is taken."""
+    """The loop behind a step that is taken."""
     if sampler is None:
-        return k.loop, s.status
+        return k.loop
     loop, e = s.loop, s.loop.event
     if e.on == 0.0:
-        return loop, s.status
+        return loop
     if e.shown > 0.0:
         note(sampler, s.body.q, loop.machine, e)
-    return Sampled(e.machine, past(e)), status_of(sampler.own, s.status, e)
+    return Sampled(e.machine, past(e))
 
 
 def note(sampler, q, machine, e):
@@ -696,12 +717,3 @@ def note(sampler, q, machine, e):
     hardware.note_angles(sampler.difference, machine, hardware.encoded(sampler.encoder, q))
     hardware.note_force(sampler.passivity, e.machine, e.asked.force)
     hardware.note_hold(sampler.delay, machine, e.machine, e.asked)
-
-
-def status_of(own, x, e):
-    """The run is over where the user's own controller asks for torques that are not finite."""
-    if own is None:
-        return x
-    if e.shown > 0.0 and is_refused(e.asked.tau):
-        return Status(NOT_FINITE, x.closing, x.careful, x.landings, x.seen)
-    return x

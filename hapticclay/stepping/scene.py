@@ -10,7 +10,7 @@ import numpy as np
 from ..model import compensator, groove, regions
 from ..model import hardware as interface
 from ..model.constants import B_MAX
-from ..model.sampled_controller import DESK, LawCaller
+from ..model.sampled_controller import DESK, Controller, LawCaller
 from ..model.scenario import Scenario
 from . import begin, hardware, laws, pace, rows
 from . import parts as p_
@@ -24,6 +24,7 @@ from .parts import INF
 NONE = (0.0, 0.0)
 QUEUE = 4  # rows of the queue of torques beyond the whole samples that they come late
 STIFF, HITTING = 1.0, 0.02  # stiffness of clay from which on it has a part Stiff, and Hits
+NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
 
 
 def hand_parts(s: Scenario):
@@ -124,7 +125,13 @@ def substeps_of_blocks(s: Scenario):
     return blocks
 
 
-def parts_of(s: Scenario):
+def parts_of(s: Scenario, controller: Controller | None = None):
+    """The parts of a scene.
+
+    Args:
+        s: the scene.
+        controller: that of the user's own, in place of the scene's.
+    """
     lag, form = compensators(s)
     clay = clay_part(s)
     return p_.Parts(
@@ -134,11 +141,11 @@ def parts_of(s: Scenario):
         1 if s.shaping else None, lag, form, hand_parts(s),
         p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
-        sampler(s, *clay[::3]), *accurate_parts(s),
+        sampler(s, controller or s.controller, *clay[::3]), *accurate_parts(s),
     )  # fmt: skip
 
 
-def sampler(s: Scenario, clay, special):
+def sampler(s: Scenario, controller, clay, special):
     """Sampled control and its hardware."""
     if s.control != "sampled":
         return None
@@ -151,14 +158,12 @@ def sampler(s: Scenario, clay, special):
         memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
     else:
         formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
-    if s.controller is not None:
-        state = s.controller.state
-        desk = np.array([0.0] * DESK + [*state, *state, *s.controller.params])
-        own = p_.Own(
-            LawCaller(s.controller, desk), memoryview(desk), len(state), tuple(map(float, state))
-        )
+    if controller is not None:
+        state = controller.state
+        desk = np.array([0.0] * DESK + [*state, *state, *controller.params])
+        own = p_.Own(LawCaller(controller, desk), desk, tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
-    told = is_held(s) and (io or (not own and s.clay and (s.clay.yields or s.clay.springs)))
+    told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
     first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
     return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
 
@@ -167,8 +172,8 @@ def hardware_parts(s: Scenario, io, Ts):
     """The parts of a Sampler from `chance` on."""
     chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
     if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
-        n = int(s.t_max / Ts) + 8
-        chance = interface.SampleNoise(io).table(0, n).ravel()
+        n = min(int(s.t_max / Ts), NOISE_AHEAD) + 8
+        chance = p_.Chance(interface.SampleNoise(io).table(0, n).ravel(), 0)
     if io.velocity == "difference":
         cutoff = float(io.velocity_filter) if io.velocity_filter else None
         difference = p_.Difference(io.window, cutoff, np.zeros(3 * io.window))
@@ -324,8 +329,18 @@ def rings(sampler):
     return [x.ring for x in parts if x is not None]
 
 
+def own_law(parts):
+    """The caller of the user's own controller; None without any."""
+    if parts.sampler is None or parts.sampler.own is None:
+        return None
+    return parts.sampler.own.law
+
+
 def beyond(parts):
-    """Why no step can go on from an arm beyond floating point."""
+    """Why no step can go on."""
+    law = own_law(parts)
+    if law is not None and not law.finite():
+        return "the torques of the controller are not finite"
     return "the arm is stretched or folded"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from . import modes as m_
-from .instant import instant
+from .instant import instant, moment
 from .march import place_behind, worked
 
 X, Y, MODE_X, MODE_Y = range(4)  # what is looked for: coordinates of borders, axes of modes
@@ -27,7 +27,8 @@ def missed(modal, probe, parts, s, k, h, what, border):
 
 def felt_behind(parts, s, k, h):
     """What clay that yields does at the end of a step of length h, in its modes."""
-    return instant(parts, s.clock.t + h, k.end, s.clay, s.loop.modes).grip
+    when = moment(parts.accurate.ahead, s.clock.t, h, -1)
+    return instant(parts, when, k.end, s.clay, s.loop.modes).grip
 
 
 def find_root(b, fb, probe, parts, s, what, border):

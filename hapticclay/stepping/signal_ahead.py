@@ -2,14 +2,125 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ..model import pieces
+from ..model.scenario import Scenario
 from ..model.signals import Signal
+from . import march
+from . import parts as p_
 
+COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the accurate method
 NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
+
+
+class Drives:
+    """The signals of a run, put into its parts.
+
+    Args:
+        scenario: of the run; its muscle force or its command varies.
+    """
+
+    def __init__(self, scenario: Scenario):
+        both = {"muscle": scenario.muscle, "command": scenario.command}
+        self.signals = {
+            name: Drive(signal, scenario.dt, name == "command")
+            for name, signal in both.items()
+            if signal is not None and signal.varies
+        }
+
+    def prepared(self, parts: p_.Parts, i: int, n: int) -> tuple[p_.Parts, int]:
+        """The parts with the signals over the next whole steps.
+
+        Args:
+            parts: the scene.
+            i: the sample that the run is at, or behind.
+            n: number of whole steps.
+
+        Returns:
+            The parts; for how many whole steps they are ready.
+        """
+        dt, further, tables = parts.time.dt, 2, self.signals.values()
+        if parts.accurate is not None:
+            counts = march.substeps(parts.accurate.blocks, parts.accurate.substeps, i)
+            cosines = max(1, *(x.cosines for x in tables))
+            n = min(n, max(1, COSINES // (2 * counts * cosines)))
+        elif parts.sampler is not None:
+            further += parts.sampler.ratio
+        begin, end = max(i - 1, 0) * dt, min((i + n + further) * dt, parts.time.t_max)
+        for drive in tables:
+            drive.prepare(begin, end)
+        if parts.accurate is not None:
+            return self._accurate(parts, i, n, (begin, end)), n
+        if parts.sampler is not None:
+            return self._sampled(parts, i, n), n
+        return self._continuous(parts, i, n), n
+
+    def _put(self, parts: p_.Parts, **signals: Any) -> p_.Parts:
+        """The parts with signals: as they act on the handle, and on the controller."""
+        muscle, command = signals.get("muscle"), signals.get("command")
+        if muscle is not None:
+            parts = parts._replace(push=parts.push._replace(muscle=muscle))
+        if command is not None and parts.sampler is not None:
+            return parts._replace(sampler=parts.sampler._replace(command=command))
+        return parts._replace(command=command)
+
+    def _continuous(self, parts: p_.Parts, i: int, n: int) -> p_.Parts:
+        t, dt, made = (i + np.arange(n + 1)) * parts.time.dt, parts.time.dt, {}
+        for name, x in self.signals.items():
+            if name == "muscle":
+                ahead = x.mean(t[:n], 0.5 * dt)
+            else:
+                ahead = np.diff(x.around(t, 0.5 * dt), axis=0)
+            made[name] = p_.Signal(x.table, ahead, i)
+        return self._put(parts, **made)
+
+    def _sampled(self, parts: p_.Parts, i: int, n: int) -> p_.Parts:
+        dt, made = parts.time.dt, {}
+        t = (i + np.arange(n)) * dt
+        for name, x in self.signals.items():
+            if name == "muscle":
+                early, late = x.mean(t - 0.25 * dt, 0.25 * dt), x.mean(t + 0.25 * dt, 0.25 * dt)
+                halves = np.column_stack((early, late, x(t)))
+                made[name] = p_.Signal(x.table, 0.5 * (early + late), i, halves)
+            else:
+                made[name] = p_.Signal(x.table, x(t + parts.sampler.Ts) - x(t), i)
+        return self._put(parts, **made)
+
+    def _accurate(self, parts: p_.Parts, i: int, n: int, span: tuple[float, float]) -> p_.Parts:
+        dt, made, accurate = parts.time.dt, {}, parts.accurate
+        times = stage_times(accurate, dt, i, n)
+        for name, x in self.signals.items():
+            made[name] = p_.Signal(x.table, x(times) if name == "muscle" else x.since_start(times), i)
+        breaks = np.unique(np.concatenate([x.breaks(*span) for x in self.signals.values()]))
+        ahead = p_.Ahead(times, np.append(breaks, math.inf), NEAR * dt)
+        return self._put(parts._replace(accurate=accurate._replace(ahead=ahead)), **made)
+
+
+def stage_times(accurate: p_.Accurate, dt: float, i: int, n: int) -> np.ndarray:
+    """Starts and middles of the steps of the accurate method, and the end of the last [s].
+
+    Args:
+        accurate: the method.
+        dt: length of a sample [s].
+        i: index of the first sample.
+        n: number of samples.
+    """
+    k, blocks = i + np.arange(n), []
+    counts = np.array([march.substeps(accurate.blocks, accurate.substeps, j) for j in k])
+    for each in np.split(k, np.flatnonzero(np.diff(counts)) + 1):
+        count = counts[each[0] - i]
+        t, end = each * dt, (each + 1) * dt
+        times = np.empty((len(each), 2 * count))
+        for j in range(count):
+            h = dt / count if j < count - 1 else end - t
+            times[:, 2 * j], times[:, 2 * j + 1] = t, t + 0.5 * h
+            t = t + h
+        blocks.append(times.ravel())
+    return np.append(np.concatenate(blocks), (i + n) * dt)
 
 
 class Drive:

@@ -742,6 +742,22 @@ class Course(NamedTuple):
     modes: Any
 
 
+class Moment(NamedTuple):
+    """When a stage of a step is.
+
+    Attributes:
+        t: time [s].
+        near: a time beside it within the step, where signals count as they are there [s].
+        row: of the signals ahead; -1 where they have none.
+        since: time since the start of the step [s].
+    """
+
+    t: float
+    near: float
+    row: int
+    since: float
+
+
 class Point(NamedTuple):
     """Where a stage of a step is.
 

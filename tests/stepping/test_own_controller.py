@@ -13,7 +13,7 @@ import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
 from hapticclay.model.sampled_controller import LawCaller, LawFailed
-from hapticclay.stepping import sampled
+from hapticclay.stepping import scene
 from tests.oracles import paper_law
 
 pytestmark = pytest.mark.usefixtures("silent_compiler")
@@ -330,7 +330,7 @@ def test_ctrl_c_at_any_moment_of_a_law_ends_the_run():
 
     s = replace(POSE, controller=hc.Controller(counting()), t_max=0.2)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sampled, "LawCaller", Signalled)
+        patch.setattr(scene, "LawCaller", Signalled)
         patch.setattr(sys, "unraisablehook", lambda told: None)
         with pytest.raises(KeyboardInterrupt):
             hc.simulate(s, engine="native")
