@@ -15,6 +15,8 @@ from typing import Any
 
 MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
 
+CARRY = "carry"  # begins the kind of many runs that are made together
+
 
 @functools.cache
 def cache_folder() -> Path:
@@ -78,11 +80,13 @@ def is_kept(kind: Any) -> bool:
 
 
 def compile_time(kind: Any) -> float:
-    """Time that it takes to compile the whole steps of a kind, measured [s].
+    """Time that it takes to compile the whole steps of a kind, or many runs of it, measured [s].
 
     Args:
-        kind: from `kind_of`.
+        kind: from `kind_of`; or that of many runs, (CARRY, kind, ...).
     """
+    if kind[0] == CARRY:
+        return 5.0 * compile_time(kind[1])
     parts = sum(1 for x in leaves(kind) if isinstance(x, type) and issubclass(x, tuple))
     return 0.25 * parts
 
