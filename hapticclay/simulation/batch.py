@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import os
 import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,9 +66,7 @@ SUMMARY = np.dtype(
     ]
 )
 KNOWN = 100_000  # runs of a sequence that are counted before the first; more repay anything
-# time that a run takes Python beside its steps, alone [s]; times that the machine code of runs made
-# together takes as long to compile as their whole steps alone, measured
-ALONE, WHOLE = 1e-3, 4.0
+ALONE = 1e-3  # time that a run takes Python beside its steps, alone, measured [s]
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
 WARNED = 1000  # kinds of scene of a batch that are looked at for values that are hardly meant
 
@@ -82,8 +81,9 @@ def simulate_batch(
 ) -> Any:
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
-    The number of threads and the order do not matter. Without numba, scenes run one after the
-    other. A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
+    The number of threads and the order do not matter. Machine code is compiled for each kind of
+    scene whose runs repay it; others run in Python. Without numba, scenes run one after the other.
+    A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
     generator: they are taken as they are run, and those of summaries are not held.
 
     Args:
@@ -120,14 +120,15 @@ def simulate_batch(
     known = scenarios if isinstance(scenarios, Sequence) and len(scenarios) <= KNOWN else ()
     plan = Plan(pool, known, together)
 
-    def make(jobs: list[Job], stopped: Callable[[], bool]) -> Any:
+    def make(jobs: list[Job]) -> Any:
         if summaries:
-            return _summaries_of(pool, plan, jobs, stopped)
-        return [record.Record.of(*pool.run(j.scenario, j.kernel)) for j in jobs if not stopped()]
+            return _summaries_of(pool, plan, jobs)
+        return [record.Record.of(*pool.run(j.scenario, j.kernel)) for j in jobs]
 
     parts = map(plan.jobs, _in_parts(itertools.chain(first, todo), together))
     with warnings_caught():
-        _on_threads(parts, make, out.put, max(min(threads, len(first)), 1))
+        count = max(min(threads, len(first)), 1)
+        _on_threads(parts, make, out.put, count, pool.stop)
     return out.all()
 
 
@@ -150,16 +151,21 @@ class BatchPool:
 
     Args:
         every: keep each every-th sample, and the last.
+
+    Attributes:
+        stop: set where the batch is over before its end, so that no run begins.
     """
 
     def __init__(self, every: int):
-        self.every = every
+        self.every, self.stop = every, threading.Event()
         self.own, self.turn = threading.local(), threading.Lock()
 
     def _go(self, scenario: Scenario, every: int, kernel: Kernel, brief: bool) -> tuple[Run, float]:
         """The run, made by this thread's engines, and the seconds it took."""
         # in CPython one after the other: side by side they would wait for each other at each step
         with self.turn if kernel is PLAIN else contextlib.nullcontext():
+            if self.stop.is_set():
+                raise CancelledError
             return completed(scenario, every, kernel, self.store(), None, brief)
 
     def store(self) -> EngineStore:
@@ -212,6 +218,8 @@ class BatchPool:
         Returns:
             As many.Lane.make.
         """
+        if self.stop.is_set():
+            raise CancelledError
         return self.lane().make(scenarios, keys)
 
 
@@ -241,6 +249,8 @@ class Plan:
             else:
                 kinds.setdefault(key, []).append(s)
         for key, jobs in kinds.items():
+            self._count(key, jobs)
+        for key, jobs in kinds.items():
             if self._repay(key, jobs):
                 self.carried[key] = False
             else:
@@ -264,35 +274,48 @@ class Plan:
             for s, key in zip(scenarios, keys, strict=True)
         ]
 
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """The module stepping.compiled; None where it cannot be loaded."""
+        return load_compiled()
+
     def _carries(self, key: Any, jobs: list[Scenario]) -> bool:
         """Whether runs of a kind are made together; compiled then."""
         if key not in self.carried:
-            if self.known or not self._repay(key, jobs):
+            if self.known:
+                return False
+            self._count(key, jobs)
+            if not self._repay(key, jobs):
                 return False
             self.carried[key] = False
+        if self.compiled is None:
+            return False
         if not self.carried[key]:
-            compiled, pattern = load_compiled(), self.patterns.of(key, jobs[0])
-            if compiled is None:
-                return False
-            with compiled.first_call(carried, pattern.kind, "many runs of this kind"):
+            pattern = self.patterns.of(key, jobs[0])
+            with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
                 self.pool.lane().group(pattern, jobs[:1])
             self.carried[key] = True
         return True
 
+    def _count(self, key: Any, jobs: list[Scenario]) -> None:
+        """Adds the time that would be saved if runs of a kind were made together."""
+        if len(jobs) < FEWEST:
+            return
+        pattern = self.patterns.of(key, jobs[0])
+        steps = 0.0 if is_ready(pattern.scene) else sum(s.t_max / s.dt for s in jobs)
+        # half: runs tend to end before t_max
+        time = ALONE * len(jobs) + 0.5e-6 * saved_in_a_step(jobs[0]) * steps
+        saved[pattern.kind] = saved.get(pattern.kind, 0.0) + time
+
     def _repay(self, key: Any, jobs: list[Scenario]) -> bool:
-        """Whether runs of a kind, with those before, repay what makes them together."""
+        """Whether runs of a kind, with those counted so far, repay what makes them together."""
         if len(jobs) < FEWEST:
             return False
         pattern = self.patterns.of(key, jobs[0])
         if not pattern.is_made or pattern.kind in carried:
             return pattern.is_made
-        steps = 0.0 if is_ready(pattern.scene) else sum(s.t_max / s.dt for s in jobs)
-        # half: runs tend to end before t_max
-        time = ALONE * len(jobs) + 0.5e-6 * saved_in_a_step(jobs[0]) * steps
-        saved[pattern.kind] = time = saved.get(pattern.kind, 0.0) + time
-        return time >= LOADING and (
-            is_kept(pattern.kind) or time >= WHOLE * compile_time(pattern.scene)
-        )
+        time = saved[pattern.kind]
+        return time >= LOADING and (is_kept(pattern.kind) or time >= compile_time(pattern.kind))
 
     def kernel(self, s: Scenario) -> Kernel:
         """How the steps of a run are made that is made alone; compiled then.
@@ -309,10 +332,9 @@ class Plan:
                 if known:
                     self.kernels[traits] = PLAIN
                 return PLAIN
-            compiled = load_compiled()
-            self.kernels[traits] = compiled.KERNEL if compiled else PLAIN
-            if compiled:
-                compiled.warm(s)
+            self.kernels[traits] = self.compiled.KERNEL if self.compiled else PLAIN
+            if self.compiled:
+                self.compiled.warm(s)
             return self.kernels[traits]
 
 
@@ -406,16 +428,13 @@ def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Sc
         yield part
 
 
-def _summaries_of(
-    pool: BatchPool, plan: Plan, jobs: list[Job], stopped: Callable[[], bool]
-) -> np.ndarray:
+def _summaries_of(pool: BatchPool, plan: Plan, jobs: list[Job]) -> np.ndarray:
     """Summaries of runs.
 
     Args:
         pool: makes them.
         plan: how.
         jobs: what to run.
-        stopped: whether the batch is over before its end.
     """
     out, keys = np.zeros(len(jobs), SUMMARY), [j.key for j in jobs]
     together = any(key is not None for key in keys)
@@ -424,8 +443,6 @@ def _summaries_of(
         for name, values in fields.items():
             out[name][places] = values
     for i in left:
-        if stopped():
-            break
         s, key, kernel = jobs[i]
         out[i] = summary_entry(*pool.brief(s, kernel if key is None else plan.kernel(s)))
     return out
@@ -438,9 +455,10 @@ def cores() -> int:
 
 def _on_threads(
     parts: Iterable[list[Job]],
-    make: Callable[[list[Job], Callable[[], bool]], Any],
+    make: Callable[[list[Job]], Any],
     put: Callable[[int, Any], None],
     threads: int,
+    stop: threading.Event,
 ) -> None:
     """Makes parts of a batch on several threads; the first exception ends all and is raised.
 
@@ -449,11 +467,12 @@ def _on_threads(
 
     Args:
         parts: of the batch.
-        make: results of a part, asked for with a function that tells whether the batch is over.
+        make: results of a part.
         put: takes the place of the first run of a part, and the results.
         threads: their number.
+        stop: set where the batch is over before its end.
     """
-    stop, at = threading.Event(), 0
+    at = 0
     working: dict[Future[Any], int] = {}
 
     def collect(most: int) -> None:
@@ -464,7 +483,7 @@ def _on_threads(
     with ThreadPoolExecutor(threads) as pool:
         try:
             for part in parts:
-                working[pool.submit(make, part, stop.is_set)] = at
+                working[pool.submit(make, part)] = at
                 at += len(part)
                 collect(2 * threads - 1)
             collect(0)

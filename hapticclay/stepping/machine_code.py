@@ -22,7 +22,9 @@ COMPILING_PART = {
     p_.Sampler: 4.0, p_.Difference: 1.0, p_.Converter: 0.5, p_.Delay: 1.0, p_.Passivity: 1.0,
     p_.Coupling: 1.0, p_.Accurate: 2.5, p_.Modal: 4.5,
 }  # fmt: skip
+CARRYING = 3.0  # times as long for many runs that are made together
 MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
+CARRY = "carry"  # begins the kind of many runs that are made together
 
 
 @functools.cache
@@ -87,11 +89,13 @@ def is_kept(kind: Any) -> bool:
 
 
 def compile_time(kind: Any) -> float:
-    """Time that it takes to compile the whole steps of a kind, measured [s].
+    """Time that it takes to compile the whole steps of a kind, or many runs of it, measured [s].
 
     Args:
-        kind: from `kind_of`.
+        kind: from `kind_of`; or that of many runs, (CARRY, kind, ...).
     """
+    if kind[0] == CARRY:
+        return CARRYING * compile_time(kind[1])
     return COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(kind))
 
 

@@ -22,7 +22,7 @@ from ..model.operator import NO_HAND, mobility_with
 from ..model.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous
 from .engine_step import put
-from .machine_code import kind_of
+from .machine_code import CARRY, kind_of
 from .memories import delay_in_samples
 from .parts import Parts
 from .run import EngineStore, Kernel
@@ -240,15 +240,17 @@ def is_plain(law: Any) -> bool:
 
 
 def hardness(s: Scenario, x: Profile, y: Profile) -> tuple[bool, bool]:
-    """Whether clay is so stiff that it has the parts Stiff and Hits, where it acts on the handle.
+    """Whether clay is so stiff that it has the parts Stiff and Hits.
 
     Args:
         s: the scenario.
         x: its clay of x.
         y: of y.
     """
+    if scene.is_held(s):
+        return False, False
     k = scene.stiffness_of(s, max(max(x.values), max(y.values)))
-    return k > scene.STIFF, k > scene.HITTING
+    return k > scene.STIFF, k > scene.HITTING and s.control != "sampled"
 
 
 def numbers_of(part: Any) -> list[float]:
@@ -295,7 +297,7 @@ class Pattern:
         self.parts: Parts = scene.parts_of(scenario)
         self.blocks: State = scene.blocks(self.parts, scenario)
         self.scene = kind_of(self.parts)
-        self.kind = "carry", self.scene, kind_of(self.blocks)
+        self.kind = CARRY, self.scene, kind_of(self.blocks)
         self.is_made = self.parts.form is None
         self.row, self.at = np.array(numbers_of(self.parts)), places(self.parts)
 
