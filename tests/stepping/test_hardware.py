@@ -18,7 +18,7 @@ from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.stepping.sampled import SampledRun
+from hapticclay.stepping.run import Run
 from hapticclay.theory import linear_loop
 
 EVERYWHERE = Profile((), (90.0,))
@@ -71,19 +71,18 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
         np.testing.assert_allclose(a.fe[:-1], b.fe[:-1], atol=8 * EPS)
 
 
-def test_a_run_loads_the_method_that_it_takes_alone():
+def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
     code = (
         "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, control={!r}), "
         "engine='python'); print(*sorted(m.rpartition('.')[2] for m in sys.modules "
         "if m.startswith('hapticclay.stepping.')))"
     )
-    loaded = {}
     for control in ("continuous", "sampled"):
         run = [sys.executable, "-c", code.format(control)]
         out = subprocess.run(run, capture_output=True, text=True, check=True)
-        loaded[control] = set(out.stdout.split())
-    assert loaded["sampled"] - loaded["continuous"] == {"sampled"}
-    assert not loaded["sampled"] & {"runge_kutta", "modes", "many", "compiled", "drive"}
+        loaded = set(out.stdout.split())
+        assert {"path", "run"} < loaded
+        assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
 
 
 def test_seeds_repeat_and_differ():
@@ -244,11 +243,11 @@ def test_difference_lags_half_its_window_in_a_run():
     """Under a steady acceleration the mean over m samples is the rate m Ts/2 ago."""
     s = hc.free(control="sampled", t_max=0.02)
     for m in (1, 4):
-        run = SampledRun(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
+        run = Run(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
         shown = []
-        for _ in range(run.last):
-            run.advance(run.filled + 1)  # one step; the kick to its sample ended with start
-            shown.append((tuple(run.s["start"])[:2], tuple(run.s["wires"])[:2]))
+        for _ in range(run.parts.time.last):
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with event.w
+            shown.append((run.state.loop.event.w, run.state.loop.machine.rates.w))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate

@@ -6,7 +6,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model.constants import TS
-from hapticclay.stepping.sampled import SampledRun
+from hapticclay.stepping.run import EngineStore, Run, completed
 from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast, same
 
 ALL = dict(
@@ -64,16 +64,17 @@ def test_both_ways_of_running_agree_to_the_last_bit(name):
 def test_the_end_of_a_run_alone_is_that_of_the_whole_run(name):
     from hapticclay.stepping import compiled
 
-    run = SampledRun(scene(name), 1, compiled.WHOLE)
+    run = Run(scene(name), 1, compiled.KERNEL)
     run.go(None)
-    brief, whole = compiled.BatchPool(1).brief(scene(name)), run.brief()
+    last, _ = completed(scene(name), 10**9, compiled.KERNEL, EngineStore(), brief=True)
+    brief, whole = last.brief(), run.brief()
     assert brief[0] == whole[0] and brief[2] == whole[2] and brief[4] == whole[4]
     assert [tuple(map(float, x)) for x in brief[3]] == [tuple(map(float, x)) for x in whole[3]]
 
 
 def test_a_run_paused_at_every_sample_is_the_run():
     s = dataclasses.replace(scene("all"), t_max=0.05)
-    whole, parts = SampledRun(s, 1), SampledRun(s, 1)
+    whole, parts = Run(s, 1), Run(s, 1)
     whole.go(None)
     while parts.outcome is None:
         parts.advance(parts.filled + 1)
