@@ -183,7 +183,16 @@ def choice(f: FunctionType) -> Callable[..., Any]:
 
 
 OF_LAW = {"load": laws.load_of, "moved": laws.moved_of, "force": laws.force_of}
-OUTLINED = {driver.kick, search.find_root, path.towards, path.crossed, borders.clay_in, borders.first_border, path.careful, borders.passed_alike}
+OUTLINED = {
+    driver.kick,
+    search.find_root,
+    path.towards,
+    path.crossed,
+    borders.clay_in,
+    borders.first_border,
+    path.careful,
+    borders.passed_alike,
+}
 ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, engine_step.numbers_at, many.filled}
 laws_known: set[ModuleType] = set()
 stepped: set[FunctionType] = set()  # functions whose source numba finds

@@ -112,7 +112,9 @@ def known_names(tree: ast.FunctionDef, shapes: Mapping[str, Any]) -> dict[str, A
         shapes: of its arguments.
     """
     nodes = list(ast.walk(tree))
-    stored = Counter(x.id for x in nodes if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store))
+    stored = Counter(
+        x.id for x in nodes if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store)
+    )
     known = {name: x for name, x in shapes.items() if not stored[name]}
     for statement in tree.body:
         match statement:
@@ -140,8 +142,9 @@ def shape_at(node: ast.expr, known: Mapping[str, Any]) -> Any:
             return None
         case ast.Name(id=name):
             return known.get(name, UNKNOWN)
-        case ast.Attribute(value=value, attr=key) | ast.Subscript(
-            value=value, slice=ast.Constant(value=key)
+        case (
+            ast.Attribute(value=value, attr=key)
+            | ast.Subscript(value=value, slice=ast.Constant(value=key))
         ):
             of = shape_at(value, known)
             return of.get(key, UNKNOWN) if isinstance(of, dict) else UNKNOWN

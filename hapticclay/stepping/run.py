@@ -328,7 +328,9 @@ class Run:
         if code == UNRESOLVED:
             self.give_up()
         elif code == NOT_FINITE:
-            self._end(monitor.Outcome("out of reach", self.t, self.i, cause=scene.beyond(self.parts)))
+            self._end(
+                monitor.Outcome("out of reach", self.t, self.i, cause=scene.beyond(self.parts))
+            )
         elif code != OPEN:
             self.finish("finished" if code == FINISHED else "time limit")
 
@@ -350,7 +352,11 @@ class Run:
 
     def _draw(self, n: int) -> None:
         """Draws the random effects on the control samples of the next n whole steps."""
-        x, k, io = self.parts.sampler.chance, self.state.loop.machine.samples.k, self.scenario.interface
+        x, k, io = (
+            self.parts.sampler.chance,
+            self.state.loop.machine.samples.k,
+            self.scenario.interface,
+        )
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
         if x.first <= k and k + most <= x.first + len(x.numbers) // 4:
             return
@@ -542,7 +548,11 @@ class Run:
 
     def ahead(self) -> dict[str, np.ndarray]:
         """The sample that a step would write now, as `arrays`; the run stays where it is."""
-        n, saved, events = self.filled, self.saved(), (self.steps, list(self.crossings), list(self.stops))
+        n, saved, events = (
+            self.filled,
+            self.saved(),
+            (self.steps, list(self.crossings), list(self.stops)),
+        )
         try:
             self._make(n + 1)
             return self.columns(self.store.rows[n : n + 1], n)

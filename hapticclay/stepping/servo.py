@@ -48,7 +48,9 @@ def advanced(lag, form, step, loop, rates, f):
     if form is None:
         x, y = loop.x, loop.y
         return Loop(
-            lagged(lag[0], step, x, rates[0], f[0]), lagged(lag[1], step, y, rates[1], f[1]), loop.form
+            lagged(lag[0], step, x, rates[0], f[0]),
+            lagged(lag[1], step, y, rates[1], f[1]),
+            loop.form,
         )
     x, y, h = loop.x, loop.y, step.after
     states = state_after(form, 0, loop.form[0], f[0]), state_after(form, 1, loop.form[1], f[1])

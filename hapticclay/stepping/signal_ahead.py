@@ -94,7 +94,9 @@ class Drives:
         dt, made, accurate = parts.time.dt, {}, parts.accurate
         times = stage_times(accurate, dt, i, n)
         for name, x in self.signals.items():
-            made[name] = p_.Signal(x.table, x(times) if name == "muscle" else x.since_start(times), i)
+            made[name] = p_.Signal(
+                x.table, x(times) if name == "muscle" else x.since_start(times), i
+            )
         breaks = np.unique(np.concatenate([x.breaks(*span) for x in self.signals.values()]))
         ahead = p_.Ahead(times, np.append(breaks, math.inf), NEAR * dt)
         return self._put(parts._replace(accurate=accurate._replace(ahead=ahead)), **made)

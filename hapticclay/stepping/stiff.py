@@ -17,7 +17,9 @@ def behind_sample(stiff, split, step, at):
         return at
     v, c, share = at.v, at.c, split.share
     vx, vy = 0.0 if share[0] > 0.0 else v[0], 0.0 if share[1] > 0.0 else v[1]
-    return Handle(at.u, at.p, at.W, v, arm.centripetal_about_sample(step.L, c[0], c[1], vx, vy, at.u))
+    return Handle(
+        at.u, at.p, at.W, v, arm.centripetal_about_sample(step.L, c[0], c[1], vx, vy, at.u)
+    )
 
 
 def slow_force(stiff, hand, moment, law_, pulled):

@@ -106,7 +106,10 @@ def resist(part, groove, grain, clay, moment, law, load, u):
     else:
         ux, uy = viscous.across(grain, w[0] + backx, w[1] + backy)
         u = ux + on * c[0], uy + on * c[1]
-    rests = 1.0 if w[0] == 0.0 and fyk[0] > 0.0 else 0.0, 1.0 if w[1] == 0.0 and fyk[3] > 0.0 else 0.0
+    rests = (
+        1.0 if w[0] == 0.0 and fyk[0] > 0.0 else 0.0,
+        1.0 if w[1] == 0.0 and fyk[3] > 0.0 else 0.0,
+    )
     anchor = (
         anchored(still, stuck[0], rests[0], felt.anchor[0], place[0]),
         anchored(still, stuck[1], rests[1], felt.anchor[1], place[1]),

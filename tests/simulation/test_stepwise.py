@@ -158,7 +158,12 @@ ARRAYS = "t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"
 def same(a, b):
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), name)
-    assert (a.outcome, a.crossings, a.stops, a.energy) == (b.outcome, b.crossings, b.stops, b.energy)
+    assert (a.outcome, a.crossings, a.stops, a.energy) == (
+        b.outcome,
+        b.crossings,
+        b.stops,
+        b.energy,
+    )
 
 
 @pytest.mark.parametrize("name", ["cut", "accurate", "hardware", "driven", "unstable"])
@@ -338,6 +343,4 @@ def test_a_thread_of_its_own_is_asked_for():
         except RuntimeError as e:
             found.append(str(e))
     thread.join()
-    assert found and set(found) == {
-        "another thread uses this simulation: give each thread its own"
-    }
+    assert found and set(found) == {"another thread uses this simulation: give each thread its own"}

@@ -57,9 +57,9 @@ def axis_solution(times):
         return np.append(made, abs(z[1]))
 
     end = times[-1]
-    return solve_ivp(
-        rhs, (0.0, end), np.zeros(7), "DOP853", times, rtol=1e-12, atol=1e-15
-    ).y[[0, 6]]
+    return solve_ivp(rhs, (0.0, end), np.zeros(7), "DOP853", times, rtol=1e-12, atol=1e-15).y[
+        [0, 6]
+    ]
 
 
 def errors_of(integrator, steps):
