@@ -73,7 +73,7 @@ def clay_at(parts, blocks, body, p):
         blocks.laws,
     )
     at = handle_at(parts.arm, body, 0.0)
-    clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 0.0)
+    clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 1.0)
     growth = same_growth(blocks.growth, clay.growth)
     clay = Clay(clay.region, clay.b, clay.b, growth, clay.hit, clay.reaction, clay.laws)
     return cut_at(parts.special, clay, at)
