@@ -27,7 +27,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.constants import CLAY_X as CLAY
-from hapticclay.simulation import simulate
+from hapticclay.simulation import batch, simulate
 
 from . import common
 
@@ -90,13 +90,13 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
     One of a batch of summaries; one alone, from call to return, all samples recorded; none but the
     last.
     """
-    from hapticclay.stepping.compiled import BatchPool
+    from hapticclay.stepping.compiled import KERNEL
 
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
 
-    s, pool = lasting(scenario, steps), BatchPool(1)
-    first, short, then = bare(), timed(pool.brief, s)[1], bare()
+    s, pool = lasting(scenario, steps), batch.BatchPool(1)
+    first, short, then = bare(), timed(pool.brief, s, KERNEL)[1], bare()
     whole = timed(hc.simulate, s, engine="native")[1]
     between = bare()
     thin = timed(hc.simulate, s, engine="native", every=1_000_000)[1]
@@ -163,13 +163,11 @@ def beside(
         (core seconds and processor seconds a run, those of a step of the bare engine on all cores
         at once).
     """
-    from hapticclay.stepping import compiled
-
     each = max(1, min(100, len(todo) // (8 * common.CORES)))
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
-    class Turns(compiled.BatchPool):
+    class Turns(batch.BatchPool):
         def _turn(self, runs: int) -> None:
             made = self.own.__dict__.setdefault("made", 0)
             if made == 0 or made // each != (made - runs) // each:
@@ -182,15 +180,15 @@ def beside(
             self._turn(1)
             return super()._go(*args)
 
-        def many(self, scenarios: Any) -> Any:
+        def many(self, scenarios: Any, keys: Any) -> Any:
             self._turn(len(scenarios))
-            return super().many(scenarios)
+            return super().many(scenarios, keys)
 
-    usual, compiled.BatchPool = compiled.BatchPool, Turns
+    usual, batch.BatchPool = batch.BatchPool, Turns
     try:
         took = timed(hc.simulate_batch, todo, keep=keep) * (common.CORES, 1.0)
     finally:
-        compiled.BatchPool = usual
+        batch.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
 
 
