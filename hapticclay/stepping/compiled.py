@@ -72,7 +72,7 @@ from . import (
 )
 from . import hardware as wires
 from .engine import mujoco
-from .machine_code import cache_folder, compile_time, mark
+from .machine_code import cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
 SOURCES = (
@@ -83,7 +83,9 @@ SOURCES = (
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
-CAREFUL = 1000  # careful steps in CPython, some 1 ms each, that repay the machine code for them
+# measured: time that machine code saves in a careful step, and that it takes to load [s]; times
+# that it takes as long to compile as whole steps
+CAREFUL, LOADING, COMPLETE = 2.5e-4, 0.8, 2.0
 
 
 # ---- numbers at an address -----------------------------------------------------------------------
@@ -318,8 +320,8 @@ def natively(r: run.Run, room: int) -> None:
     """
     kind, parts = r.kind, own_law.called(r.parts)
     while r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room):
-        if met.get(kind, 0) > CAREFUL:
-            with first_call(complete, kind, "borders and hits of such runs"):
+        if met.get(kind, 0) > enough(kind):
+            with first_call(complete, (COMPLETE, kind), "borders and hits of such runs"):
                 r.state = ADVANCE(parts, r.state, r.native, room)
             continue
         with first_call(ready, kind, "runs of this kind"):
@@ -327,6 +329,17 @@ def natively(r: run.Run, room: int) -> None:
         if path.has_room(r.parts.time, r.state, r.e, room):
             run.one_plainly(r, path.careful)
             met[kind] = met.get(kind, 0) + 1
+
+
+@functools.cache
+def enough(kind: Any) -> float:
+    """How many careful steps of a kind repay the machine code for them.
+
+    Args:
+        kind: of the scene.
+    """
+    cost = LOADING if is_kept((COMPLETE, kind)) else COMPLETE * compile_time(kind)
+    return cost / CAREFUL
 
 
 @contextlib.contextmanager

@@ -219,7 +219,8 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         x, y = clay.x, clay.y
         if clay.angle or clay.groove is not None or not (is_plain(x) and (y is x or is_plain(y))):
             return None
-        law = x.edges, x.along, y.edges, y.along, y is x or y == x, *hardness(s, x, y)
+        hard = scene.hardness(s, max(max(x.values), max(y.values)))
+        law = x.edges, x.along, y.edges, y.along, y is x or y == x, hard
     parts: Any = None
     if wires is not None:
         if wires.jitter or wires.lost or wires.force_noise:
@@ -237,20 +238,6 @@ def is_plain(law: Any) -> bool:
         law: of the axis.
     """
     return type(law) is Profile and not (law.growth or law.Fy or law.K or law.springs)
-
-
-def hardness(s: Scenario, x: Profile, y: Profile) -> tuple[bool, bool]:
-    """Whether clay is so stiff that it has the parts Stiff and Hits.
-
-    Args:
-        s: the scenario.
-        x: its clay of x.
-        y: of y.
-    """
-    if scene.is_held(s):
-        return False, False
-    k = scene.stiffness_of(s, max(max(x.values), max(y.values)))
-    return k > scene.STIFF, k > scene.HITTING and s.control != "sampled"
 
 
 def numbers_of(part: Any) -> list[float]:

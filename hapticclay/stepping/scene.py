@@ -23,7 +23,7 @@ from .parts import INF
 
 NONE = (0.0, 0.0)
 QUEUE = 4  # rows of the queue of torques beyond the whole samples that they come late
-STIFF, HITTING = 1.0, 0.02  # stiffness of clay from which on it has a part Stiff, and Hits
+STIFF, HITTING = 1.0, 0.02  # see `hardness`
 NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
 
 
@@ -54,14 +54,18 @@ def is_held(s: Scenario) -> bool:
     return s.control == "sampled" and s.render == "held"
 
 
-def stiffness(s: Scenario) -> float:
-    """Largest share of its velocity that a step of explicit damping would take from the handle."""
-    return stiffness_of(s, B_MAX if s.clay.grows else s.clay.largest)
+def largest_damping(s: Scenario) -> float:
+    """Largest damping that the clay may ever have [N.s/m]."""
+    return B_MAX if s.clay.grows else s.clay.largest
 
 
-def stiffness_of(s: Scenario, b: float) -> float:
-    """The same of a handle without a hand, the lightest, in clay of some damping [N.s/m]."""
-    return b * s.dt * s.arm.links[4]
+def hardness(s: Scenario, b: float) -> tuple[bool, bool]:
+    """Whether a scene has the parts Stiff and Hits, in clay of some largest damping [N.s/m]."""
+    if is_held(s) or (s.integrator != "fast" and s.control != "sampled"):
+        return False, False
+    # share of its velocity that a step of explicit damping would take from a handle without a hand
+    k = b * s.dt * s.arm.links[4]
+    return k > STIFF, k > HITTING and s.control != "sampled"
 
 
 def clay_part(s: Scenario):
@@ -82,9 +86,9 @@ def clay_part(s: Scenario):
             g.numbers, float(g.damping) if g.damping else None, g.shares.copy(), g.relief,
             np.zeros(groove.RIM), np.zeros(2),
         )  # fmt: skip
-    b = stiffness(s) if fast and not is_held(s) else 0.0
-    stiff = p_.Stiff(float(s.mobility)) if b > STIFF else None
-    hits = p_.Hits(HITTING / s.arm.links[4]) if b > HITTING and s.control != "sampled" else None
+    is_stiff, is_hit = hardness(s, largest_damping(s))
+    stiff = p_.Stiff(float(s.mobility)) if is_stiff else None
+    hits = p_.Hits(HITTING / s.arm.links[4]) if is_hit else None
     special = p_.Special(clay.smooth or None, stiff, flow, springy, block, laws.parts_of(s))
     special = special if any(x is not None for x in special) else None
     return p_.Clay(1 if clay.grows else None), grain, hits, special
@@ -285,10 +289,10 @@ def traits(s: Scenario) -> tuple[Any, ...]:
     """
     clay, io, own, law, wires = s.clay, s.interface, s.controller, None, None
     if clay is not None:
-        block, b = clay.groove, stiffness(s)
+        block, hard = clay.groove, hardness(s, largest_damping(s))
         law = (
             clay.grows, clay.smooth, clay.yields, clay.springs, bool(clay.angle), clay.isotropic,
-            block is not None and bool(block.damping), block is not None, b > STIFF, b > HITTING,
+            block is not None and bool(block.damping), block is not None, hard,
         )  # fmt: skip
     if io is not None:
         random = io.jitter > 0.0, io.lost > 0.0 or io.force_noise > 0.0, io.delay > 0.0
