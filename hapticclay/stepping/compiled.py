@@ -72,7 +72,7 @@ from . import (
 )
 from . import hardware as wires
 from .engine import mujoco
-from .machine_code import cache_folder, compile_time, is_kept, mark
+from .machine_code import COMPLETE, cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
 SOURCES = (
@@ -83,9 +83,8 @@ SOURCES = (
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
-# measured: time that machine code saves in a careful step, and that it takes to load [s]; times
-# that it takes as long to compile as whole steps
-CAREFUL, LOADING, COMPLETE = 2.5e-4, 0.8, 2.0
+# measured: time that machine code saves in a careful step, and that it takes to load [s]
+CAREFUL, LOADING = 2.5e-4, 0.8
 
 
 # ---- numbers at an address -----------------------------------------------------------------------
@@ -338,8 +337,8 @@ def enough(kind: Any) -> float:
     Args:
         kind: of the scene.
     """
-    cost = LOADING if is_kept((COMPLETE, kind)) else COMPLETE * compile_time(kind)
-    return cost / CAREFUL
+    more = COMPLETE, kind
+    return (LOADING if is_kept(more) else compile_time(more)) / CAREFUL
 
 
 @contextlib.contextmanager

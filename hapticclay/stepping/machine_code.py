@@ -22,9 +22,10 @@ COMPILING_PART = {
     p_.Sampler: 4.0, p_.Difference: 1.0, p_.Converter: 0.5, p_.Delay: 1.0, p_.Passivity: 1.0,
     p_.Coupling: 1.0, p_.Accurate: 2.5, p_.Modal: 4.5,
 }  # fmt: skip
-CARRYING = 3.0  # times as long for many runs that are made together
+# what begins the kind of more than whole steps; times that it takes as long to compile
+CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
+TIMES = {CARRY: 3.0, COMPLETE: 2.0}
 MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
-CARRY = "carry"  # begins the kind of many runs that are made together
 
 
 @functools.cache
@@ -89,13 +90,13 @@ def is_kept(kind: Any) -> bool:
 
 
 def compile_time(kind: Any) -> float:
-    """Time that it takes to compile the whole steps of a kind, or many runs of it, measured [s].
+    """Time that it takes to compile the steps of a kind, measured [s].
 
     Args:
-        kind: from `kind_of`; or that of many runs, (CARRY, kind, ...).
+        kind: from `kind_of`, for whole steps; (CARRY or COMPLETE, kind, ...) for more.
     """
-    if kind[0] == CARRY:
-        return CARRYING * compile_time(kind[1])
+    if kind[0] in TIMES:
+        return TIMES[kind[0]] * compile_time(kind[1])
     return COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(kind))
 
 
