@@ -64,7 +64,9 @@ class Drives:
         muscle, command = signals.get("muscle"), signals.get("command")
         if muscle is not None:
             parts = parts._replace(push=parts.push._replace(muscle=muscle))
-        if command is not None and parts.sampler is not None:
+        if command is None:
+            return parts
+        if parts.sampler is not None:
             return parts._replace(sampler=parts.sampler._replace(command=command))
         return parts._replace(command=command)
 
@@ -94,7 +96,9 @@ class Drives:
         dt, made, accurate = parts.time.dt, {}, parts.accurate
         times = stage_times(accurate, dt, i, n)
         for name, x in self.signals.items():
-            made[name] = p_.Signal(x.table, x(times) if name == "muscle" else x.since_start(times), i)
+            made[name] = p_.Signal(
+                x.table, x(times) if name == "muscle" else x.since_start(times), i
+            )
         breaks = np.unique(np.concatenate([x.breaks(*span) for x in self.signals.values()]))
         ahead = p_.Ahead(times, np.append(breaks, math.inf), NEAR * dt)
         return self._put(parts._replace(accurate=accurate._replace(ahead=ahead)), **made)
