@@ -473,8 +473,9 @@ def glide_kicks(parts, s, e, room):
 
 def step(parts, s, e):
     """The state after one step, or after those to the next sample."""
-    made = s.filled.steps
-    s = glide(parts, s, e, s.filled.rows + 1)  # and what then lies between the samples
+    c, made, rows_ = s.clock, s.filled.steps, s.filled.rows
+    room = rows_ + 1 if c.t == c.i * parts.time.dt else rows_  # and what lies between the samples
+    s = glide(parts, s, e, room)
     return careful(parts, s, e) if s.filled.steps == made else s
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model import compensator, groove, regions
+from ..model import compensator, groove, pieces, regions
 from ..model import hardware as interface
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, Controller, LawCaller
@@ -138,7 +138,7 @@ def parts_of(s: Scenario, controller: Controller | None = None):
     """
     lag, form = compensators(s)
     clay = clay_part(s)
-    return p_.Parts(
+    parts = p_.Parts(
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo),
@@ -147,6 +147,25 @@ def parts_of(s: Scenario, controller: Controller | None = None):
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
         sampler(s, controller or s.controller, *clay[::3]), *accurate_parts(s),
     )  # fmt: skip
+    return with_signals(parts, s) if s.driven else parts
+
+
+def with_signals(parts, s: Scenario):
+    """The parts with signals over no step yet, see signal_ahead.Drives."""
+    accurate, sampler, push = parts.accurate, parts.sampler, parts.push
+    signal = p_.Signal(np.zeros((1, pieces.PIECE)), np.zeros((0, 2)), 0)
+    if accurate is not None:
+        parts = parts._replace(
+            accurate=accurate._replace(ahead=p_.Ahead(np.zeros(0), np.full(1, INF), 0.0))
+        )
+    if s.muscle is not None and s.muscle.varies:
+        halves = np.zeros((0, 6)) if sampler is not None else None
+        parts = parts._replace(push=push._replace(muscle=signal._replace(halves=halves)))
+    if s.command is not None and s.command.varies:
+        if sampler is not None:
+            return parts._replace(sampler=sampler._replace(command=signal))
+        return parts._replace(command=signal)
+    return parts
 
 
 def sampler(s: Scenario, controller, clay, special):

@@ -64,7 +64,9 @@ class Drives:
         muscle, command = signals.get("muscle"), signals.get("command")
         if muscle is not None:
             parts = parts._replace(push=parts.push._replace(muscle=muscle))
-        if command is not None and parts.sampler is not None:
+        if command is None:
+            return parts
+        if parts.sampler is not None:
             return parts._replace(sampler=parts.sampler._replace(command=command))
         return parts._replace(command=command)
 

@@ -18,6 +18,7 @@ from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
+from hapticclay.stepping import scene
 from hapticclay.stepping.run import Run
 from hapticclay.theory import linear_loop
 
@@ -83,6 +84,25 @@ def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
         loaded = set(out.stdout.split())
         assert {"path", "run"} < loaded
         assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
+
+
+def test_random_effects_are_drawn_part_by_part(monkeypatch):
+    """No run holds those of all its samples; return to a sample brings them back."""
+    s = cut(hc.Interface(jitter=5e-5, lost=0.1, force_noise=0.1), t_max=0.1)
+    whole = hc.simulate(s)
+    monkeypatch.setattr(scene, "NOISE_AHEAD", 8)
+    run = Run(s, 1)
+    run.pause = 100
+    run.go(None)
+    early = run.snapshot()
+    run.pause = 200
+    run.go(None)
+    drawn = run.parts.sampler.chance
+    assert 0 < drawn.first <= 100 and len(drawn.numbers) // 4 < 150
+    run.return_to(early)
+    run.pause = math.inf
+    run.go(None)
+    np.testing.assert_array_equal(run.arrays()["p"], whole.p)
 
 
 def test_seeds_repeat_and_differ():
