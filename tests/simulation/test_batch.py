@@ -318,13 +318,12 @@ def test_what_a_generator_raises_or_gives_wrongly_reaches_the_caller():
 
 
 @pytest.mark.perf
-@pytest.mark.usefixtures("repaid")
 def test_short_runs_cost_little_more_than_their_steps():
-    """A guard, not the measurement: benchmarks/throughput.py measures 1.2, and 3 one by one."""
+    """A guard, not the measurement: benchmarks/throughput.py measures 1.2."""
     from benchmarks import throughput
 
     scenes = list(throughput.monte_carlo(1000, "continuous"))
-    hc.simulate_batch(scenes[:100], keep="summaries", threads=1)
+    throughput.warm(scenes[:100])
     ratios = []
     for _ in range(3):
         before = throughput.floor(scenes[0], 20_000, time.process_time)
