@@ -83,6 +83,7 @@ SOURCES = (
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+SIGNALS = [getattr(signal, x) for x in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, x)]
 # measured: time that machine code saves in a careful step, and that it takes to load [s]
 CAREFUL, LOADING = 2.5e-4, 0.8
 
@@ -343,14 +344,14 @@ def enough(kind: Any) -> float:
 
 @contextlib.contextmanager
 def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
-    """A first call, which compiles or takes from the disk; Ctrl-C waits for the end of it.
+    """A first call, which compiles or takes from the disk; signals wait for the end of it.
 
     Args:
         kinds: that are ready; this one is, in the end.
         kind: of the scene.
         what: is compiled, in words.
     """
-    with Notice(what, compile_time(kind)) as notice, interrupts_held():
+    with Notice(what, compile_time(kind)) as notice, signals_held():
         if not isinstance(GLIDE._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
         before = cache.on_miss.set(notice.begin)
@@ -363,24 +364,31 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
 
 
 def first_call(kinds: set[Any], kind: Any, what: str) -> contextlib.AbstractContextManager[None]:
-    """As `compiling` before the first call of a kind; nothing before the others."""
-    return contextlib.nullcontext() if kind in kinds else compiling(kinds, kind, what)
+    """As `compiling` before the first call of a kind; `signals_held` before the others."""
+    return signals_held() if kind in kinds else compiling(kinds, kind, what)
 
 
 @contextlib.contextmanager
-def interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits for the end of this block."""
+def signals_held() -> Iterator[None]:
+    """Signals that are handled in Python wait for the end of this block.
+
+    A handler that raises, as that of Ctrl-C, would do so while the values that machine code returns
+    are made into Python's, which numba takes for granted to succeed.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    caught: list[object] = []
-    before = signal.signal(signal.SIGINT, lambda *what: caught.append(what))
+    caught: list[int] = []
+    held = {x: f for x in SIGNALS if callable(f := signal.getsignal(x))}
+    for number in held:
+        signal.signal(number, lambda number, frame: caught.append(number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if caught:
-        raise KeyboardInterrupt
+        for number, handler in held.items():
+            signal.signal(number, handler)
+    for number in caught:
+        held[number](number, None)  # type: ignore[operator]
 
 
 def keep_mark(kind: Any) -> None:
