@@ -16,6 +16,7 @@ os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
 from hapticclay.simulation import simulate, stepwise  # noqa: E402
+from hapticclay.stepping.notice import Notice  # noqa: E402
 
 try:
     import fcntl
@@ -114,11 +115,8 @@ def ledger_rows(paper_runs):
     return claims.ledger_rows(paper_runs)
 
 
-@pytest.fixture(scope="module")
-def silent_compiler():
+@pytest.fixture(autouse=True)
+def silent_compiler(request, monkeypatch):
     """Without machine code on disk, too, stderr holds what a test is about, and no more."""
-    from hapticclay.stepping.notice import Notice
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Notice, "begin", lambda self: None)
-        yield
+    if request.path.name != "test_notice.py":
+        monkeypatch.setattr(Notice, "begin", lambda self: None)

@@ -12,7 +12,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.simulation.simulate import has_numba
 
-pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("silent_compiler")]
+pytestmark = pytest.mark.plain
 fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03)
 HARD = hc.Interface(

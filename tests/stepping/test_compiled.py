@@ -26,8 +26,6 @@ from hapticclay.stepping import engine as engines
 from hapticclay.stepping import machine_code, monitor, run, scene
 from tests.stepping.test_kick import CASES
 
-pytestmark = pytest.mark.usefixtures("silent_compiler")
-
 fast = pytest.mark.skipif(
     importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
 )

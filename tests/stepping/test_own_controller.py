@@ -16,8 +16,6 @@ from hapticclay.model.sampled_controller import LawCaller, LawFailed
 from hapticclay.stepping import scene
 from tests.oracles import paper_law
 
-pytestmark = pytest.mark.usefixtures("silent_compiler")
-
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03, control="sampled")
 

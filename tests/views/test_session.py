@@ -305,7 +305,6 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     assert said[-1][1].unstable == bool(axis)
 
 
-@pytest.mark.usefixtures("silent_compiler")
 def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
     from hapticclay.views import session as module
 
