@@ -45,6 +45,8 @@ Names:
     K: gain of a compensator [1/kg], or consistency of clay that yields.
     law: what drives the handle, or the numbers of a clay law.
     load: a Load.
+    signal: a Signal of the parts.
+    states: of laws that are modules of their own.
     at: a Handle.
     links: arm.Arm.links.
     r: a Region.

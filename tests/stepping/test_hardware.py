@@ -98,7 +98,7 @@ def test_random_effects_are_drawn_part_by_part(monkeypatch):
     run.pause = 200
     run.go(None)
     drawn = run.parts.sampler.chance
-    assert 0 < drawn.first <= 100 and len(drawn.numbers) // 4 < 150
+    assert 0 < drawn.first <= 101 and len(drawn.numbers) // 4 < 150
     run.return_to(early)
     run.pause = math.inf
     run.go(None)
