@@ -19,6 +19,26 @@ def sides(r, p):
     return side(p[0], r.low[0], r.high[0]), side(p[1], r.low[1], r.high[1])
 
 
+def stood_on(r, p, sx, sy):
+    """The border that a place lies on or beyond, of those on the sides (sx, sy): coordinate, side.
+
+    Args:
+        r: the region.
+        p: the place, (x, y) [m].
+        sx: side of x, 0 for none.
+        sy: side of y, 0 for none.
+
+    Returns:
+        Coordinate and side; side 0 for none.
+    """
+    x, y = sides(r, p)
+    if sx != 0 and x != 0:
+        return 0, sx
+    if sy != 0 and y != 0:
+        return 1, sy
+    return 0, 0
+
+
 def border_of(r, i, up):
     """Place of a border of a region [m]."""
     if i == 0:

@@ -139,15 +139,13 @@ def coupled_in_clay(special, part, state, tool, at, b, Ts):
 
 def coupled_in_flow(flow, part, state, tool, at, b, Ts):
     if flow is None:
-        p, v, k, d = at.p, at.v, part.spring, part.damper
-        x, ux = law.virtual_coupling(tool[0], p[0], v[0], b[0], k, d, Ts)
-        y, uy = law.virtual_coupling(tool[1], p[1], v[1], b[1], k, d, Ts)
+        p, v = at.p, at.v
+        x, ux = law.virtual_coupling(tool[0], p[0], v[0], b[0], part, Ts)
+        y, uy = law.virtual_coupling(tool[1], p[1], v[1], b[1], part, Ts)
         f = b[0] * ux, b[1] * uy
         return f, Pull(f, (ux, uy)), (x, y)
     along = flow.along is not None
-    ux, uy, fx, fy = law.tool_that_yields(
-        tool, at.p, at.v, b, state.flow.law, along, part.spring, part.damper, Ts
-    )
+    ux, uy, fx, fy = law.tool_that_yields(tool, at.p, at.v, b, state.flow.law, along, part, Ts)
     return (fx, fy), Pull((fx, fy), (ux, uy)), (tool[0] + Ts * ux, tool[1] + Ts * uy)
 
 

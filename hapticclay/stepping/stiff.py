@@ -31,7 +31,7 @@ def slow_force(stiff, hand, moment, law_, pulled):
     hx, hy = uh[0] - kx * p[0] - pulled[0], uh[1] - ky * p[1] - pulled[1]
     gx, gy = a[0] + W[0] * hx + W[1] * hy, a[1] + W[1] * hx + W[2] * hy
     fx, fy = (k.b0[0] + k.b1[0]) * v[0], (k.b0[1] + k.b1[1]) * v[1]
-    return law.slow_force(gx, gy, W[0], W[1], W[2], share[0], share[1], fx, fy)
+    return law.slow_force((gx, gy), W, share, (fx, fy))
 
 
 def with_owed(stiff, hand, moment, load, owed, g):
