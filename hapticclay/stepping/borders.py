@@ -140,7 +140,12 @@ def passed_alike(parts, s, here, p):
 
 
 def first_border(probe, parts, s, after, p, sx, sy):
-    """The step that ends on the first border in its way: its length [s], coordinate, side."""
+    """The step that ends on the first border in its way: its length [s], coordinate, side.
+
+    Args:
+        sx: side of x that the step would pass, 0 for none.
+        sy: the same of y.
+    """
     span, axis, up = after, -1, 0
     for i in range(2):
         at = sy if i else sx

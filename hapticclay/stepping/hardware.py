@@ -61,11 +61,11 @@ def converted(part, x):
 # ---- joints --------------------------------------------------------------------------------------
 
 
-def encoded(counts, q):
+def encoded(encoder, q):
     """Joint angles as the encoders read them [rad]."""
-    if counts is None:
+    if encoder is None:
         return q
-    return law.encode(q[0], counts), law.encode(q[1], counts)
+    return law.encode(q[0], encoder), law.encode(q[1], encoder)
 
 
 def differenced(part, x, k, Ts, q, w):
@@ -86,9 +86,9 @@ def smoothed(cutoff, old, w, span):
     return law.low_pass(old[0], w[0], cutoff, span), law.low_pass(old[1], w[1], cutoff, span)
 
 
-def handle_seen(counts, difference, arm, at, q, w):
+def handle_seen(encoder, difference, arm, at, q, w):
     """The handle as it is measured."""
-    if counts is None:
+    if encoder is None:
         return handle_turning(difference, at, w)
     return handle_at(arm, Body(q, w, NONE), 0.0)
 
@@ -177,11 +177,11 @@ def note_force(part, machine, f):
 # ---- delay ---------------------------------------------------------------------------------------
 
 
-def is_due(part, queue, now):
-    """Whether torques come by now."""
+def is_due(part, queue, t):
+    """Whether torques come by t."""
     if part is None:
         return False
-    return queue.due <= now
+    return queue.due <= t
 
 
 def queued(part, machine, after, shown, now):
@@ -271,6 +271,11 @@ def note_hold(part, before, machine, asked):
 
 
 def write_two(x, i, pair):
+    """Writes two numbers into an array.
+
+    Args:
+        pair: the numbers.
+    """
     x[i], x[i + 1] = pair[0], pair[1]
 
 
