@@ -34,7 +34,7 @@ def halved_damping(b0, b1, L, R):
     return (L * b0[0], L * b0[1]), (R * b1[0], R * b1[1])
 
 
-def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # plain numbers
+def split_damping(b0, b1, H, L, R, W, damperx, dampery):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     A step gives half of its clay to the kick before it and half to the kick after it:
@@ -76,30 +76,26 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # pla
     return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
 
 
-def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # plain numbers, for speed
+def slow_force(g, W, share, f):
     """Force of stiff clay on a handle in slow motion that nothing else supports.
 
     Args:
-        gx: acceleration of the handle without clay, x [m/s^2].
-        gy: acceleration of the handle without clay, y [m/s^2].
-        sxx: acceleration per unit of force, x from x [1/kg].
-        sxy: acceleration per unit of force, x from y [1/kg].
-        syy: acceleration per unit of force, y from y [1/kg].
-        sharex: from `split_damping`; nonzero where the clay is stiff along x.
-        sharey: from `split_damping`; nonzero where the clay is stiff along y.
-        fx: clay force along x where the clay is not stiff [N].
-        fy: clay force along y where the clay is not stiff [N].
+        g: acceleration of the handle without clay, (x, y) [m/s^2].
+        W: acceleration per unit of force, (xx, xy, yy) [1/kg].
+        share: from `split_damping`, (x, y); nonzero where the clay is stiff.
+        f: clay force where the clay is not stiff, (x, y) [N].
 
     Returns:
         (x, y) [N].
     """
-    if sharex and sharey:
-        det = sxx * syy - sxy * sxy
-        x = (syy * gx - sxy * gy) / det
-        y = (sxx * gy - sxy * gx) / det
+    (gx, gy), (xx, xy, yy) = g, W
+    if share[0] and share[1]:
+        det = xx * yy - xy * xy
+        x = (yy * gx - xy * gy) / det
+        y = (xx * gy - xy * gx) / det
     else:
-        x = (gx - sxy * fy) / sxx
-        y = (gy - sxy * fx) / syy
+        x = (gx - xy * f[1]) / xx
+        y = (gy - xy * f[0]) / yy
     return x, y
 
 
@@ -118,7 +114,7 @@ def viscous_force(bx, by, vx, vy):
     return bx * vx, by * vy
 
 
-def turned_force(c, s, bx, by, vx, vy):  # noqa: PLR0913  # plain numbers, for speed
+def turned_force(c, s, bx, by, vx, vy):
     """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
 
     Args:

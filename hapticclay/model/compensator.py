@@ -289,17 +289,29 @@ def exponential(form, n, i, h, e, at):
                 e[SUM + r] += e[NEXT + r]
         for r in range(n):
             e[gamma + r if c == n else at + 4 * r + c] = e[SUM + r]
-    for _ in range(halvings):  # Gamma += Phi Gamma, then Phi = Phi Phi
-        for c in range(n + 1):
-            for r in range(n):
-                x = e[gamma + r] if c == n else 0.0
-                for j in range(n):
-                    x += e[at + 4 * r + j] * e[gamma + j if c == n else at + 4 * j + c]
-                e[NEXT + 4 * r + c if c < n else TERM + r] = x
+    for _ in range(halvings):
+        double_time(n, e, at)
+
+
+def double_time(n, e, at):
+    """Doubles the time of `exponential`: Gamma += Phi Gamma, then Phi = Phi Phi.
+
+    Args:
+        n: highest order of the two axes.
+        e: as of `exponential`.
+        at: where Phi begins in it, and Gamma after it.
+    """
+    gamma = at + 16
+    for c in range(n + 1):
         for r in range(n):
-            e[gamma + r] = e[TERM + r]
-            for c in range(n):
-                e[at + 4 * r + c] = e[NEXT + 4 * r + c]
+            x = e[gamma + r] if c == n else 0.0
+            for j in range(n):
+                x += e[at + 4 * r + j] * e[gamma + j if c == n else at + 4 * j + c]
+            e[NEXT + 4 * r + c if c < n else TERM + r] = x
+    for r in range(n):
+        e[gamma + r] = e[TERM + r]
+        for c in range(n):
+            e[at + 4 * r + c] = e[NEXT + 4 * r + c]
 
 
 def form_kick(form, n, i, before, after, e, out):

@@ -71,13 +71,12 @@ def servo_coefficients(
     return keep, take * servo[2], 1.0 / H + damping * R, 1.0 / H - damping * L, servo[5]
 
 
-def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PLR0913  # of one axis
+def servo_acceleration(weights, yd1, yd0, v, y, p, c):
     """Acceleration of one axis in a kick without forces and without the velocity after it [m/s^2].
 
     Args:
-        after: weight of the rate after the kick [1/s], from `servo_coefficients`.
-        before: weight of the rate before the kick [1/s], from `servo_coefficients`.
-        spring: stiffness of Sh [1/s^2], from `servo_coefficients`.
+        weights: from `servo_coefficients`: of the rates after and before the kick [1/s], stiffness
+            of Sh [1/s^2].
         yd1: rate of the reference model after the kick [m/s].
         yd0: rate of the reference model before the kick [m/s].
         v: handle velocity before the kick [m/s].
@@ -88,6 +87,7 @@ def servo_acceleration(after, before, spring, yd1, yd0, v, y, p, c):  # noqa: PL
     Returns:
         The acceleration [m/s^2].
     """
+    after, before, spring = weights
     return after * yd1 + before * (v - yd0) + spring * (y - p) + c
 
 
@@ -108,7 +108,7 @@ def feedback_law(servo, delta, y, yd, p, v, c):
     """
     ydd = servo[2] * (servo[0] * delta - y) - servo[1] * yd
     # a kick of one second from rest, in which the velocity after it is the acceleration
-    a = servo_acceleration(1.0, -servo[4], servo[5], ydd, yd, v, y, p, c)
+    a = servo_acceleration((1.0, -servo[4], servo[5]), ydd, yd, v, y, p, c)
     return a, ydd
 
 
@@ -209,7 +209,7 @@ def velocity_under_torque(H, v, u, links, tau, f, d):
     return ux, uy
 
 
-def kick_at_limit(H, v, u, links, f, d, tau, limit):  # noqa: PLR0913  # plain numbers
+def kick_at_limit(H, v, u, links, f, d, tau, limit):
     """The kick under torques that the limits of the motors cut.
 
     Args:
@@ -238,7 +238,7 @@ def kick_at_limit(H, v, u, links, f, d, tau, limit):  # noqa: PLR0913  # plain n
     return ux, uy, g1, g2, ffx, ffy, t1, t2
 
 
-def turned_kick_at_limit(H, v, u, links, f, d, tau, limit):  # noqa: PLR0913  # plain numbers
+def turned_kick_at_limit(H, v, u, links, f, d, tau, limit):
     """As `kick_at_limit`, against a damping tensor: worked out along its principal axes.
 
     Args:

@@ -192,9 +192,9 @@ def first_rates(part, sampler, body):
     return Rates(w, 0)
 
 
-def unfiltered(filter_):
-    if filter_ is None:
-        return filter_
+def unfiltered(part):
+    if part is None:
+        return part
     return 0.0, 0.0, 0.0, 0.0
 
 
@@ -248,7 +248,11 @@ def changed(parts, blocks, s, before):
 
 
 def kept_blocks(fresh, before):
-    """Blocks of a new scene, which go on as before where they did."""
+    """Blocks of a new scene, which go on as before where they did.
+
+    Args:
+        fresh: those of the new scene.
+    """
     if fresh is None or before is None:
         return fresh
     pairs = zip(fresh, before, strict=True)

@@ -19,6 +19,26 @@ def sides(r, p):
     return side(p[0], r.low[0], r.high[0]), side(p[1], r.low[1], r.high[1])
 
 
+def stood_on(r, p, sx, sy):
+    """The border that a place lies on or beyond, of those on the sides (sx, sy): coordinate, side.
+
+    Args:
+        r: the region.
+        p: the place, (x, y) [m].
+        sx: side of x, 0 for none.
+        sy: side of y, 0 for none.
+
+    Returns:
+        Coordinate and side; side 0 for none.
+    """
+    x, y = sides(r, p)
+    if sx != 0 and x != 0:
+        return 0, sx
+    if sy != 0 and y != 0:
+        return 1, sy
+    return 0, 0
+
+
 def border_of(r, i, up):
     """Place of a border of a region [m]."""
     if i == 0:
@@ -120,7 +140,12 @@ def passed_alike(parts, s, here, p):
 
 
 def first_border(probe, parts, s, after, p, sx, sy):
-    """The step that ends on the first border in its way: its length [s], coordinate, side."""
+    """The step that ends on the first border in its way: its length [s], coordinate, side.
+
+    Args:
+        sx: side of x that the step would pass, 0 for none.
+        sy: the same of y.
+    """
     span, axis, up = after, -1, 0
     for i in range(2):
         at = sy if i else sx

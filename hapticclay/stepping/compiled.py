@@ -104,7 +104,13 @@ def place_of(builder: Any, address: Any, i: Any) -> Any:
 
 @intrinsic
 def store(context, address, i, values):  # noqa: ARG001
-    """Writes numbers into an array from i on."""
+    """Writes numbers into an array from i on.
+
+    Args:
+        context: of what numba compiles.
+        address: of the array.
+        values: the numbers.
+    """
 
     def generate(context, builder, signature, arguments):
         address, i, tuple_ = arguments
@@ -119,7 +125,12 @@ def store(context, address, i, values):  # noqa: ARG001
 
 @intrinsic
 def fill(context, like, row):  # noqa: ARG001
-    """The tuple `like`, its numbers replaced by those at an address, one after the other."""
+    """The tuple `like`, its numbers replaced by those at an address, one after the other.
+
+    Args:
+        context: of what numba compiles.
+        like: the tuple.
+    """
 
     def generate(context, builder, signature, arguments):
         count = iter(range(1 << 20))
@@ -141,7 +152,12 @@ def fill(context, like, row):  # noqa: ARG001
 
 @intrinsic
 def load_pair(context, address):  # noqa: ARG001
-    """The first two numbers of an array."""
+    """The first two numbers of an array.
+
+    Args:
+        context: of what numba compiles.
+        address: of the array.
+    """
 
     def generate(context, builder, signature, arguments):
         at = [ir.Constant(ir.IntType(64), j) for j in range(2)]
@@ -249,7 +265,7 @@ def register_atoms() -> None:
     )
 
 
-# ---- entries: all that is called between them is compiled with the same flags ---------------------
+# ---- entries: all that is called between them is compiled with the same flags --------------------
 
 
 def glide(parts, s, e, room):
@@ -364,7 +380,13 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
 
 
 def first_call(kinds: set[Any], kind: Any, what: str) -> contextlib.AbstractContextManager[None]:
-    """As `compiling` before the first call of a kind; `signals_held` before the others."""
+    """As `compiling` before the first call of a kind; `signals_held` before the others.
+
+    Args:
+        kinds: that are ready.
+        kind: of the scene.
+        what: is compiled, in words.
+    """
     return signals_held() if kind in kinds else compiling(kinds, kind, what)
 
 

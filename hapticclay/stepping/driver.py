@@ -1,4 +1,4 @@
-"""The kick of a scene: driven by the continuous law, or by the torques that sampled control holds."""
+"""The kick of a scene: by the continuous law, or by the torques that sampled control holds."""
 
 from __future__ import annotations
 

@@ -68,10 +68,10 @@ def first_mode(m, i, v):
     return (1.0 if v > 0.0 else -1.0), False
 
 
-def tried_mode(k, rests, ended, now):
+def tried_mode(k, rests, ended, mode):
     """The k-th mode to be tried: the present one unless the axis rests; the first is rest."""
     if not rests:
-        return now
+        return mode
     if abs(ended) == FREE:
         return 1.0 if ended > 0.0 else -1.0
     return 0.0 if k == 0 else 1.0 if k == 1 else -1.0
@@ -113,6 +113,10 @@ def rests_now(modal, law, grip, i, rests):
 def fitting(parts, s, body, m, restx, resty):
     """Of the nine pairs of modes, those that agree with their own accelerations, and what the clay
     does in them.
+
+    Args:
+        restx: whether x has no velocity.
+        resty: whether y has none.
     """
     modal, (x, y), (endx, endy) = parts.modal, m.mode, m.ended
     openx, openy = restx and abs(endx) != FREE, resty and abs(endy) != FREE

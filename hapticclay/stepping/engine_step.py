@@ -72,33 +72,47 @@ class Engine(NamedTuple):
 
 
 def put(array, i, values):
-    """Writes numbers into an array from i on; compiled, `array` is its address."""
+    """Writes numbers into an array from i on; compiled, `array` is its address.
+
+    Args:
+        array: of floats.
+        values: the numbers, a tuple.
+    """
     for x in values:
         array[i] = x
         i += 1
 
 
 def numbers_at(like, array, i):
-    """As many numbers of an array as a tuple has, from i on; compiled, `array` is its address."""
+    """As many numbers of an array as a tuple has, from i on; compiled, `array` is its address.
+
+    Args:
+        like: the tuple.
+        array: of floats.
+    """
     return tuple(array[i : i + len(like)])
 
 
 def pair(array):
-    """The first two numbers of an array; compiled, `array` is its address."""
+    """The first two numbers of an array; compiled, `array` is its address.
+
+    Args:
+        array: of floats.
+    """
     return array[0], array[1]
 
 
-def with_dampers(clay, e, dampers):
-    """Gives the clay's dampers to the engine, which has some where there is clay."""
+def with_dampers(clay, e, b):
+    """Gives the clay's damping to the engine, which has dampers where there is clay."""
     if clay is None:
         return
-    put(e.ctrl, 2, dampers)
+    put(e.ctrl, 2, b)
 
 
-def step_engine(e, clay, tau, push, dampers, h):
+def step_engine(e, clay, tau, push, b, h):
     """Lets the engine step; returns joint angles and rates."""
     put(e.ctrl, 0, tau)
-    with_dampers(clay, e, dampers)
+    with_dampers(clay, e, b)
     put(e.push, 0, push)
     put(e.timestep, 0, (h,))
     e.step(e.model, e.data)

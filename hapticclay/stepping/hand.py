@@ -15,16 +15,16 @@ def with_hand(hand, load, step, at):
     return Load((f[0] - fx, f[1] - fy), (d[0] + dx, d[1] + dy, d[2]))
 
 
-def resisting(th, step, p, v, c):
+def resisting(part, step, p, v, c):
     """Resisting force of one axis without the velocity after the kick, and its part per unit.
 
     Mass and damping as for the handle. The spring acts by the place at the sample; a quarter of
     k h^2 added to the mass makes its energy exact in even steps.
     """
-    h = span(th.longer, step)
-    mass = th.mass + 0.25 * th.spring * h * h
-    before, after = th.damper * step.L - mass / step.H, th.damper * step.R + mass / step.H
-    return th.spring * p - mass * c + before * v, after
+    h = span(part.longer, step)
+    mass = part.mass + 0.25 * part.spring * h * h
+    before, after = part.damper * step.L - mass / step.H, part.damper * step.R + mass / step.H
+    return part.spring * p - mass * c + before * v, after
 
 
 def span(longer, step):

@@ -61,11 +61,11 @@ def converted(part, x):
 # ---- joints --------------------------------------------------------------------------------------
 
 
-def encoded(counts, q):
+def encoded(encoder, q):
     """Joint angles as the encoders read them [rad]."""
-    if counts is None:
+    if encoder is None:
         return q
-    return law.encode(q[0], counts), law.encode(q[1], counts)
+    return law.encode(q[0], encoder), law.encode(q[1], encoder)
 
 
 def differenced(part, x, k, Ts, q, w):
@@ -86,9 +86,9 @@ def smoothed(cutoff, old, w, span):
     return law.low_pass(old[0], w[0], cutoff, span), law.low_pass(old[1], w[1], cutoff, span)
 
 
-def handle_seen(counts, difference, arm, at, q, w):
+def handle_seen(encoder, difference, arm, at, q, w):
     """The handle as it is measured."""
-    if counts is None:
+    if encoder is None:
         return handle_turning(difference, at, w)
     return handle_at(arm, Body(q, w, NONE), 0.0)
 
@@ -139,15 +139,13 @@ def coupled_in_clay(special, part, state, tool, at, b, Ts):
 
 def coupled_in_flow(flow, part, state, tool, at, b, Ts):
     if flow is None:
-        p, v, k, d = at.p, at.v, part.spring, part.damper
-        x, ux = law.virtual_coupling(tool[0], p[0], v[0], b[0], k, d, Ts)
-        y, uy = law.virtual_coupling(tool[1], p[1], v[1], b[1], k, d, Ts)
+        p, v = at.p, at.v
+        x, ux = law.virtual_coupling(tool[0], p[0], v[0], b[0], part, Ts)
+        y, uy = law.virtual_coupling(tool[1], p[1], v[1], b[1], part, Ts)
         f = b[0] * ux, b[1] * uy
         return f, Pull(f, (ux, uy)), (x, y)
     along = flow.along is not None
-    ux, uy, fx, fy = law.tool_that_yields(
-        tool, at.p, at.v, b, state.flow.law, along, part.spring, part.damper, Ts
-    )
+    ux, uy, fx, fy = law.tool_that_yields(tool, at.p, at.v, b, state.flow.law, along, part, Ts)
     return (fx, fy), Pull((fx, fy), (ux, uy)), (tool[0] + Ts * ux, tool[1] + Ts * uy)
 
 
@@ -179,11 +177,11 @@ def note_force(part, machine, f):
 # ---- delay ---------------------------------------------------------------------------------------
 
 
-def is_due(part, queue, now):
-    """Whether torques come by now."""
+def is_due(part, queue, t):
+    """Whether torques come by t."""
     if part is None:
         return False
-    return queue.due <= now
+    return queue.due <= t
 
 
 def queued(part, machine, after, shown, now):
@@ -273,6 +271,11 @@ def note_hold(part, before, machine, asked):
 
 
 def write_two(x, i, pair):
+    """Writes two numbers into an array.
+
+    Args:
+        pair: the numbers.
+    """
     x[i], x[i + 1] = pair[0], pair[1]
 
 

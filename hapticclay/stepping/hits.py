@@ -55,7 +55,7 @@ def with_hit(s, hit):
 
 
 def halted(parts, s):
-    """The state behind half a kick that leads to the sample: the next kick starts from rest there."""
+    """The state behind half a kick that leads to the sample; the next kick starts at rest there."""
     k, c = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0), s.clay
     body, clock = Body(s.body.q, k.w, k.g), Clock(s.clock.t, s.clock.i, 0.0)
     clay = Clay(c.region, c.b, c.old, c.growth, c.hit, k.motion.reaction, c.laws)

@@ -30,7 +30,11 @@ def place(part, q):
 
 
 def handle_at(part, body, half):
-    """The handle at a sample; `half` is half of the step before [s]."""
+    """The handle at a sample.
+
+    Args:
+        half: half of the step before [s].
+    """
     (q1, q2), (r1, w2), (g1, g2) = body.q, body.w, body.g
     r2 = r1 + w2
     u = arm.jacobian(q1, q2, part.links)
@@ -128,7 +132,12 @@ def commanded(signal, loop, dt, clock, step):
 
 
 def command_change(table, t0, t1, h):
-    """Change of the command between two times, pieces by their mean over h around each (x, y) [m]."""
+    """Change of the command between two times, by its mean over h around each (x, y) [m].
+
+    Args:
+        t0: the first time [s].
+        t1: the second [s].
+    """
     x0, y0 = pieces.mean_of_lines(table, t0, 0.0)
     x1, y1 = pieces.mean_of_lines(table, t1, 0.0)
     if pieces.has_pieces(table):

@@ -2,12 +2,12 @@
 
 A function that takes a part asks for it first: `if part is None: return ...`. For machine code the
 question is answered by the types of the arguments: where the part is None, the function ends there;
-where it is not, the question and its answer are left out. A call of a function of which no more than
-one returned expression is left is replaced by that expression. So what a scene lacks is not compiled,
-not even as a function that returns at once, and both answers may be of different types.
+where it is not, the question and its answer are left out. A call of a function of which no more
+than one returned expression is left is replaced by that expression. So what a scene lacks is not
+compiled, not even as a function that returns at once, and both answers may be of different types.
 
-What is known of an argument is its shape: None for what is lacking, for a tuple a dictionary with the
-shapes of its fields and items, else GIVEN.
+What is known of an argument is its shape: None for what is lacking, for a tuple a dictionary with
+the shapes of its fields and items, else GIVEN.
 """
 
 from __future__ import annotations

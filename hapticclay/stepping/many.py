@@ -155,11 +155,11 @@ def ended(parts, runs, k, s, first):
     runs.times[k] = s.clock.t
 
 
-def friction_of(works):
+def friction_of(work):
     """Energy that friction has taken [J]."""
-    if works is None:
+    if work is None:
         return 0.0
-    return works.friction
+    return work.friction
 
 
 def carry(like, blocks, e, runs):

@@ -39,10 +39,10 @@ EVEN = 1e-4  # of the slack of signals: so close to a time worked out ahead is a
 # ---- how a sample is divided ---------------------------------------------------------------------
 
 
-def substeps(blocks, count, i):
+def substeps(blocks, n, i):
     """Engine steps a sample."""
     if blocks is None:
-        return count
+        return n
     return int(blocks[i // GROWTH_BLOCK])
 
 
@@ -343,14 +343,14 @@ def modes_behind(m):
     return Modes(m.law, m.mode, m.way, m.anchor, m.ends, (0.0, 0.0), stuck, m.fine)
 
 
-def noted(modal, e, was, now, t, n):
+def noted(modal, e, before, modes, t, n):
     """Notes where clay that yields stops the handle or lets it go; how many are then noted."""
     if modal is None:
         return n
-    if now.stuck[0] != was.stuck[0]:
-        n = note(e.stops, n, axis_of(modal.along), now.stuck[0], t)
-    if now.stuck[1] != was.stuck[1] and axis_of(modal.along) == 0.0:
-        n = note(e.stops, n, 1.0, now.stuck[1], t)
+    if modes.stuck[0] != before.stuck[0]:
+        n = note(e.stops, n, axis_of(modal.along), modes.stuck[0], t)
+    if modes.stuck[1] != before.stuck[1] and axis_of(modal.along) == 0.0:
+        n = note(e.stops, n, 1.0, modes.stuck[1], t)
     return n
 
 

@@ -95,7 +95,11 @@ def with_way(m, x, way):
 
 
 def has_mode(modes, rests):
-    """Whether some axis, or each, rests."""
+    """Whether some axis, or each, rests.
+
+    Args:
+        rests: 2 asks for each, another number for some axis.
+    """
     if modes is None:
         return False
     x, y = modes.mode
@@ -335,6 +339,11 @@ def gap(along, modal, modes, x, i):
 
 
 def gap_of_hold(most, f):
+    """What is left of the force that holds, as `gap`.
+
+    Args:
+        most: the largest force that the clay bears [N].
+    """
     return (most - f) / (1.0 + most)
 
 

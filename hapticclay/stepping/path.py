@@ -333,15 +333,13 @@ def towards(probe, parts, s, after, over, first):
         s = borders.passed_alike(parts, s, here, p)
         sx, sy = borders.sides(s.clay.region, p)
         sx, sy = sx if over[0] in (0, sx) else 0, sy if over[1] in (0, sy) else 0
-        herex, herey = borders.sides(s.clay.region, here)
         if sx == 0 and sy == 0:
             return s, k, after, axis, up, False
-        standing = sx != 0 and herex != 0 or sy != 0 and herey != 0
-        if standing:
-            i, side = (0, sx) if sx != 0 and herex != 0 else (1, sy)
-        elif s.status.landings >= LANDINGS:
-            return s, k, after, axis, up, False
-        else:
+        i, side = borders.stood_on(s.clay.region, here, sx, sy)
+        length, standing = 0.0, side != 0
+        if not standing:
+            if s.status.landings >= LANDINGS:
+                return s, k, after, axis, up, False
             length, i, side = borders.first_border(probe, parts, s, after, p, sx, sy)
         if borders.is_same_beyond(parts.table, s.clay.region, i, side):
             s = borders.moved_on(parts, s, here, i, side, 0.0)

@@ -99,15 +99,15 @@ def with_work(parts, a, k, w):
     )  # fmt: skip
 
 
-def hardware_work(works, k, w, v):
-    """What hardware has taken, with its works in a kick; v is the mean velocity."""
-    if works is None:
-        return works
+def hardware_work(work, k, w, v):
+    """What hardware has taken, with its work in a kick; v is the mean velocity."""
+    if work is None:
+        return work
     H, (hold, slip), n = k.step.H, k.loop, k.w
     rates = 0.5 * (w[0] + n[0]), 0.5 * (w[1] + n[1])
     return HardwareWork(
-        works.friction + friction_work(slip, H, rates), works.guard + guard_work(hold.guard, H, v),
-        works.coupling + coupling_work(hold.pull, H, v),
+        work.friction + friction_work(slip, H, rates), work.guard + guard_work(hold.guard, H, v),
+        work.coupling + coupling_work(hold.pull, H, v),
     )  # fmt: skip
 
 

@@ -255,7 +255,7 @@ class Run:
         pause: index of the sample to pause at.
     """
 
-    def __init__(  # noqa: PLR0913
+    def __init__(
         self,
         scenario: Scenario,
         every: int,
@@ -749,7 +749,7 @@ def _columns(made: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(made[:, :12].T)
 
 
-def completed(  # noqa: PLR0913
+def completed(
     scenario: Scenario,
     every: int,
     kernel: Kernel,

@@ -294,6 +294,11 @@ def form_feed(form, i):
 
 
 def shown_axis(form, i, z, out):
+    """Output of a compensator of another shape [m].
+
+    Args:
+        out: the part of it that is no state's [m].
+    """
     c, o = form.numbers, compensator.FORM * i + 20
     for j in range(compensator.ORDER):
         out += c[o + j] * z[j]
@@ -466,8 +471,8 @@ def acted(sampler, parts, s):
 
 
 def unless_refused(own, s, e):
-    """The state; of a run that is over where the user's own controller asks for torques that are not
-    finite: limits would hide it, and a delay put it off.
+    """The state; of a run that is over where the user's own controller asks for torques that are
+    not finite: limits would hide it, and a delay put it off.
     """
     if own is None:
         return s
@@ -490,8 +495,12 @@ def past(e):
     )  # fmt: skip
 
 
-def event(sampler, parts, s, acts, now):
-    """An event: the kick that leads to it, what is measured, and what the motors then hold."""
+def event(sampler, parts, s, acts, t):
+    """An event: the kick that leads to it, what is measured, and what the motors then hold.
+
+    Args:
+        acts: whether the controller takes a sample.
+    """
     clock, m, w = s.clock, s.loop.machine, s.body.w
     at = handle_at(parts.arm, s.body, 0.0)
     left, work, fh, u, tau = s.clay.reaction, s.work, NONE, at.v, NONE
@@ -508,7 +517,7 @@ def event(sampler, parts, s, acts, now):
         sight, seen = seen_handle(late, w, u, v)
         machine, a = sampled(sampler, parts, s, sight, seen, left, tau)
         delta, shown_, hold = a.delta, a.shown, a.hold
-    machine = hardware.queued(sampler.delay, m, machine, shown_, now)
+    machine = hardware.queued(sampler.delay, m, machine, shown_, t)
     return Event(1.0, late, w, left, fh, work, delta, shown_, hold, machine)
 
 
@@ -588,15 +597,15 @@ def before_uneven(uneven, sampler, dt, s, target, after):
     return target, after
 
 
-def first_after(t, event_, stop):
-    return event_ if t < event_ < stop else stop
+def first_after(t, when, target):
+    return when if t < when < target else target
 
 
-def first_due(delay, m, t, stop):
+def first_due(delay, m, t, target):
     if delay is None:
-        return stop
-    stop = first_after(t, m.samples.when + delay.delay, stop)
-    return first_after(t, m.queue.due, first_after(t, m.queue.then, stop))
+        return target
+    target = first_after(t, m.samples.when + delay.delay, target)
+    return first_after(t, m.queue.due, first_after(t, m.queue.then, target))
 
 
 def acting_laws(sampler, special):

@@ -169,7 +169,11 @@ def with_signals(parts, s: Scenario):
 
 
 def sampler(s: Scenario, controller, clay, special):
-    """Sampled control and its hardware."""
+    """Sampled control and its hardware.
+
+    Args:
+        controller: the user's own, as it runs; None for none.
+    """
     if s.control != "sampled":
         return None
     ratio, io = round((s.Ts or s.dt) / s.dt), s.interface
@@ -192,7 +196,11 @@ def sampler(s: Scenario, controller, clay, special):
 
 
 def hardware_parts(s: Scenario, io, Ts):
-    """The parts of a Sampler from `chance` on."""
+    """The parts of a Sampler from `chance` on.
+
+    Args:
+        io: the Interface.
+    """
     chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
     if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / Ts), NOISE_AHEAD) + 8

@@ -36,6 +36,9 @@ def find_root(b, fb, probe, parts, s, what, border):
 
     It may vanish at 0 itself, as when a handle enters stiff clay, stops and returns; the root of
     f/h is then found. Where f does not change its sign, the result lies next to 0.
+
+    Args:
+        fb: `beyond` at b [m].
     """
     first, end, leaves, opening = 1e-9 * b, b, False, True
     a, fa, h = 0.0, 0.0, first

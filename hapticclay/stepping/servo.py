@@ -1,4 +1,4 @@
-"""What drives the handle in a kick: the continuous law of compensator and servo, or given torques."""
+"""What drives the handle in a kick: the law of compensator and servo, or given torques."""
 
 from __future__ import annotations
 

@@ -74,14 +74,14 @@ def moved_axis(n, rest, stretch, at, p, h):
     return rest, z, f + f1, kept + kept1, lost + lost1
 
 
-def dent(table, axis, index, way, before, now):
+def dent(table, i, index, way, before, now):
     """Notes what gave way in a surface."""
     if way != 0.0 and now != before:
-        table[dent_place(table, axis, index)] = now
+        table[dent_place(table, i, index)] = now
 
 
-def dent_place(table, axis, index):
-    return regions.spring_place(table, axis, index[0], index[1]) + regions.SPRING - 1
+def dent_place(table, i, index):
+    return regions.spring_place(table, i, index[0], index[1]) + regions.SPRING - 1
 
 
 def entered(springs, s, region, table, p, crossed):

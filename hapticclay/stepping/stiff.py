@@ -22,25 +22,25 @@ def behind_sample(stiff, split, step, at):
     )
 
 
-def slow_force(stiff, hand, moment, law_, pulled):
+def slow_force(stiff, hand, acting, law_, pull):
     """The force that stiff clay bears in slow motion, (x, y) [N]; see clay.slow_force."""
-    if stiff is None or moment.split.over == 0.0:
+    if stiff is None or acting.split.over == 0.0:
         return NONE
-    at, k, uh, share = moment.at, moment.viscous, moment.uh, moment.split.share
+    at, k, uh, share = acting.at, acting.viscous, acting.uh, acting.split.share
     (kx, ky), p, v, W, a = hands.springs(hand), at.p, at.v, law_.W, law_.rest
-    hx, hy = uh[0] - kx * p[0] - pulled[0], uh[1] - ky * p[1] - pulled[1]
+    hx, hy = uh[0] - kx * p[0] - pull[0], uh[1] - ky * p[1] - pull[1]
     gx, gy = a[0] + W[0] * hx + W[1] * hy, a[1] + W[1] * hx + W[2] * hy
     fx, fy = (k.b0[0] + k.b1[0]) * v[0], (k.b0[1] + k.b1[1]) * v[1]
-    return law.slow_force(gx, gy, W[0], W[1], W[2], share[0], share[1], fx, fy)
+    return law.slow_force((gx, gy), W, share, (fx, fy))
 
 
-def with_owed(stiff, hand, moment, load, owed, g):
+def with_owed(stiff, hand, acting, load, owed, g):
     """The load with what stiff clay owes from the step before, and owes to the next kick.
 
     Args:
         stiff: the part.
         hand: the operator's arm.
-        moment: of the kick.
+        acting: what acts in the kick.
         load: the load.
         owed: impulse from the step before [N.s].
         g: the slow force [N].
@@ -49,9 +49,9 @@ def with_owed(stiff, hand, moment, load, owed, g):
         The load; force returned [N]; force owed [N], and its part per unit of the velocity after
         the kick [N.s/m].
     """
-    if stiff is None or moment.split.over == 0.0:
+    if stiff is None or acting.split.over == 0.0:
         return load, NONE, NONE, NONE
-    step, share, (kx, ky) = moment.step, moment.split.share, hands.springs(hand)
+    step, share, (kx, ky) = acting.step, acting.split.share, hands.springs(hand)
     back = owed[0] / step.H, owed[1] / step.H
     owes = share[0] * g[0], share[1] * g[1]
     soft = 0.5 * step.after * kx * share[0], 0.5 * step.after * ky * share[1]
@@ -59,11 +59,16 @@ def with_owed(stiff, hand, moment, load, owed, g):
     return load, back, owes, soft
 
 
-def still_owed(stiff, moment, back, owes, soft, u):
-    """Clay force beside its dampers [N], and impulse owed to the next kick [N.s]."""
-    if stiff is None or moment.split.over == 0.0:
+def still_owed(stiff, acting, back, owes, soft, u):
+    """Clay force beside its dampers [N], and impulse owed to the next kick [N.s].
+
+    Args:
+        back: force returned in the kick, from `with_owed` [N].
+        owes: force owed to the next, from `with_owed` [N].
+    """
+    if stiff is None or acting.split.over == 0.0:
         return NONE, NONE
-    H, x, y = moment.step.H, owes[0] - soft[0] * u[0], owes[1] - soft[1] * u[1]
+    H, x, y = acting.step.H, owes[0] - soft[0] * u[0], owes[1] - soft[1] * u[1]
     return (back[0] - x, back[1] - y), (H * x, H * y)
 
 

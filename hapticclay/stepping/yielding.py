@@ -70,11 +70,11 @@ def flows_freely(groove, state):
     return False
 
 
-def resist(part, groove, grain, clay, moment, law, load, u):
+def resist(part, groove, grain, clay, acting, law, load, u):
     """Velocity after the kick, and what the clay did; None where nothing yields."""
     if part is None:
         return u, None
-    step, at, felt = moment.step, moment.at, clay.reaction.felt
+    step, at, felt = acting.step, acting.at, clay.reaction.felt
     stuck, c, v = felt.stuck, at.c, at.v
     if flows_freely(groove, clay.laws.flow):
         s = v[0] + step.L * (u[0] - v[0]), v[1] + step.L * (u[1] - v[1])
@@ -155,32 +155,38 @@ def is_still(part, felt):
     return felt.still > 0.0
 
 
-def creeping(part, stiff, groove, state, moment, g):
+def creeping(part, stiff, groove, state, acting, g):
     """The part of a slow force on stiff clay that its damping bears: what yielding leaves of it."""
     if part is None:
         return g
     if stiff is None:
         return g
-    return creeping_flow(groove, part, state, moment, g)
+    return creeping_flow(groove, part, state, acting, g)
 
 
-def creeping_flow(groove, part, state, moment, g):
+def creeping_flow(groove, part, state, acting, g):
     if groove is None:
-        return crept(part, law_now(part, state, moment.step.L, moment.at.v), moment.viscous, g)
+        return crept(part, law_now(part, state, acting.step.L, acting.at.v), acting.viscous, g)
     return g
 
 
-def crept(part, fyk, k, g):
+def crept(part, law, k, g):
     """The part of a slow force that damping bears under Fy, K, n of x and y."""
     bx, by = k.b0[0] + k.b1[0], k.b0[1] + k.b1[1]
     gx, gy = abs(g[0]), abs(g[1])
     if part.along is not None:
         gx = gy = math.sqrt(g[0] * g[0] + g[1] * g[1])
         bx = by = 0.5 * (bx + by)
-    return creep(gx, bx, fyk[0], fyk[1], fyk[2], g[0]), creep(gy, by, fyk[3], fyk[4], fyk[5], g[1])
+    return creep(gx, bx, law[0], law[1], law[2], g[0]), creep(gy, by, law[3], law[4], law[5], g[1])
 
 
 def creep(size, b, Fy, K, n, g):
+    """The same of one axis, where the force has a length of its own.
+
+    Args:
+        size: length of the force [N].
+        Fy: yield force [N].
+    """
     if size > Fy and b > 0.0:  # of what exceeds Fy, b v where b v + K v^n is all of it
         return g / size * b * flow.thinned((size - Fy) / b, K / b, n)
     return 0.0
@@ -232,5 +238,11 @@ def noted(part, e, felt, before, t, n):
 
 
 def note(stops, n, axis, starts, t):
+    """Notes a stop; how many are then noted.
+
+    Args:
+        axis: 0.0 for x, 1.0 for y.
+        starts: 1.0 where the stop begins, 0.0 where it ends.
+    """
     put(stops, 3 * n, (axis, starts, t))
     return n + 1

@@ -347,8 +347,8 @@ def test_nothing_that_a_scene_lacks_is_compiled(tmp_path):
     code = (
         "import sys, json, hapticclay as hc; from hapticclay.stepping import lacking, compiled; "
         "plain = lacking.without; made = set(); "
-        "lacking.without = lambda f, *rest: made.add((f.__module__.rpartition('.')[2], f.__name__)) "
-        "or plain(f, *rest); "
+        "name = lambda f: (f.__module__.rpartition('.')[2], f.__name__); "
+        "lacking.without = lambda f, *rest: made.add(name(f)) or plain(f, *rest); "
         "s = hc.constant_cut(t_max=0.1); s = eval(sys.argv[1]); "
         "hc.simulate(s, engine='native'); print(json.dumps(sorted(made)))"
     )

@@ -529,7 +529,7 @@ def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exac
     st.floats(1e-5, 1e-2),
 )
 def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k, d, v, Ts):
-    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, k, d, Ts)
+    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, (k, d), Ts)
     assert abs(b * u) <= min(b, d + k * Ts) * abs(v) * (1.0 + 1e-12)
     assert b * u == pytest.approx(
         k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v))
@@ -539,7 +539,7 @@ def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k
 def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     tool, b, v, Ts = 0.0, 90.0, 0.1, 1e-3
     for i in range(3000):
-        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
+        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, (2e3, 20.0), Ts)
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 

@@ -113,7 +113,7 @@ def kick_by_laws(run, state, before, after):
             feed[i] = K * (C @ moved + D), take
             W[2 * i] += ni * take * ratio * feed[i][0]
         vr = keep * ydi + take * (ratio * delta - yi)
-        a.append(controller.servo_acceleration(ni, mi, spring, vr, ydi, v[i], yi, p[i], c[i]))
+        a.append(controller.servo_acceleration((ni, mi, spring), vr, ydi, v[i], yi, p[i], c[i]))
         n.append(ni)
         rate.append([vr, delta, ratio])
         mass = th.mass + 0.25 * th.spring * H * H

@@ -1,4 +1,4 @@
-"""Laws of the clay that are modules of their own, in every method, against independent solutions."""
+"""Laws of the clay in modules of their own, in every method, against independent solutions."""
 
 import dataclasses
 import pickle

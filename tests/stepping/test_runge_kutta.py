@@ -188,7 +188,7 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
             W[2 * i] += servo.G.gain * feed[i]  # a force moves delta, and delta the reference
         ydd = servo.G.gain * shown[i] - servo.G.stiffness * y - servo.G.damping * yd
         k, d = servo.S.stiffness, servo.S.damping
-        a.append(controller.servo_acceleration(1.0, -d, k, ydd, yd, v[i], y, p[i], c[i]))
+        a.append(controller.servo_acceleration((1.0, -d, k), ydd, yd, v[i], y, p[i], c[i]))
         law = controller.feedback_law(servo.numbers, shown[i], y, yd, p[i], v[i], c[i])
         np.testing.assert_allclose(law, (a[i], ydd), rtol=1e-12, atol=1e-11)
         resists = operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])

@@ -168,7 +168,7 @@ def test_the_tool_of_a_coupling_obeys_the_law_and_takes_energy(  # noqa: PLR0913
 ):
     Fy, K, n = law
     u1, u2, f1, f2 = hardware.tool_that_yields(
-        tool, p, v, (b, b), law + law, along, spring, damper, 1e-3
+        tool, p, v, (b, b), law + law, along, (spring, damper), 1e-3
     )
     u, f = np.array([u1, u2]), np.array([f1, f2])
     asked = spring * np.subtract(p, tool) + damper * np.array(v)
