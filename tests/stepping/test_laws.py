@@ -13,7 +13,6 @@ from hapticclay.stepping import laws, run
 from tests.oracles import Arm, Linear, drag_law, hardening_law
 from tests.oracles.hardening_law import DAMPING, WAY
 
-
 CLAY = 5.0  # [N.s/m] of the viscous clay around the law
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
 METHODS = {
