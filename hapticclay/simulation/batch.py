@@ -68,7 +68,7 @@ SUMMARY = np.dtype(
 KNOWN = 100_000  # runs of a sequence that are counted before the first; more repay anything
 ALONE = 1e-3  # time that a run takes Python beside its steps, alone, measured [s]
 LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
-WARNED = 1000  # kinds of scene of a batch that are looked at for values that are hardly meant
+WARNED = 200  # kinds of scene of a batch that are looked at for values that are hardly meant
 
 
 @checked
