@@ -442,7 +442,7 @@ def glide_by(accurate, parts, s, e, room):
     c = s.clock
     if c.t != c.i * parts.time.dt or c.i >= parts.time.last or s.status.closing != OPEN:
         return s
-    s, fine = ends.acted(parts.modal, parts, s, INF)
+    fine = INF
     while s.clock.i < parts.time.last:
         target, after, on_grid = next_sample(parts.time, s.clock.t, s.clock.i)
         if on_grid:
@@ -450,6 +450,8 @@ def glide_by(accurate, parts, s, e, room):
             if not (even and has_room(parts.time, s, e, room)):
                 break
             s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
+            # at each sample, so that it makes no difference where a call of this ends
+            s, fine = ends.acted(parts.modal, parts, s, INF)
         s, after = march.paced(accurate, parts.modal, s, target, after, on_grid)
         if s.status.code != OPEN or fine < after:
             break
