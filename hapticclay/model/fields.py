@@ -40,7 +40,9 @@ from ..errors import Bound, ParameterError, choice, field_types, quantity
 from .constants import AXES, each_axis
 from .hardware import JOINTS
 
-P, T, R = ParamSpec("P"), TypeVar("T"), TypeVar("R")
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 KIND = "kind"  # key of the class, where a field takes several
 USUAL_KIND = "multisine"  # the class without that key, where none of its own is usual
 UNSET = dataclasses.MISSING

@@ -8,7 +8,7 @@ import itertools
 import os
 import sys
 import threading
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple
@@ -238,7 +238,8 @@ class Plan:
         self.pool, self.together, self.known = pool, together, bool(known)
         self.lock = threading.Lock()
         self.kernels: dict[Any, Kernel] = {}  # by traits of a scene
-        self.expected: Counter[Any] = Counter()  # steps of runs alone, by traits of their scene
+        # steps of runs alone, by traits of their scene
+        self.expected: defaultdict[Any, float] = defaultdict(float)
         self.patterns = Patterns()
         self.carried: dict[Any, bool] = {}  # kinds of run made together: whether compiled by now
         kinds: dict[Any, list[Scenario]] = {}

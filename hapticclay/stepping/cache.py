@@ -17,7 +17,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from numba.core import types
 from numba.core.caching import _Cache
@@ -141,7 +141,7 @@ def classes_in(kind: Any) -> Iterator[type]:
     if hasattr(kind, "instance_class"):
         yield kind.instance_class
     if isinstance(kind, tuple | types.BaseTuple):
-        for x in kind:
+        for x in cast(Any, kind):
             yield from classes_in(x)
 
 

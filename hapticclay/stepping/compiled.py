@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numba
 from llvmlite import ir
@@ -137,7 +137,8 @@ def fill(context, like, row):  # noqa: ARG001
 
         def made(kind, value):
             if isinstance(kind, types.BaseTuple):
-                parts = [made(x, builder.extract_value(value, j)) for j, x in enumerate(kind)]
+                kinds: Any = kind
+                parts = [made(x, builder.extract_value(value, j)) for j, x in enumerate(kinds)]
                 return context.make_tuple(builder, kind, parts)
             if not isinstance(kind, types.Float | types.Integer):
                 return value
@@ -181,7 +182,7 @@ def shape_of(kind: Any) -> lacking.Shape:
         return None
     if not isinstance(kind, types.BaseTuple):
         return lacking.GIVEN
-    items = {i: shape_of(x) for i, x in enumerate(kind)}
+    items = {i: shape_of(x) for i, x in enumerate(cast(Any, kind))}
     return items | dict(zip(getattr(kind, "fields", ()), items.values(), strict=False))
 
 
@@ -254,14 +255,20 @@ def register_atoms() -> None:
     for name, f in OF_LAW.items():
         overload(f, jit_options=LAW, strict=False)(choice_of_law(name))
     overload(engine_step.put, inline="always")(
-        lambda array, i, values: lambda array, i, values: store(array, i, values)
+        lambda array, i, values: lambda array, i, values: store(array, i, values)  # type: ignore[call-arg]
     )
-    overload(engine_step.pair, inline="always")(lambda array: lambda array: load_pair(array))
+    overload(engine_step.pair, inline="always")(
+        lambda array: lambda array: load_pair(array)  # type: ignore[call-arg]
+    )
     overload(engine_step.numbers_at, inline="always")(
-        lambda like, array, i: lambda like, array, i: fill(like, array + 8 * i)
+        lambda like, array, i: lambda like, array, i: fill(like, array + 8 * i)  # type: ignore[call-arg]
     )
     overload(many.filled, jit_options=LAW)(
-        lambda like, numbers, k: lambda like, numbers, k: fill(like, numbers[k].ctypes.data)
+        lambda like, numbers, k: (
+            lambda like, numbers, k: fill(  # type: ignore[call-arg]
+                like, numbers[k].ctypes.data
+            )
+        )
     )
 
 

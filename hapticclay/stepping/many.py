@@ -216,7 +216,8 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         return None
     law: Any = None
     if clay is not None:
-        x, y = clay.x, clay.y
+        x: Any = clay.x
+        y: Any = clay.y
         if clay.angle or clay.groove is not None or not (is_plain(x) and (y is x or is_plain(y))):
             return None
         hard = scene.hardness(s, max(max(x.values), max(y.values)))

@@ -236,9 +236,10 @@ def march(probe, parts, s, h):
         end = z
     elif h > 0.0:
         end = m_.back_to_rest(modes, parts.modal, parts.arm, end)
-    x = first
+    x = first  # type: ignore[possibly-unbound]
     shown = Shown(x.p, x.v, x.fh, x.tau, x.delta, x.b, x.fe)
-    return Stride(shown, force_of(x.grip), now.grip, end, with_works(s.work, sums.power, h))
+    last = now.grip  # type: ignore[possibly-unbound]
+    return Stride(shown, force_of(x.grip), last, end, with_works(s.work, sums.power, h))
 
 
 def force_of(grip):

@@ -182,8 +182,8 @@ class EngineStore:
         if parts.accurate is not None:
             probe = Probe(forward, *engine_, *map(kernel.place, felt))
         places = map(kernel.place, [*own, *(x.reshape(-1) for x in kept)])
-        bounds = CROSSINGS - 3, max(len(self.stops) - 8, 1)
-        return Engine(step, *engine_, *places, *bounds, probe)
+        rest: Any = *places, CROSSINGS - 3, max(len(self.stops) - 8, 1), probe
+        return Engine(step, *engine_, *rest)
 
 
 _idle: list[EngineStore] = []  # engines that no run uses
@@ -352,11 +352,8 @@ class Run:
 
     def _draw(self, n: int) -> None:
         """Draws the random effects on the control samples of the next n whole steps."""
-        x, k, io = (
-            self.parts.sampler.chance,
-            self.state.loop.machine.samples.k,
-            self.scenario.interface,
-        )
+        x, k = self.parts.sampler.chance, self.state.loop.machine.samples.k
+        io: Any = self.scenario.interface
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
         if x.first <= k and k + most <= x.first + len(x.numbers) // 4:
             return

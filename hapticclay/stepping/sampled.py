@@ -189,7 +189,7 @@ def stiff_velocity(part, sampler, parts, s, at, u):
         return u
     step = step_around(before, before)
     _, split = viscous.damping(sampler.clay, sampler.special, s.clay, t, parts.hand, step)
-    soft = split.soft
+    soft = split.soft  # type: ignore[union-attr]
     if soft[0] == 0.0 and soft[1] == 0.0:
         return u
     k = pushed(sampler, parts, s.clock, step, at, s.body.w, s.clay, s.loop.machine.hold)

@@ -38,7 +38,7 @@ def hand_parts(s: Scenario):
 
 
 def compensators(s: Scenario):
-    lags = [c.lag for c in s.compensators]
+    lags: Any = [c.lag for c in s.compensators]
     if all(x and x[0] == 1.0 for x in lags):
         return tuple(p_.Lag(float(K), float(x[1])) for K, x in zip(s.gain, lags, strict=True)), None
     numbers = np.array([x for c in s.compensators for x in compensator.form_numbers(c)])
@@ -56,7 +56,8 @@ def is_held(s: Scenario) -> bool:
 
 def largest_damping(s: Scenario) -> float:
     """Largest damping that the clay may ever have [N.s/m]."""
-    return B_MAX if s.clay.grows else s.clay.largest
+    clay: Any = s.clay
+    return B_MAX if clay.grows else clay.largest
 
 
 def hardness(s: Scenario, b: float) -> tuple[bool, bool]:
@@ -191,7 +192,7 @@ def sampler(s: Scenario, controller, clay, special):
         own = p_.Own(LawCaller(controller, desk), desk, tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
-    first = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
+    first: Any = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
     return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
 
 
@@ -382,7 +383,7 @@ def viewed(part):
         part: the parts of a scene.
     """
     if isinstance(part, np.ndarray):
-        return memoryview(part)
+        return memoryview(part)  # type: ignore[arg-type]
     if isinstance(part, tuple):
         made = map(viewed, part)
         return type(part)._make(made) if hasattr(part, "_make") else tuple(made)

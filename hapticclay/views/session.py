@@ -173,14 +173,14 @@ class LiveRun(Run):
         x, y = reaction.felt.stuck
         return bool(x), bool(y)
 
-    def judge(self, rows: np.ndarray) -> int:
+    def judge(self, made: np.ndarray) -> int:
         """As Run.judge; forgets the samples while they are not to be kept.
 
         Args:
-            rows: as in Run.judge.
+            made: as in Run.judge.
         """
         before = len(self.kept)
-        good = super().judge(rows)
+        good = super().judge(made)
         if not self.keeping:
             del self.kept[before:]
         return good
