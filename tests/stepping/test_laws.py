@@ -191,3 +191,15 @@ def test_what_a_law_refuses_is_refused_at_the_door(hardening):
         with pytest.raises(ParameterError, match=told) as e:
             hc.simulate(s)
         assert e.value.field == "clay"
+
+
+def test_batches_carry_the_law(both):
+    """Records and summaries of many runs, long enough and short, are those of single runs."""
+    few = [dataclasses.replace(scene(**METHODS[name]), t_max=0.1) for name in METHODS]
+    for s, r in zip(few, hc.simulate_batch(few), strict=True):
+        assert not same(hc.simulate(s, engine="python"), r)
+    many = [dataclasses.replace(scene(force=(0.5 + 0.02 * i, 0.0)), t_max=0.05) for i in range(40)]
+    ends = hc.simulate_batch(many, keep="summaries")
+    single = np.array([hc.simulate(s, engine="python").p[-1] for s in many])
+    np.testing.assert_array_equal(ends["p"], single)
+    assert not np.array_equal(single, single[0])
