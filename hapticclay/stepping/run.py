@@ -217,16 +217,16 @@ class Snapshot(NamedTuple):
 
     Attributes:
         scenario: of the run.
-        saved: the run.
-        before: the run at the last look of the monitor.
+        saved: the run, Saved.
+        before: the run at the last look of the monitor, Saved.
         rows: that have not been judged yet.
         rendered: force of the clay in them [N].
         record: what the run keeps of those judged.
     """
 
     scenario: Scenario
-    saved: Saved
-    before: Saved
+    saved: Any
+    before: Any
     rows: np.ndarray
     rendered: np.ndarray
     record: dict[str, Any]
