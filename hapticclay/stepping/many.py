@@ -459,8 +459,8 @@ class Lane:
             p.numbers(jobs), p.tables(jobs), p.memory(jobs), starts, model.actuator_ctrlrange,
             self.reset, self.store.rows, self.store.crossings,
             self.store.rendered if scene.tells(parts) else np.empty((0, 3)), np.zeros(n, np.int64),
-            np.empty((n, rows.ROW)), np.zeros((n, 2)), crossed, np.zeros((n, 4), np.int64),
-            np.zeros(n), np.tile(np.array([0, -1, -1, 0]), (n, 1)), np.empty((n, WORKS)),
+            np.zeros((n, rows.ROW)), np.zeros((n, 2)), crossed, np.zeros((n, 4), np.int64),
+            np.zeros(n), np.tile(np.array([0, -1, -1, 0]), (n, 1)), np.zeros((n, WORKS)),
             np.zeros((2, monitor.QUIET)),
         )  # fmt: skip
         self.carry(parts, p.blocks, e, runs)
