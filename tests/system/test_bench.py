@@ -219,8 +219,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     assert (
         text.startswith("before")
         and text.endswith("after\n")
-        and "old" not in text
-        and "hapticclay | fast" in text
+        and "\nold\n" not in text
+        and "hapticclay |" in text
     )
     page = (tmp_path / "o" / "bench.md").read_text()
     assert page == bench.page(data) and all(c.name in page for c in some)
