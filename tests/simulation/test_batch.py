@@ -256,7 +256,7 @@ def test_a_generator_is_taken_as_it_is_run():
 
     def generated():
         for i in range(1500):
-            s = dataclasses.replace(CUT, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
+            s = dataclasses.replace(HELD, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
             alive.add(s)
             most.append(len(alive))
             yield s
@@ -273,7 +273,7 @@ def test_a_generator_is_taken_as_it_is_run():
 def test_no_run_is_lost_where_summaries_grow():
     n = 3000
     gains = 0.2 + 0.5 * np.arange(n) / n
-    same = dataclasses.replace(CUT, t_max=20.5 * CUT.dt, length=None)
+    same = dataclasses.replace(HELD, t_max=20.5 * CUT.dt, length=None)
     found = hc.simulate_batch(
         (dataclasses.replace(same, gain=(k, 0.2)) for k in gains.tolist()), keep="summaries"
     )
