@@ -8,7 +8,7 @@ BIN := .venv/bin
 .venv/run.done: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hapticclay needs Python 3.11 or newer, this is %s" % sys.version.split()[0])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fast]'
 	@touch $@
 
 .venv/dev.done: .venv/run.done

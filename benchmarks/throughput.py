@@ -27,7 +27,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.constants import CLAY_X as CLAY
-from hapticclay.simulation import simulate
+from hapticclay.simulation import batch, simulate
 
 from . import common
 
@@ -84,19 +84,34 @@ def timed(function, *args, **kw) -> np.ndarray:
     return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1]))
 
 
+def warm(todo: list[hc.Scenario]) -> None:
+    """Compiles all that runs like these may need, so that no timing has it in it."""
+    from hapticclay.stepping import compiled, machine_code, many, scene
+
+    pool = batch.BatchPool(1)
+    for key, s in {many.kind_key(s): s for s in todo}.items():
+        if key is not None:
+            pool.many([s] * many.FEWEST, [key] * many.FEWEST)
+            batch.carried.add(pool.lane().patterns.of(key, s).kind)
+    for s in {scene.traits(s): s for s in todo}.values():
+        compiled.warm(s)
+        compiled.met[machine_code.kind_of(scene.parts_of(s))] = compiled.CAREFUL + 1
+        compiled.warm(s)
+
+
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
     """The compiled run over the floor just before and after it, in processor time.
 
     One of a batch of summaries; one alone, from call to return, all samples recorded; none but the
     last.
     """
-    from hapticclay.stepping.compiled import BatchPool
+    from hapticclay.stepping.compiled import KERNEL
 
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
 
-    s, pool = lasting(scenario, steps), BatchPool(1)
-    first, short, then = bare(), timed(pool.brief, s)[1], bare()
+    s, pool = lasting(scenario, steps), batch.BatchPool(1)
+    first, short, then = bare(), timed(pool.brief, s, KERNEL)[1], bare()
     whole = timed(hc.simulate, s, engine="native")[1]
     between = bare()
     thin = timed(hc.simulate, s, engine="native", every=1_000_000)[1]
@@ -112,6 +127,8 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     rows: list[dict[str, float | str]] = []
     for name, scenario in SCENES.items():
         times = []
+        if simulate.has_numba():
+            warm([lasting(scenario, steps)])
         for _ in range(rounds):
             times.append((floor(scenario, steps), loop(scenario, steps)))
         compiled = (
@@ -163,13 +180,11 @@ def beside(
         (core seconds and processor seconds a run, those of a step of the bare engine on all cores
         at once).
     """
-    from hapticclay.stepping import compiled
-
     each = max(1, min(100, len(todo) // (8 * common.CORES)))
     bare: list[Any] = []  # of a step
     aside: list[Any] = []  # of the turns of the floor, its preparations included
 
-    class Turns(compiled.BatchPool):
+    class Turns(batch.BatchPool):
         def _turn(self, runs: int) -> None:
             made = self.own.__dict__.setdefault("made", 0)
             if made == 0 or made // each != (made - runs) // each:
@@ -182,15 +197,15 @@ def beside(
             self._turn(1)
             return super()._go(*args)
 
-        def many(self, scenarios: Any) -> Any:
+        def many(self, scenarios: Any, keys: Any) -> Any:
             self._turn(len(scenarios))
-            return super().many(scenarios)
+            return super().many(scenarios, keys)
 
-    usual, compiled.BatchPool = compiled.BatchPool, Turns
+    usual, batch.BatchPool = batch.BatchPool, Turns
     try:
         took = timed(hc.simulate_batch, todo, keep=keep) * (common.CORES, 1.0)
     finally:
-        compiled.BatchPool = usual
+        batch.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
 
 
@@ -199,6 +214,7 @@ def batches(sizes: list[tuple[int, int]], rounds: int) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for n, steps in sizes:
         todo = jobs(n, steps)
+        warm(todo)
         row: dict[str, Any] = {"runs": n, "steps": steps}
         for keep in ("summaries", "records")[: 2 if n <= 1024 else 1]:
             made = (beside(todo, steps, keep) for _ in range(rounds if n < 10_000 else 1))
@@ -242,6 +258,7 @@ def linearity(sizes: list[int], steps: int) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for n in sizes:
         todo = jobs(n, steps)
+        warm(todo)
         run, bare = np.mean([beside(todo, steps) for _ in range(max(1, 20_000 // n))], axis=0)
         over, over_cpu = (run / (steps * bare)).tolist()
         rows.append(
@@ -277,7 +294,7 @@ def monte_carlo(n: int, control: str) -> Iterator[hc.Scenario]:
 def short_runs(n: int, control: str) -> dict[str, Any]:
     """Many short runs from a generator: seconds, and those of their engine steps alone."""
     first = next(monte_carlo(1, control))
-    hc.simulate_batch(monte_carlo(100, control), keep="summaries")
+    warm(list(monte_carlo(100, control)))
     before = floor(first, 20_000)
     begin = time.perf_counter()
     found = hc.simulate_batch(monte_carlo(n, control), keep="summaries")
@@ -306,6 +323,7 @@ def stability_map() -> dict[str, float]:
     """50 dampings by 20 gains, 2 s each: seconds, and how many are unstable."""
     grid = [(b, k) for b in np.geomspace(5.0, 500.0, 50) for k in np.linspace(0.2, 6.0, 20)]
     todo = [hc.constant_cut(b=b, gain=(k, 0.2), start=(0.1, 0.0), t_max=2.0) for b, k in grid]
+    warm(todo)
     begin = time.perf_counter()
     found = hc.simulate_batch(todo, keep="summaries")
     wall = time.perf_counter() - begin
@@ -365,8 +383,6 @@ def main(
     native = simulate.has_numba()
     if native and not quick:
         data["first_call"] = [first_calls()]
-    if native:
-        hc.simulate_batch(jobs(2, 10), keep="summaries")
     data["rows"] = measure(rounds, steps)
     if native:
         sizes = [(64, 1000)] if quick else [(64, 1000), (1024, 1000), (64, LONG), (1024, LONG)]

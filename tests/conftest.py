@@ -2,7 +2,7 @@
 
 Workers are processes of pytest-xdist. Tests that share a dear fixture or a scarce resource share a
 worker (GROUPS). A test marked `perf` compares run times: while it runs, the other workers wait.
-`engine="auto"` takes the compiled loop, but in tests marked `plain`, which test the Python one.
+Tests marked `plain` test steps in Python: there `engine="auto"` takes no machine code.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
 from hapticclay.simulation import simulate  # noqa: E402
+from hapticclay.stepping.notice import Notice  # noqa: E402
 
 try:
     import fcntl
@@ -43,13 +44,12 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "page": "gui",
     "test_page.py": "gui",
 }
-PLAIN = {  # files whose tests are about the Python loop
+PLAIN = {  # files whose tests are about steps in Python
     "test_energy.py",
     "test_engine.py",
     "test_interrupted.py",
     "test_monitor.py",
 }
-PAYS = simulate._pays
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
@@ -93,9 +93,9 @@ def pytest_runtest_protocol(item):
 
 @pytest.fixture(autouse=True)
 def auto_engine(request, monkeypatch):
-    """The compiled loop from the first step on, or the Python one as ever."""
-    plain = request.node.get_closest_marker("plain")
-    monkeypatch.setattr(simulate, "_pays", PAYS if plain else lambda s: simulate.has_numba())
+    """Steps in Python where they are what is tested."""
+    if request.node.get_closest_marker("plain"):
+        monkeypatch.setattr(simulate, "repays", lambda kind, time: False)
 
 
 @pytest.fixture(scope="session")
@@ -114,11 +114,8 @@ def ledger_rows(paper_runs):
     return claims.ledger_rows(paper_runs)
 
 
-@pytest.fixture(scope="module")
-def silent_compiler():
+@pytest.fixture(autouse=True)
+def silent_compiler(request, monkeypatch):
     """Without machine code on disk, too, stderr holds what a test is about, and no more."""
-    from hapticclay.stepping.notice import Notice
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Notice, "begin", lambda self: None)
-        yield
+    if request.path.name != "test_notice.py":
+        monkeypatch.setattr(Notice, "begin", lambda self: None)

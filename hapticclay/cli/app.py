@@ -209,7 +209,7 @@ def _option_units(words: Sequence[str]) -> dict[str, str]:
     from ..model.fields import field_descriptions
 
     kind = load_command(words[0])
-    nested = filter(dataclasses.is_dataclass, _hints(kind).values())
+    nested: Any = filter(dataclasses.is_dataclass, _hints(kind).values())
     out: dict[str, str] = {}
     for part in (*nested, kind):
         for name, about in field_descriptions(part).items():

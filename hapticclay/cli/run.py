@@ -165,17 +165,7 @@ def run_table(record: Record) -> str:
     lines = [console.text_table(rows, head, "r" * len(head)), ""]
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
-    for c in record.crossings[:MOST_ROWS]:
-        at = f"border {c.axis} = {100 * c.border + 0.0:g} cm"
-        lines.append(f"{at} crossed at {c.time:.6f} s with {console.fixed(c.speed, 6)} m/s")
-    if len(record.crossings) > MOST_ROWS:
-        lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
-    told = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
-    for x in told:
-        until = "to the end" if x.end is None else f"to {x.end:.6f} s"
-        lines.append(f"{' and '.join(x.axis)} held still from {x.start:.6f} s {until}")
-    if len(record.stops) > len(told):
-        lines.append(f"... and {len(record.stops) - len(told)} more stops")
+    lines += _crossing_lines(record) + _stop_lines(record)
     if isinstance(s.muscle, Multisine) and len(record.t) >= 32:  # the fewest for irregularity()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
@@ -190,6 +180,27 @@ def run_table(record: Record) -> str:
     speed = record.t[-1] / record.wall_time if len(record.t) and record.wall_time else 0.0
     lines.append(f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time")
     return "\n".join(lines)
+
+
+def _crossing_lines(record: Record) -> list[str]:
+    lines = []
+    for c in record.crossings[:MOST_ROWS]:
+        at = f"border {c.axis} = {100 * c.border + 0.0:g} cm"
+        lines.append(f"{at} crossed at {c.time:.6f} s with {console.fixed(c.speed, 6)} m/s")
+    if len(record.crossings) > MOST_ROWS:
+        lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
+    return lines
+
+
+def _stop_lines(record: Record) -> list[str]:
+    lines = []
+    told = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
+    for x in told:
+        until = "to the end" if x.end is None else f"to {x.end:.6f} s"
+        lines.append(f"{' and '.join(x.axis)} held still from {x.start:.6f} s {until}")
+    if len(record.stops) > len(told):
+        lines.append(f"... and {len(record.stops) - len(told)} more stops")
+    return lines
 
 
 def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:

@@ -19,7 +19,22 @@ from .groove import Groove
 from .spring import Spring
 
 
-def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # plain numbers
+def halved_damping(b0, b1, L, R):
+    """Damping in a kick of clay that a step cannot overshoot: half of a step's on either side.
+
+    Args:
+        b0: damping before the sample, (x, y) [N.s/m].
+        b1: damping after the sample, (x, y) [N.s/m].
+        L: share of the kick before the sample.
+        R: share of the kick after the sample.
+
+    Returns:
+        Damping on the velocity before the kick, and on that after it, (x, y) each [N.s/m].
+    """
+    return (L * b0[0], L * b0[1]), (R * b1[0], R * b1[1])
+
+
+def split_damping(b0, b1, H, L, R, W, damperx, dampery):
     """Splits the clay's damping in one kick between the velocities before and after it.
 
     A step gives half of its clay to the kick before it and half to the kick after it:
@@ -45,8 +60,7 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # pla
         stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
     most = 1.0 / (H * W)
-    x0, y0 = L * b0[0], L * b0[1]
-    x1, y1 = R * b1[0], R * b1[1]
+    (x0, y0), (x1, y1) = halved_damping(b0, b1, L, R)
     stiff, sharex, sharey, softx, softy = 0.0, 0.0, 0.0, 0.0, 0.0
     if x0 > most or y0 > most or x1 > most or y1 > most:
         stiff = 1.0
@@ -62,49 +76,30 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):  # noqa: PLR0913  # pla
     return x0, x1, y0, y1, stiff, sharex, sharey, softx, softy
 
 
-def slow_force(gx, gy, sxx, sxy, syy, sharex, sharey, fx, fy):  # noqa: PLR0913  # plain numbers, for speed
+def slow_force(g, W, share, f):
     """Force of stiff clay on a handle in slow motion that nothing else supports.
 
     Args:
-        gx: acceleration of the handle without clay, x [m/s^2].
-        gy: acceleration of the handle without clay, y [m/s^2].
-        sxx: acceleration per unit of force, x from x [1/kg].
-        sxy: acceleration per unit of force, x from y [1/kg].
-        syy: acceleration per unit of force, y from y [1/kg].
-        sharex: from `split_damping`; nonzero where the clay is stiff along x.
-        sharey: from `split_damping`; nonzero where the clay is stiff along y.
-        fx: clay force along x where the clay is not stiff [N].
-        fy: clay force along y where the clay is not stiff [N].
+        g: acceleration of the handle without clay, (x, y) [m/s^2].
+        W: acceleration per unit of force, (xx, xy, yy) [1/kg].
+        share: from `split_damping`, (x, y); nonzero where the clay is stiff.
+        f: clay force where the clay is not stiff, (x, y) [N].
 
     Returns:
         (x, y) [N].
     """
-    if sharex and sharey:
-        det = sxx * syy - sxy * sxy
-        x = (syy * gx - sxy * gy) / det
-        y = (sxx * gy - sxy * gx) / det
+    (gx, gy), (xx, xy, yy) = g, W
+    if share[0] and share[1]:
+        det = xx * yy - xy * xy
+        x = (yy * gx - xy * gy) / det
+        y = (xx * gy - xy * gx) / det
     else:
-        x = (gx - sxy * fy) / sxx
-        y = (gy - sxy * fx) / syy
+        x = (gx - xy * f[1]) / xx
+        y = (gy - xy * f[0]) / yy
     return x, y
 
 
-def viscous_force(bx, by, vx, vy):
-    """Resisting force of the clay, fe = b v (Eqs. 3, 4). Numbers, or arrays of one shape.
-
-    Args:
-        bx: damping, x [N.s/m].
-        by: damping, y [N.s/m].
-        vx: velocity, x [m/s].
-        vy: velocity, y [m/s].
-
-    Returns:
-        (fex, fey) [N].
-    """
-    return bx * vx, by * vy
-
-
-def turned_force(c, s, bx, by, vx, vy):  # noqa: PLR0913  # plain numbers, for speed
+def turned_force(c, s, bx, by, vx, vy):
     """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
 
     Args:
@@ -135,21 +130,6 @@ def turned_damping(c, s, bx, by):
         (xx, yy, xy) [N.s/m].
     """
     return c * c * bx + s * s * by, s * s * bx + c * c * by, c * s * (bx - by)
-
-
-def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"] = "x") -> Profile:
-    """Constant damping in one interval of a coordinate, none elsewhere.
-
-    Args:
-        b: damping [N.s/m].
-        start: lower border [m].
-        end: upper border [m].
-        along: coordinate that decides, "x" or "y".
-
-    Returns:
-        The profile.
-    """
-    return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
 
 
 @checked

@@ -289,17 +289,29 @@ def exponential(form, n, i, h, e, at):
                 e[SUM + r] += e[NEXT + r]
         for r in range(n):
             e[gamma + r if c == n else at + 4 * r + c] = e[SUM + r]
-    for _ in range(halvings):  # Gamma += Phi Gamma, then Phi = Phi Phi
-        for c in range(n + 1):
-            for r in range(n):
-                x = e[gamma + r] if c == n else 0.0
-                for j in range(n):
-                    x += e[at + 4 * r + j] * e[gamma + j if c == n else at + 4 * j + c]
-                e[NEXT + 4 * r + c if c < n else TERM + r] = x
+    for _ in range(halvings):
+        double_time(n, e, at)
+
+
+def double_time(n, e, at):
+    """Doubles the time of `exponential`: Gamma += Phi Gamma, then Phi = Phi Phi.
+
+    Args:
+        n: highest order of the two axes.
+        e: as of `exponential`.
+        at: where Phi begins in it, and Gamma after it.
+    """
+    gamma = at + 16
+    for c in range(n + 1):
         for r in range(n):
-            e[gamma + r] = e[TERM + r]
-            for c in range(n):
-                e[at + 4 * r + c] = e[NEXT + 4 * r + c]
+            x = e[gamma + r] if c == n else 0.0
+            for j in range(n):
+                x += e[at + 4 * r + j] * e[gamma + j if c == n else at + 4 * j + c]
+            e[NEXT + 4 * r + c if c < n else TERM + r] = x
+    for r in range(n):
+        e[gamma + r] = e[TERM + r]
+        for c in range(n):
+            e[at + 4 * r + c] = e[NEXT + 4 * r + c]
 
 
 def form_kick(form, n, i, before, after, e, out):
@@ -337,53 +349,3 @@ def form_kick(form, n, i, before, after, e, out):
             out[o + 5 + 4 * r + j] = x
         out[o + r], out[o + 21 + r] = row, gamma
     out[o + FEED] = feed
-
-
-def form_output(kick, z, i):
-    """Output of the compensator at the sample but for the force of the kick, with K = 1 [m].
-
-    Args:
-        kick: from `form_kick`.
-        z: states of both axes before the kick.
-        i: axis, 0 for x, 1 for y.
-    """
-    o, j = KICK * i, ORDER * i
-    return kick[o] * z[j] + kick[o + 1] * z[j + 1] + kick[o + 2] * z[j + 2] + kick[o + 3] * z[j + 3]
-
-
-def form_advance(kick, z, i, f):
-    """Carries the states of one axis over the kick.
-
-    Args:
-        kick: from `form_kick`.
-        z: states of both axes before the kick; gets those after it.
-        i: axis, 0 for x, 1 for y.
-        f: net force times K [N].
-    """
-    o, j = KICK * i + 5, ORDER * i
-    a, b, c, d = z[j], z[j + 1], z[j + 2], z[j + 3]
-    for r in range(ORDER):
-        x = kick[o] * a + kick[o + 1] * b + kick[o + 2] * c + kick[o + 3] * d
-        z[j + r] = x + kick[KICK * i + 21 + r] * f
-        o += 4
-
-
-def form_stage(s, i, f, weight, h):
-    """One stage of a Runge-Kutta step of one axis: adds its rates, and goes to the next point.
-
-    Args:
-        s: state of the run: form, formed, and form_states, form_point, form_sums.
-        i: axis, 0 for x, 1 for y.
-        f: net force at the stage times K [N].
-        weight: of the stage in the sums.
-        h: time from the start of the step to the next point [s].
-    """
-    form, start, point, sums = s["form"], s["form_states"], s["form_point"], s["form_sums"]
-    a, b, j = FORM * i, FORM * i + 16, ORDER * i
-    z = point[j], point[j + 1], point[j + 2], point[j + 3]
-    for r in range(ORDER):
-        x = form[a] * z[0] + form[a + 1] * z[1] + form[a + 2] * z[2] + form[a + 3] * z[3]
-        x += form[b + r] * f
-        sums[j + r] += weight * x
-        point[j + r] = start[j + r] + h * x
-        a += 4

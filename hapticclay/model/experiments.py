@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
-from ..arguments import known_names, named
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, field_types, flag
 from .clay import Clay, Profile, slab
 from .constants import (
@@ -46,6 +46,7 @@ from .fields import (
     check_added_hand,
     dotted_names,
     field_descriptions,
+    function_of,
     laid_over,
     make_part,
     merged_values,
@@ -466,21 +467,13 @@ def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
         kind: the experiment.
     """
     assert isinstance(kind, type)
-
-    signature, told = inspect.signature(kind), field_descriptions(kind)
     name = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
+    refused = "a value is out of its bounds, or the path out of reach."
+    return function_of(kind, name, _scenario_of, refused)
 
-    def make(*args: P.args, **parameters: P.kwargs) -> Scenario:
-        known_names(name, parameters, signature.parameters)
-        return kind(*args, **parameters).scenario()
 
-    make.__name__ = make.__qualname__ = name
-    make.__signature__ = signature.replace(return_annotation=Scenario)  # type: ignore[attr-defined]
-    summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
-    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
-    refused = "    ParameterError: a value is out of its bounds, or the path out of reach."
-    make.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n{refused}"
-    return make
+def _scenario_of(experiment: Experiment) -> Scenario:
+    return experiment.scenario()
 
 
 constant_cut = scenario_factory(ConstantCut)

@@ -19,18 +19,30 @@ import functools
 import inspect
 import pkgutil
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import UnionType
-from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import (
+    Any,
+    Literal,
+    NamedTuple,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import checked, known_names
 from ..errors import Bound, ParameterError, choice, field_types, quantity
 from .constants import AXES, each_axis
 from .hardware import JOINTS
 
+P = ParamSpec("P")
 T = TypeVar("T")
+R = TypeVar("R")
 KIND = "kind"  # key of the class, where a field takes several
 USUAL_KIND = "multisine"  # the class without that key, where none of its own is usual
 UNSET = dataclasses.MISSING
@@ -251,15 +263,8 @@ def _taken(hint: Any, bound: Bound, value: Any, path: str, old: Any) -> Any:
     if pairs == list(kinds) and dataclasses.is_dataclass(value):
         return (value, value)
     classes = part_classes(hint)
-    if classes and isinstance(value, Mapping) and isinstance(old, tuple):  # some of its parts
-        known = {str(i): part for i, part in enumerate(old)}
-        for name in value:
-            if name not in known:
-                raise no_field(join_names(path, name), value[name], [f"{path}.{n}" for n in known])
-        value = [value.get(name, part) for name, part in known.items()]
-        return _taken_parts(hint, classes, value, path, old)
     if classes and isinstance(value, Mapping):
-        return _taken_part(hint, classes, value, path, old)
+        return _taken_by_name(hint, classes, value, path, old)
     if classes and isinstance(value, list | tuple):
         return _taken_parts(hint, classes, value, path, old)
     for kind in kinds:
@@ -350,6 +355,20 @@ def laid_over(below: Any, above: Any) -> Any:
     if not isinstance(above, Mapping) or not isinstance(below, Mapping):
         return above
     return {**below, **{k: laid_over(below.get(k), v) for k, v in above.items()}}
+
+
+def _taken_by_name(
+    hint: Any, classes: dict[str, type], value: Mapping[Any, Any], path: str, old: Any
+) -> Any:
+    """A part, or some of several parts by their indices."""
+    if not isinstance(old, tuple):
+        return _taken_part(hint, classes, value, path, old)
+    known = {str(i): part for i, part in enumerate(old)}
+    for name in value:
+        if name not in known:
+            raise no_field(join_names(path, name), value[name], [f"{path}.{n}" for n in known])
+    parts = [value.get(name, part) for name, part in known.items()]
+    return _taken_parts(hint, classes, parts, path, old)
 
 
 def _taken_part(
@@ -738,6 +757,34 @@ def _defaults(kind: type) -> dict[str, Any]:
 
 
 @functools.cache
+def function_of(
+    kind: Callable[P, T], name: str, answer: Callable[[T], R], refused: str
+) -> Callable[P, R]:
+    """A function with the fields of a dataclass as its arguments, and its description.
+
+    Args:
+        kind: the dataclass.
+        name: of the function, in the module of `answer`.
+        answer: what the function returns, of an instance; its return annotation is the function's.
+        refused: why the function raises ParameterError.
+    """
+    assert isinstance(kind, type)
+    signature, told = inspect.signature(kind), field_descriptions(kind)
+
+    def make(*args: P.args, **given: P.kwargs) -> R:
+        known_names(name, given, signature.parameters)
+        return answer(kind(*args, **given))
+
+    made: Any = make
+    made.__name__ = made.__qualname__ = name
+    made.__module__ = answer.__module__
+    made.__signature__ = signature.replace(return_annotation=get_type_hints(answer)["return"])
+    summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
+    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
+    made.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n    ParameterError: {refused}"
+    return made
+
+
 def field_descriptions(kind: type) -> dict[str, str]:
     """What the docstrings of a dataclass and its bases say of each field, on one line.
 

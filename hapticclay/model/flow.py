@@ -193,35 +193,12 @@ def resist_axes(B, v, end, law, sample):
         did not or were.
     """
     xx, xy, yx, yy = B
-    Fyx, Kx, nx, Fyy, Ky, ny = law
     vx, vy = v
     dx, dy = end[0] - vx, end[1] - vy
     rx, ry, sx, sy, hx, hy, stopx, stopy = 0.0, 0.0, vx, vy, 0.0, 0.0, -1.0, -1.0
     begin, left, first = 0.0, 1.0, True
     for part in range(KICK_PARTS):
-        fx, fy, stuckx, stucky = 0.0, 0.0, False, False
-        if vx == 0.0 and vy == 0.0:
-            det = xx * yy - xy * yx
-            fx, fy = (yy * dx - xy * dy) / det, (xx * dy - yx * dx) / det
-            stuckx = stucky = abs(fx) <= Fyx and abs(fy) <= Fyy
-        elif vy != 0.0:
-            fy = Fyy if vy > 0.0 else -Fyy
-        for _ in range(AXIS_ROUNDS if not (stuckx and stucky) else 0):
-            oldx, oldy = fx, fy
-            need = dx - xy * fy
-            stuckx = vx == 0.0 and abs(need) <= xx * Fyx
-            if stuckx:
-                fx = need / xx
-            else:
-                fx = sliding_force(vx, vx + left * need, left * xx, Fyx, Kx, nx)
-            need = dy - yx * fx
-            stucky = vy == 0.0 and abs(need) <= yy * Fyy
-            if stucky:
-                fy = need / yy
-            else:
-                fy = sliding_force(vy, vy + left * need, left * yy, Fyy, Ky, ny)
-            if abs(fx - oldx) <= CLOSE * abs(fx) and abs(fy - oldy) <= CLOSE * abs(fy):
-                break
+        fx, fy, stuckx, stucky = forces_on_axes(B, (vx, vy), (dx, dy), left, law)
         gx = 0.0 if stuckx else dx - xx * fx - xy * fy
         gy = 0.0 if stucky else dy - yx * fx - yy * fy
         span, axis = left, 0
@@ -250,6 +227,49 @@ def resist_axes(B, v, end, law, sample):
     if vy != 0.0:
         stopy = -1.0
     return rx, ry, vx, vy, sx, sy, hx, hy, stopx, stopy
+
+
+def forces_on_axes(B, v, d, left, law):
+    """Mean forces over a part of a kick, each axis by itself, worked out until they agree.
+
+    Args:
+        B: velocity lost in a kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
+        v: velocity at the begin, (x, y) [m/s].
+        d: velocity gained in a kick without this force, (x, y) [m/s].
+        left: share of the kick that is left.
+        law: Fy, K, n of x, then of y.
+
+    Returns:
+        Forces of x and of y [N]; whether x and y stay at rest.
+    """
+    xx, xy, yx, yy = B
+    Fyx, Kx, nx, Fyy, Ky, ny = law
+    vx, vy = v
+    dx, dy = d
+    fx, fy, stuckx, stucky = 0.0, 0.0, False, False
+    if vx == 0.0 and vy == 0.0:
+        det = xx * yy - xy * yx
+        fx, fy = (yy * dx - xy * dy) / det, (xx * dy - yx * dx) / det
+        stuckx = stucky = abs(fx) <= Fyx and abs(fy) <= Fyy
+    elif vy != 0.0:
+        fy = Fyy if vy > 0.0 else -Fyy
+    for _ in range(AXIS_ROUNDS if not (stuckx and stucky) else 0):
+        oldx, oldy = fx, fy
+        need = dx - xy * fy
+        stuckx = vx == 0.0 and abs(need) <= xx * Fyx
+        if stuckx:
+            fx = need / xx
+        else:
+            fx = sliding_force(vx, vx + left * need, left * xx, Fyx, Kx, nx)
+        need = dy - yx * fx
+        stucky = vy == 0.0 and abs(need) <= yy * Fyy
+        if stucky:
+            fy = need / yy
+        else:
+            fy = sliding_force(vy, vy + left * need, left * yy, Fyy, Ky, ny)
+        if abs(fx - oldx) <= CLOSE * abs(fx) and abs(fy - oldy) <= CLOSE * abs(fy):
+            break
+    return fx, fy, stuckx, stucky
 
 
 def resist_along(B, v, end, law, sample):
@@ -302,7 +322,7 @@ def resist_along(B, v, end, law, sample):
     return rx, ry, vx, vy, sx, sy, hx, hy, stop, stop
 
 
-def force_along(B, v, d, hold, left, Fy, K, n):  # noqa: PLR0913  # plain numbers, for speed
+def force_along(B, v, d, hold, left, Fy, K, n):
     """Mean force along the motion over a part of a kick on a tool that slides.
 
     Args:

@@ -30,7 +30,6 @@ HALF = tuple(
     for k in range(SECTORS)
 )
 RIM = 4 * 4 * SECTORS  # numbers of the rim: four a sector, see `cut`
-BLOCK_NUMBERS = 10  # numbers of Groove.numbers
 
 
 def outside(u):
@@ -57,7 +56,7 @@ def outside(u):
     return 0.5 + (share if u > 0.0 else -share), slope
 
 
-def cut(grid, left, relief, x, y, whole, rim, removed):  # noqa: PLR0913  # plain numbers, for speed
+def cut(grid, left, relief, x, y, whole, rim, removed):
     """Cuts what lies under the tool, and takes down the clay that touches it.
 
     Args:

@@ -296,7 +296,7 @@ def passivity_controller(energy, f, v, Ts, W):
     return copysign(low, v) if along < low else f
 
 
-def virtual_coupling(tool, p, v, b, spring, damper, Ts):
+def virtual_coupling(tool, p, v, b, coupling, Ts):
     """Spring and damper between the handle and a massless tool in clay, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
@@ -307,19 +307,19 @@ def virtual_coupling(tool, p, v, b, spring, damper, Ts):
         p: position of the handle [m].
         v: velocity of the handle [m/s].
         b: clay at the tool [N.s/m].
-        spring: stiffness of the coupling [N/m].
-        damper: damping of the coupling [N.s/m].
+        coupling: its stiffness [N/m] and damping [N.s/m].
         Ts: control sample [s].
 
     Returns:
         (position of the tool after the sample [m], its velocity [m/s]); b times the velocity is the
         resisting force.
     """
+    spring, damper = coupling
     u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
     return tool + Ts * u, u
 
 
-def tool_that_yields(tool, p, v, b, law, along, spring, damper, Ts):  # noqa: PLR0913  # plain numbers
+def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
     """As `virtual_coupling`, both axes, in clay that yields: the tool rests below the yield force.
 
     (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
@@ -331,13 +331,13 @@ def tool_that_yields(tool, p, v, b, law, along, spring, damper, Ts):  # noqa: PL
         b: clay at the tool, (x, y) [N.s/m].
         law: Fy, K, n of x, then of y.
         along: whether the clay yields along the motion, by the law of x; else each axis by itself.
-        spring: stiffness of the coupling [N/m].
-        damper: damping of the coupling [N.s/m].
+        coupling: its stiffness [N/m] and damping [N.s/m].
         Ts: control sample [s].
 
     Returns:
         Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N].
     """
+    spring, damper = coupling
     qx, qy = spring * (p[0] - tool[0]) + damper * v[0], spring * (p[1] - tool[1]) + damper * v[1]
     dx, dy = b[0] + damper + spring * Ts, b[1] + damper + spring * Ts
     if along:
@@ -364,6 +364,11 @@ class SampleNoise:
         self.parts = parts
         self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
         self._first, self._rows = 0, np.zeros((0, 4))
+
+    @property
+    def first(self) -> int:
+        """Index of the first sample that is not forgotten."""
+        return self._first
 
     def forget(self, first: int) -> None:
         """Forgets the samples before one.

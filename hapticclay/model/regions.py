@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,48 +42,82 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
     always = {e for f in laws if isinstance(f, Profile) for e in f.edges} | {end}
     if length is not None:
         lines[0] = sorted({e for e in lines[0] if e < end} | {end})
-    head, parts, size = [end], [], HEAD
-
-    def put(values: Any) -> None:
-        nonlocal size
-        head.append(float(size))
-        parts.append(values)
-        size += len(values)
-
+    out = _Columns(end)
     for e in lines:
-        put([-math.inf, *e, math.inf])
+        out.put([-math.inf, *e, math.inf])
     for e in lines:
-        put([1.0, *(float(x in always) for x in e), 1.0])
+        out.put([1.0, *(float(x in always) for x in e), 1.0])
     for law in laws:
         for own, e, step in zip(law.borders, lines, (law.damping.shape[1], 1), strict=True):
-            put([float(step * bisect.bisect_right(own, x)) for x in (-math.inf, *e)])
-    smooth = [law.numbers if isinstance(law, Smooth) else None for law in given]
-    for i, numbers in enumerate(smooth):
-        if numbers is None:
-            head.append(0.0)
-        elif i == 1 and smooth[0] is not None and given[0] == given[1]:
-            head.append(head[-1])
+            out.put([float(step * bisect.bisect_right(own, x)) for x in (-math.inf, *e)])
+    _put_smooth(out, given)
+    # those of both axes are one where they may be
+    _put_cells(out, clay, laws[:1] if laws[0] == laws[1] else laws)
+    return out.table()
+
+
+class _Columns:
+    """Columns one behind the other, and before them where each begins; the end comes first."""
+
+    def __init__(self, end: float):
+        self._head: list[float] = [end]
+        self._columns: list[Any] = []
+        self._size = HEAD
+
+    def put(self, values: Any) -> None:
+        """Adds a column."""
+        self._head.append(float(self._size))
+        self._columns.append(values)
+        self._size += len(values)
+
+    def lack(self) -> None:
+        """Notes that there is no such column."""
+        self._head.append(0.0)
+
+    def repeat(self) -> None:
+        """Notes that the next column is the one before."""
+        self._head.append(self._head[-1])
+
+    def table(self) -> np.ndarray:
+        """All of them."""
+        rest = [0.0] * (HEAD - len(self._head))
+        return np.concatenate((self._head + rest, *self._columns))
+
+
+def _put_smooth(out: _Columns, given: Sequence[Any]) -> None:
+    """Puts the numbers of smooth clay of x and of y."""
+    for i, law in enumerate(given):
+        if not isinstance(law, Smooth):
+            out.lack()
+        elif i == 1 and isinstance(given[0], Smooth) and given[0] == law:
+            out.repeat()
         else:
-            put(numbers)
-    cells = laws[:1] if laws[0] == laws[1] else laws  # those of both axes are one where they may be
+            out.put(law.numbers)
+
+
+def _put_cells(out: _Columns, clay: Clay | None, laws: Sequence[Any]) -> None:
+    """Puts what each cell holds, for each of the laws."""
     yields, springs = bool(clay and clay.yields), bool(clay and clay.springs)
-    for part in ["damping", "rates", "entered", *["flows"] * yields, *["elastic"] * springs]:
-        if part == "elastic" and not yields:
-            head += [0.0, 0.0]
-        for law in cells:
-            if part == "entered":
-                put(np.full(law.damping.size, math.nan))
-            elif part == "flows":
-                put(np.stack(law.flows, axis=-1).ravel())
-            elif part == "elastic":
-                dent = np.full((*law.damping.shape, 1), math.nan)
-                put(np.concatenate((law.elastic, dent), axis=2).ravel())
-            else:
-                put(getattr(law, part).ravel())
-        if len(cells) < 2:
-            head.append(head[-1])
-    head += [0.0] * (HEAD - len(head))
-    return np.concatenate((head, *parts))
+    for what in ["damping", "rates", "entered", *["flows"] * yields, *["elastic"] * springs]:
+        if what == "elastic" and not yields:
+            out.lack()
+            out.lack()
+        for law in laws:
+            out.put(_of_cells(what, law))
+        if len(laws) < 2:
+            out.repeat()
+
+
+def _of_cells(what: str, law: Any) -> np.ndarray:
+    """One thing that the cells of a law hold, cell by cell."""
+    if what == "entered":
+        return np.full(law.damping.size, math.nan)
+    if what == "flows":
+        return np.stack(law.flows, axis=-1).ravel()
+    if what == "elastic":
+        dent = np.full((*law.damping.shape, 1), math.nan)
+        return np.concatenate((law.elastic, dent), axis=2).ravel()
+    return getattr(law, what).ravel()
 
 
 def region_of(table, p):
@@ -169,7 +204,7 @@ def spring_place(table, axis, ix, iy):
     return int(table[SPRINGS + axis]) + SPRING * _cell(table, axis, ix, iy)
 
 
-def smooth_clay(table, which, x, y, bx, by):  # noqa: PLR0913  # plain numbers, for speed
+def smooth_clay(table, which, x, y, bx, by):
     """Clay at a place, where it is smooth.
 
     Args:

@@ -108,6 +108,7 @@ class LawCaller:
         law: the function.
         error: exception of a call that failed, after which the torques are not finite.
         pointer: what machine code calls, where Python runs the law; else None.
+        called: what machine code calls, once it does.
     """
 
     def __init__(self, controller: Controller, desk: Any):
@@ -115,6 +116,7 @@ class LawCaller:
         self.desk: Any = memoryview(desk)
         self.error: BaseException | None = None
         self.pointer: Any = None
+        self.called: Any = None
         self._returned = 0.0, 0.0
         self._ends = DESK + len(controller.state), DESK + 2 * len(controller.state)
 

@@ -18,8 +18,8 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, number
 from ..model.scenario import Scenario
+from ..stepping.pace import STABLE_STEP, check_explicit, fastest_rate
 from ..stepping.run import Crossing
-from ..stepping.runge_kutta import STABLE_STEP, check_explicit, fastest_rate
 from .record import ARRAYS, Record
 from .simulate import has_numba, simulate
 

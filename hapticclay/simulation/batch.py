@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import itertools
 import os
 import sys
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Any
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,12 +20,14 @@ from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
 from ..model.plausible import warn_of
 from ..model.scenario import Scenario
+from ..stepping import scene
 from ..stepping.engine import warnings_caught
-from ..stepping.many import SUMMARY_CROSSINGS
+from ..stepping.machine_code import compile_time, is_kept
+from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, kind_key
 from ..stepping.monitor import Outcome
-from ..stepping.run import Crossing, kind_of
+from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
-from .simulate import NUMBA, has_numba, load_compiled, simulate
+from .simulate import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step, simulate
 
 KEEP = ("records", "summaries")
 MANY = 32  # runs of a batch from which on those of one kind are made together
@@ -60,7 +65,10 @@ SUMMARY = np.dtype(
         *((name, "f8") for name in WORKS),  # record.Record.energy [J]
     ]
 )
-WARNED = 1000  # kinds of scene of a batch that are looked at for values that are hardly meant
+KNOWN = 100_000  # runs of a sequence that are counted before the first; more repay anything
+ALONE = 1e-3  # time that a run takes Python beside its steps, alone, measured [s]
+LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
+WARNED = 200  # kinds of scene of a batch that are looked at for values that are hardly meant
 
 
 @checked
@@ -73,8 +81,9 @@ def simulate_batch(
 ) -> Any:
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
-    The number of threads and the order do not matter. Without numba, scenes run one after the
-    other. A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
+    The number of threads and the order do not matter. Machine code is compiled for each kind of
+    scene whose runs repay it; others run in Python. Without numba, scenes run one after the other.
+    A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
     generator: they are taken as they are run, and those of summaries are not held.
 
     Args:
@@ -100,33 +109,248 @@ def simulate_batch(
     todo = _checked(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
     out = _Summaries() if summaries else _Records()
-    module = load_compiled() if first and has_numba() else None
-    if module is None:
-        if first and not has_numba():
+    if not has_numba():
+        if first:
             print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
         for i, scenario in enumerate(itertools.chain(first, todo)):
             r = simulate(scenario, every=every, engine="python")
             out.put(i, [summary_entry(*record.brief(r))] if summaries else [r])
         return out.all()
-    pool, together = module.BatchPool(every), summaries and len(first) == MANY
+    pool, together = BatchPool(every), summaries and len(first) == MANY
+    known = scenarios if isinstance(scenarios, Sequence) and len(scenarios) <= KNOWN else ()
+    plan = Plan(pool, known, together)
 
-    def make(jobs: list[Scenario], stopped: Callable[[], bool]) -> Any:
+    def make(jobs: list[Job]) -> Any:
         if summaries:
-            return _summaries_of(pool, jobs, together, stopped)
-        return [record.Record.of(*pool.run(s)) for s in jobs if not stopped()]
+            return _summaries_of(pool, plan, jobs)
+        return [record.Record.of(*pool.run(j.scenario, j.kernel)) for j in jobs]
 
-    warmed: set[Any] = set()
-
-    def parts() -> Iterator[list[Scenario]]:
-        for part in _in_parts(itertools.chain(first, todo), together):
-            for kind in {kind_of(s) for s in part} - warmed:
-                module.warm(kind)
-                warmed.add(kind)
-            yield part
-
+    parts = map(plan.jobs, _in_parts(itertools.chain(first, todo), together))
     with warnings_caught():
-        _on_threads(parts(), make, out.put, min(threads, len(first)))
+        count = max(min(threads, len(first)), 1)
+        _on_threads(parts, make, out.put, count, pool.stop)
     return out.all()
+
+
+class Job(NamedTuple):
+    """A run of a batch.
+
+    Attributes:
+        scenario: what to run.
+        key: from many.kind_key where it is made together with others; else None.
+        kernel: how its steps are made where it is made alone.
+    """
+
+    scenario: Scenario
+    key: Any
+    kernel: Kernel
+
+
+class BatchPool:
+    """What each thread of a batch has of its own: engines, and what runs of one kind share.
+
+    Args:
+        every: keep each every-th sample, and the last.
+
+    Attributes:
+        stop: set where the batch is over before its end, so that no run begins.
+    """
+
+    def __init__(self, every: int):
+        self.every, self.stop = every, threading.Event()
+        self.own, self.turn = threading.local(), threading.Lock()
+
+    def _go(self, scenario: Scenario, every: int, kernel: Kernel, brief: bool) -> tuple[Run, float]:
+        """The run, made by this thread's engines, and the seconds it took."""
+        # in CPython one after the other: side by side they would wait for each other at each step
+        with self.turn if kernel is PLAIN else contextlib.nullcontext():
+            if self.stop.is_set():
+                raise CancelledError
+            return completed(scenario, every, kernel, self.store(), None, brief)
+
+    def store(self) -> EngineStore:
+        """The engines of this thread."""
+        if not hasattr(self.own, "store"):
+            self.own.store = EngineStore()
+        return self.own.store
+
+    def lane(self) -> Lane:
+        """What makes runs of one kind together in this thread."""
+        if not hasattr(self.own, "lane"):
+            from ..stepping.compiled import CARRY, KERNEL, RESET  # where it pays
+
+            self.own.lane = Lane(KERNEL, self.store(), CARRY, RESET)
+        return self.own.lane
+
+    def run(self, scenario: Scenario, kernel: Kernel) -> tuple[Run, float]:
+        """Makes a run.
+
+        Args:
+            scenario: what to run.
+            kernel: how its steps are made.
+
+        Returns:
+            The run, and the seconds it took.
+        """
+        return self._go(scenario, self.every, kernel, False)
+
+    def brief(self, scenario: Scenario, kernel: Kernel) -> tuple[Any, ...]:
+        """The end of a run, without its samples.
+
+        Args:
+            scenario: what to run.
+            kernel: how its steps are made.
+
+        Returns:
+            As Run.brief.
+        """
+        return self._go(scenario, LAST_ONLY, kernel, True)[0].brief()
+
+    def many(
+        self, scenarios: Sequence[Scenario], keys: Sequence[Any]
+    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
+        """Makes short runs of one kind together, without their samples.
+
+        Args:
+            scenarios: what to run.
+            keys: as Job.key.
+
+        Returns:
+            As many.Lane.make.
+        """
+        if self.stop.is_set():
+            raise CancelledError
+        return self.lane().make(scenarios, keys)
+
+
+class Plan:
+    """Chooses how each run of a batch is made: compiled where the runs of its kind repay it.
+
+    Those are all of the batch where they are known, else those taken so far.
+
+    Args:
+        pool: makes the runs.
+        known: all scenarios of the batch; empty where they are not known beforehand.
+        together: whether runs of one kind may be made together.
+    """
+
+    def __init__(self, pool: BatchPool, known: Sequence[Scenario], together: bool):
+        self.pool, self.together, self.known = pool, together, bool(known)
+        self.lock = threading.Lock()
+        self.kernels: dict[Any, Kernel] = {}  # by traits of a scene
+        # steps of runs alone, by traits of their scene
+        self.expected: defaultdict[Any, float] = defaultdict(float)
+        self.patterns = Patterns()
+        self.carried: dict[Any, bool] = {}  # kinds of run made together: whether compiled by now
+        kinds: dict[Any, list[Scenario]] = {}
+        for s in known:
+            key = kind_key(s) if together else None
+            if key is None:
+                self.expected[scene.traits(s)] += s.t_max / s.dt
+            else:
+                kinds.setdefault(key, []).append(s)
+        for key, jobs in kinds.items():
+            self._count(key, jobs)
+        for key, jobs in kinds.items():
+            if self._repay(key, jobs):
+                self.carried[key] = False
+            else:
+                self.expected[scene.traits(jobs[0])] += sum(s.t_max / s.dt for s in jobs)
+
+    def jobs(self, scenarios: list[Scenario]) -> list[Job]:
+        """Runs of the batch, for one thread; what they need is compiled.
+
+        Args:
+            scenarios: of the runs.
+        """
+        if not self.together:
+            return [Job(s, None, self.kernel(s)) for s in scenarios]
+        keys, kinds = [kind_key(s) for s in scenarios], dict[Any, list[Scenario]]()
+        for key, s in zip(keys, scenarios, strict=True):
+            kinds.setdefault(key, []).append(s)
+        kinds.pop(None, None)
+        made = {key for key, jobs in kinds.items() if self._carries(key, jobs)}
+        return [
+            Job(s, key, PLAIN) if key in made else Job(s, None, self.kernel(s))
+            for s, key in zip(scenarios, keys, strict=True)
+        ]
+
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """The module stepping.compiled; None where it cannot be loaded."""
+        return load_compiled()
+
+    def _carries(self, key: Any, jobs: list[Scenario]) -> bool:
+        """Whether runs of a kind are made together; compiled then."""
+        if key not in self.carried:
+            if self.known:
+                return False
+            self._count(key, jobs)
+            if not self._repay(key, jobs):
+                return False
+            self.carried[key] = False
+        if self.compiled is None:
+            return False
+        if not self.carried[key]:
+            pattern = self.patterns.of(key, jobs[0])
+            with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
+                self.pool.lane().group(pattern, jobs[:1])
+            self.carried[key] = True
+        return True
+
+    def _count(self, key: Any, jobs: list[Scenario]) -> None:
+        """Adds the time that would be saved if runs of a kind were made together."""
+        if len(jobs) < FEWEST:
+            return
+        pattern = self.patterns.of(key, jobs[0])
+        steps = 0.0 if is_ready(pattern.scene) else sum(s.t_max / s.dt for s in jobs)
+        # half: runs tend to end before t_max
+        time = ALONE * len(jobs) + 0.5 * saved_in_a_step(jobs[0]) * steps
+        saved[pattern.kind] = saved.get(pattern.kind, 0.0) + time
+
+    def _repay(self, key: Any, jobs: list[Scenario]) -> bool:
+        """Whether runs of a kind, with those counted so far, repay what makes them together."""
+        if len(jobs) < FEWEST:
+            return False
+        pattern = self.patterns.of(key, jobs[0])
+        if not pattern.is_made or pattern.kind in carried:
+            return pattern.is_made
+        time = saved[pattern.kind]
+        return time >= LOADING and (is_kept(pattern.kind) or time >= compile_time(pattern.kind))
+
+    def kernel(self, s: Scenario) -> Kernel:
+        """How the steps of a run are made that is made alone; compiled then.
+
+        Args:
+            s: what to run.
+        """
+        traits = scene.traits(s)
+        with self.lock:
+            if traits in self.kernels:
+                return self.kernels[traits]
+            known = traits in self.expected
+            if not pays(s, self.expected.pop(traits, s.t_max / s.dt)):
+                if known:
+                    self.kernels[traits] = PLAIN
+                return PLAIN
+            self.kernels[traits] = self.compiled.KERNEL if self.compiled else PLAIN
+            if self.compiled:
+                self.compiled.warm(s)
+            return self.kernels[traits]
+
+
+carried: set[Any] = set()  # kinds of which many runs are compiled in this process, or loaded
+saved: dict[Any, float] = {}  # time that this would have saved so far, by kind [s]
+
+
+def is_ready(kind: Any) -> bool:
+    """Whether machine code for steps of a kind of scene is loaded.
+
+    Args:
+        kind: from machine_code.kind_of.
+    """
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
+    return compiled is not None and kind in compiled.ready
 
 
 class _Records:
@@ -205,26 +429,23 @@ def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Sc
         yield part
 
 
-def _summaries_of(
-    pool: Any, jobs: list[Scenario], together: bool, stopped: Callable[[], bool]
-) -> np.ndarray:
+def _summaries_of(pool: BatchPool, plan: Plan, jobs: list[Job]) -> np.ndarray:
     """Summaries of runs.
 
     Args:
-        pool: a compiled.BatchPool.
+        pool: makes them.
+        plan: how.
         jobs: what to run.
-        together: whether to make runs of one kind together.
-        stopped: whether the batch is over before its end.
     """
-    out = np.zeros(len(jobs), SUMMARY)
-    done, left = pool.many(jobs) if together else ([], range(len(jobs)))
+    out, keys = np.zeros(len(jobs), SUMMARY), [j.key for j in jobs]
+    together = any(key is not None for key in keys)
+    done, left = pool.many([j.scenario for j in jobs], keys) if together else ([], range(len(jobs)))
     for places, fields in done:
         for name, values in fields.items():
             out[name][places] = values
     for i in left:
-        if stopped():
-            break
-        out[i] = summary_entry(*pool.brief(jobs[i]))
+        s, key, kernel = jobs[i]
+        out[i] = summary_entry(*pool.brief(s, kernel if key is None else plan.kernel(s)))
     return out
 
 
@@ -234,10 +455,11 @@ def cores() -> int:
 
 
 def _on_threads(
-    parts: Iterable[list[Scenario]],
-    make: Callable[[list[Scenario], Callable[[], bool]], Any],
+    parts: Iterable[list[Job]],
+    make: Callable[[list[Job]], Any],
     put: Callable[[int, Any], None],
     threads: int,
+    stop: threading.Event,
 ) -> None:
     """Makes parts of a batch on several threads; the first exception ends all and is raised.
 
@@ -246,11 +468,12 @@ def _on_threads(
 
     Args:
         parts: of the batch.
-        make: results of a part, asked for with a function that tells whether the batch is over.
+        make: results of a part.
         put: takes the place of the first run of a part, and the results.
         threads: their number.
+        stop: set where the batch is over before its end.
     """
-    stop, at = threading.Event(), 0
+    at = 0
     working: dict[Future[Any], int] = {}
 
     def collect(most: int) -> None:
@@ -261,7 +484,7 @@ def _on_threads(
     with ThreadPoolExecutor(threads) as pool:
         try:
             for part in parts:
-                working[pool.submit(make, part, stop.is_set)] = at
+                working[pool.submit(make, part)] = at
                 at += len(part)
                 collect(2 * threads - 1)
             collect(0)

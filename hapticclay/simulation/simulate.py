@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
 import math
 import sys
@@ -13,16 +12,18 @@ from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..model.plausible import warn_of
 from ..model.scenario import Scenario
+from ..stepping import scene
 from ..stepping.engine import warnings_caught
-from ..stepping.run import PLAIN, Kernel, borrowed_store, cache_folder, completed, kind_of
+from ..stepping.machine_code import compile_time, is_kept, kind_of
+from ..stepping.run import PLAIN, Kernel, Run, borrowed_store, completed, plainly
 from . import record
 from .memory import memory_left
 
 ENGINES = ("auto", "python", "native")
-# measured: time that machine code saves in a step [us]; that it takes to load, and to compile [s]
-SAVED = {"LeapfrogRun": 2.5, "RungeKuttaRun": 10.0, "SampledRun": 20.0}
-SAVED_IN_GROOVE = 400.0  # more, where clay stays cut [us]
-LOADING, COMPILING = 0.6, {"LeapfrogRun": 3.5, "RungeKuttaRun": 4.0, "SampledRun": 10.0}
+# measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
+SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
+LOADING = 0.8
+saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
 
@@ -71,8 +72,8 @@ def simulate(
     if scenario.controller is not None:
         scenario.controller.function()  # refused before anything is compiled
     with warnings_caught():
-        kernel = _kernel(scenario, choice("engine", engine, ENGINES))
-        with borrowed_store(kernel) as store:
+        kernel = kernel_for(scenario, choice("engine", engine, ENGINES))
+        with borrowed_store() as store:
             return record.Record.of(*completed(scenario, every, kernel, store, progress))
 
 
@@ -93,35 +94,99 @@ def _check_memory(scenario: Scenario, every: int) -> None:
     )
 
 
-def _kernel(scenario: Scenario, engine: str) -> Kernel:
-    """How the loops of this run are run."""
+def kernel_for(scenario: Scenario, engine: str) -> Kernel:
+    """How the steps of a run are made.
+
+    Args:
+        scenario: what to run.
+        engine: as in `simulate`.
+
+    Raises:
+        ParameterError: numba is not installed.
+    """
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
-    if engine == "python" or (engine == "auto" and not _pays(scenario)):
+    if engine == "python" or not has_numba():
         return PLAIN
+    kind = kind_of(scene.parts_of(scenario))
+    if engine == "auto" and not repays(kind, time_ahead(scenario, 0) + saved.get(kind, 0.0)):
+        return AUTO
     compiled = load_compiled()
-    return compiled.kernel(scenario) if compiled else PLAIN
+    return compiled.KERNEL if compiled else PLAIN
 
 
-def _pays(scenario: Scenario) -> bool:
-    """Whether compiled loops are likely to end this run sooner than Python, loading included."""
-    compiled, kind = sys.modules.get("hapticclay.stepping.compiled"), kind_of(scenario)
-    if compiled is not None and compiled.is_warm(kind):
-        return True
-    name, steps = kind.__name__, scenario.t_max / scenario.dt
-    grooved = scenario.clay is not None and scenario.clay.groove is not None
-    each = SAVED[name] + (SAVED_IN_GROOVE if grooved else 0.0)
-    saved = 0.5e-6 * each * steps  # half: runs tend to end before t_max
-    if saved < LOADING or not has_numba():
+def time_ahead(scenario: Scenario, i: int) -> float:
+    """Time that machine code may save in the rest of a run [s]: half of it, as runs tend to end
+    before t_max.
+
+    Args:
+        scenario: what to run.
+        i: index of the sample at which the run is.
+    """
+    return 0.5 * saved_in_a_step(scenario) * max(scenario.t_max / scenario.dt - i, 0.0)
+
+
+def repays(kind: Any, time: float) -> bool:
+    """Whether machine code that saves some time repays loading or compiling it.
+
+    Args:
+        kind: of scene.
+        time: in this process, so far and ahead [s].
+    """
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
+    if compiled is not None and kind in compiled.ready:
+        return has_numba()
+    if time < LOADING or not has_numba():
         return False
-    with contextlib.suppress(OSError, RuntimeError):  # no home: nothing is kept
-        if any(cache_folder().glob(f"{name}.*")):
-            return True
-    return saved >= COMPILING[name]
+    return is_kept(kind) or time >= compile_time(kind)
+
+
+def pays(scenario: Scenario, steps: float) -> bool:
+    """Whether machine code repays loading or compiling it: for what this process has run of a kind
+    of scene so far, and is about to run.
+
+    Args:
+        scenario: what to run.
+        steps: how many steps of its kind are about to be made.
+    """
+    kind = kind_of(scene.parts_of(scenario))
+    saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(scenario) * steps
+    return repays(kind, saved[kind])
+
+
+def as_it_pays(run: Run, room: int) -> None:
+    """Makes steps in CPython, and from where machine code repays itself, compiled.
+
+    Args:
+        run: the run.
+        room: rows that it may have.
+    """
+    kind, s, i = run.kind, run.scenario, run.i
+    if repays(kind, time_ahead(s, i) + saved.get(kind, 0.0)) and (compiled := load_compiled()):
+        run.kernel = compiled.KERNEL
+        run.kernel.advance(run, room)
+        return
+    plainly(run, room)
+    saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * (run.i - i)
+
+
+AUTO = PLAIN._replace(advance=as_it_pays)
+
+
+def saved_in_a_step(scenario: Scenario) -> float:
+    """Time that machine code saves in a step [s].
+
+    Args:
+        scenario: what to run.
+    """
+    method = "accurate" if scenario.integrator == "accurate" else "continuous"
+    each = SAVED["sampled" if scenario.control == "sampled" else method]
+    grooved = scenario.clay is not None and scenario.clay.groove is not None
+    return each + (SAVED_IN_GROOVE if grooved else 0.0)
 
 
 def load_compiled() -> Any:
-    """Imports the compiled loops; prints a line that says why, where this fails.
+    """Imports the compiled steps; prints a line that says why, where this fails.
 
     Returns:
         The module stepping.compiled; None where it fails.
@@ -147,5 +212,5 @@ NUMBA = "needs numba: pip install hapticclay[fast]"
 
 
 def has_numba() -> bool:
-    """Whether the compiled loop is available."""
+    """Whether compiled steps are available."""
     return importlib.util.find_spec("numba") is not None

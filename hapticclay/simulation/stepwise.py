@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, numbers_of, pair
+from ..errors import ParameterError, choice, integer, number, numbers_of, pair
+from ..model.clay import Clay
+from ..model.constants import B_MAX
+from ..model.flow import CONSISTENCY_MAX, FY_MAX
+from ..model.groove import Groove
 from ..model.hardware import JOINTS
+from ..model.operator import Operator
 from ..model.plausible import warn_of
 from ..model.sampled_controller import Controller
 from ..model.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
-from ..stepping.run import STEPWISE, borrowed_store, kind_of
+from ..stepping.run import PLAIN, EngineStore, Run, Snapshot
 from . import record
+from .simulate import ENGINES, kernel_for, pays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
+LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges
+TOLD = 1000  # steps after which to ask anew whether machine code pays
+LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
 
 
 class Sample(NamedTuple):
@@ -52,7 +65,7 @@ class Sample(NamedTuple):
 
 @checked
 class Simulation:
-    """A run that makes a step when it is told to, to the same numbers as `simulate`.
+    """A run that makes steps when it is told to, to the same numbers as `simulate`.
 
         with hc.Simulation(scenario) as sim:
             while sim.outcome is None:
@@ -62,27 +75,56 @@ class Simulation:
 
     A step leads from one sample to the next, dt later; a border in its way is landed on. As in
     `simulate` the samples are judged 4095 at a time: a verdict of instability comes late by so many
-    steps at most, and the record ends where it was due.
+    steps at most, and the record ends where it was due; `diverging` tells it sooner.
+
+    A simulation belongs to one thread at a time. It can be pickled and copied; a copy goes on by
+    itself.
 
     Args:
         scenario: what to run.
+        engine: as in `simulate`; "auto" compiles once the steps asked for repay it.
 
     Raises:
         ParameterError: scenario is of another type, or refused as by `simulate`.
     """
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, *, engine: str = "auto"):
         if not isinstance(scenario, Scenario):
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
-        warn_of(scenario)
-        self.scenario = scenario
-        self._store = borrowed_store(STEPWISE)
-        self._run = kind_of(scenario)(scenario, 1, STEPWISE, self._store.__enter__())
-        self._wall = 0.0
-        self._state: Sample | None = None
+        self._engine = choice("engine", engine, ENGINES)
+        self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
+        self._closed, self._warned = False, ()
+        self._begin(scenario)
+
+    def _begin(self, scenario: Scenario) -> None:
+        place = scenario.clay, scenario.origin, scenario.arm, scenario.operators
+        if place != self._warned:  # of clay out of reach and the like, once
+            warn_of(scenario)
+            self._warned = place
+        kernel = PLAIN if self._engine == "auto" else kernel_for(scenario, self._engine)
+        self._run = Run(scenario, 1, kernel, self._store, watched=True)
+        self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forgets what was told of the run, which has changed."""
+        self._state: Sample | None = None
         self._record: record.Record | None = None
+        self._looked, self._diverging = -math.inf, False
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[Run]:
+        """The run, for this thread alone."""
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("another thread uses this simulation: give each thread its own")
+        try:
+            if self._closed:
+                raise RuntimeError("the simulation is closed")
+            yield self._run
+        finally:
+            self._lock.release()
 
     def __enter__(self) -> Simulation:
         return self
@@ -90,13 +132,28 @@ class Simulation:
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    def __getstate__(self) -> dict[str, Any]:
+        with self._alone() as run:
+            names = "_engine", "_torque", "_wall", "_given"
+            return {x: getattr(self, x) for x in names} | {"snapshot": run.snapshot()}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        self.__init__(kept["_given"], engine=kept["_engine"])  # type: ignore[misc]
+        if kept["_torque"] is not None:
+            self._take_over(kept["_torque"])
+        self._run.return_to(kept["snapshot"])
+        self._wall = kept["_wall"]
+
     def close(self) -> None:
-        """Gives the engine back, after which no step can be made."""
-        if self._store is not None:
-            if self._run.filled or self._run.looked:
-                self.record()  # while rows and state are this run's
-            self._store.__exit__(None, None, None)
-            self._store = None
+        """Ends the simulation, after which no step can be made."""
+        if not self._closed and (self._run.filled or self._run.looked):
+            self.record()
+        self._closed = True
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is run, with the force, gain, operator and clay now in effect."""
+        return self._run.scenario
 
     @property
     def outcome(self) -> Outcome | None:
@@ -117,14 +174,23 @@ class Simulation:
         """
         if self._state is None:
             if self._run.outcome is None:
-                if self._store is None:
-                    raise RuntimeError("the simulation is closed")
-                found = {"t": np.array([self._run.i * self.scenario.dt]), **self._run.ahead()}
+                with self._alone() as run:
+                    found = {"t": np.array([run.i * run.scenario.dt]), **run.ahead()}
             else:
                 found = {name: getattr(self.record(), name) for name in Sample._fields}
-            last = {name: x[-1] for name, x in found.items()}
-            self._state = Sample(**last)
+            self._state = Sample(**{name: x[-1] for name, x in found.items()})
         return self._state
+
+    @property
+    def diverging(self) -> bool:
+        """Whether the motion so far is unstable by the rules of the monitor.
+
+        It is asked anew each 20 ms of simulated time, and is no verdict: the run goes on.
+        """
+        with self._alone() as run:
+            if run.outcome is None and run.t >= self._looked + LOOK:
+                self._looked, self._diverging = run.t, run.is_diverging()
+            return self._diverging or run.watch.onset is not None
 
     def step(
         self,
@@ -143,24 +209,109 @@ class Simulation:
         Raises:
             ParameterError: a value is no finite number within 1e6, or torques come too late, or
                 without control="sampled".
-            RuntimeError: the simulation is closed.
+            RuntimeError: the simulation is closed, or another thread uses it.
         """
-        if self._store is None:
-            raise RuntimeError("the simulation is closed")
-        if self.outcome is not None:
-            return
-        if force is not None:
-            force = pair("force", force, -MOST, MOST, unit="N")
-            if force != self._run.scenario.force:
-                self._run.change_force(force)
-        if torque is not None:
-            self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
-        self._state = None
+        self.advance(1, force=force, torque=torque)
+
+    def advance(
+        self,
+        n: int = 1,
+        *,
+        force: Sequence[float] | None = None,
+        torque: Sequence[float] | None = None,
+    ) -> None:
+        """Makes n steps under the same action; fewer where the run ends.
+
+        Args:
+            n: number of steps, at least 1.
+            force: as in `step`.
+            torque: as in `step`.
+
+        Raises:
+            ParameterError: as by `step`.
+            RuntimeError: as by `step`.
+        """
+        n = integer("n", n, 1, 1_000_000_000)
+        with self._alone() as run:
+            if run.outcome is not None:
+                return
+            if force is not None:
+                force = pair("force", force, -MOST, MOST, unit="N")
+                if force != run.scenario.force:
+                    run.change_force(force)
+            if torque is not None:
+                self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
+            self._state, begin = None, time.perf_counter()
+            run.pause = run.i + n
+            with warnings_caught():
+                self._choose(n)
+                run.go(None)
+            self._wall += time.perf_counter() - begin
+
+    def _choose(self, n: int) -> None:
+        """Takes machine code for the steps from now on, where it pays."""
         run = self._run
-        begin = time.perf_counter()
-        with warnings_caught():
-            run.step()
-        self._wall += time.perf_counter() - begin
+        self._untold += n
+        if self._engine == "auto" and run.kernel is PLAIN and self._untold >= TOLD:
+            if pays(run.scenario, self._untold):
+                run.kernel = kernel_for(run.scenario, "native")
+            self._untold = 0
+
+    def reset(self, scenario: Scenario | None = None) -> None:
+        """Begins anew.
+
+        Args:
+            scenario: what to run; None for the same.
+        """
+        with self._alone() as run:
+            kernel = run.kernel
+            self._begin(scenario or self._given)
+            self._run.kernel = kernel
+
+    def snapshot(self) -> Snapshot:
+        """The run as it is now, to `restore`; it can be pickled."""
+        with self._alone() as run:
+            return run.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Goes back to a snapshot, with the record as it was.
+
+        Args:
+            snapshot: of this simulation, or of another one of the same scenario.
+        """
+        with self._alone() as run:
+            run.return_to(snapshot)
+            self._forget()
+
+    def set(
+        self,
+        *,
+        gain: tuple[float, float] | None = None,
+        operator: Operator | tuple[Operator | None, Operator | None] | None = None,
+        b: float | None = None,
+    ) -> None:
+        """Goes on with other numbers from this sample on.
+
+        Args:
+            gain: K of x and y [1/kg]; None keeps it.
+            operator: the operator's arm; None keeps it. A run without one cannot take one.
+            b: damping, yield force, consistency and pressure of all clay as a multiple of those
+                of the scenario that the run began with; None keeps them.
+
+        Raises:
+            ParameterError: a value is out of its bounds, or an operator is to come or to go.
+        """
+        with self._alone() as run:
+            changes: dict[str, Any] = {} if gain is None else {"gain": gain}
+            if operator is not None:
+                if not any(run.scenario.operators):
+                    bound = "must be given from the start on: this run has no operator"
+                    raise ParameterError("operator", operator, bound)
+                changes["operator"] = operator
+            if b is not None:
+                changes["clay"] = scaled(self._given.clay, number("b", b, 0.0, 1e6))
+            run.change(replace(run.scenario, **changes))
+            self._state = None
 
     def record(self) -> record.Record:
         """The record up to the last sample stepped from; from then on the simulation has ended.
@@ -172,21 +323,60 @@ class Simulation:
         """
         if self._record is not None:
             return self._record
-        if self._run.outcome is None:
-            if not (self._run.filled or self._run.looked):
-                raise RuntimeError("no step has been made")
-            self._run.interrupt()
-        self._record = record.Record.of(self._run, self._wall)
+        with self._alone() as run:
+            if run.outcome is None:
+                if not (run.filled or run.looked):
+                    raise RuntimeError("no step has been made")
+                run.interrupt()
+            self._record = record.Record.of(run, self._wall)
         return self._record
 
     def _drive(self, torque: tuple[float, ...]) -> None:
+        run = self._run
         if self._torque is None:
-            if self.scenario.control != "sampled":
+            if run.scenario.control != "sampled":
                 bound = "must be 'sampled' where torques are given"
-                raise ParameterError("control", self.scenario.control, bound)
-            if self._run.i or self.scenario.controller:
+                raise ParameterError("control", run.scenario.control, bound)
+            if run.i or run.scenario.controller:
                 bound = "must be given from the first step on, and not beside a controller"
                 raise ParameterError("torque", torque, bound)
-            own: Any = self._run
-            own.take_over(Controller(lambda *measured: (self._torque, ())))
+            self._take_over(torque)
         self._torque = torque[0], torque[1]
+
+    def _take_over(self, torque: tuple[float, ...]) -> None:
+        self._torque = torque[0], torque[1]
+        self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+
+
+def scaled(clay: Clay | None, factor: float) -> Clay | None:
+    """Returns the same clay with a multiple of its damping, yield force, consistency and pressure.
+
+    Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
+
+    Args:
+        clay: the clay; None for none.
+        factor: on all of them, within their bounds.
+    """
+
+    def times(values: Any, least: float = 0.0, most: float = B_MAX) -> Any:  # numbers, or rows
+        if isinstance(values, tuple):
+            return tuple(times(x, least, most) for x in values)
+        return min(max(values * factor, least), most) if values else values
+
+    def law(f: Any) -> Any:
+        more = {"growth": times(f.growth)} if f.growth else {}
+        more |= {"Fy": times(f.Fy, LEAST_YIELD, FY_MAX)} if f.Fy else {}
+        more |= {"K": times(f.K, LEAST_YIELD, CONSISTENCY_MAX)} if f.K else {}
+        return replace(f, values=times(f.values), **more)
+
+    def block(groove: Groove | None) -> Groove | None:
+        if groove is None:
+            return None
+        most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
+        k = min(max(factor, LEAST_YIELD), most)  # a block resists, however little
+        names = "pressure", "gradient", "damping"
+        return replace(groove, **{name: k * getattr(groove, name) for name in names})
+
+    if clay is None:
+        return None
+    return replace(clay, x=law(clay.x), y=law(clay.y), groove=block(clay.groove))

@@ -15,16 +15,18 @@ import os
 import pickle
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from numba.core import types
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from .machine_code import MARK
+
 DIGEST = hashlib.sha256().digest_size
-MARKS = "*Run.*"  # files that say for which kinds of run a folder has machine code
 lost: set[Path] = set()  # folders that machine code could not be written to
 on_miss: contextvars.ContextVar[Callable[[], object]] = contextvars.ContextVar("on_miss")
 
@@ -76,7 +78,7 @@ class FileCache(_Cache):
                     return CompileResult._rebuild(target_context, *payload)
         except Exception:  # written whole, but by what this process cannot read
             pass
-        for stale in (file, *self.folder.glob(MARKS)):  # the marks would promise what is gone
+        for stale in (file, *self.folder.glob("*" + MARK)):  # the marks would promise what is gone
             with contextlib.suppress(OSError):
                 stale.unlink()
         return None
@@ -113,11 +115,46 @@ class FileCache(_Cache):
             file.unlink(missing_ok=True)
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
-        return str(sig), codegen.magic_tuple(), self.code, sys.version
+        return str(sig), tuples_in(sig), codegen.magic_tuple(), self.code, sys.version
 
     def _file(self, key: tuple[Any, ...]) -> Path:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()
         return self.folder / f"{self.name}-{digest[:16]}.code"
+
+
+def tuples_in(sig: Any) -> tuple[str, ...]:
+    """The named tuples among types, with the sources of those from outside of the package.
+
+    Args:
+        sig: types of numba.
+    """
+    found = {f"{x.__module__}.{x.__qualname__} {source_of(x.__module__)}" for x in classes_in(sig)}
+    return tuple(sorted(found))
+
+
+def classes_in(kind: Any) -> Iterator[type]:
+    """The classes of the named tuples among types.
+
+    Args:
+        kind: types of numba.
+    """
+    if hasattr(kind, "instance_class"):
+        yield kind.instance_class
+    if isinstance(kind, tuple | types.BaseTuple):
+        for x in cast(Any, kind):
+            yield from classes_in(x)
+
+
+def source_of(module: str) -> str:
+    """Digest of the source of a module; "" of one that the folder is named by.
+
+    Args:
+        module: its name.
+    """
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is None or Path(__file__).parent in Path(file).parents:
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def write(file: Path, data: bytes) -> None:

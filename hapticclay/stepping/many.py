@@ -1,17 +1,17 @@
 """Many short runs in one call of compiled code: what runs share is set up once.
 
-A run of a hundred steps takes the engine 0.1 ms, and Python as long to set it up. Runs whose scenes
-are of one kind (see `kind_key`) differ in numbers alone. The first of them is set up as any other
-run, and its state is the pattern of the rest: the numbers that differ are put into copies of it,
-column by column, and `carry` makes all these runs without a return to Python. What it cannot judge,
-as an unstable run, is made again by `run`.
+A run of a hundred steps takes the engine 0.3 ms, and Python as long to set it up. Runs of one kind
+(see `kind_key`) have the same parts and differ in numbers alone. Each is a row of the numbers of
+its parts, put column by column; `carry` fills them in, begins the run, makes its steps and keeps
+its end. What it cannot judge, as an unstable run, is made again by `run`.
 """
 
 from __future__ import annotations
 
+import itertools
 import operator
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,15 @@ from ..model.clay import Profile
 from ..model.controller import Servo
 from ..model.operator import NO_HAND, mobility_with
 from ..model.scenario import Scenario
-from . import energy, monitor, path, run, sampled
+from . import begin, energy, laws, monitor, path, rows, scene, viscous
+from .engine_step import put
+from .machine_code import CARRY, kind_of
+from .memories import delay_in_samples
+from .parts import Parts
+from .run import EngineStore, Kernel
+from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
+WORKS = 10  # numbers of Runs.work
 SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
 LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so does Ctrl-C
 FEWEST = 4  # runs of a kind that repay its pattern
@@ -37,152 +44,154 @@ _scene = operator.attrgetter(
 _shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
 
 
-class ManyRuns(NamedTuple):
-    """Runs that `carry` makes, what it keeps of each, and its workspace.
+# ---- compiled ------------------------------------------------------------------------------------
+
+
+class Runs(NamedTuple):
+    """Runs that `carry` makes, and what it keeps of each.
 
     Attributes:
-        states: of the runs, with the numbers of their scenarios; become final, shape (n,).
-        tables: from regions.region_table, shape (n, len(Engine.table)).
+        numbers: of their parts, see `numbers_of`, shape (n, m).
+        tables: of their clay, shape (n, len(parts.table)).
+        memory: of their samplers, shape (n, len(sampler.memory)).
         starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
-        limits: of the engine's motors, shape (m, 2).
+        limits: of the engine's motors, shape (2, 2).
         reset: mj_resetData.
+        rows: of the record, one more than are filled before a look at them, shape (m, rows.ROW).
+        crossings: noted by steps, shape (m, 4).
+        rendered: force of the clay [N] where b v does not tell it, shape (m, 3).
         good: 1 for a run that has nothing for the monitor, else 0, shape (n,).
-        last: its last row, shape (n, path.ROW).
-        force: of the clay there [N], shape (n, 2).
-        crossings: the first ones: coordinate, time [s], speed [m/s], shape (n, SUMMARY_CROSSINGS,
-            3).
-        crossed: number of all, shape (n,).
+        last: its last row, shape (n, rows.ROW).
+        force: of the clay there [N], where b v does not tell it, shape (n, 2).
+        crossed: the first ones: coordinate, time [s], speed [m/s], shape (n, SUMMARY_CROSSINGS, 3).
+        counts: number of all crossings, engine steps, last sample, code, shape (n, 4).
+        times: end of the run [s], shape (n,).
         seen: counts of the monitor, see monitor.is_quiet, shape (n, 4).
-        stored: energy of arm and hand at the start, then at the end [J], shape (n, 4).
+        work: ledger, energies stored at the start and at the end, taken by friction [J], shape
+            (n, WORKS).
         swings: workspace of monitor.is_quiet.
     """
 
-    states: Any
+    numbers: Any
     tables: Any
+    memory: Any
     starts: Any
     limits: Any
     reset: Any
+    rows: Any
+    crossings: Any
+    rendered: Any
     good: Any
     last: Any
     force: Any
-    crossings: Any
     crossed: Any
+    counts: Any
+    times: Any
     seen: Any
-    stored: Any
+    work: Any
     swings: Any
 
-    @classmethod
-    def of(cls, states: Any, tables: Any, starts: Any, limits: Any, reset: Any) -> ManyRuns:  # noqa: PLR0913
-        """Runs that are to be made.
 
-        Args:
-            states: as the attribute.
-            tables: as the attribute.
-            starts: as the attribute.
-            limits: as the attribute.
-            reset: as the attribute.
-        """
-        n = len(states)
-        crossings = np.full((n, SUMMARY_CROSSINGS, 3), np.nan)
-        crossings[:, :, 0] = -1.0
-        counts = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        seen = np.tile(np.array([0, -1, -1, 0]), (n, 1))
-        rows = np.empty((n, path.ROW)), np.empty((n, 2))
-        return cls(
-            states, tables, starts, limits, reset, counts[0], *rows, crossings, counts[1], seen,
-            np.empty((n, 4)), np.zeros((2, monitor.QUIET)),
-        )  # fmt: skip
+def filled(like, numbers, k):
+    """The parts of run k, which differ from those of `like` in numbers alone; compiled only."""
+    raise NotImplementedError
 
 
-def advance_or_carry(m, s, e, room, runs):
-    """One run, as path.advance, or many: what is compiled once need not be compiled for both.
-
-    Args:
-        m: the method.
-        s: state of the run.
-        e: arrays of the run, or of the runs, which all use.
-        room: largest number of rows to fill; 0 makes the many runs.
-        runs: as ManyRuns.
-    """
-    if room > 0:
-        path.advance(m, s, e, room)
-    else:
-        carry(m, e, runs)
+def readied(parts, e, runs, k):
+    """Readies the engine, the clay and the workspace for run k."""
+    for j in range(len(parts.table)):
+        parts.table[j] = runs.tables[k, j]
+    for j in range(2):
+        runs.limits[j, 0], runs.limits[j, 1] = -parts.limits[j], parts.limits[j]
+        for i in range(monitor.QUIET):
+            runs.swings[j, i] = 0.0
+    runs.reset(e.model, e.data)
+    put(e.timestep, 0, (parts.time.dt,))
+    remember(parts.sampler, runs, k)
 
 
-def carry(m, e, runs):
+def remember(sampler, runs, k):
+    """Readies the compensators of sampled control for run k."""
+    if sampler is None:
+        return
+    for j in range(len(sampler.memory)):
+        sampler.memory[j] = runs.memory[k, j]
+
+
+def noted(runs, k, n):
+    """Keeps the crossings of the steps just made."""
+    for j in range(n):
+        i = runs.counts[k, 0]
+        if i < SUMMARY_CROSSINGS:
+            found = runs.crossings[j]
+            runs.crossed[k, i, 0], runs.crossed[k, i, 1] = found[0], found[2]
+            runs.crossed[k, i, 2] = found[3]
+        runs.counts[k, 0] = i + 1
+
+
+def judged(parts, runs, k, s):
+    """Judges the rows made; whether the run may go on without the monitor."""
+    n, limit = s.filled.rows, parts.limits
+    if s.status.code == NOT_FINITE or s.status.code == UNRESOLVED:
+        return False
+    if n == 0:
+        return True
+    if not monitor.is_quiet(runs.rows, n, limit[0], limit[1], runs.swings, runs.seen[k]):
+        return False
+    for j in range(rows.ROW):
+        runs.last[k, j] = runs.rows[n - 1, j]
+    for j in range(2):
+        runs.force[k, j] = runs.rendered[n - 1, j] if len(runs.rendered) else 0.0
+    return True
+
+
+def ended(parts, runs, k, s, first):
+    """Keeps the end of a run."""
+    last, w, out = energy.stored(parts, s), s.work, runs.work[k]
+    out[0], out[1], out[2], out[3], out[4] = w.muscle, w.motors, w.clay, w.hand, w.through
+    out[5], out[6], out[7], out[8] = first[0], first[1], last[0], last[1]
+    out[9] = friction_of(w.hardware)
+    runs.counts[k, 2], runs.counts[k, 3] = s.clock.i, s.status.code
+    runs.times[k] = s.clock.t
+
+
+def friction_of(work):
+    """Energy that friction has taken [J]."""
+    if work is None:
+        return 0.0
+    return work.friction
+
+
+def carry(like, blocks, e, runs):
     """Makes runs one after the other.
 
     Args:
-        m: the method.
-        e: arrays of a run, which all use.
-        runs: as ManyRuns.
+        like: parts of their kind; the table and whatever else steps write into is used by all, and
+            its rings are long enough for each.
+        blocks: from scene.blocks.
+        e: the engine.
+        runs: what to run.
     """
-    room, kept, starts, limits = len(e.rows), runs, runs.starts, runs.limits
-    for k in range(len(runs.states)):
-        s = runs.states[k]
-        for j in range(len(e.table)):
-            e.table[j] = runs.tables[k, j]
-        for i in range(len(e.ring)):
-            for j in range(sampled.HOLD + 1):
-                e.ring[i, j] = 0.0
-        for j in range(2):
-            limits[j, 0], limits[j, 1] = -s["torque_limit"][j], s["torque_limit"][j]
-            for i in range(monitor.QUIET):
-                kept.swings[j, i] = 0.0
-        runs.reset(e.model, e.data)
-        x, y, vx, vy = starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3]
-        path.put_handle(s, e, x, y, vx, vy)
-        path.settle(s, e.table, -1)
-        for j in range(2):
-            s["old"][j], s["old"][2 + j] = s["base"][j], s["rate"][j]
-        w1, w2 = s["w"][0], s["w"][1]
-        stored, crossings = kept.stored[k], kept.crossings[k]
-        stored[0], stored[1] = energy.stored_energy(s, w1, w1 + w2, (x, y), (vx, vy))
-        m.begin(s, e, x, y)
-        kept.good[k] = 1
-        while s["code"] == path.OPEN and kept.good[k]:
-            s["crossed"], s["stopped"] = 0, 0
-            path.advance(m, s, e, room)
-            for j in range(s["crossed"]):
-                i = kept.crossed[k]
-                if i < SUMMARY_CROSSINGS:
-                    row = e.crossings[j]
-                    crossings[i, 0], crossings[i, 1], crossings[i, 2] = row[0], row[2], row[3]
-                kept.crossed[k] = i + 1
-            n, limit = s["filled"], s["torque_limit"]
-            if s["code"] in (path.NOT_FINITE, path.UNRESOLVED):
-                kept.good[k] = 0
-            elif n >= room or s["code"] != path.OPEN:
-                if n > 0 and not monitor.is_quiet(
-                    e.rows, n, limit[0], limit[1], kept.swings, kept.seen[k]
-                ):
-                    kept.good[k] = 0
-                elif n > 0:
-                    keep_last(s, e, n - 1, kept.last[k], kept.force[k])
-                s["filled"] = 0
-        f = s["final"]
-        stored[2], stored[3] = energy.stored_energy(
-            s, f[4], f[4] + f[5], (f[0], f[1]), (f[2], f[3])
-        )
+    room = len(runs.rows) - 1
+    for k in range(len(runs.starts)):
+        parts, x = filled(like, runs.numbers, k), runs.starts[k]
+        readied(parts, e, runs, k)
+        s = begin.begun(parts, blocks, e, (x[0], x[1]), (x[2], x[3]))
+        first, good = energy.stored(parts, s), True
+        while s.status.code == OPEN and good:
+            s = path.advance(parts, s, e, room)
+            made = s.filled
+            noted(runs, k, made.crossings)
+            if made.rows >= room or s.status.code != OPEN:
+                good = judged(parts, runs, k, s)
+                made = Filled(made.steps, 0, 0, 0)
+            s = path.with_filled(s, Filled(0, made.rows, 0, 0))
+            runs.counts[k, 1] += made.steps
+        runs.good[k] = 1 if good else 0
+        ended(parts, runs, k, s, first)
 
 
-def keep_last(s, e, i, last, force):
-    """Keeps a row, and the force of the clay there.
-
-    Args:
-        s: state of the run.
-        e: its arrays.
-        i: the row.
-        last: gets it, shape (path.ROW,).
-        force: gets the force, shape (2,) [N].
-    """
-    for j in range(path.ROW):
-        last[j] = e.rows[i, j]
-    if len(e.rendered) > 0:
-        force[0], force[1] = e.rendered[i, 0], e.rendered[i, 1]
-    else:
-        force[0], force[1] = path.viscous_parts(s, last[12], last[13], last[4], last[5])
+# ---- which runs, and their numbers ---------------------------------------------------------------
 
 
 def kind_key(s: Scenario) -> tuple[Any, ...] | None:
@@ -202,14 +211,17 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         or s.integrator != "fast"
         or not s.stop
         or s.t_max > LONGEST * s.dt
+        or (laws.TABLE and laws.parts_of(s) is not None)
     ):
         return None
     law: Any = None
     if clay is not None:
-        x, y = clay.x, clay.y
+        x: Any = clay.x
+        y: Any = clay.y
         if clay.angle or clay.groove is not None or not (is_plain(x) and (y is x or is_plain(y))):
             return None
-        law = x.edges, x.along, y.edges, y.along, y is x or y == x
+        hard = scene.hardness(s, max(max(x.values), max(y.values)))
+        law = x.edges, x.along, y.edges, y.along, y is x or y == x, hard
     parts: Any = None
     if wires is not None:
         if wires.jitter or wires.lost or wires.force_noise:
@@ -229,198 +241,256 @@ def is_plain(law: Any) -> bool:
     return type(law) is Profile and not (law.growth or law.Fy or law.K or law.springs)
 
 
-class Pattern:
-    """A run set up, whose state is that of all runs of its kind but for some numbers.
+def numbers_of(part: Any) -> list[float]:
+    """The numbers of parts, in the order in which `filled` takes them.
 
     Args:
-        scenario: of the run.
-        kernel: how the loops are run.
-        store: engines to use.
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        return [x for each in part for x in numbers_of(each)]
+    return [float(part)] if isinstance(part, float | int) else []
+
+
+def places(part: Any, count: Iterator[int] | None = None) -> Any:
+    """Parts whose numbers are their places in `numbers_of`; all else is None.
+
+    Args:
+        part: the parts of a scene.
+        count: of the numbers before; None for none.
+    """
+    count = count or itertools.count()
+    if isinstance(part, tuple):
+        made = [places(x, count) for x in part]
+        return type(part)._make(made) if hasattr(part, "_make") else tuple(made)
+    return next(count) if isinstance(part, float | int) else None
+
+
+class Pattern:
+    """A scene whose parts are those of all runs of its kind, but for some numbers.
+
+    Args:
+        scenario: the scene.
+
+    Attributes:
+        parts: of the scene.
+        blocks: from scene.blocks.
+        scene: what the machine code of its steps is compiled for.
+        kind: what that of `carry` is compiled for.
+        is_made: whether `carry` makes such runs: not with compensators of another shape.
     """
 
-    def __init__(self, scenario: Scenario, kernel: run.Kernel, store: run.EngineStore):
-        self.scenario, self.store = scenario, store  # kept: their identity is part of the key
-        self.kind = run.kind_of(scenario)
-        made = self.kind(scenario, 1, kernel, store, True)
-        made.s.push()
-        self.formed = bool(made.s["formed"])
-        self.state, self.native = made.s.record.copy(), cast(Any, made.native)
-        self.method, self.model = made.method, made.model
-        self.table: Any = made.table
-        self.ring = np.zeros((0, 1 + sampled.HOLD))
+    def __init__(self, scenario: Scenario):
+        self.scenario = scenario  # kept: the identity of its parts is in the key
+        self.parts: Parts = scene.parts_of(scenario)
+        self.blocks: State = scene.blocks(self.parts, scenario)
+        self.scene = kind_of(self.parts)
+        self.kind = CARRY, self.scene, kind_of(self.blocks)
+        self.is_made = self.parts.form is None
+        self.row, self.at = np.array(numbers_of(self.parts)), places(self.parts)
 
-    def states(self, jobs: Sequence[Scenario]) -> np.ndarray:
-        """The states of runs before they begin.
+    def roomy(self, jobs: Sequence[Scenario]) -> Parts:
+        """Parts whose arrays have room for each of some runs; those that they have are kept.
 
         Args:
             jobs: their scenarios.
-
-        Returns:
-            Shape (n,).
         """
-        out: Any = np.empty(len(jobs), self.state.dtype)
-        out[:] = self.state
-        out["gain"], out["origin"] = [s.gain for s in jobs], [s.origin for s in jobs]
-        out["force"] = [s.force for s in jobs]  # without a muscle
-        self._put_hands(out, jobs)
-        self._put_servos(out, jobs)
-        if self.scenario.interface is not None:
-            Ts = float(self.state["Ts"])
-            delays = [s.interface.delay for s in jobs if s.interface]
-            parts = [sampled.delay_in_samples(d, Ts) for d in delays]
-            out["delay"], out["whole_delay"] = delays, [whole for whole, _ in parts]
-            out["part_delay"] = [part for _, part in parts]
-        return out
+        longest = max((s.interface.delay for s in jobs if s.interface), default=0.0)
+        held = self.parts.sampler
+        if held and held.delay and longest > held.delay.delay:
+            self.parts = scene.for_delays(self.parts, longest)
+        return self.parts
 
-    def _put_hands(self, out: Any, jobs: Sequence[Scenario]) -> None:
-        """Puts the operators' arms into states."""
-        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
-        out["handx"], out["handy"] = hands[:, 0], hands[:, 1]
-        mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
-        out["mobility"] = mobility_with(float(self.state["arm"][4]), mass)
-
-    def _put_servos(self, out: Any, jobs: Sequence[Scenario]) -> None:
-        """Puts servos and the loop at the start into states."""
-        servo, first = jobs[0].servo, self.kind.first_loop
-        if all(s.servo is servo for s in jobs):
-            starts = np.array([(*s.start, *s.velocity) for s in jobs]).T
-            for j, x in enumerate(first(starts[:2], starts[2:], servo)):
-                out["loop"][:, j] = x
-            out["servox"], out["servoy"] = servo[0].numbers, servo[1].numbers
-        else:
-            out["loop"] = [first(s.start, s.velocity, s.servo) for s in jobs]
-            for i, name in enumerate(("servox", "servoy")):
-                out[name] = [s.servo[i].numbers for s in jobs]
-        if "memory" in out.dtype.names:
-            out["memory"] = np.concatenate([self._memory(jobs, i) for i in (0, 1)], axis=1)
-
-    def _memory(self, jobs: Sequence[Scenario], i: int) -> np.ndarray:
-        """Rows of controller.held_compensator of an axis, shape (n, 20)."""
-        Ts, shape = float(self.state["Ts"]), jobs[0].compensators[i]
-        out, places = np.empty((len(jobs), 20)), dict[Servo, list[int]]()
-        for k, s in enumerate(jobs):
-            places.setdefault(s.servo[i], []).append(k)
-        for servo, at in places.items():
-            gains, which = np.unique([jobs[k].gain[i] for k in at], return_inverse=True)
-            A, B = controller.held_compensator(servo, shape, gains, Ts)
-            out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
-        return out
-
-    def tables(self, jobs: Sequence[Scenario]) -> np.ndarray:
-        """Their tables of the clay, shape (n, len(table)).
+    def numbers(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """The numbers of their parts, shape (n, m).
 
         Args:
             jobs: scenarios.
         """
-        out = np.tile(self.table, (len(jobs), 1))
+        at, out = self.at, np.tile(self.row, (len(jobs), 1))
+        out[:, at.arm.ox : at.arm.oy + 1] = [s.origin for s in jobs]
+        out[:, [x.K for x in at.lag]] = [s.gain for s in jobs]
+        out[:, at.push.steady[1:3]] = [s.force for s in jobs]
+        servo = jobs[0].servo
+        alike = all(s.servo is servo for s in jobs)
+        for i in (0, 1):
+            rows_ = servo[i].numbers if alike else [s.servo[i].numbers for s in jobs]
+            out[:, at.servo[i]] = rows_
+        if at.hand is not None:
+            self._put_hands(out, jobs)
+        if at.sampler is not None and at.sampler.delay is not None:
+            self._put_delays(out, [s.interface.delay for s in jobs if s.interface])
+        return out
+
+    def _put_hands(self, out: np.ndarray, jobs: Sequence[Scenario]) -> None:
+        """Puts the operators' arms into numbers, and the mobility with them."""
+        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
+        for i, x in enumerate(self.at.hand):
+            out[:, [x.mass, x.damper, x.spring]] = hands[:, i]
+        mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
+        for special in (self.at.special, self.at.sampler and self.at.sampler.special):
+            if special is not None and special.stiff is not None:
+                trace = self.scenario.arm.links[4]
+                out[:, special.stiff.mobility] = mobility_with(trace, mass)
+
+    def _put_delays(self, out: np.ndarray, delays: list[float]) -> None:
+        """Puts delays of the torques into numbers."""
+        at, Ts = self.at.sampler, self.parts.sampler.Ts
+        whole, share = np.array([delay_in_samples(x, Ts) for x in delays]).T
+        out[:, at.delay.delay], out[:, at.delay.rows] = delays, whole + scene.QUEUE
+        if at.passivity is not None:
+            out[:, at.passivity.whole], out[:, at.passivity.share] = whole, share
+
+    def tables(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """Their tables of the clay, shape (n, len(parts.table)).
+
+        Args:
+            jobs: scenarios.
+        """
+        table = self.parts.table
+        out = np.tile(table, (len(jobs), 1))
         if self.scenario.clay is not None:
-            at = [int(self.table[regions.VALUES + i]) for i in (0, 1)]
+            at = [int(table[regions.VALUES + i]) for i in (0, 1)]
             for i in range(2 if at[0] != at[1] else 1):
                 values = [s.clay.laws[i].values for s in jobs if s.clay]
                 out[:, at[i] : at[i] + len(values[0])] = values
         return out
 
-    def arrays(self, states: Any) -> Any:
-        """Engine for these runs.
+    def memory(self, jobs: Sequence[Scenario]) -> np.ndarray:
+        """Rows of controller.held_compensator of their axes, shape (n, 40); (n, 0) for none.
 
         Args:
-            states: of the runs.
+            jobs: scenarios.
         """
-        native = self.native
-        if self.scenario.interface is not None:
-            rows = sampled.ring_rows(int(self.state["window"]), int(states["whole_delay"].max()))
-            if len(self.ring) < rows:
-                self.ring = np.zeros((rows, 1 + sampled.HOLD))
-            native = native._replace(ring=self.ring)
-        return native
+        if self.parts.sampler is None:
+            return np.empty((len(jobs), 0))
+        return np.concatenate([self._memory(jobs, i) for i in (0, 1)], axis=1)
+
+    def _memory(self, jobs: Sequence[Scenario], i: int) -> np.ndarray:
+        Ts, shape = self.parts.sampler.Ts, jobs[0].compensators[i]
+        out, found = np.empty((len(jobs), 20)), dict[Servo, list[int]]()
+        for k, s in enumerate(jobs):
+            found.setdefault(s.servo[i], []).append(k)
+        for servo, at in found.items():
+            gains, which = np.unique([jobs[k].gain[i] for k in at], return_inverse=True)
+            A, B = controller.held_compensator(servo, shape, gains, Ts)
+            out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
+        return out
 
 
-class Lane:
-    """Makes many runs; of one thread.
+class Patterns:
+    """The patterns of the last kinds of run."""
 
-    Args:
-        kernel: how the loops are run.
-        store: engines to use.
-        carry: the function, compiled.
-        reset: mj_resetData as compiled code calls it.
-    """
+    def __init__(self):
+        self.known: dict[Any, Pattern] = {}
 
-    def __init__(self, kernel: Any, store: run.EngineStore, carry: Callable[..., None], reset: Any):
-        self.kernel, self.store, self.carry, self.reset = kernel, store, carry, reset
-        self.patterns: dict[Any, Pattern] = {}
-
-    def pattern(self, key: Any, scenario: Scenario) -> Pattern:
+    def of(self, key: Any, scenario: Scenario) -> Pattern:
         """The pattern of a kind.
 
         Args:
             key: from `kind_key`.
             scenario: one of the kind.
         """
-        if key not in self.patterns:
-            if len(self.patterns) >= PATTERNS:
-                del self.patterns[next(iter(self.patterns))]
-            self.patterns[key] = Pattern(scenario, self.kernel, self.store)
-        return self.patterns[key]
+        if key not in self.known:
+            if len(self.known) >= PATTERNS:
+                del self.known[next(iter(self.known))]
+            self.known[key] = Pattern(scenario)
+        return self.known[key]
+
+
+class Lane:
+    """Makes many runs; of one thread.
+
+    Args:
+        kernel: how the steps are made, compiled.
+        store: engines to use.
+        carry: the function, compiled.
+        reset: mj_resetData as compiled code calls it.
+    """
+
+    def __init__(self, kernel: Kernel, store: EngineStore, carry: Callable[..., None], reset: Any):
+        self.kernel, self.store, self.carry, self.reset = kernel, store, carry, reset
+        self.patterns = Patterns()
 
     def make(
-        self, jobs: Sequence[Scenario]
+        self, jobs: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
         """Makes those runs that it can.
 
         Args:
             jobs: scenarios.
+            keys: of each, from `kind_key`; None for one that is not to be made.
 
         Returns:
             Groups of runs: their places among jobs, and the fields of a summary, arrays over them;
             and the places of all others.
         """
         kinds: dict[Any, list[int]] = {}
-        for i, s in enumerate(jobs):
-            kinds.setdefault(kind_key(s), []).append(i)
+        for i, key in enumerate(keys):
+            kinds.setdefault(key, []).append(i)
         done, left = [], kinds.pop(None, [])
-        for key, places in kinds.items():
-            if len(places) < FEWEST or self.pattern(key, jobs[places[0]]).formed:
-                left += places
+        for key, found in kinds.items():
+            if len(found) < FEWEST or not (p := self.patterns.of(key, jobs[found[0]])).is_made:
+                left += found
                 continue
-            fields, good = self._group(self.patterns[key], [jobs[i] for i in places])
-            at = np.array(places)
+            fields, good = self.group(p, [jobs[i] for i in found])
+            at = np.array(found)
             done.append((at[good], fields))
             left += at[~good].tolist()
         return done, sorted(left)
 
-    def _group(self, p: Pattern, jobs: list[Scenario]) -> tuple[dict[str, Any], np.ndarray]:
-        """Runs of one kind: fields of a summary of those that are good, and which are."""
-        self.store.engine(p.scenario)
-        p.native.timestep[0] = p.scenario.dt
-        states, starts = p.states(jobs), np.array([(*s.start, *s.velocity) for s in jobs])
-        native, limits = p.arrays(states)._replace(table=p.table.copy()), p.model.actuator_ctrlrange
-        runs = ManyRuns.of(states, p.tables(jobs), starts, limits, self.reset)
-        self.carry(p.method, p.state, native, 0, runs)
+    def group(self, p: Pattern, jobs: list[Scenario]) -> tuple[dict[str, Any], np.ndarray]:
+        """Makes runs of one kind.
+
+        Args:
+            p: its pattern.
+            jobs: their scenarios.
+
+        Returns:
+            Fields of a summary of those that are good, and which are.
+        """
+        parts, n = p.roomy(jobs), len(jobs)
+        model, data = self.store.engine(p.scenario)
+        e = self.store.arrays(parts, model, data, self.kernel)
+        starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
+        crossed = np.full((n, SUMMARY_CROSSINGS, 3), np.nan)
+        crossed[:, :, 0] = -1.0
+        runs = Runs(
+            p.numbers(jobs), p.tables(jobs), p.memory(jobs), starts, model.actuator_ctrlrange,
+            self.reset, self.store.rows, self.store.crossings,
+            self.store.rendered if scene.tells(parts) else np.empty((0, 3)), np.zeros(n, np.int64),
+            np.zeros((n, rows.ROW)), np.zeros((n, 2)), crossed, np.zeros((n, 4), np.int64),
+            np.zeros(n), np.tile(np.array([0, -1, -1, 0]), (n, 1)), np.zeros((n, WORKS)),
+            np.zeros((2, monitor.QUIET)),
+        )  # fmt: skip
+        self.carry(parts, p.blocks, e, runs)
         good = runs.good > 0
         return {name: x[good] for name, x in summary_columns(p.scenario, runs).items()}, good
 
 
-def summary_columns(like: Scenario, kept: ManyRuns) -> dict[str, Any]:
+def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
     """The fields of summaries, arrays over runs.
 
     Args:
         like: a scenario of their kind.
-        kept: the runs, made.
+        made: the runs.
     """
-    states = kept.states
-    seen, moved, unbound, _ = kept.seen.T
+    crossings, steps, step, codes = made.counts.T
+    seen, moved, unbound, _ = made.seen.T
     saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
     ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
-    code = np.where(states["code"] == path.FINISHED, "finished", ends)
-    work, stored = states["work"], kept.stored
-    balance = energy.energy_balance(work[:, :5].T, stored[:, :2].T, stored[:, 2:].T)
+    work = made.work.T
+    balance = energy.balance(work[:5], work[5:7], work[7:9])
     if like.interface is not None and any(like.interface.friction):
-        balance["residual"] = balance["residual"] - work[:, path.SUMS - len(energy.HARDWARE_WORK)]
-    last, crossings = kept.last, kept.crossings
+        balance["residual"] = balance["residual"] - work[9]
+    last, crossed = made.last, made.crossed
+    v, b, fe = last[:, 4:6], last[:, 12:14], made.force
+    if not len(made.rendered):
+        fe = np.column_stack(viscous.force(None, b.T, v.T))
     return dict(
-        code=code, axis=np.zeros(len(code), "U1"), time=states["t"], step=states["i"],
-        steps=states["steps"],
-        crossings=kept.crossed, crossing_axis=crossings[:, :, 0].astype(np.int64),
-        crossing_time=crossings[:, :, 1], crossing_speed=crossings[:, :, 2],
-        p=last[:, 2:4], v=last[:, 4:6], fh=last[:, 6:8], fe=kept.force, b=last[:, 12:14], **balance,
+        code=np.where(codes == FINISHED, "finished", ends), axis=np.zeros(len(codes), "U1"),
+        time=made.times, step=step, steps=steps, crossings=crossings,
+        crossing_axis=crossed[:, :, 0].astype(np.int64), crossing_time=crossed[:, :, 1],
+        crossing_speed=crossed[:, :, 2], p=last[:, 2:4], v=v, fh=last[:, 6:8], fe=fe, b=b,
+        **balance,
     )  # fmt: skip

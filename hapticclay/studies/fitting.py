@@ -643,7 +643,7 @@ def _quantile(level: float, freedom: float) -> float:
     return float(t.ppf(0.5 + 0.5 * level, max(freedom, 1.0)))
 
 
-def _intervals(  # noqa: PLR0913  # what one fit is made of
+def _intervals(
     joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
 ) -> tuple[FlowParameter, ...]:
     """Where the profile of the sum of squares rises by quantile^2 variance, within the bounds."""
@@ -658,7 +658,7 @@ def _intervals(  # noqa: PLR0913  # what one fit is made of
     return tuple(out)
 
 
-def _crossing(  # noqa: PLR0913  # of one profile
+def _crossing(
     joint: Joint,
     law: str,
     free: Minimum,

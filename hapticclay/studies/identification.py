@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..files import versions
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
+from ..model.fields import function_of
 from ..model.operator import Operator
 from ..model.scenario import Control, Scenario
 from ..model.signals import Multisine
@@ -249,30 +250,14 @@ def measured(
 
 
 @checked
-def identify(  # noqa: PLR0913  # the settings of one experiment, each by its name
-    axis: str = "x",
-    what: str = "G",
-    *,
-    origin: tuple[float, float] = NOMINAL_POSE,
-    shaping: bool = False,
-    noise: Noise | None = None,
-    seed: int = 0,
-    band: tuple[float, float] | None = None,
-    period: float | None = None,
-    periods: int = 2,
-    realisations: int = 4,
-    lines: int = MULTISINE_LINES,
-    amplitude: float | None = None,
-    control: Control = "continuous",
-    dt: float = TS,
-    progress: Callable[[int, int], None] | None = None,
-) -> Identified:
+@dataclass(frozen=True)
+class Identification:
     """Identify one block of the loop on one axis; the compensator is off (K = 0).
 
     A command drives G and a muscle force Sh; for Th the operator's arm holds a handle that a
     command moves.
 
-    Args:
+    Attributes:
         axis: "x" or "y".
         what: "G", "S" (Sh) or "Th".
         origin: world position about which the handle moves [m].
@@ -290,64 +275,106 @@ def identify(  # noqa: PLR0913  # the settings of one experiment, each by its na
         control: "continuous", or "sampled" (slow, about real time).
         dt: physics and control step [s].
         progress: called after each run with (runs made, runs in all).
-
-    Raises:
-        ParameterError: a value is out of its bounds, the handle cannot be there, or a run ended
-            early or met the limits of the motors.
     """
-    from scipy.fft import next_fast_len
 
-    i = AXES.index(choice("axis", axis, AXES))
-    choice("what", what, BLOCK_KINDS)
-    if not isinstance(noise, Noise | None):
-        raise ParameterError("noise", noise, "must be a Noise or None")
-    seed = integer("seed", seed, 0, 2**32 - 1)
-    realisations = integer("realisations", realisations, 1, 1000)
-    periods = integer("periods", periods, 1 if realisations > 1 else 2, 1000)
-    size = AMPLITUDE[what] if amplitude is None else amplitude
-    size = number("amplitude", size, 0.0, 1.0, above=True, unit="m")
-    length = number("period", PERIOD[what] if period is None else period, 0.1, 1000.0, unit="s")
-    base = Scenario(
-        name=f"identify {what} {axis}",
-        gain=(0.0, 0.0),
-        force=(0.0, 0.0),
-        origin=pair("origin", origin, unit="m"),
-        operator=Operator() if what == "Th" else None,
-        shaping=flag("shaping", shaping),
-        control=control,
-        dt=dt,
-        length=None,
-    )
-    n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
-    gain = S[i].gain if shaping or what != "S" else endpoint_mobility(*base.origin)[i]
-    rms = size * S[i].stiffness / gain if what == "S" else size
-    along = (rms, 0.0) if i == 0 else (0.0, rms)
-    band = IDENTIFICATION_BAND[what] if band is None else band
-    wave = _multisine(along, band, n * base.dt, lines, 0.1 / base.dt)
-    base = replace(base, t_max=(1 + periods) * wave.period)
-    seeds = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1)
-    drive = "muscle" if what == "S" else "command"
-    scenarios = [replace(base, **{drive: replace(wave, seed=x)}) for x in seeds[0].tolist()]
-    signals = []
-    for made, (scenario, x) in enumerate(zip(scenarios, seeds[1].tolist(), strict=True), 1):
-        record = simulate(scenario)
-        if record.outcome.code != "time limit" or record.outcome.cause:
-            bound = "the handle must move for all of the run, its motors within their limits"
-            raise ParameterError("amplitude", size, f"{bound}: {record.status}")
-        shown = measured(record, noise, np.random.default_rng(x))
-        signals.append(_signals(what, i, record, *shown, slice(n, (1 + periods) * n)))
-        if progress:
-            progress(made, realisations)
-    bins = np.round(wave.omega / (2.0 * np.pi) * wave.period).astype(int)
-    frequency = bins / wave.period
-    found = estimate_response(np.array(signals), n, bins)
-    # The difference equation of the continuous loop; none of second order describes a hold.
-    step = base.dt if control == "continuous" else None
-    floor = (SHAPED if what == "S" and shaping else SETTLING[what]) * (size / AMPLITUDE[what]) ** 2
-    fitted = fitted_coefficients(what, axis, frequency, found, step, floor)
-    return Identified(
-        what, axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods, realisations
-    )
+    axis: str = "x"
+    what: str = "G"
+    _: KW_ONLY
+    origin: tuple[float, float] = NOMINAL_POSE
+    shaping: bool = False
+    noise: Noise | None = None
+    seed: int = 0
+    band: tuple[float, float] | None = None
+    period: float | None = None
+    periods: int = 2
+    realisations: int = 4
+    lines: int = MULTISINE_LINES
+    amplitude: float | None = None
+    control: Control = "continuous"
+    dt: float = TS
+    progress: Callable[[int, int], None] | None = None
+
+    def scenario(self) -> Scenario:
+        """The run without its signal."""
+        return Scenario(
+            name=f"identify {self.what} {self.axis}",
+            gain=(0.0, 0.0),
+            force=(0.0, 0.0),
+            origin=pair("origin", self.origin, unit="m"),
+            operator=Operator() if self.what == "Th" else None,
+            shaping=flag("shaping", self.shaping),
+            control=self.control,
+            dt=self.dt,
+            length=None,
+        )
+
+    def identified(self) -> Identified:
+        """Makes the runs, and fits the block to them.
+
+        Raises:
+            ParameterError: a value is out of its bounds, the handle cannot be there, or a run ended
+                early or met the limits of the motors.
+        """
+        from scipy.fft import next_fast_len
+
+        what, noise = self.what, self.noise
+        i = AXES.index(choice("axis", self.axis, AXES))
+        choice("what", what, BLOCK_KINDS)
+        if not isinstance(noise, Noise | None):
+            raise ParameterError("noise", noise, "must be a Noise or None")
+        seed = integer("seed", self.seed, 0, 2**32 - 1)
+        realisations = integer("realisations", self.realisations, 1, 1000)
+        periods = integer("periods", self.periods, 1 if realisations > 1 else 2, 1000)
+        size = AMPLITUDE[what] if self.amplitude is None else self.amplitude
+        size = number("amplitude", size, 0.0, 1.0, above=True, unit="m")
+        length = PERIOD[what] if self.period is None else self.period
+        length = number("period", length, 0.1, 1000.0, unit="s")
+        base = self.scenario()
+        n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
+        gain = S[i].gain if self.shaping or what != "S" else endpoint_mobility(*base.origin)[i]
+        rms = size * S[i].stiffness / gain if what == "S" else size
+        along = (rms, 0.0) if i == 0 else (0.0, rms)
+        band = IDENTIFICATION_BAND[what] if self.band is None else self.band
+        wave = _multisine(along, band, n * base.dt, self.lines, 0.1 / base.dt)
+        base = replace(base, t_max=(1 + periods) * wave.period)
+        seeds = np.random.SeedSequence(seed).generate_state(2 * realisations).reshape(2, -1)
+        drive = "muscle" if what == "S" else "command"
+        scenarios = [replace(base, **{drive: replace(wave, seed=x)}) for x in seeds[0].tolist()]
+        signals = []
+        for made, (scenario, x) in enumerate(zip(scenarios, seeds[1].tolist(), strict=True), 1):
+            record = simulate(scenario)
+            if record.outcome.code != "time limit" or record.outcome.cause:
+                bound = "the handle must move for all of the run, its motors within their limits"
+                raise ParameterError("amplitude", size, f"{bound}: {record.status}")
+            shown = measured(record, noise, np.random.default_rng(x))
+            signals.append(_signals(what, i, record, *shown, slice(n, (1 + periods) * n)))
+            if self.progress:
+                self.progress(made, realisations)
+        bins = np.round(wave.omega / (2.0 * np.pi) * wave.period).astype(int)
+        frequency = bins / wave.period
+        found = estimate_response(np.array(signals), n, bins)
+        # The difference equation of the continuous loop; none of second order describes a hold.
+        step = base.dt if self.control == "continuous" else None
+        settling = SHAPED if what == "S" and self.shaping else SETTLING[what]
+        floor = settling * (size / AMPLITUDE[what]) ** 2
+        fitted = fitted_coefficients(what, self.axis, frequency, found, step, floor)
+        return Identified(
+            what, self.axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods,
+            realisations,
+        )  # fmt: skip
+
+
+def _identified(experiment: Identification) -> Identified:
+    return experiment.identified()
+
+
+identify = function_of(
+    Identification,
+    "identify",
+    _identified,
+    "a value is out of its bounds, the handle cannot be there, or a run ended early or met the "
+    "limits of the motors.",
+)
 
 
 def _multisine(

@@ -278,7 +278,7 @@ def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float)
     return replace(base, name="impedance", muscle=wave, dt=dt, Ts=subject.Ts, **still)
 
 
-def _measured(  # noqa: PLR0913  # one record, and where it is read
+def _measured(
     subject: Subject, record: Record, part: slice, n: int, steps: int, i: int, wave: Multisine
 ) -> tuple[Impedance, np.ndarray]:
     """The impedance over two whole periods of a record, and its relative deviation.

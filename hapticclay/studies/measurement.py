@@ -156,30 +156,51 @@ def _check_sampling(t: np.ndarray) -> None:
 
 def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Columns of a CSV file as floats, by the keys of `wanted`."""
+    (_, first), *rows = _read_table(path)
+    head = [x.strip() for x in first]
+    if all(_is_number(x) for x in head):
+        bound = f"must name its columns in the first line; that holds {head[0]}, ..."
+        raise _bad_file(path, bound)
+    at = _places(path, head, wanted)
+    out: dict[str, list[float]] = {key: [] for key in at}
+    for line, row in rows:
+        if len(row) != len(head):
+            raise _bad_file(path, f"line {line}: must have {len(head)} cells, has {len(row)}")
+        for key, i in at.items():
+            if not _is_number(row[i]):
+                bound = f"must be a finite number, is {row[i][:20]!r}"
+                raise _bad_file(path, f"line {line}, column {head[i]!r}: {bound}")
+            out[key].append(float(row[i]))
+    return {key: np.array(x) for key, x in out.items()}
 
-    def refuse(bound: str) -> ParameterError:
-        return ParameterError("csv", str(path), bound)
 
+def _bad_file(path: Path, bound: str) -> ParameterError:
+    return ParameterError("csv", str(path), bound)
+
+
+def _read_table(path: Path) -> list[tuple[int, list[str]]]:
+    """Lines of a CSV file that are no comments: number and cells."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise refuse(f"must be a readable file ({error.strerror})") from None
+        raise _bad_file(path, f"must be a readable file ({error.strerror})") from None
     except UnicodeDecodeError:
-        raise refuse("must be a text file in UTF-8") from None
+        raise _bad_file(path, "must be a text file in UTF-8") from None
     lines = [
         (i, x) for i, x in enumerate(text.splitlines(), 1) if x.strip() and not x.startswith("#")
     ]
     if not lines:
-        raise refuse("must name its columns in the first line; it is empty")
+        raise _bad_file(path, "must name its columns in the first line; it is empty")
     separator = max(",;\t", key=lines[0][1].count)
     rows = csv.reader((x for _, x in lines), delimiter=separator, skipinitialspace=True)
     try:
-        table = [(lines[rows.line_num - 1][0], row) for row in rows]
+        return [(lines[rows.line_num - 1][0], row) for row in rows]
     except csv.Error as error:
-        raise refuse(f"must be a table of cells ({error})") from None
-    head = [x.strip() for x in table[0][1]]
-    if all(_is_number(x) for x in head):
-        raise refuse(f"must name its columns in the first line; that holds {head[0]}, ...")
+        raise _bad_file(path, f"must be a table of cells ({error})") from None
+
+
+def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str, int]:
+    """Where in the first line the columns stand, by the keys of `wanted`."""
     at = {}
     for key, name in wanted.items():
         column = choice(f"columns.{key}", name, tuple(head))
@@ -190,18 +211,7 @@ def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray
         at[key] = head.index(column)
     if len(set(at.values())) < len(at):
         raise ParameterError("columns", dict(wanted), "must be different columns")
-    out: dict[str, list[float]] = {key: [] for key in at}
-    for line, row in table[1:]:
-        if len(row) != len(head):
-            raise refuse(f"line {line}: must have {len(head)} cells, has {len(row)}")
-        for key, i in at.items():
-            if not _is_number(row[i]):
-                told = (
-                    f"line {line}, column {head[i]!r}: must be a finite number, is {row[i][:20]!r}"
-                )
-                raise refuse(told)
-            out[key].append(float(row[i]))
-    return {key: np.array(x) for key, x in out.items()}
+    return at
 
 
 def _is_number(cell: str) -> bool:

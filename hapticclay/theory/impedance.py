@@ -96,7 +96,7 @@ class HeldArm(NamedTuple):
     hold: np.ndarray
 
 
-def held_arm(  # noqa: PLR0913  # the numbers of one mass
+def held_arm(
     mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
 ) -> HeldArm:
     """Responses of a mass, damper and spring whose motor holds its force from sample to sample.
@@ -109,9 +109,7 @@ def held_arm(  # noqa: PLR0913  # the numbers of one mass
         delay: from a sample to the force computed from it [s].
         omega: [rad/s], > 0, shape (n,).
     """
-    whole = math.floor(delay / Ts + 1e-9)
-    part = delay / Ts - whole
-    part = part if part > 1e-9 else 0.0
+    whole, part = linear_loop.whole_samples(delay, Ts)
     own, s = np.array([-spring, -damper]) / mass, 1j * omega
     # under the force of one sample for a share `part`, then under the next
     head, old = linear_loop.held_motion(own, 1.0 / mass, part * Ts)

@@ -191,25 +191,8 @@ def of_loop(
         def ask(*args: Any, **given: Any) -> Answer:
             if known:
                 known_names(name, given, known)
-            if args and isinstance(args[0], Scenario):
-                scenario, *rest = args
-                if not rest and "axis" not in given:
-                    raise TypeError(f"{name}() of a Scenario needs an axis")
-                axis = rest.pop(0) if rest else given.pop("axis")
-                args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
-            for word in ("loop", "axis"):
-                if word in given:
-                    args = (given.pop(word), *args)
-            if not args:
-                raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
-            whole, *rest = args
-            names = free if isinstance(whole, Loop) else order
-            if len(rest) > len(names):
-                raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
-            for word, value in zip(names, rest, strict=False):
-                if word in given:
-                    raise TypeError(f"{name}() got multiple values for argument {word!r}")
-                given[word] = value
+            whole, *rest = _loop_first(name, args, given)
+            _by_name(name, free if isinstance(whole, Loop) else order, rest, given)
             parts = {word: given.pop(word) for word in PARTS if word in given}
             if isinstance(whole, Loop):
                 loop = _with_gain(whole, parts)
@@ -219,15 +202,49 @@ def of_loop(
                     raise TypeError(f"{name}() lacks {', '.join(missing)}")
                 loop = Loop(whole, **parts)
             if not timing:
-                for word, value in TIMING.items():
-                    if getattr(loop, word) != value:
-                        raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
+                _refuse_timing(loop)
             return guarded(loop, **given)
 
         ask.__signature__ = signature  # type: ignore[attr-defined]
         return ask
 
     return decorate
+
+
+def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequence[Any]:
+    """What an analysis was asked by position, after a Loop, that of a Scenario, or an axis.
+
+    What makes the first is taken from `given`, the arguments by name.
+    """
+    if args and isinstance(args[0], Scenario):
+        scenario, *rest = args
+        if not rest and "axis" not in given:
+            raise TypeError(f"{name}() of a Scenario needs an axis")
+        axis = rest.pop(0) if rest else given.pop("axis")
+        args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
+    for word in ("loop", "axis"):
+        if word in given:
+            args = (given.pop(word), *args)
+    if not args:
+        raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
+    return args
+
+
+def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[str, Any]) -> None:
+    """Puts arguments that follow by position among those by name."""
+    if len(rest) > len(names):
+        raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
+    for word, value in zip(names, rest, strict=False):
+        if word in given:
+            raise TypeError(f"{name}() got multiple values for argument {word!r}")
+        given[word] = value
+
+
+def _refuse_timing(loop: Loop) -> None:
+    """Refuses a loop that is sampled or late."""
+    for word, value in TIMING.items():
+        if getattr(loop, word) != value:
+            raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
 
 
 def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
@@ -522,9 +539,7 @@ def sampled_differences(
     assert Ts is not None
     nominal = _shaped_mobility(loops)
     W, shaping = _nominal_pose(loops) if pose is None else pose
-    whole = math.floor(first.delay / Ts + 1e-9)
-    part = first.delay / Ts - whole
-    part = max(part, 0.0) if part > 1e-9 else 0.0
+    whole, part = whole_samples(first.delay, Ts)
     newest = at[-1]
     m = newest + n * (1 + whole)
     inertia, mass = np.linalg.inv(W), np.diag([x.hand.mass for x in loops])
@@ -532,21 +547,9 @@ def sampled_differences(
     springs, dampers = _resistance(loops if implicit else [replace(x, b=0.0, k=0.0) for x in loops])
     masses, directions = np.linalg.eigh(inertia + mass)
     w = (directions / masses) @ directions.T
-
-    def moved(t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Change of (p of each axis, v of each axis) over t [s], and that for a held u."""
-        if np.ptp(springs) or np.ptp(dampers):  # another hand on each axis
-            return _moved_together(np.hstack((np.diag(springs), np.diag(dampers))), w, t)
-        change, drive = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, n))
-        # In the directions in which hand and handle have one mass the axes are decoupled.
-        for size, direction in zip(masses.tolist(), directions.T, strict=True):
-            own, held = held_motion(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
-            share = np.outer(direction, direction)
-            change += np.kron(own, share)
-            drive += np.kron(held[:, None], share)
-        return change, drive
-
-    (rest, new), (head, old) = (moved(x * Ts) for x in (1.0 - part, part))
+    (rest, new), (head, old) = (
+        _moved(masses, directions, springs, dampers, x * Ts) for x in (1.0 - part, part)
+    )
     queue = np.zeros((n, n * (1 + whole)))
     force = np.hstack((_over_states(loops, places, rates), queue))
     before = np.hstack((w @ _over_states(loops, springs, dampers), queue))
@@ -581,6 +584,18 @@ def sampled_differences(
     less[np.arange(newest + n, m), np.arange(newest, m - n)] = 1.0
     less[np.arange(newest, m), np.arange(newest, m)] -= 1.0
     return less, beta, gamma
+
+
+def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
+    """Whole samples in a delay, and the rest of it as a share of one; 0.0 within rounding.
+
+    Args:
+        delay: [s].
+        Ts: control sample [s].
+    """
+    whole = math.floor(delay / Ts + 1e-9)
+    part = delay / Ts - whole
+    return whole, part if part > 1e-9 else 0.0
 
 
 def _places(loops: Sequence[Loop]) -> list[int]:
@@ -627,6 +642,31 @@ def _over_states(
     for j, k in enumerate(at[:-1]):
         out[j, k : k + 2] = place[j], rate[j]
     return out
+
+
+def _moved(
+    masses: np.ndarray,
+    directions: np.ndarray,
+    springs: np.ndarray,
+    dampers: np.ndarray,
+    t: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Change of (p of each axis, v of each axis) over t [s], and that for held forces.
+
+    In the directions, columns, hand and handle have one mass each: there the axes are decoupled if
+    all have the same hand.
+    """
+    n = len(masses)
+    if np.ptp(springs) or np.ptp(dampers):
+        w = (directions / masses) @ directions.T
+        return _moved_together(np.hstack((np.diag(springs), np.diag(dampers))), w, t)
+    change, drive = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, n))
+    for size, direction in zip(masses.tolist(), directions.T, strict=True):
+        own, held = held_motion(np.array([springs[0], dampers[0]]) / size, 1.0 / size, t)
+        share = np.outer(direction, direction)
+        change += np.kron(own, share)
+        drive += np.kron(held[:, None], share)
+    return change, drive
 
 
 def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:

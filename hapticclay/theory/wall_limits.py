@@ -150,9 +150,7 @@ def _kept(wall: VirtualWall) -> float:
 
 def _split_delay(wall: VirtualWall) -> tuple[int, float]:
     """Whole samples of the delay, and the rest as a share of a sample."""
-    whole = math.floor(wall.delay / wall.Ts + 1e-9)
-    part = wall.delay / wall.Ts - whole
-    return whole, part if part > 1e-9 else 0.0
+    return linear_loop.whole_samples(wall.delay, wall.Ts)
 
 
 def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, float]:

@@ -125,11 +125,7 @@ class Page:
         self._console.quiet = self._quiet
 
     def _scene(self) -> None:
-        add, tool, arm = self.server.scene, self.session.tool, self.session.scenario.arm
-        size = room_scale(arm)
-        dark, steel, blue, orange = (
-            rgb_bytes(PART_COLORS[name]) for name in ("dark", "steel", "blue", "orange")
-        )
+        add, size = self.server.scene, room_scale(self.session.scenario.arm)
         camera = self.server.initial_camera
         camera.position = (0.21 * size, -0.66 * size, 0.64 * size)
         camera.look_at, camera.fov = (0.18 * size, 0.15 * size, -0.04), 0.60
@@ -147,6 +143,29 @@ class Page:
         lines: Any = dict(cell_size=0.1, section_size=0.1)
         lines.update(cell_color=rgb_bytes(GRID), section_color=rgb_bytes(GRID))
         add.add_grid("/grid", *table, plane="xy", position=(*centre, GROUND - 0.001), **lines)
+        self._draw_arm()
+        self._clay: Any = None
+        if self.stage.field >= 0:
+            grid, origin = self.stage.removal, self.session.scenario.origin
+            self._plan, faces = _clay_sheet(grid.x + origin[0], grid.y + origin[1])
+            look: Any = dict(color=rgb_bytes(CLAY_DEEP), flat_shading=True, side="front")
+            look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
+            self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
+        self._arrow: Any = None
+        if self.session.scenario.clay and self.session.scenario.clay.yields:
+            look = dict(shaft_radius=0.5 * ARROW_WIDTH, head_radius=1.2 * ARROW_WIDTH)
+            look.update(head_length=3.0 * ARROW_WIDTH, visible=False)
+            self._arrow = add.add_arrows("/force", np.zeros((1, 2, 3)), (0, 0, 0), **look)
+        in_plane: Any = dict(active_axes=(True, True, False), disable_rotations=True)
+        self.target = add.add_transform_controls("/hand", scale=0.12, **in_plane)
+        self.target.on_update(self._dragged)
+
+    def _draw_arm(self) -> None:
+        """Adds foot, links and tool."""
+        add, tool, arm = self.server.scene, self.session.tool, self.session.scenario.arm
+        dark, steel, blue, orange = (
+            rgb_bytes(PART_COLORS[name]) for name in ("dark", "steel", "blue", "orange")
+        )
         add.add_cylinder("/foot", 0.06, 0.03, dark, position=(0.0, 0.0, GROUND + 0.015))
         add.add_cylinder("/shoulder", 0.042, 0.052, steel, position=(0.0, 0.0, -0.004))
         along_x = math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0  # of a cylinder
@@ -163,21 +182,6 @@ class Page:
         add.add_cylinder("/link2/tool", 0.5 * tool.width, -tip, steel, position=place)
         add.add_cylinder("/link2/handle", 0.008, 0.045, dark, position=(l2, 0.0, 0.022))
         add.add_icosphere("/link2/knob", 0.016, orange, position=(l2, 0.0, 0.052))
-        self._clay: Any = None
-        if self.stage.field >= 0:
-            grid, origin = self.stage.removal, self.session.scenario.origin
-            self._plan, faces = _clay_sheet(grid.x + origin[0], grid.y + origin[1])
-            look: Any = dict(color=rgb_bytes(CLAY_DEEP), flat_shading=True, side="front")
-            look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
-            self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
-        self._arrow: Any = None
-        if self.session.scenario.clay and self.session.scenario.clay.yields:
-            look = dict(shaft_radius=0.5 * ARROW_WIDTH, head_radius=1.2 * ARROW_WIDTH)
-            look.update(head_length=3.0 * ARROW_WIDTH, visible=False)
-            self._arrow = add.add_arrows("/force", np.zeros((1, 2, 3)), (0, 0, 0), **look)
-        in_plane: Any = dict(active_axes=(True, True, False), disable_rotations=True)
-        self.target = add.add_transform_controls("/hand", scale=0.12, **in_plane)
-        self.target.on_update(self._dragged)
 
     def _vertices(self) -> np.ndarray:
         """Corners of the clay's mesh [m], shape (n, 3): its surface, closed down to the table."""

@@ -3,7 +3,7 @@
 `Session` is the run, `Replay` plays a record in its place, `Player` advances either in real time,
 and `live_verdict` says whether the loop is stable. Nothing here draws: the window and the page tell
 the session where the hand pulls to, and a script can do the same. A slice is stepped as any run is,
-by the leapfrog.
+by kicks.
 """
 
 from __future__ import annotations
@@ -23,18 +23,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, integer, number
-from ..model import regions
-from ..model.clay import Clay
-from ..model.constants import AXES, B_MAX
-from ..model.flow import CONSISTENCY_MAX, FY_MAX
-from ..model.groove import Groove
+from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..simulation.record import Record
+from ..simulation.simulate import has_numba, load_compiled, saved_in_a_step
+from ..simulation.stepwise import scaled
 from ..stepping import monitor, path
 from ..stepping.monitor import Outcome
-from ..stepping.run import LeapfrogRun
+from ..stepping.run import PLAIN, Kernel, Run
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import gain_limit
 
@@ -47,7 +45,7 @@ LONGEST_SESSION = 3600.0  # [s]
 PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
 RECENT_FRAMES = 60  # over which the real-time factor is averaged
-LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
+KEEPS_UP = 0.4  # of real time, that steps may take; the rest is for the picture
 CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
 
 
@@ -105,9 +103,10 @@ class Pull:
         """
         return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
 
-    def ramp(self) -> tuple[float, ...]:
-        """The force of the spring as in path.SCENARIO: since [s], (x, y) [N], its rate [N/s]."""
-        return self._since, *(self.spring * self._from), *(self.spring * self._rate)
+    def steady(self) -> tuple[float, ...]:
+        """The force as parts.Push.steady: since [s], (x, y) [N], its rate [N/s]."""
+        (fx, fy), (px, py) = self.force, (self.spring * self._from).tolist()
+        return float(self._since), fx + px, fy + py, *(self.spring * self._rate).tolist()
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
         """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`.
@@ -119,23 +118,24 @@ class Pull:
         return np.array(self.force) + self.spring * self.at(t)
 
 
-class LiveRun(LeapfrogRun):
+class LiveRun(Run):
     """A run that goes on slice by slice, and whose muscle, gain and clay may change in between.
 
     Args:
         scenario: what to run.
         every: keep each every-th sample.
+        kernel: how the steps are made.
 
     Attributes:
+        pull: the muscle.
         keeping: whether samples are kept.
         gains: (index of the first sample with it, gain), one after the other.
     """
 
-    def __init__(self, scenario: Scenario, every: int):
-        super().__init__(scenario, every)
+    def __init__(self, scenario: Scenario, every: int, kernel: Kernel = PLAIN):
+        super().__init__(scenario, every, kernel)
         x, y = (th or NO_HAND for th in scenario.operators)
-        self.muscle = Pull((x.spring, y.spring), scenario.start)
-        self.varies = True
+        self.pull = Pull((x.spring, y.spring), scenario.start)
         # motion is the person's: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
         self.keeping = True
@@ -147,8 +147,8 @@ class LiveRun(LeapfrogRun):
         Args:
             steps: number of steps.
         """
-        self.pause = min(self.i + steps, self.last)
-        self._put(force=self.muscle.force, ramp=self.muscle.ramp())
+        self.pause = min(self.i + steps, self.parts.time.last)
+        self.push_evenly(self.pull.steady())
         self.go(None)
         if self.filled:
             self.flush()
@@ -161,42 +161,33 @@ class LiveRun(LeapfrogRun):
         """
         if scenario.gain != self.scenario.gain:
             self.gains.append((self.i, scenario.gain))
-        self.scenario = scenario
-        self._tell(scenario)
+        super().change(scenario)
         self.watch.scenario = replace(scenario, muscle=Multisine())
-        if scenario.clay is not None:
-            table = regions.region_table(scenario.clay, scenario.length)
-            regions.keep_entries(table, self.table)
-            self.table = table
-            self._arrays(table=table)
-            path.settle(self.s, self.e.table, -1)
-            if block := scenario.clay.groove:
-                self._put(block=block.numbers, cut_at=(math.nan, math.nan))
-                self._put(bare=(*self.s["base"], *self.s["base"]))
-                self.s["drag"] = block.damping
-                path.cut_place(self.s, self.e)
 
     @property
     def held(self) -> tuple[bool, bool]:
         """Whether clay that yields holds the handle still, along x and along y."""
-        x, y = self.s["stuck"]
+        reaction = self.state.clay.reaction
+        if reaction is None or reaction.felt is None:
+            return False, False
+        x, y = reaction.felt.stuck
         return bool(x), bool(y)
 
-    def judge(self, rows: np.ndarray) -> int:
+    def judge(self, made: np.ndarray) -> int:
         """As Run.judge; forgets the samples while they are not to be kept.
 
         Args:
-            rows: as in Run.judge.
+            made: as in Run.judge.
         """
         before = len(self.kept)
-        good = super().judge(rows)
+        good = super().judge(made)
         if not self.keeping:
             del self.kept[before:]
         return good
 
     def end(self) -> None:
         """Ends the run here, as one that reached its end."""
-        self.s["closing"] = path.FINISHED
+        self.state = path.closed(self.state)
         self.advance(self.filled + 1)
         self.flush()
 
@@ -325,7 +316,7 @@ class Session:
                 )
         self.given = scenario
         self.scenario = played(scenario, self.stiffness)
-        self.run = LiveRun(self.scenario, self.every)
+        self.run = LiveRun(self.scenario, self.every, live_kernel(self.scenario))
         self.paused, self.recording = False, True
         self.clock = Clock()
         self.point: tuple[float, float] | None = None
@@ -387,7 +378,7 @@ class Session:
         Args:
             force: along x and y [N].
         """
-        self.run.muscle.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
+        self.run.pull.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
 
     def change(self, gain: tuple[float, float] | None = None, b: float | None = None) -> None:
         """Changes the gain or the damping.
@@ -428,9 +419,9 @@ class Session:
         if not steps:
             return np.empty((0, 2))
         if self.point is None:
-            run.muscle.jump(run.t, *self._state())
+            run.pull.jump(run.t, *self._state())
         else:
-            run.muscle.lead(run.t, self.point, steps * dt)
+            run.pull.lead(run.t, self.point, steps * dt)
         run.keeping = self.recording
         run.slice(steps)
         self._look()
@@ -449,7 +440,7 @@ class Session:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
         out = Record.of(run, max(self.clock.real, 1e-9))
         volume, rate = self._removed(out)
-        knots = np.array(run.muscle.knots)
+        knots = np.array(run.pull.knots)
         index = np.rint(out.t / self.scenario.dt)
         which = np.searchsorted([i for i, _ in run.gains], index, "right") - 1
         extra = {
@@ -502,7 +493,7 @@ class Session:
         b = self.b
         hands = [th or NO_HAND for th in self.scenario.operators]
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
-        hand = self.run.muscle.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
+        hand = self.run.pull.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
         if self.run.last_rendered:  # of clay that yields, at the last sample
             fe = tuple(self.run.last_rendered)
@@ -517,6 +508,21 @@ class Session:
         most = min(PULL_MARGIN[1], 0.25 * (stretched - folded))
         scale = min(max(r, folded + least), stretched - most) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
+
+
+def live_kernel(scenario: Scenario) -> Kernel:
+    """How the steps of a session are made: compiled where Python could not keep up with real time.
+
+    Args:
+        scenario: that is played.
+    """
+    if saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
+        return PLAIN
+    compiled = load_compiled()
+    if compiled is None:
+        return PLAIN
+    compiled.warm(scenario)
+    return compiled.KERNEL
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
@@ -541,40 +547,6 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
         t_max=LONGEST_SESSION,
         stop=False,
     )
-
-
-def scaled(clay: Clay | None, factor: float) -> Clay | None:
-    """Returns the same clay with a multiple of its damping, yield force, consistency and pressure.
-
-    Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
-
-    Args:
-        clay: the clay; None for none.
-        factor: on all of them, within their bounds.
-    """
-
-    def times(values: Any, least: float = 0.0, most: float = B_MAX) -> Any:  # numbers, or rows
-        if isinstance(values, tuple):
-            return tuple(times(x, least, most) for x in values)
-        return min(max(values * factor, least), most) if values else values
-
-    def law(f: Any) -> Any:
-        more = {"growth": times(f.growth)} if f.growth else {}
-        more |= {"Fy": times(f.Fy, LEAST_YIELD, FY_MAX)} if f.Fy else {}
-        more |= {"K": times(f.K, LEAST_YIELD, CONSISTENCY_MAX)} if f.K else {}
-        return replace(f, values=times(f.values), **more)
-
-    def block(groove: Groove | None) -> Groove | None:
-        if groove is None:
-            return None
-        most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
-        k = min(max(factor, LEAST_YIELD), most)  # a block resists, however little
-        names = "pressure", "gradient", "damping"
-        return replace(groove, **{name: k * getattr(groove, name) for name in names})
-
-    if clay is None:
-        return None
-    return replace(clay, x=law(clay.x), y=law(clay.y), groove=block(clay.groove))
 
 
 def yields_at(scenario: Scenario, p: tuple[float, float]) -> bool:

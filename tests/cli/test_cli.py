@@ -62,7 +62,7 @@ def test_a_run_to_an_asked_error_says_what_was_reached(capsys, tmp_path):
     assert code == 0 and "asked: not reached" in out and "why: the loop is unstable" in out
 
 
-def test_accuracy_writes_figure_page_and_numbers(capsys, tmp_path, silent_compiler):
+def test_accuracy_writes_figure_page_and_numbers(capsys, tmp_path):
     args = ("--length", "0.06", "--quick", "--out", str(tmp_path))
     code, out, err = run(capsys, "accuracy", "constant", *args)
     assert (code, err) == (0, "")

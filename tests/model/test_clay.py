@@ -86,7 +86,7 @@ def test_slow_force_balances_whatever_pushes():
     """Under the slow force the handle does not accelerate along any stiff axis."""
     W, g, soft = np.array([[0.8, 0.2], [0.2, 0.15]]), np.array([1.0, -2.0]), np.array([0.3, -0.4])
     for stiff in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
-        slow = clay.slow_force(*g, W[0, 0], W[0, 1], W[1, 1], *stiff, *soft)
+        slow = clay.slow_force(g, (W[0, 0], W[0, 1], W[1, 1]), stiff, soft)
         f = np.where(np.array(stiff) > 0.0, slow, soft)
         rest = (g - W @ f)[np.array(stiff) > 0.0]
         assert np.abs(rest).max() < 1e-15 * 10  # a few roundings

@@ -11,11 +11,35 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model.controller import SERVO, Servo
-from hapticclay.simulation import batch, record
+from hapticclay.simulation import batch, record, simulate
+from hapticclay.stepping import many, run, scene
+from hapticclay.stepping.machine_code import kind_of
 
 pytest.importorskip("numba")
 CUT = hc.constant_cut(start=(0.02, 0.0), t_max=0.05)
 WIRED = dataclasses.replace(CUT, control="sampled", interface=hc.Interface(delay=2e-4))
+RICH = hc.Interface(
+    delay=1e-4, encoder=4000, velocity="difference", window=3, velocity_filter=80.0, adc_bits=12,
+    dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
+)  # fmt: skip
+GUARDED = dataclasses.replace(RICH, passivity=True, coupling=hc.Coupling(5e3, 5.0))
+HELD = dataclasses.replace(CUT, operator=hc.Operator())
+REPAID = [
+    HELD,
+    dataclasses.replace(WIRED, interface=GUARDED),
+]  # kinds compiled here: some 20 s each
+
+
+@pytest.fixture
+def repaid(monkeypatch):
+    """However few their runs, those of some kinds are made together, all others in Python."""
+    kinds = {scene.traits(s) for s in REPAID}
+
+    def repay(self, key, jobs):
+        return len(jobs) >= many.FEWEST and scene.traits(jobs[0]) in kinds
+
+    monkeypatch.setattr(batch.Plan, "_repay", repay)
+    monkeypatch.setattr(batch, "pays", lambda s, steps: False)
 
 
 def varied(like, rng, **own):
@@ -38,16 +62,11 @@ def kinds(rng):
     """Scenes of every kind that is made together, and of some that are not; without end."""
     grown = hc.variable_cut(t_max=0.05)
     other = Servo(dataclasses.replace(SERVO[0].G, damping=30.0), SERVO[0].S)
-    rich = hc.Interface(
-        delay=1e-4, encoder=4000, velocity="difference", window=3, velocity_filter=80.0,
-        adc_bits=12, dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
-    )  # fmt: skip
-    guarded = hc.Interface(delay=1e-4, passivity=True, coupling=hc.Coupling(5e3, 5.0))
     while True:
         b = rng.uniform(5.0, 300.0)
         clay = hc.slab(b, 0.05, 0.06)
         yield varied(CUT, rng, clay=clay)
-        yield varied(dataclasses.replace(CUT, operator=hc.Operator()), rng)
+        yield varied(HELD, rng)
         yield varied(CUT, rng, clay=hc.slab(1e5 * b, 0.05, 0.15))  # stiff
         yield varied(CUT, rng, clay=None, shaping=True)
         yield varied(CUT, rng, operator=(hc.Operator(0.2, b, 1.0), None))
@@ -60,10 +79,10 @@ def kinds(rng):
         yield varied(WIRED, rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, operator=hc.Operator()), rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, interface=None), rng, clay=clay)
-        yield varied(dataclasses.replace(WIRED, interface=rich), rng, clay=clay)
-        yield varied(dataclasses.replace(WIRED, interface=guarded), rng, clay=clay, Ts=7.2e-4)
+        yield varied(dataclasses.replace(WIRED, interface=RICH), rng, clay=clay)
+        yield varied(dataclasses.replace(WIRED, interface=GUARDED), rng, clay=clay, Ts=7.2e-4)
         yield varied(WIRED, rng, clay=clay, render="implicit")
-        yield dataclasses.replace(CUT, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
+        yield dataclasses.replace(HELD, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
         # and, one by one
         yield dataclasses.replace(grown, start=(rng.uniform(0.0, 0.01), 0.0))
         yield varied(CUT, rng, clay=hc.slab(hc.Flow(Fy=0.5, b=b), 0.05, 0.15))
@@ -77,6 +96,7 @@ def entry(s):
     return np.array([batch.summary_entry(*brief)], batch.SUMMARY)
 
 
+@pytest.mark.usefixtures("repaid")
 @pytest.mark.parametrize("threads", [1, 3])
 def test_summaries_of_short_runs_are_those_of_simulate_bit_for_bit(threads):
     rng, scenes = random.Random(threads), []
@@ -99,18 +119,128 @@ def test_summaries_of_short_runs_are_those_of_simulate_bit_for_bit(threads):
 
 
 def test_runs_of_one_kind_are_made_together_and_others_are_left():
-    from hapticclay.stepping import compiled
-
-    source = kinds(random.Random(5))
-    scenes = [next(source) for _ in range(20 * 5)]
-    done, left = compiled.BatchPool(1).many(scenes)
+    source, kinds_ = kinds(random.Random(5)), {scene.traits(s) for s in REPAID}
+    scenes = [next(source) for _ in range(20 * 8)]
+    keys = [many.kind_key(s) for s in scenes]
+    assert {i % 20 for i, key in enumerate(keys) if key is None} == {16, 17, 18, 19}
+    asked = [
+        key if key and scene.traits(s) in kinds_ else None
+        for s, key in zip(scenes, keys, strict=True)
+    ]
+    done, left = batch.BatchPool(1).many(scenes, asked)
     places = sorted([*left, *(i for at, _ in done for i in at.tolist())])
-    assert places == list(range(100))
-    alone = {i % 20 for i in left}
-    assert {15, 16, 17, 18, 19} <= alone  # 15 diverges, and is judged by the monitor
-    assert not alone & {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14}
+    assert places == list(range(160))
+    made = {i % 20 for i in places} - {i % 20 for i in left}
+    assert {1, 13} <= made
+    assert 15 in {i % 20 for i in left}  # it diverges, and is judged by the monitor
 
 
+def columns(jobs):
+    """Numbers, tables and memory of runs of one kind, and of each alone."""
+    pattern = many.Pattern(jobs[0])
+    parts = pattern.roomy(jobs)
+    found = [scene.parts_of(s) for s in jobs]
+    assert {kind_of(x) for x in found} == {kind_of(parts)} == {pattern.scene}
+    assert {kind_of(scene.blocks(x, s)) for x, s in zip(found, jobs, strict=True)} == {
+        kind_of(pattern.blocks)
+    }
+    memory = [[] if x.sampler is None else x.sampler.memory for x in found]
+    alone = [many.numbers_of(x) for x in found], [x.table for x in found], memory
+    together = pattern.numbers(jobs), pattern.tables(jobs), pattern.memory(jobs)
+    for x in found:
+        sizes = zip(map(len, scene.written(parts)), map(len, scene.written(x)), strict=True)
+        assert all(room >= needed for room, needed in sizes)
+    return together, alone
+
+
+def test_numbers_of_many_runs_are_those_of_each_to_the_bit():
+    source, groups = kinds(random.Random(7)), {}
+    for _ in range(20 * 12):
+        s = next(source)
+        groups.setdefault(many.kind_key(s), []).append(s)
+    del groups[None]
+    assert len(groups) >= 16
+    for jobs in groups.values():
+        together, alone = columns(jobs)
+        for x, each in zip(together, alone, strict=True):
+            assert x.tobytes() == np.array(each, float).tobytes()
+
+
+def test_places_are_those_of_the_numbers():
+    parts = scene.parts_of(dataclasses.replace(WIRED, operator=hc.Operator(), interface=RICH))
+    at, numbers = many.places(parts), many.numbers_of(parts)
+    assert numbers[at.lag[0].K] == parts.lag[0].K
+    assert numbers[at.hand[1].damper] == parts.hand[1].damper
+    assert numbers[at.sampler.delay.delay] == parts.sampler.delay.delay
+    assert [numbers[i] for i in at.sampler.filter] == list(parts.sampler.filter)
+    assert at.sampler.passivity is None and at.table is None
+
+
+def test_scenes_alike_in_their_traits_have_the_same_parts():
+    source, found = kinds(random.Random(9)), {}
+    for _ in range(20 * 6):
+        s = next(source)
+        found.setdefault(scene.traits(s), set()).add(kind_of(scene.parts_of(s)))
+    assert len(found) >= 16 and all(len(kinds_) == 1 for kinds_ in found.values())
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_machine_code_is_compiled_where_the_runs_of_its_kind_repay_it(monkeypatch, known):
+    monkeypatch.setattr(batch, "saved", {})
+    monkeypatch.setattr(batch, "carried", set())
+    monkeypatch.setattr(batch, "is_kept", lambda kind: False)
+    monkeypatch.setattr(batch, "compile_time", lambda kind: 20.0)
+    monkeypatch.setattr(batch, "pays", lambda s, steps: False)
+    monkeypatch.setattr(batch, "is_ready", lambda kind: False)
+    asked = []
+    monkeypatch.setattr(batch.BatchPool, "lane", lambda pool: asked.append(pool) or NoLane())
+    rng = random.Random(3)
+    few = [varied(CUT, rng) for _ in range(200)]
+    many_ = [varied(CUT, rng) for _ in range(6000)]  # 1 ms, and 139 steps of 25 us
+    plan = batch.Plan(batch.BatchPool(1), few if known else (), True)
+    assert all(j.key is None and j.kernel is run.PLAIN for j in plan.jobs(few)) and not asked
+    plan = batch.Plan(batch.BatchPool(1), many_ if known else (), True)
+    parts = [plan.jobs(many_[i : i + 150]) for i in range(0, 6000, 150)]
+    together = [all(j.key is not None for j in part) for part in parts]
+    assert together.count(True) == 40 if known else 5 < together.count(True) < 20
+    assert together == sorted(together) and len(asked) == 1
+
+
+class NoLane:
+    """In place of many.Lane."""
+
+    def group(self, pattern, jobs):
+        assert len(jobs) == 1
+
+
+def test_steps_are_compiled_for_the_kinds_of_runs_made_alone_that_repay_them(monkeypatch):
+    asked = []
+    monkeypatch.setattr(batch, "pays", lambda s, steps: asked.append(round(steps)) or steps > 1000)
+    monkeypatch.setattr(simulate, "saved", {})
+    grown = hc.variable_cut(t_max=0.05)
+    runs = [dataclasses.replace(grown, start=(1e-3 * i, 0.0)) for i in range(9)]
+    other = dataclasses.replace(CUT, integrator="accurate", t_max=0.01)
+    plan = batch.Plan(batch.BatchPool(1), [*runs, other], False)
+    plan.compiled, warmed = Compiled(), Compiled.warmed
+    warmed.clear()
+    kernels = [j.kernel for j in plan.jobs([*runs, other])]
+    assert kernels == ["compiled"] * 9 + [run.PLAIN] and warmed == runs[:1]
+    assert asked == [round(9 * 0.05 / grown.dt), round(0.01 / CUT.dt)]  # of all known runs, once
+    asked.clear()
+    plan = batch.Plan(batch.BatchPool(1), (), False)  # of each run as it comes
+    assert all(j.kernel is run.PLAIN for j in plan.jobs(runs)) and len(asked) == 9
+
+
+class Compiled:
+    """In place of stepping.compiled."""
+
+    KERNEL, warmed = "compiled", []  # noqa: RUF012
+
+    def warm(self, s):
+        self.warmed.append(s)
+
+
+@pytest.mark.usefixtures("repaid")
 def test_resting_handles_are_told_as_the_monitor_tells_them():
     still = dataclasses.replace(CUT, force=(0.0, 0.0))
     bound = dataclasses.replace(CUT, torque_limit=(1e-5, 1e-5), force=(1e-4, 0.0))
@@ -120,12 +250,13 @@ def test_resting_handles_are_told_as_the_monitor_tells_them():
     assert hc.simulate_batch([still] * 40, keep="summaries")["code"][0] == "stalled"
 
 
+@pytest.mark.usefixtures("repaid")
 def test_a_generator_is_taken_as_it_is_run():
     alive, most = weakref.WeakSet(), []
 
     def generated():
         for i in range(1500):
-            s = dataclasses.replace(CUT, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
+            s = dataclasses.replace(HELD, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
             alive.add(s)
             most.append(len(alive))
             yield s
@@ -138,10 +269,11 @@ def test_a_generator_is_taken_as_it_is_run():
     assert found.nbytes == 1500 * batch.SUMMARY.itemsize
 
 
+@pytest.mark.usefixtures("repaid")
 def test_no_run_is_lost_where_summaries_grow():
     n = 3000
     gains = 0.2 + 0.5 * np.arange(n) / n
-    same = dataclasses.replace(CUT, t_max=20.5 * CUT.dt, length=None)
+    same = dataclasses.replace(HELD, t_max=20.5 * CUT.dt, length=None)
     found = hc.simulate_batch(
         (dataclasses.replace(same, gain=(k, 0.2)) for k in gains.tolist()), keep="summaries"
     )
@@ -151,6 +283,7 @@ def test_no_run_is_lost_where_summaries_grow():
         assert found[i].tobytes() == alone[0].tobytes()
 
 
+@pytest.mark.usefixtures("repaid")
 def test_ctrl_c_in_a_generator_without_end_ends_the_batch():
     taken = []
 
@@ -184,11 +317,11 @@ def test_what_a_generator_raises_or_gives_wrongly_reaches_the_caller():
 
 @pytest.mark.perf
 def test_short_runs_cost_little_more_than_their_steps():
-    """A guard, not the measurement: benchmarks/throughput.py measures 1.2, and 3 one by one."""
+    """A guard, not the measurement: benchmarks/throughput.py measures 1.2."""
     from benchmarks import throughput
 
     scenes = list(throughput.monte_carlo(1000, "continuous"))
-    hc.simulate_batch(scenes[:100], keep="summaries", threads=1)
+    throughput.warm(scenes[:100])
     ratios = []
     for _ in range(3):
         before = throughput.floor(scenes[0], 20_000, time.process_time)

@@ -1,5 +1,8 @@
 """Simulation: a run step by step gives the numbers of simulate, and takes forces and torques."""
 
+import copy
+import pickle
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +10,10 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.simulation.simulate import has_numba
 
 pytestmark = pytest.mark.plain
+fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03)
 HARD = hc.Interface(
     delay=5e-4, encoder=100_000, velocity="difference", window=3, jitter=1e-4, force_noise=0.1,
@@ -145,3 +150,197 @@ def test_torques_come_from_the_first_step_on():
             sim.step(torque=(0.0, 0.0))
     with hc.Simulation(CUT) as sim, pytest.raises(RuntimeError, match="no step"):
         sim.record()
+
+
+ARRAYS = "t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"
+
+
+def same(a, b):
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), name)
+    assert (a.outcome, a.crossings, a.stops, a.energy) == (
+        b.outcome,
+        b.crossings,
+        b.stops,
+        b.energy,
+    )
+
+
+@pytest.mark.parametrize("name", ["cut", "accurate", "hardware", "driven", "unstable"])
+def test_many_steps_at_once_are_as_many_single_ones(name):
+    s, counts = SCENES[name], (1, 7, 300, 4095, 5000, 100_000)
+    with hc.Simulation(s, engine="python") as sim:
+        at = 0
+        for n in counts:
+            sim.advance(n)
+            at += n
+            if sim.outcome is None:
+                assert sim.t == pytest.approx(at * s.dt, abs=1e-12)
+    same(sim.record(), hc.simulate(s, engine="python"))
+
+
+@fast
+@pytest.mark.parametrize("name", ["cut", "hardware"])
+def test_compiled_steps_give_the_same_bits(name):
+    s, records = SCENES[name], []
+    for engine in ("python", "native"):
+        with hc.Simulation(s, engine=engine) as sim:
+            for i in range(40):
+                sim.advance(1 + 30 * (i % 3), force=(1.0 + 0.05 * i, 0.1))
+            records.append(sim.record())
+    same(*records)
+
+
+def held(sim, n, force):
+    """The states of the next steps under a force."""
+    out = []
+    for _ in range(n):
+        sim.step(force=force)
+        out.append([np.array(x) for x in sim.state])
+    return out
+
+
+@pytest.mark.parametrize("name", ["cut", "accurate", "hardware", "yields", "springs", "groove"])
+def test_a_snapshot_returns_to_where_it_was_taken(name):
+    special = {
+        "yields": hc.slab(hc.Flow(Fy=0.4, b=10.0), 0.002, 0.02),
+        "springs": hc.Clay(
+            hc.Profile((0.002,), (0.0, 20.0), springs=(hc.Spring(), hc.Spring(k=300.0, limit=0.2))),
+            hc.Profile((), (5.0,)),
+        ),
+        "groove": hc.Clay.of_groove(hc.Groove((0.002, 0.03), (-0.01, 0.01), pressure=2e4)),
+    }
+    s = SCENES.get(name) or replace(CUT, clay=special[name], length=None)
+    with hc.Simulation(s) as sim:
+        sim.advance(150, force=(1.5, 0.2))
+        taken = sim.snapshot()
+        first = held(sim, 120, (2.0, -0.3))
+        sim.advance(4000, force=(-2.0, 0.1))
+        other = sim.t
+        sim.restore(pickle.loads(pickle.dumps(taken)))
+        assert sim.t == pytest.approx(150 * s.dt) and sim.t != other
+        again = held(sim, 120, (2.0, -0.3))
+        rest = sim.record()
+    for a, b in zip(first, again, strict=True):
+        for x, y in zip(a, b, strict=True):
+            np.testing.assert_array_equal(x, y)
+    with hc.Simulation(s) as straight:  # and the record is that of the way taken
+        straight.advance(150, force=(1.5, 0.2))
+        straight.advance(120, force=(2.0, -0.3))
+        same(straight.record(), rest)
+
+
+@pytest.mark.parametrize("name", ["cut", "hardware", "driven"])
+@pytest.mark.parametrize("twin", [copy.deepcopy, lambda sim: pickle.loads(pickle.dumps(sim))])
+def test_a_copy_goes_on_by_itself(name, twin):
+    sim = hc.Simulation(SCENES[name])
+    sim.advance(100, force=(1.5, 0.0))
+    other = twin(sim)
+    ends = []
+    for each in (sim, other):
+        each.advance(50, force=(1.0, 0.4))
+        ends.append(each.record())
+    same(*ends)
+
+
+def test_a_gain_from_a_sample_on_is_that_of_the_exact_loop():
+    """After a change of K the handle follows the free loop with the new K: its steady speed."""
+    s = replace(CUT, clay=hc.slab(20.0), length=None, t_max=4.0, shaping=True)
+    speeds = []
+    with hc.Simulation(s) as sim:
+        for K in (0.4, 0.8, 0.2):
+            sim.set(gain=(K, 0.2))
+            sim.advance(3500)
+            speeds.append(sim.state.v[0])
+            assert sim.scenario.gain == (K, 0.2)
+    # C = K/(s (s + 10)): uh = (10/K + b) v, where nothing else resists
+    exact = [1.0 / (10.0 / K + 20.0) for K in (0.4, 0.8, 0.2)]
+    np.testing.assert_allclose(speeds, exact, rtol=2e-3)  # the pose still turns
+
+
+def test_the_clay_from_a_sample_on_resists_with_its_new_damping():
+    with hc.Simulation(replace(CUT, clay=hc.slab(20.0), length=None, t_max=4.0)) as sim:
+        for factor in (1.0, 3.0, 0.5, 1.0):
+            sim.set(b=factor)
+            sim.advance(500)
+            x = sim.state
+            np.testing.assert_allclose(x.b, 20.0 * factor)
+            np.testing.assert_allclose(x.fe, 20.0 * factor * x.v, rtol=1e-12)
+    assert abs(sim.record().energy["residual"]) < 1e-3 * sim.record().energy["throughput"]
+
+
+def test_another_operator_from_a_sample_on_holds_with_its_own_spring():
+    s = replace(CUT, operator=hc.Operator(0.2, 4.0, 20.0), length=None, t_max=20.0, clay=None)
+    with hc.Simulation(s) as sim:
+        for k in (20.0, 80.0):
+            sim.set(operator=hc.Operator(0.2, 8.0, k))
+            sim.advance(20_000)
+            assert sim.state.p[0] == pytest.approx(1.0 / k, rel=1e-3)
+    with hc.Simulation(CUT) as bare, pytest.raises(ParameterError, match="from the start on"):
+        bare.set(operator=hc.Operator())
+
+
+@pytest.mark.parametrize(
+    "change,field",
+    [(dict(gain=(-1.0, 0.1)), "gain[x]"), (dict(b=-1.0), "b"), (dict(gain=(0.1,)), "gain")],
+)
+def test_changes_are_refused_by_name_and_change_nothing(change, field):
+    with hc.Simulation(CUT) as sim, hc.Simulation(CUT) as other:
+        sim.advance(20)
+        with pytest.raises(ParameterError) as e:
+            sim.set(**change)
+        assert e.value.field == field
+        sim.advance(20)
+        other.advance(40)
+        assert np.array_equal(sim.state.p, other.state.p)
+
+
+def test_divergence_is_told_within_20_ms_and_long_before_the_verdict():
+    s = hc.constant_cut(gain=(1.0, 1.0))
+    verdict = hc.simulate(s, engine="python").outcome
+    assert verdict.code == "diverged"
+    with hc.Simulation(s) as sim:
+        while not sim.diverging and sim.t < verdict.time + 1.0:
+            sim.step()
+        assert verdict.time <= sim.t <= verdict.time + 0.02 + 2 * s.dt
+        assert sim.outcome is None  # the verdict waits for the end of its samples
+    with hc.Simulation(CUT) as calm:
+        while calm.outcome is None:
+            calm.advance(100)
+            assert not calm.diverging
+
+
+def test_a_new_beginning_is_a_new_simulation():
+    other = replace(CUT, gain=(0.6, 0.2))
+    with hc.Simulation(CUT) as sim:
+        sim.advance(200, force=(2.0, 0.0))
+        sim.set(b=2.0)
+        for s in (CUT, other, SCENES["hardware"]):
+            sim.reset(None if s is CUT else s)
+            sim.advance(100_000)
+            same(sim.record(), hc.simulate(s, engine="python"))
+            sim.reset(CUT)
+
+
+def test_a_thread_of_its_own_is_asked_for():
+    sim = hc.Simulation(CUT)
+    found, begin = [], threading.Event()
+
+    def other():
+        begin.wait()
+        for _ in range(2000):
+            try:
+                sim.step()
+            except RuntimeError as e:
+                found.append(str(e))
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    begin.set()
+    for _ in range(2000):
+        try:
+            sim.step()
+        except RuntimeError as e:
+            found.append(str(e))
+    thread.join()
+    assert found and set(found) == {"another thread uses this simulation: give each thread its own"}

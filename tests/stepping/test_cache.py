@@ -9,7 +9,7 @@ import pytest
 
 numba = pytest.importorskip("numba")
 
-from hapticclay.stepping import cache, run  # noqa: E402
+from hapticclay.stepping import cache, machine_code  # noqa: E402
 
 
 def seventh(x):
@@ -60,7 +60,7 @@ def test_damaged_machine_code_is_compiled_again(damage, tmp_path):
     assert fresh(tmp_path)(14) == 2.0
     (file,) = tmp_path.iterdir()
     file.write_bytes(DAMAGE[damage](file.read_bytes()))
-    (tmp_path / "LeapfrogRun.whole").touch()
+    (tmp_path / f"1234{machine_code.MARK}").touch()
     again = fresh(tmp_path)
     assert again(14) == 2.0 and hits(again) == 0
     assert list(tmp_path.iterdir()) == [file]  # the mark promised what was not there
@@ -91,13 +91,13 @@ def test_a_full_disk_ends_no_run_and_leaves_nothing(tmp_path):
 
 
 def test_another_environment_has_a_folder_of_its_own(monkeypatch):
-    names = {run.cache_folder.__wrapped__()}
+    names = {machine_code.cache_folder.__wrapped__()}
     for package in ("numba", "llvmlite", "mujoco", "numpy"):
         with monkeypatch.context() as patch:
-            patch.setattr(run, "version", lambda x, p=package: "0" if x == p else "1")
-            names.add(run.cache_folder.__wrapped__())
-    monkeypatch.setattr(run, "_processor", lambda: "another")
-    names.add(run.cache_folder.__wrapped__())
+            patch.setattr(machine_code, "version", lambda x, p=package: "0" if x == p else "1")
+            names.add(machine_code.cache_folder.__wrapped__())
+    monkeypatch.setattr(machine_code, "_processor", lambda: "another")
+    names.add(machine_code.cache_folder.__wrapped__())
     assert len(names) == 6
 
 

@@ -1,7 +1,8 @@
-"""The compiled loop against the Python one, and batches against single runs."""
+"""Compiled steps against those in Python, and batches against single runs."""
 
 import dataclasses
 import importlib.util
+import json
 import math
 import os
 import random
@@ -22,10 +23,8 @@ from hapticclay.model.signals import Multisine
 from hapticclay.simulation import batch, record, simulate
 from hapticclay.simulation.record import Record
 from hapticclay.stepping import engine as engines
-from hapticclay.stepping import monitor, run
-from tests.stepping.test_leapfrog import CASES
-
-pytestmark = pytest.mark.usefixtures("silent_compiler")
+from hapticclay.stepping import machine_code, monitor, run, scene
+from tests.stepping.test_kick import CASES
 
 fast = pytest.mark.skipif(
     importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
@@ -116,7 +115,7 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     s = hc.constant_cut(
         gain=(4.2, 0.2), shaping=True, operator=hc.Operator(), start=(0.05, 0.0), force=(0.5, 0.0)
     )
-    late, watched = (run.LeapfrogRun(s, 1, compiled.MIXED) for _ in range(2))
+    late, watched = (run.Run(s, 1, compiled.KERNEL) for _ in range(2))
     watched.calm = False
     for made in (late, watched):
         made.go(None)
@@ -127,7 +126,7 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     same(hc.simulate(s, every=7, engine="native"), thin)
     same(hc.simulate_batch([s], every=7)[0], thin)
     assert hc.simulate_batch([s], keep="summaries")["code"][0] == "diverged"
-    calm = run.LeapfrogRun(hc.constant_cut(), 1, compiled.WHOLE)
+    calm = run.Run(hc.constant_cut(), 1, compiled.KERNEL)
     calm.watch.look = None  # is not called
     calm.go(None)
     same(Record.of(calm, 0.0), hc.simulate(hc.constant_cut(), engine="native", every=1))
@@ -198,7 +197,7 @@ def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
     with pytest.raises(hc.ParameterError, match=r"hapticclay\[fast\]"):
         hc.simulate(hc.free(t_max=0.1), engine="native")
     long = hc.free(force=(0.0, 0.0), dt=1e-6, t_max=1.0)
-    assert simulate._kernel(long, "auto") is run.PLAIN
+    assert simulate.kernel_for(long, "auto") is run.PLAIN
     scenes = [hc.free(t_max=0.1), hc.constant_cut(t_max=0.1)]
     records = hc.simulate_batch(scenes)
     said = capsys.readouterr().err
@@ -213,23 +212,61 @@ def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
     monkeypatch.delattr(stepping, "compiled", raising=False)
     r = hc.simulate(CASES["plain"], engine="native")
     assert capsys.readouterr().err.count("\n") == 1
+    monkeypatch.setattr(batch, "pays", lambda scenario, steps: True)
     (b,) = hc.simulate_batch([CASES["plain"]])
     assert capsys.readouterr().err.count("\n") == 1
     same(r, hc.simulate(CASES["plain"], engine="python"))
     same(r, b)
 
 
-@pytest.mark.plain
-def test_auto_takes_native_for_long_runs_and_once_it_is_loaded(monkeypatch):
+@fast
+def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", None)
-    assert not simulate._pays(hc.constant_cut())
-    long = hc.constant_cut(dt=1e-5)
-    assert simulate._pays(long) == simulate.has_numba()
-    assert simulate._kernel(long, "python") is run.PLAIN
-    monkeypatch.undo()
-    if simulate.has_numba():
-        hc.simulate(hc.free(t_max=0.01), engine="native")
-        assert simulate._pays(hc.free(t_max=0.01))
+    monkeypatch.setattr(simulate, "saved", {})
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)  # nothing is kept there
+    cut = hc.constant_cut(t_max=5.0)
+    kind = machine_code.kind_of(scene.parts_of(cut))
+    per_run = 0.5 * simulate.saved_in_a_step(cut) * cut.t_max / cut.dt
+    asked = [simulate.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
+    cost = machine_code.compile_time(kind)
+    assert asked == [(i + 1) * per_run >= cost for i in range(20)]
+    assert not simulate.pays(hc.free(t_max=0.1), 100.0)  # of another kind
+    machine_code.mark(kind).touch()
+    monkeypatch.setattr(simulate, "saved", {})
+    asked = [simulate.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
+    assert asked == [(i + 1) * per_run >= simulate.LOADING for i in range(20)]
+    assert simulate.kernel_for(cut, "python") is run.PLAIN
+
+
+@fast
+@pytest.mark.parametrize("name", ["plain", "hand"])
+def test_auto_takes_machine_code_in_the_middle_of_a_run_to_the_same_bits(name, monkeypatch):
+    from hapticclay.stepping import compiled
+
+    s = dataclasses.replace(CASES[name], t_max=4.0, length=None)
+    kind = machine_code.kind_of(scene.parts_of(s))
+    per_step, chunk = simulate.saved_in_a_step(s), run.CHUNK - 1
+    monkeypatch.setattr(simulate, "saved", {})
+    monkeypatch.setattr(compiled, "ready", set())
+    monkeypatch.setattr(simulate, "is_kept", lambda kind: False)
+    # half of the run and two chunks repay it
+    cost = per_step * (0.5 * s.t_max / s.dt + chunk - 1)
+    monkeypatch.setattr(simulate, "compile_time", lambda kind: cost)
+    monkeypatch.setattr(simulate, "LOADING", 0.0)
+    seen, plainly = [], simulate.plainly
+    monkeypatch.setattr(simulate, "plainly", lambda r, room: (seen.append(r), plainly(r, room)))
+    r = hc.simulate(s)
+    assert len(seen) == 2 and seen[0].kernel is compiled.KERNEL
+    assert simulate.saved == {kind: pytest.approx(2 * chunk * per_step)}
+    same(r, hc.simulate(s, engine="python"))
+
+
+@fast
+def test_auto_takes_machine_code_that_is_loaded():
+    short = hc.free(t_max=0.01)
+    hc.simulate(short, engine="native")
+    assert simulate.pays(short, 1.0)
+    assert simulate.kernel_for(short, "auto") is not run.PLAIN
 
 
 @pytest.mark.parametrize("kw", [dict(threads=0), dict(every=0), dict(keep="all")])
@@ -257,8 +294,8 @@ def test_an_error_in_a_thread_reaches_the_caller(monkeypatch):
     def broken(self, room):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(run.LeapfrogRun, "advance", broken)
-    monkeypatch.setattr(compiled, "warm", lambda kind: None)
+    monkeypatch.setattr(run.Run, "advance", broken)
+    monkeypatch.setattr(compiled, "warm", lambda scenario: None)
     with pytest.raises(RuntimeError, match="broken"):
         hc.simulate_batch([hc.free(t_max=0.1)] * 5, threads=2)
 
@@ -283,7 +320,7 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
         "from hapticclay.stepping import compiled; "
-        "print(sum(compiled._leap.stats.cache_hits.values()))"
+        "print(sum(compiled.GLIDE.stats.cache_hits.values()))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     took, said = [], []
@@ -303,7 +340,8 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
         os.close(end)
         took.append(float(out.stdout.split()[0]))
         assert out.stdout.split()[1] == str(hits).encode()
-    begin, end = rb"\rhapticclay: compiling fast runs, this once: about \d+ s", rb"\d+ s\r\n\."
+    begin = rb"\rhapticclay: compiling runs of this kind, this once: about \d+ s"
+    end = rb"\d+ s\r\n\."
     for told in (said[0], said[2]):
         assert re.match(begin, told) and re.search(rb"\rhapticclay: compiled in " + end, told)
     assert said[1] == b"."
@@ -324,6 +362,38 @@ def test_native_is_faster():
         hc.simulate(s, engine="native")
         ratio.append((middle - begin) / (time.process_time() - middle))
     assert max(ratio) > 1.5
+
+
+@fast
+def test_nothing_that_a_scene_lacks_is_compiled(tmp_path):
+    """Of the functions that machine code was made of, none belongs to a part that is None."""
+    code = (
+        "import sys, json, hapticclay as hc; from hapticclay.stepping import lacking, compiled; "
+        "plain = lacking.without; made = set(); "
+        "name = lambda f: (f.__module__.rpartition('.')[2], f.__name__); "
+        "lacking.without = lambda f, *rest: made.add(name(f)) or plain(f, *rest); "
+        "s = hc.constant_cut(t_max=0.1); s = eval(sys.argv[1]); "
+        "hc.simulate(s, engine='native'); print(json.dumps(sorted(made)))"
+    )
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def modules(scenario):
+        words = [sys.executable, "-c", code, scenario]
+        out = subprocess.run(words, env=env, capture_output=True, text=True, check=True)
+        made = json.loads(out.stdout)
+        return {module for module, _ in made}, len(made)
+
+    used, count = modules("s")
+    lacks = "sampled", "hardware", "friction", "yielding", "springs", "grooves", "stiff", "laws"
+    lacks += "march", "instant", "modes", "ends", "search", "borders", "hand", "flow", "spring"
+    assert used.isdisjoint(lacks), used
+    with_hand, more = modules("hc.constant_cut(t_max=0.1, operator=hc.Operator())")
+    assert "hand" in with_hand and more > count
+    assert with_hand - used <= {"hand", "operator"}
+    hardware, _ = modules(
+        "hc.Scenario(t_max=0.1, control='sampled', interface=hc.Interface(force_filter=30.0))"
+    )
+    assert {"sampled", "hardware"} <= hardware and hardware.isdisjoint(lacks[3:])
 
 
 numbers = st.floats(-25.0, 25.0) | st.sampled_from([0.0, math.nan, math.inf, 1e-12, 1e-6])
@@ -353,7 +423,7 @@ def test_what_the_filter_passes_the_monitor_passes(data):
     watch = monitor.StabilityMonitor(s)
     parts = sorted({0, n, data.draw(st.integers(0, n), "cut")})
     for first, last in zip(parts, parts[1:], strict=False):
-        quiet = compiled.WHOLE.quiet
+        quiet = compiled.KERNEL.quiet
         if not quiet(rows[first:last], last - first, *s.torque_limit, swings, seen):
             return
         assert watch.look(rows[first:last, :12].T, first) == (last - first, None)

@@ -95,7 +95,7 @@ def test_an_engine_that_disobeys_shows_in_the_balance(monkeypatch):
         return model
 
     monkeypatch.setattr(engine, "build", build)
-    monkeypatch.setattr(run, "_idle", {})  # engines that were built before
+    monkeypatch.setattr(run, "_idle", [])  # engines that were built before
     e = hc.simulate(hc.constant_cut(t_max=2.0)).energy
     assert abs(e["residual"]) > 1e-3 * e["throughput"]
 

@@ -18,7 +18,8 @@ from hapticclay.model import arm, constants, hardware
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.stepping.sampled import SampledRun
+from hapticclay.stepping import scene
+from hapticclay.stepping.run import Run
 from hapticclay.theory import linear_loop
 
 EVERYWHERE = Profile((), (90.0,))
@@ -71,19 +72,37 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
         np.testing.assert_allclose(a.fe[:-1], b.fe[:-1], atol=8 * EPS)
 
 
-def test_a_run_loads_the_method_that_it_takes_alone():
+def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
     code = (
         "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, control={!r}), "
         "engine='python'); print(*sorted(m.rpartition('.')[2] for m in sys.modules "
         "if m.startswith('hapticclay.stepping.')))"
     )
-    loaded = {}
     for control in ("continuous", "sampled"):
         run = [sys.executable, "-c", code.format(control)]
         out = subprocess.run(run, capture_output=True, text=True, check=True)
-        loaded[control] = set(out.stdout.split())
-    assert loaded["sampled"] - loaded["continuous"] == {"sampled"}
-    assert not loaded["sampled"] & {"runge_kutta", "modes", "many", "compiled", "drive"}
+        loaded = set(out.stdout.split())
+        assert {"path", "run"} < loaded
+        assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
+
+
+def test_random_effects_are_drawn_part_by_part(monkeypatch):
+    """No run holds those of all its samples; return to a sample brings them back."""
+    s = cut(hc.Interface(jitter=5e-5, lost=0.1, force_noise=0.1), t_max=0.1)
+    whole = hc.simulate(s)
+    monkeypatch.setattr(scene, "NOISE_AHEAD", 8)
+    run = Run(s, 1)
+    run.pause = 100
+    run.go(None)
+    early = run.snapshot()
+    run.pause = 200
+    run.go(None)
+    drawn = run.parts.sampler.chance
+    assert 0 < drawn.first <= 101 and len(drawn.numbers) // 4 < 150
+    run.return_to(early)
+    run.pause = math.inf
+    run.go(None)
+    np.testing.assert_array_equal(run.arrays()["p"], whole.p)
 
 
 def test_seeds_repeat_and_differ():
@@ -244,11 +263,11 @@ def test_difference_lags_half_its_window_in_a_run():
     """Under a steady acceleration the mean over m samples is the rate m Ts/2 ago."""
     s = hc.free(control="sampled", t_max=0.02)
     for m in (1, 4):
-        run = SampledRun(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
+        run = Run(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
         shown = []
-        for _ in range(run.last):
-            run.advance(run.filled + 1)  # one step; the kick to its sample ended with start
-            shown.append((tuple(run.s["start"])[:2], tuple(run.s["wires"])[:2]))
+        for _ in range(run.parts.time.last):
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with event.w
+            shown.append((run.state.loop.event.w, run.state.loop.machine.rates.w))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate
@@ -510,7 +529,7 @@ def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exac
     st.floats(1e-5, 1e-2),
 )
 def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k, d, v, Ts):
-    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, k, d, Ts)
+    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, (k, d), Ts)
     assert abs(b * u) <= min(b, d + k * Ts) * abs(v) * (1.0 + 1e-12)
     assert b * u == pytest.approx(
         k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v))
@@ -520,7 +539,7 @@ def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k
 def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     tool, b, v, Ts = 0.0, 90.0, 0.1, 1e-3
     for i in range(3000):
-        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, 2e3, 20.0, Ts)
+        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, (2e3, 20.0), Ts)
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 

@@ -13,10 +13,8 @@ import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
 from hapticclay.model.sampled_controller import LawCaller, LawFailed
-from hapticclay.stepping import sampled
+from hapticclay.stepping import scene
 from tests.oracles import paper_law
-
-pytestmark = pytest.mark.usefixtures("silent_compiler")
 
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03, control="sampled")
@@ -330,7 +328,7 @@ def test_ctrl_c_at_any_moment_of_a_law_ends_the_run():
 
     s = replace(POSE, controller=hc.Controller(counting()), t_max=0.2)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sampled, "LawCaller", Signalled)
+        patch.setattr(scene, "LawCaller", Signalled)
         patch.setattr(sys, "unraisablehook", lambda told: None)
         with pytest.raises(KeyboardInterrupt):
             hc.simulate(s, engine="native")

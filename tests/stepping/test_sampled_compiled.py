@@ -6,7 +6,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model.constants import TS
-from hapticclay.stepping.sampled import SampledRun
+from hapticclay.stepping.run import EngineStore, Run, completed
 from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast, same
 
 ALL = dict(
@@ -18,27 +18,23 @@ ALL = dict(
 PHYSICAL = {name: x for name, x in ALL.items() if name not in ("passivity", "coupling")}
 HAND = dict(operator=hc.Operator())
 STIFF = dict(render="implicit", b=1e5, gain=(1.0, 0.1))
-SCENES = {
+SCENES = {  # of eight kinds, each compiled for some 12 s: every part is in one of them
     "ideal": (None, {}),
-    "physical": (None, dict(render="implicit", **HAND)),
-    "substeps": (None, dict(dt=1e-4, Ts=4e-4, shaping=True)),
+    "substeps": (None, dict(dt=1e-4, Ts=4e-4)),
     "stiff": (None, STIFF | HAND),
     "not stable": (None, dict(b=8e3, start=(0.02, 0.0), gain=(1.0, 0.1), t_max=1.0)),
     "not on the grid": (None, dict(t_max=0.1001)),
     "weak": (None, dict(torque_limit=(0.3, 0.2))),
-    "layers": (ALL, dict(clay=LAYERS)),
+    "layers": (ALL, dict(clay=LAYERS, **HAND)),
     "growing": (None, dict(clay=GROWING, render="implicit", muscle=WAVE)),
-    "driven": (ALL, dict(muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))),
-    "driven in substeps": (None, dict(dt=1e-4, Ts=4e-4, muscle=WAVE, command=WAVE)),
+    "driven": (
+        ALL, dict(shaping=True, muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))
+    ),
     "all": (ALL, HAND),
     "all, stiff": (PHYSICAL, STIFF),
-    "all, slow": (ALL | dict(delay=0.01), dict(dt=1e-4, Ts=0.05)),
+    "all, slow": (ALL | dict(delay=0.01), dict(dt=1e-4, Ts=0.05, **HAND)),
     "first order": (dict(force_filter=500.0, filter_order=1), {}),
-    "a sample late": (dict(delay=TS, passivity=True), {}),
     "jitter and delay": (dict(jitter=8e-5, delay=0.4 * TS, lost=0.1), {}),
-} | {
-    name: ({name: ALL[name]}, {})
-    for name in ("jitter", "lost", "encoder", "adc_bits", "force_noise", "dac_bits", "friction")
 }  # fmt: skip
 
 
@@ -64,16 +60,17 @@ def test_both_ways_of_running_agree_to_the_last_bit(name):
 def test_the_end_of_a_run_alone_is_that_of_the_whole_run(name):
     from hapticclay.stepping import compiled
 
-    run = SampledRun(scene(name), 1, compiled.WHOLE)
+    run = Run(scene(name), 1, compiled.KERNEL)
     run.go(None)
-    brief, whole = compiled.BatchPool(1).brief(scene(name)), run.brief()
+    last, _ = completed(scene(name), 10**9, compiled.KERNEL, EngineStore(), brief=True)
+    brief, whole = last.brief(), run.brief()
     assert brief[0] == whole[0] and brief[2] == whole[2] and brief[4] == whole[4]
     assert [tuple(map(float, x)) for x in brief[3]] == [tuple(map(float, x)) for x in whole[3]]
 
 
 def test_a_run_paused_at_every_sample_is_the_run():
     s = dataclasses.replace(scene("all"), t_max=0.05)
-    whole, parts = SampledRun(s, 1), SampledRun(s, 1)
+    whole, parts = Run(s, 1), Run(s, 1)
     whole.go(None)
     while parts.outcome is None:
         parts.advance(parts.filled + 1)

@@ -141,7 +141,7 @@ def errors_of(name, drive, integrator, steps):
 
 @pytest.mark.parametrize("drive", ["muscle", "command"])
 @pytest.mark.parametrize("name", CASES)
-def test_leapfrog_is_of_second_order_under_any_signal(name, drive):
+def test_kick_is_of_second_order_under_any_signal(name, drive):
     """Jumps included, on the samples or off: each kick takes the exact mean.
 
     The constant of the error changes with the place of a jump within its step: error/dt^2 stays

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.stepping import path, runge_kutta
+from hapticclay.stepping import pace, path
 
 AFTER = hc.Pulse((8.0, 0.0), 0.0, 0.3, 0.6)
 NONE = hc.Profile((), (0.0,))
@@ -73,12 +73,12 @@ def test_steps_of_clay_that_grows_depend_on_the_sample_alone():
         while sim.outcome is None:
             sim.step()
     np.testing.assert_array_equal(sim.record().p, r.p)
-    parts = [runge_kutta.parts_of_sample(s, i) for i in range(200)]
+    parts = [pace.parts_of_sample(s, i) for i in range(200)]
     assert parts == sorted(parts) and parts[0] < parts[-1]
 
 
 def test_clay_that_has_grown_too_stiff_ends_the_run_with_a_status():
-    growing = hc.Clay(hc.Profile((), (50.0,), growth=(5e7,)), NONE)
+    growing = hc.Clay(hc.Profile((), (50.0,), growth=(5e8,)), NONE)
     r = hc.simulate(replace(GROWING, clay=growing, dt=1e-4, t_max=0.2), engine="python")
     assert r.outcome.code == "unresolved" and "steps in one sample" in r.status
     assert "fast" in r.outcome.advice

@@ -14,9 +14,8 @@ from scipy.integrate import quad
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.clay import Clay, Profile
-from hapticclay.stepping import modes, runge_kutta
-from hapticclay.stepping.run import PLAIN
-from hapticclay.stepping.runge_kutta import RungeKuttaRun
+from hapticclay.stepping import modes, pace
+from hapticclay.stepping.run import PLAIN, Run
 from tests.oracles import store
 from tests.oracles.yielding import yielding_case
 
@@ -231,7 +230,7 @@ def test_below_the_yield_force_nothing_moves(along):
         hc.free(), clay=clay, force=(0.2, 0.1), muscle=wave, integrator="accurate", dt=1e-3,
         t_max=1.0, start=(0.05, 0.02),
     )  # fmt: skip
-    run = RungeKuttaRun(s, 1)
+    run = Run(s, 1)
     q = run.data.qpos.copy()
     run.go(None)
     r = run.arrays()
@@ -303,8 +302,8 @@ def test_a_creep_too_slow_for_explicit_steps_counts_as_rest():
     """Of clay of n < 1; how slow is known, and too much of it is refused."""
     K, n, dt, span = 30.0, 0.5, 1e-3, 0.01
     s = slider(hc.Flow(K=K, n=n), dt, span)
-    slowest = modes.creep_speed(runge_kutta.largest_lightness(s), dt, K, n)
-    assert slowest < runge_kutta.CREEP_MOST
+    slowest = modes.creep_speed(pace.largest_lightness(s), dt, K, n)
+    assert slowest < pace.CREEP_MOST
     for times, moves in ((0.5, False), (2.0, True)):
         speed = times * slowest
         push = dataclasses.replace(s, velocity=(0.0, 0.0), force=(K * speed**n, 0.0))
@@ -319,7 +318,7 @@ def test_a_creep_too_slow_for_explicit_steps_counts_as_rest():
 def test_consistency_counts_among_the_rates_that_divide_a_step():
     thin, thick = (slider(hc.Flow(K=K), 1e-3, 0.1) for K in (5.0, 5e3))
     damper = dataclasses.replace(thick, clay=hc.slab(5e3))
-    assert runge_kutta.fastest_rate(thick) == runge_kutta.fastest_rate(damper)
+    assert pace.fastest_rate(thick) == pace.fastest_rate(damper)
     assert hc.simulate(thin).steps < 150 < 700 < hc.simulate(thick).steps
     with pytest.raises(ParameterError, match="explicit.*choose 'fast'"):
         hc.simulate(slider(hc.Flow(K=1e6), 1e-3, 0.1))
@@ -338,7 +337,7 @@ def test_an_asked_error_is_kept_in_clay_that_yields():
 def test_all_engines_step_alike_in_clay_that_yields(name):
     from hapticclay.stepping import compiled
 
-    runs = [RungeKuttaRun(scene(CASES[name], 2e-3), 3, k) for k in (PLAIN, compiled.WHOLE)]
+    runs = [Run(scene(CASES[name], 2e-3), 3, k) for k in (PLAIN, compiled.KERNEL)]
     for run in runs:
         run.go(None)
     plain, other = runs

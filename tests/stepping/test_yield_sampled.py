@@ -12,8 +12,10 @@ from scipy.optimize import lsq_linear
 import hapticclay as hc
 from hapticclay.model import hardware
 from hapticclay.model.constants import TS
-from hapticclay.stepping import sampled
-from hapticclay.stepping.sampled import SampledRun
+from hapticclay.stepping.driver import pushed
+from hapticclay.stepping.kick import at_rates, handle_at, step_around
+from hapticclay.stepping.run import Run
+from hapticclay.stepping.state import Flow, Hold
 from tests.oracles import paper_law
 from tests.oracles.sampled_yield import yielding
 from tests.stepping.test_compiled import fast, same
@@ -166,7 +168,7 @@ def test_the_tool_of_a_coupling_obeys_the_law_and_takes_energy(  # noqa: PLR0913
 ):
     Fy, K, n = law
     u1, u2, f1, f2 = hardware.tool_that_yields(
-        tool, p, v, (b, b), law + law, along, spring, damper, 1e-3
+        tool, p, v, (b, b), law + law, along, (spring, damper), 1e-3
     )
     u, f = np.array([u1, u2]), np.array([f1, f2])
     asked = spring * np.subtract(p, tool) + damper * np.array(v)
@@ -233,11 +235,19 @@ def test_the_sensor_shows_the_whole_push_of_a_hand_at_rest():
 
 
 def started(**kw):
-    """A run in clay that yields, before its first step, and its first kick."""
+    """A run in clay that yields, before its first step."""
     s = scene(hc.Flow(Fy=2.0), False, hc.Interface(friction=(0.3, 0.2)), render="implicit", **kw)
-    run = SampledRun(dataclasses.replace(s, start=(0.02, 0.0)), 1)
-    sampled.ready_kick(run.s, run.s["late"], 0.0, s.dt, s.force)
-    return run.s, run.s["late"]
+    return Run(dataclasses.replace(s, start=(0.02, 0.0)), 1)
+
+
+def first_kick(run, friction, Fy, tau, w):
+    """Its first kick, with joint rates w before it, under torques."""
+    parts, state, law = run.views, run.state, (Fy, 0.0, 1.0, Fy, 0.0, 1.0)
+    sampler = parts.sampler._replace(friction=friction)
+    clay = state.clay._replace(laws=state.clay.laws._replace(flow=Flow(law, law)))
+    at = at_rates(handle_at(parts.arm, state.body, 0.0), w)
+    step, hold = step_around(0.0, parts.time.dt), Hold(tau, (0.0, 0.0), None, None)
+    return pushed(sampler, parts, state.clock, step, at, w, clay, hold)
 
 
 @given(
@@ -246,19 +256,13 @@ def started(**kw):
     Fy=st.floats(0.0, 6.0),
 )
 def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
-    s, x = started()
-    flow = s["flow"]
-    flow[0] = flow[3] = s["flow_old"][0] = s["flow_old"][3] = 0.0
-    hold = [*t] + [0.0] * 8
-    s["rubs"] = 0
-    kick = lambda t: (sampled.kick(s, x, *t, *w, 0.0, 0.0), np.array(s["end"][:]))[1]  # noqa: E731
-    free = kick(t)[2:]
-    A = np.column_stack([kick((t[0] + 1.0, t[1]))[2:] - free, kick((t[0], t[1] + 1.0))[2:] - free])
-    u = np.reshape(s["pose"][:4], (2, 2))  # of both links
+    run = started()
+    kick = lambda t: np.array(first_kick(run, None, 0.0, t, w).w)  # noqa: E731
+    free = kick(t)
+    A = np.column_stack([kick((t[0] + 1.0, t[1])) - free, kick((t[0], t[1] + 1.0)) - free])
+    u = np.reshape(first_kick(run, None, 0.0, t, w).at.u, (2, 2))  # of both links
     J = np.array([[u[0, 0] + u[1, 0], u[1, 0]], [u[0, 1] + u[1, 1], u[1, 1]]])
-    s["rubs"] = 1
-    flow[0] = flow[3] = s["flow_old"][0] = s["flow_old"][3] = Fy
-    sampled.push(s, x, hold, *w, 0.0, 0.0)
+    k = first_kick(run, (0.3, 0.2), Fy, t, w)
     # rates after the kick: free + A (friction - J' clay), of least energy w' A^-1 w
     half = np.linalg.cholesky(np.linalg.inv(A)).T
     G, most = np.column_stack((A, -A @ J.T)), np.array([0.3, 0.2, Fy + 1e-12, Fy + 1e-12])
@@ -266,12 +270,12 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
     expected = free + G @ best.x
     if any(w):  # a kick that stops on the way, and turns, is no single implicit step
         v0, v1 = J @ w, J @ expected
-        turned = np.any(np.sign(v0) * np.sign(v1) < 0) or np.any(v0 * (J @ free) < 0)
+        turned = any(np.any(v0 * x < 0) for x in (v1, J @ free, J @ k.w))
         if turned:
             return
-    np.testing.assert_allclose(s["end"][2:], expected, atol=1e-9 * (1.0 + np.abs(free).max()))
+    np.testing.assert_allclose(k.w, expected, atol=1e-9 * (1.0 + np.abs(free).max()))
     if np.abs(expected).max() < 1e-13 and Fy > 1e-3 and best.optimality < 1e-12:
-        assert np.abs(s["slip"][0]) <= 0.3 and np.abs(s["slip"][1]) <= 0.2
+        assert np.abs(k.loop.slip[0]) <= 0.3 and np.abs(k.loop.slip[1]) <= 0.2
 
 
 def test_friction_beside_clay_elsewhere_is_that_without_it():

@@ -1,6 +1,8 @@
 """The documents say what is so: snippets run, commands exist, figures and symbols are current."""
 
 import ast
+import importlib
+import inspect
 import re
 import shlex
 import subprocess
@@ -173,6 +175,25 @@ def test_every_recorded_array_is_in_the_symbol_table():
     text = (ROOT / "docs" / "equations.md").read_text()
     for name in record.ARRAYS:
         assert name == "t" or f"`{name}`" in text, name
+
+
+STEP = (ROOT / "docs" / "equations.md").read_text().partition("\n## 4. ")[2].partition("\n## ")[0]
+NAMED = [
+    name
+    for row in re.findall(r"^\|(.*)\|$", STEP, re.M)
+    for name in re.findall(r"`(\w+\.\w+)`", re.split(r"(?<!\\)\|", row)[2])
+]
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_function_that_the_table_of_the_step_names_exists(name):
+    module, function = name.split(".")
+    found = importlib.import_module(f"hapticclay.stepping.{module}")
+    assert inspect.isfunction(getattr(found, function)), name
+
+
+def test_the_table_of_the_step_names_functions_for_each_row():
+    assert len(NAMED) > 10 and {"kick", "servo", "viscous"} <= {x.split(".")[0] for x in NAMED}
 
 
 def test_inertias_in_the_documents_are_those_of_the_model():

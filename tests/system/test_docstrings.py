@@ -53,29 +53,27 @@ def lacking_fields(node):
     return found
 
 
-def arguments(node):
-    """Names of a function's parameters."""
-    return [x.arg for x in node.args.args]
+def named_in(tree):
+    """Names of the fields of all named tuples of a module."""
+    fields = (x for node in tree.body if isinstance(node, ast.ClassDef) for x in node.body)
+    return {x.target.id for x in fields if isinstance(x, ast.AnnAssign)}
 
 
-# what path.Method documents for every method of stepping
-SHARED = {
-    x.name: arguments(x)
-    for node in MODULES["stepping.path"].body
-    if isinstance(node, ast.ClassDef) and node.name == "Method"
-    for x in node.body
-    if isinstance(x, Function)
-}
+# what stands for itself in everything that is stepped: the room's own names, fields of its values
+SHARED = documented(MODULES["stepping.__init__"], "Names").union(
+    *(named_in(MODULES[f"stepping.{name}"]) for name in ("parts", "state"))
+)
 
 
 def undocumented(module, tree):
     """`where: names` of what a module leaves out."""
+    shared = SHARED if module.startswith("stepping.") else frozenset()
     for node in tree.body:
         if not isinstance(node, Function | ast.ClassDef) or node.name.startswith("_"):
             continue
         where = f"{module}.{node.name}"
         if isinstance(node, Function):
-            yield where, lacking_arguments(node)
+            yield where, lacking_arguments(node, shared)
             continue
         bases = {ast.unparse(x) for x in node.bases}
         if "dataclass" in decorators(node) or bases & {"NamedTuple", "typing.NamedTuple"}:
@@ -84,8 +82,6 @@ def undocumented(module, tree):
             if isinstance(x, Function) and x.name == "__init__":  # the class's own docstring
                 yield where, lacking_arguments(x, documented(node, "Args"))
             elif isinstance(x, Function) and not x.name.startswith("_"):
-                if "NamedTuple" in bases and SHARED.get(x.name) == arguments(x):
-                    continue
                 if not decorators(x) & {"setter", "override", "overload"}:
                     yield f"{where}.{x.name}", lacking_arguments(x)
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.simulation.simulate import has_numba
+from hapticclay.stepping.run import PLAIN
 from hapticclay.views.session import (
     FRAME_TIME,
     LONGEST_SLICE,
@@ -301,3 +303,18 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     said.append((replay.t, replay.verdict()))
     assert all(v.unstable == (bool(axis) and t >= record.outcome.time) for t, v in said)
     assert said[-1][1].unstable == bool(axis)
+
+
+def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
+    from hapticclay.views import session as module
+
+    fine, ends = hc.constant_cut(dt=5e-5), []
+    for numba in (True, False):
+        with monkeypatch.context() as patch:
+            if not numba:
+                patch.setattr(module, "has_numba", lambda: False)
+            live = drag(Session(fine, stiffness=10.0), 0.3)
+            assert (live.run.kernel is PLAIN) == (not numba or not has_numba())
+            ends.append(live.record())
+    np.testing.assert_array_equal(ends[0].p, ends[1].p)
+    assert Session(hc.constant_cut()).run.kernel is PLAIN

@@ -1,4 +1,4 @@
-"""The leapfrog: what a kick works out, what the engine makes of it, one source for both engines."""
+"""The kick: what it works out, what the engine makes of it, one source for both engines."""
 
 import dataclasses
 import importlib.util
@@ -16,13 +16,14 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import hapticclay as hc
-from hapticclay.model import arm, clay, controller
+from hapticclay.model import arm, clay
 from hapticclay.model.operator import NO_HAND, Operator
-from hapticclay.stepping import leapfrog, loop, path
+from hapticclay.stepping import driver, kick, path, sampled
 from hapticclay.stepping import run as runs
-from hapticclay.stepping.run import LeapfrogRun
-from tests.oracles import Arm
-from tests.oracles.laws import servo_kick
+from hapticclay.stepping.run import Run
+from hapticclay.stepping.state import Axis, Loop
+from tests.oracles import Arm, laws
+from tests.oracles.links import Links
 
 OTHER = dict(  # parts that have nothing in common with the paper's
     arm=hc.Arm(0.3, 0.25, 0.05, 0.4),
@@ -73,24 +74,20 @@ def held(compensator, h, z, f):
     return (expm(h * M) @ (*z, f))[:n]
 
 
-def kick_by_laws(run, before, after):
+def kick_by_laws(run, state, before, after):
     """One kick put together from the laws, as docs/equations.md has it; motors without limits.
 
     Returns velocity, net force, torques, rates of the reference model, delta, and states of the
     compensator after it.
     """
-    s, now = run.scenario, run.s
+    s, x, y = run.scenario, state.loop.x, state.loop.y
     H, L, R = (0.5 * (before + after), before / (before + after), after / (before + after))
+    formed = state.loop.form is not None
     hands, links = [th or NO_HAND for th in s.operators], s.arm.links
-    u = arm.jacobian(*now["q"], links)
-    q1, q2 = now["q"]
-    x, y = arm.handle_position(q1, q2, links)
-    p = x - s.origin[0], y - s.origin[1]
-    w1, w2 = now["w"]
+    u = arm.jacobian(*state.body.q, links)
+    p = Links(*links[:4]).forward(state.body.q) - s.origin
+    (w1, w2), (g1, g2) = state.body.w, state.body.g
     v = arm.handle_velocity(w1, w1 + w2, u)
-    dx, dy, ex, ey, yx, yy, ydx, ydy, g1, g2, _, _ = now["loop"]
-    statics = [servo.G.gain / servo.G.stiffness for servo in s.servo]
-    dx, dy, ex, ey = (x / g for x, g in zip((dx, dy, ex, ey), statics * 2, strict=True))
     c = arm.centripetal(w1 + 0.5 * before * g1, w1 + w2 + 0.5 * before * g2, u)
     W = [s.servo[0].S.gain, 0.0, s.servo[1].S.gain] if s.shaping else [*arm.mobility(u, links)]
     b = run.b()
@@ -102,13 +99,13 @@ def kick_by_laws(run, before, after):
     f, d, n, a, feed, rate = [], [], [], [], [], []
     for i in (0, 1):
         th, compensator, K = hands[i], s.compensators[i], s.gain[i]
-        delta, yi, ydi = (dx, dy)[i], (yx, yy)[i], (ydx, ydy)[i]
+        delta, yi, ydi = (x, y)[i].delta, (x, y)[i].y, (x, y)[i].yrate
         ratio = s.servo[i].G.gain / s.servo[i].G.stiffness
-        keep, take, ni, mi, spring = controller.servo_coefficients(s.servo[i].numbers, H, L, R)
+        keep, take, ni, mi, spring = laws.servo_weights(s.servo[i], H, L, R)
         feed.append((0.0, 0.0))
-        if run.s["formed"]:  # what it shows at the sample without the force of the kick, and per N
+        if formed:  # what it shows at the sample without the force of the kick, and per N
             _, B, C, D = compensator.state_space()
-            z = now["form_states"][4 * i : 4 * i + compensator.order]
+            z = state.loop.form[i][: compensator.order]
             delta += C @ held(compensator, 0.5 * before, z, 0.0)
             # held between equal steps; between others, one impulse at the sample
             moved = held(compensator, 0.5 * before, 0.0 * np.array(z), 1.0)
@@ -116,21 +113,21 @@ def kick_by_laws(run, before, after):
             feed[i] = K * (C @ moved + D), take
             W[2 * i] += ni * take * ratio * feed[i][0]
         vr = keep * ydi + take * (ratio * delta - yi)
-        a.append(controller.servo_acceleration(ni, mi, spring, vr, ydi, v[i], yi, p[i], c[i]))
+        a.append(laws.servo_acceleration(ni, mi, spring, (ydi, vr), v[i], yi, p[i], c[i]))
         n.append(ni)
         rate.append([vr, delta, ratio])
         mass = th.mass + 0.25 * th.spring * H * H
         th0, th1 = th.damper * L - mass / H, th.damper * R + mass / H
         f.append(s.force[i] - (b0x, b0y)[i] * v[i] - (th.spring * p[i] - mass * c[i] + th0 * v[i]))
         d.append((b1x, b1y)[i] + th1)
-    ux, uy, _, _, *ff, t1, t2 = servo_kick(H, v, u, links, n, a, W, f, d)
+    ux, uy, _, _, *ff, t1, t2 = laws.servo_kick(H, v, u, links, (n, a, W), (f, d))
     each = list(zip(rate, feed, ff, strict=True))
     rates = [vr + take * ratio * e * x for (vr, _, ratio), (e, take), x in each]
     shown = [delta + e * x for (_, delta, _), (e, _), x in each]
     states = []
     for i, compensator in enumerate(s.compensators):
-        if run.s["formed"]:
-            z = now["form_states"][4 * i : 4 * i + compensator.order]
+        if formed:
+            z = state.loop.form[i][: compensator.order]
             drive, B = s.gain[i] * ff[i], compensator.state_space()[1]
             if before == after:
                 states += [*held(compensator, H, z, drive)]
@@ -138,8 +135,8 @@ def kick_by_laws(run, before, after):
                 kicked = held(compensator, 0.5 * before, z, 0.0) + H * B * drive
                 states += [*held(compensator, 0.5 * after, kicked, 0.0)]
         else:
-            keep, take = controller.compensator_coefficients(compensator.den[1], H, L, R)
-            states.append(keep * (ex, ey)[i] + take * s.gain[i] * ff[i])
+            keep, take = laws.trapezoid(compensator.den[1], H, L, R)
+            states.append(keep * (x, y)[i].rate + take * s.gain[i] * ff[i])
     return (ux, uy), ff, (t1, t2), rates, shown, states
 
 
@@ -152,30 +149,32 @@ def kick_by_laws(run, before, after):
     st.none() | st.floats(0.1, 1.0),
 )
 def test_the_kick_is_what_its_laws_say(name, x, before, after):
-    """`kicks` spells its laws out; put together from the laws, a kick is the same to rounding."""
+    """A kick put together from the laws of the model one by one is the same to rounding."""
     after = before if after is None else after
     s = dataclasses.replace(CASES[name], torque_limit=(1e6, 1e6))
-    run = LeapfrogRun(s, 1)
-    for i in (0, 1):
-        run.s["w"][i] = x[i]
-    for j in range(8):
-        run.s["loop"][j] = 0.1 * x[2 + j]
-    formed, orders = run.s["formed"], [c.order for c in s.compensators]
-    assert bool(formed) == (name in ("formed", "all"))
-    for i in (0, 1):
-        for j in range(orders[i] if formed else 0):
-            run.s["form_states"][4 * i + j] = 0.1 * x[10 + 4 * i + j]
-    before, after = before * s.dt, after * s.dt
-    run.s["before"] = before
-    leapfrog.propose(run.s, run.e, before, after)
-    u, f, tau, rates, shown, states = kick_by_laws(run, before, after)
-    raw, end = np.asarray(run.e.raw)[0], run.s["next"]
+    run = Run(s, 1)
+    state = run.state
+    formed, orders = run.parts.form is not None, [c.order for c in s.compensators]
+    assert formed == (name in ("formed", "all"))
+    axes = [Axis(*(0.1 * a for a in x[2 + 4 * i : 6 + 4 * i])) for i in (0, 1)]
+    form = None
     if formed:
-        own = [run.s["form_next"][4 * i + j] for i in (0, 1) for j in range(orders[i])]
+        axes = [axis._replace(rate=0.0) for axis in axes]
+        own = [[0.1 * a for a in x[10 + 4 * i :][: orders[i]]] for i in (0, 1)]
+        form = tuple((*z, *[0.0] * (4 - len(z))) for z in own)
+    before, after = before * s.dt, after * s.dt
+    state = state._replace(
+        clock=state.clock._replace(before=before),
+        body=state.body._replace(w=x[:2]),
+        loop=Loop(*axes, form),
+    )
+    u, f, tau, rates, shown, states = kick_by_laws(run, state, before, after)
+    k = driver.kick(run.views, state.clock, state.body, state.loop, state.clay, after)
+    if formed:
+        own = [k.loop.form[i][j] for i in (0, 1) for j in range(orders[i])]
     else:
-        own = [end[2 + i] / servo.numbers[0] for i, servo in enumerate(s.servo)]
-    delta = [raw[12 + i] / servo.numbers[0] for i, servo in enumerate(s.servo)]
-    found = raw[6:8], raw[8:10], raw[10:12], end[6:8], delta, own
+        own = [k.loop.x.rate, k.loop.y.rate]
+    found = k.motion.u, k.motion.f, k.tau, (k.loop.x.yrate, k.loop.y.yrate), k.delta, own
     for a, b, what in zip(found, (u, f, tau, rates, shown, states), "uftrds", strict=True):
         # 1/dt = 2800 multiplies roundings of the velocity
         np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11, err_msg=what)
@@ -185,28 +184,27 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
 def test_engine_does_what_the_kick_foretold(name, monkeypatch):
     """The rates after each engine step are those worked out."""
     worst = 0.0
-    plain = leapfrog.step_engine
+    plain = sampled.stepped_arm
 
-    def engine(s, e, command, after):
+    def stepped(sampler, parts, e, s, k, after):
         nonlocal worst
-        foretold = e.raw[0, 16], e.raw[0, 17]
-        plain(s, e, command, after)
-        worst = max(worst, *(abs(a - b) for a, b in zip(s["w"], foretold, strict=True)))
+        q, w = plain(sampler, parts, e, s, k, after)
+        worst = max(worst, *(abs(a - b) for a, b in zip(w, k.w, strict=True)))
+        return q, w
 
-    monkeypatch.setattr(leapfrog, "step_engine", engine)
-    monkeypatch.setattr(leapfrog.Leapfrog, "glide", lambda *a: 0)
+    monkeypatch.setattr(sampled, "stepped_arm", stepped)
     hc.simulate(dataclasses.replace(CASES[name], t_max=0.8), engine="python")
     assert 0.0 < worst < 1e-11  # rounding of a 2x2 solve, conditioned by b dt/Lambda = 4e2 at most
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_whole_steps_in_a_block_are_those_made_one_by_one(name, monkeypatch):
-    blocks = hc.simulate(CASES[name], engine="python")
-    monkeypatch.setattr(leapfrog.Leapfrog, "glide", lambda *a: 0)
-    single = hc.simulate(CASES[name], engine="python")
+def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
+    gliding = hc.simulate(CASES[name], engine="python")
+    monkeypatch.setattr(path, "glide", lambda parts, s, e, room: s)
+    careful = hc.simulate(CASES[name], engine="python")
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
-        np.testing.assert_array_equal(getattr(blocks, field), getattr(single, field), field)
-    assert blocks.energy == single.energy and blocks.crossings == single.crossings
+        np.testing.assert_array_equal(getattr(gliding, field), getattr(careful, field), field)
+    assert gliding.energy == careful.energy and gliding.crossings == careful.crossings
 
 
 @pytest.mark.parametrize("name", ["plain", "shaped", "weak motors"])
@@ -221,7 +219,7 @@ def test_recorded_clay_force_is_what_changed_the_engines_momentum(name, monkeypa
         states.append((*before, data.qvel.copy(), model.opt.timestep))
 
     monkeypatch.setattr(mujoco, "mj_step", spy)
-    monkeypatch.setattr(runs, "_idle", {})  # engines that call the plain one
+    monkeypatch.setattr(runs, "_idle", [])  # engines that call the plain one
     s = CASES[name]
     r = hc.simulate(s, engine="python")
     whole = [x for x in states if x[4] == s.dt]
@@ -246,37 +244,20 @@ def test_engine_never_sees_more_than_the_motors_can_give():
     assert np.any(np.abs(r.tau) == limit)
 
 
+def numbers_in(value):
+    """All numbers in tuples of tuples."""
+    if isinstance(value, tuple):
+        return [x for each in value for x in numbers_in(each)]
+    return [] if value is None else [value]
+
+
 @pytest.mark.parametrize("name", CASES)
-def test_a_plain_run_holds_no_numpy_numbers(name):
+def test_a_run_in_python_holds_no_numpy_numbers(name):
     """They are several times slower in CPython, and divide by zero without an error."""
-    run = LeapfrogRun(CASES[name], 1)
+    run = Run(CASES[name], 1)
     run.go(None)
-    numbers = {k: x for k, x in run.s.items() if not isinstance(x, memoryview)}
-    assert {type(x) for x in numbers.values()} == {int, float}, numbers
-    assert all(isinstance(x, memoryview) for x in run.s.values() if x not in numbers.values())
-
-
-@pytest.mark.parametrize("name", ["plain", "hand", "stiff"])
-def test_both_ways_to_tabulate_a_block_agree(name):
-    run = LeapfrogRun(CASES[name], 1)
-    run.go(None)  # fills the workspace; the rows below are of its last block
-    s, n = run.s, 50
-    tables = []
-    for tabulate in (leapfrog.tabulate, leapfrog.tabulate_each):
-        s["filled"] = 0
-        for j in range(path.SUMS):
-            s["work"][j] = 0.1 * j
-        leapfrog.prepare(s, run.e, s["dt"], s["dt"])
-        e = (
-            run.e
-            if tabulate is leapfrog.tabulate
-            else run.e._replace(raw=np.asarray(run.e.raw), varied=np.asarray(run.e.varied))
-        )
-        tabulate(s, e, n)
-        tables.append((run.store.rows[:n].copy(), [*s["work"]]))
-    (rows, work), (again, other) = tables
-    np.testing.assert_array_equal(rows, again)
-    assert work == other
+    assert {type(x) for x in numbers_in(run.state)} == {int, float}
+    assert {type(x) for x in numbers_in(run.views)} <= {int, float, memoryview}
 
 
 @fast
@@ -307,19 +288,18 @@ def test_a_changed_law_changes_both_engines(tmp_path):
     (python,) = ends("python")
     law = tmp_path / "hapticclay/model/clay.py"
     text = law.read_text()
-    changed = text.replace("x0, y0 = L * b0[0], L * b0[1]", "x0, y0 = L * b0[0], 2.0 * L * b0[1]")
+    changed = text.replace("return (L * b0[0], L * b0[1])", "return (L * b0[0], 2.0 * L * b0[1])")
     assert changed != text
     law.write_text(changed)
     new_python, new_native = ends("python", "native")
     assert new_python == new_native != python
 
 
-def test_inputs_of_a_whole_step_are_those_of_its_clay_and_hand():
-    """Half of the clay on either side of the sample; all of the muscle."""
-    run = LeapfrogRun(CASES["hand"], 1)
-    run.s["base"][0], run.s["base"][1] = 8.0, 6.0
-    for j, x in enumerate((8.0, 6.0, 0.0, 0.0)):
-        run.s["old"][j] = x
-    k = leapfrog.inputs(run.s, run.e, 1e-3, 1e-3)
-    assert k[:7] == (4.0, 4.0, 3.0, 3.0, 0.5, 2.0, 0.0) and k[7:] == (0.0,) * 5
-    assert len(loop.loop_coefficients(run.s, 1e-3, 1e-3)) == 33
+def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
+    run = Run(CASES["hand"], 1)
+    clay = run.state.clay._replace(b=(8.0, 6.0), old=(8.0, 6.0))
+    step = kick.step_around(1e-3, 1e-3)
+    at = kick.handle_at(run.parts.arm, run.state.body, 0.0)
+    a = kick.acting(run.views, run.parts.clay, None, run.state.clock, step, at, (0.0, 0.0), clay)
+    assert a.viscous == ((4.0, 3.0), (4.0, 3.0)) and (step.L, a.uh) == (0.5, (2.0, 0.0))
+    assert a.split is None and a.d == (4.0, 3.0, 0.0)

@@ -1,0 +1,143 @@
+"""The engine's step: it gets torques, dampers and the rest of the hand force, and moves the arm."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ..model import arm
+
+
+class Probe(NamedTuple):
+    """What the accurate method has of the engine.
+
+    Attributes:
+        forward: mj_forward.
+        model: the model.
+        data: its data.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        acceleration: joint accelerations [rad/s^2].
+        ctrl: torques of the motors [N.m] and dampers [N.s/m].
+        push: applied joint torques [N.m].
+    """
+
+    forward: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    acceleration: Any
+    ctrl: Any
+    push: Any
+
+
+class Engine(NamedTuple):
+    """The engine, and the arrays that a run fills: memoryviews, or addresses for compiled steps.
+
+    Attributes:
+        step: mj_step.
+        model: the model, or its address.
+        data: the data, or its address.
+        q: joint angles [rad].
+        w: joint rates [rad/s].
+        ctrl: controls.
+        push: applied joint torques [N.m].
+        timestep: length of a step [s].
+        rows: of the record, rows.ROW numbers each.
+        crossings: coordinate, border [m], time [s], speed along it [m/s] of each.
+        stops: where yielding clay stops the handle or lets it go: coordinate, or 2.0 for both; 1.0
+            for a stop, 0.0 for the end of one; time [s].
+        rendered: force of the clay [N] where b v does not tell it, and volume removed [m^3], a line
+            a row.
+        most_crossings: from which on they are full.
+        most_stops: from which on they are full.
+        probe: for the accurate method.
+    """
+
+    step: Any
+    model: Any
+    data: Any
+    q: Any
+    w: Any
+    ctrl: Any
+    push: Any
+    timestep: Any
+    rows: Any
+    crossings: Any
+    stops: Any
+    rendered: Any
+    most_crossings: int
+    most_stops: int
+    probe: Any
+
+
+def put(array, i, values):
+    """Writes numbers into an array from i on; compiled, `array` is its address.
+
+    Args:
+        array: of floats.
+        values: the numbers, a tuple.
+    """
+    for x in values:
+        array[i] = x
+        i += 1
+
+
+def numbers_at(like, array, i):
+    """As many numbers of an array as a tuple has, from i on; compiled, `array` is its address.
+
+    Args:
+        like: the tuple.
+        array: of floats.
+    """
+    return tuple(array[i : i + len(like)])
+
+
+def pair(array):
+    """The first two numbers of an array; compiled, `array` is its address.
+
+    Args:
+        array: of floats.
+    """
+    return array[0], array[1]
+
+
+def with_dampers(clay, e, b):
+    """Gives the clay's damping to the engine, which has dampers where there is clay."""
+    if clay is None:
+        return
+    put(e.ctrl, 2, b)
+
+
+def step_engine(e, clay, tau, push, b, h):
+    """Lets the engine step; returns joint angles and rates."""
+    put(e.ctrl, 0, tau)
+    with_dampers(clay, e, b)
+    put(e.push, 0, push)
+    put(e.timestep, 0, (h,))
+    e.step(e.model, e.data)
+    return pair(e.q), pair(e.w)
+
+
+def moved_arm(parts, e, before, w, k, h):
+    """Steps the engine to the rates of a kick; joint angles and rates there."""
+    if before == h:  # beside its dampers the engine gets all of the force
+        (x, y), f = k.damped, k.motion.f
+        push = arm.joint_torques(f[0] + x, f[1] + y, k.at.u)
+        return step_engine(e, parts.clay, k.tau, push, k.viscous.b1, h)
+    # its step is longer or shorter than the kick
+    links, n, tau = parts.arm.links, k.w, k.tau
+    a1, a2 = (n[0] - w[0]) / h, (n[0] + n[1] - w[0] - w[1]) / h
+    push = links[2] * a1 + links[3] * a2 - tau[0], links[3] * a2 - tau[1]
+    return step_engine(e, parts.clay, tau, push, (0.0, 0.0), h)
+
+
+def accelerations(probe, clay, z, now):
+    """Joint accelerations that the engine gives at a point of a step [rad/s^2]."""
+    put(probe.q, 0, z.q)
+    put(probe.w, 0, z.w)
+    put(probe.ctrl, 0, now.tau)
+    with_dampers(clay, probe, now.b)
+    put(probe.push, 0, now.push)
+    probe.forward(probe.model, probe.data)
+    return pair(probe.acceleration)

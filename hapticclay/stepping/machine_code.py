@@ -1,0 +1,113 @@
+"""Machine code as it is known without numba: where it is kept, and of which kinds of scene."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from . import parts as p_
+
+# measured: time to compile the whole steps of the plain cut, and what a part adds to it [s]
+COMPILING = 6.0
+COMPILING_PART = {
+    p_.Form: 1.0, p_.Hand: 0.3, p_.Special: 1.0, p_.Flow: 3.5, p_.Springs: 1.5, p_.Groove: 5.0,
+    p_.Sampler: 4.0, p_.Difference: 1.0, p_.Converter: 0.5, p_.Delay: 1.0, p_.Passivity: 1.0,
+    p_.Coupling: 1.0, p_.Accurate: 2.5, p_.Modal: 4.5,
+}  # fmt: skip
+# what begins the kind of more than whole steps; times that it takes as long to compile
+CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
+TIMES = {CARRY: 3.0, COMPLETE: 2.0}
+MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder of the machine code, in NUMBA_CACHE_DIR or the user's cache.
+
+    It is named by all that the code depends on: sources, versions, processor.
+    """
+    packages = [version(x) for x in ("numba", "llvmlite", "mujoco", "numpy")]
+    digest = hashlib.sha256(repr((sys.version, packages, _processor())).encode())
+    package = Path(__file__).resolve().parents[1]
+    for file in sorted((*package.glob("model/*.py"), *package.glob("stepping/*.py"))):
+        digest.update(file.read_bytes())
+    root = (
+        os.environ.get("NUMBA_CACHE_DIR")
+        or os.environ.get("XDG_CACHE_HOME")
+        or Path.home() / ".cache"
+    )
+    return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+def _processor() -> str:
+    """Name and abilities of the processor."""
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return "".join(sorted({x for x in lines if x.startswith(("model name", "flags", "Feat"))}))
+    return f"{platform.machine()} {platform.processor()}"
+
+
+def kind_of(part: Any) -> Any:
+    """What scenes have in common whose steps are made by the same machine code.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        return type(part), *map(kind_of, part)
+    return None if part is None else type(part)
+
+
+def mark(kind: Any) -> Path:
+    """A file that says that machine code of a kind is kept.
+
+    Args:
+        kind: from `kind_of`.
+
+    Raises:
+        OSError, RuntimeError: there is no home, so that nothing is kept.
+    """
+    return cache_folder() / (hashlib.sha256(repr(kind).encode()).hexdigest()[:16] + MARK)
+
+
+def is_kept(kind: Any) -> bool:
+    """Whether machine code of a kind is kept.
+
+    Args:
+        kind: from `kind_of`.
+    """
+    with contextlib.suppress(OSError, RuntimeError):
+        return mark(kind).exists()
+    return False
+
+
+def compile_time(kind: Any) -> float:
+    """Time that it takes to compile the steps of a kind, measured [s].
+
+    Args:
+        kind: from `kind_of`, for whole steps; (CARRY or COMPLETE, kind, ...) for more.
+    """
+    if kind[0] in TIMES:
+        return TIMES[kind[0]] * compile_time(kind[1])
+    return COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(kind))
+
+
+def leaves(kind: Any) -> Iterator[Any]:
+    """The types in a kind, one by one.
+
+    Args:
+        kind: from `kind_of`.
+    """
+    if isinstance(kind, tuple):
+        for x in kind:
+            yield from leaves(x)
+    else:
+        yield kind
