@@ -22,7 +22,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.arm import PAPER
-from hapticclay.model.hardware import Coupling, Interface
+from hapticclay.model.hardware import Coupling, Hardware
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import simulate
 from hapticclay.stepping import engine
@@ -79,9 +79,9 @@ CUT = dataclasses.replace(hc.constant_cut(start=(0.06, 0.0)), length=None)
 WAVE = Multisine(rms=(0.1, 0.1), low=0.2, high=3.0, period=5.0, seed=1)
 
 
-def _sampled(**interface: Any) -> hc.Scenario:
-    given = Interface(**interface) if interface else None
-    return dataclasses.replace(CUT, control="sampled", interface=given)
+def _sampled(**hardware: Any) -> hc.Scenario:
+    given = Hardware(**hardware) if hardware else None
+    return dataclasses.replace(CUT, control="sampled", hardware=given)
 
 
 LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {

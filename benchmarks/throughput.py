@@ -280,7 +280,7 @@ def monte_carlo(n: int, control: str) -> Iterator[hc.Scenario]:
     same, rng = lasting(same, SHORT_STEPS), np.random.default_rng(n)
     for _ in range(n):
         mass, damper, spring, b, gain, start, delay = rng.random(7).tolist()
-        own: Any = dict(interface=hc.Interface(delay=1e-3 * delay)) if control == "sampled" else {}
+        own: Any = dict(hardware=hc.Hardware(delay=1e-3 * delay)) if control == "sampled" else {}
         yield dataclasses.replace(
             same,
             operator=hc.Operator(0.1 + mass, 1.0 + damper, 2.0 + 8.0 * spring),

@@ -23,7 +23,7 @@ from .model.fields import with_fields as with_fields
 from .model.flow import Flow as Flow
 from .model.groove import Groove as Groove
 from .model.hardware import Coupling as Coupling
-from .model.hardware import Interface as Interface
+from .model.hardware import Hardware as Hardware
 from .model.materials import MATERIALS as MATERIALS
 from .model.materials import Material as Material
 from .model.materials import material as material

@@ -200,7 +200,7 @@ def numbers_with_units(kind):
 PLACES = [
     (kind, name, bound)
     for kind in (*EXPERIMENTS.values(), hc.Scenario, hc.Arm, hc.Operator, hc.Flow, hc.VirtualWall,
-                 hc.Device, hc.Interface, hc.Loop, hc.Press)
+                 hc.Device, hc.Hardware, hc.Loop, hc.Press)
     for name, hint, bound in numbers_with_units(kind)
     if not any(getattr(k, "__origin__", None) is tuple for k in app._members(hint))
 ]  # fmt: skip

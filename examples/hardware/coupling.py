@@ -30,8 +30,8 @@ base = hc.Scenario(
 couplings = {"held by the motors": None, "coupled": hc.Coupling(spring=5e4, damper=500.0)}
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.8))
 for name, coupling in couplings.items():
-    interface = hc.Interface(coupling=coupling)
-    record = hc.simulate(hc.with_fields(base, {"interface": interface}))
+    hardware = hc.Hardware(coupling=coupling)
+    record = hc.simulate(hc.with_fields(base, {"hardware": hardware}))
     print(f"{name}: {record.status}")
     t = 1e3 * (record.t - record.crossings[0].time)
     above.plot(t, 100 * record.v[:, 0], ".-", ms=3, lw=0.8, label=name)

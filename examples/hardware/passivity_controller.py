@@ -29,7 +29,7 @@ base = hc.Scenario(
 )
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.8))
 for name, on in (("without", False), ("with the controller", True)):
-    record = hc.simulate(hc.with_fields(base, {"interface": hc.Interface(passivity=on)}))
+    record = hc.simulate(hc.with_fields(base, {"hardware": hc.Hardware(passivity=on)}))
     taken = np.cumsum(record.fe[:-1, 0] * np.diff(record.p[:, 0]))  # J, each force held for Ts
     print(f"{name}: {record.status}; least energy {1e3 * taken.min():.3g} mJ")
     t = 1e3 * (record.t - record.crossings[0].time)

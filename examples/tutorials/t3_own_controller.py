@@ -99,13 +99,13 @@ plt.show()
 # %%
 # On hardware
 # -----------
-# :obj:`~hapticclay.Interface` puts encoders, converters, a delay and friction around the same
+# :obj:`~hapticclay.Hardware` puts encoders, converters, a delay and friction around the same
 # law. Angles come in counts, rates from their differences.
 
-interface = hc.Interface(
+hardware = hc.Hardware(
     encoder=65_536, velocity="difference", window=4, delay=Ts, dac_bits=12, friction=(0.05, 0.02)
 )
-rough = hc.simulate(hc.with_fields(scenario, {"interface": interface}))
+rough = hc.simulate(hc.with_fields(scenario, {"hardware": hardware}))
 print(rough.status)
 
 fig, ax = plt.subplots()

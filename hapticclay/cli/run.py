@@ -206,7 +206,7 @@ def _stop_lines(record: Record) -> list[str]:
 def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:
     """Whether clay that should hold the handle is rendered by the motors from the velocity."""
     rendered = s.control == "sampled" and s.render == "held"
-    if not rendered or (s.interface and (s.interface.coupling or s.interface.passivity)):
+    if not rendered or (s.hardware and (s.hardware.coupling or s.hardware.passivity)):
         return False
     return any(r.get("Fy") and r["expected_speed"] == 0.0 for r in stretches)
 

@@ -37,7 +37,7 @@ class Coupling:
 
 @named
 @dataclass(frozen=True)
-class Interface:
+class Hardware:
     """The hardware between computer and arm, part by part; ideal by default.
 
     Attributes:
@@ -87,10 +87,10 @@ class Interface:
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
 
     def __post_init__(self):
-        check_fields(self, "interface.")
+        check_fields(self, "hardware.")
         if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
             raise ParameterError(
-                "interface.velocity", self.velocity, "must be 'difference' for a window or a filter"
+                "hardware.velocity", self.velocity, "must be 'difference' for a window or a filter"
             )
 
 
@@ -360,7 +360,7 @@ class SampleNoise:
         parts: the hardware, with its seed.
     """
 
-    def __init__(self, parts: Interface):
+    def __init__(self, parts: Hardware):
         self.parts = parts
         self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
         self._first, self._rows = 0, np.zeros((0, 4))

@@ -34,7 +34,7 @@ class Controller:
     (torques, state): t [s]; q [rad] and qd [rad/s] of shoulder and elbow as they are measured; fh
     [N] (x, y), force of the hand on the handle as it is measured; state and params tuples of
     floats. The torques (shoulder, elbow) [N.m] are held for a sample, within the torque limits and
-    behind converter and delay of the interface. The state is handed to the next call. Rendering
+    behind converter and delay of the hardware. The state is handed to the next call. Rendering
     the clay is up to the law, unless the scenario's `render` is "implicit", where it is physical.
 
     Runs compile the function with numba where they are compiled themselves and it can be; Python

@@ -17,7 +17,7 @@ from .clay import Clay, Smooth
 from .compensator import PRINTED, Compensator
 from .constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from .controller import SERVO, Servo
-from .hardware import JOINTS, Interface
+from .hardware import JOINTS, Hardware
 from .operator import Operator, mobility_with
 from .sampled_controller import Controller
 from .scenario_text import scenario_rows
@@ -80,7 +80,7 @@ class Scenario:
             t = 0, so that the run starts without a jump; None for none.
         stop: whether the run ends when an axis is judged unstable; False lets it go on against
             the torque limits.
-        interface: hardware of a sampled loop; None for an ideal one.
+        hardware: hardware of a sampled loop; None for an ideal one.
         arm: the two-link arm.
         servo: G and Sh of each axis, (x, y).
         compensator: shape of C, of both axes or a pair (x, y); K/(s^2 + 10 s) as printed. Systems
@@ -109,7 +109,7 @@ class Scenario:
     muscle: Signal | None = None
     command: Signal | None = None
     stop: bool = True
-    interface: Interface | None = None
+    hardware: Hardware | None = None
     arm: Arm = PAPER
     servo: tuple[Servo, Servo] = SERVO
     compensator: Compensator | tuple[Compensator, Compensator] = PRINTED
@@ -226,20 +226,20 @@ class Scenario:
             raise ParameterError("dt", self.dt, bound)
 
     def _check_interface(self) -> None:
-        given, Ts = self.interface, self.Ts or self.dt
+        given, Ts = self.hardware, self.Ts or self.dt
         if given is None:
             return
         if self.control != "sampled":
-            raise ParameterError("interface", given, "must be None unless control is 'sampled'")
+            raise ParameterError("hardware", given, "must be None unless control is 'sampled'")
         if (given.passivity or given.coupling) and self.render != "held":
             raise ParameterError(
                 "render", self.render, "must be 'held' for a passivity controller or a coupling"
             )
         if self.controller and (given.passivity or given.coupling):
             bound = "must be without passivity controller and coupling where the law is one's own"
-            raise ParameterError("interface", given, bound)
-        number("interface.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
-        number("interface.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
+            raise ParameterError("hardware", given, bound)
+        number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
+        number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 
     @property
     def turned(self) -> bool:
@@ -248,7 +248,7 @@ class Scenario:
 
     def _check_turned_clay(self) -> None:
         """Refuses turned clay where no law of it is known: see docs/equations.md, section 4."""
-        given, clay = self.interface, self.clay
+        given, clay = self.hardware, self.clay
         if clay is None or not self.turned:
             return
         if given and (given.passivity or given.coupling):
@@ -286,10 +286,10 @@ class Scenario:
         """Refuses springs where no law of them is known."""
         if self.clay is None or not self.clay.springs:
             return
-        given = self.interface
+        given = self.hardware
         if given and (given.passivity or given.coupling):
             bound = "must be without passivity controller and coupling in clay that springs back"
-            raise ParameterError("interface", given, bound)
+            raise ParameterError("hardware", given, bound)
         if self.integrator != "fast":
             bound = "must be 'fast' in clay that springs back"
             raise ParameterError("integrator", self.integrator, bound)
@@ -298,7 +298,7 @@ class Scenario:
 
     def _check_groove(self) -> None:
         """Refuses clay that stays cut where no step takes it away, or where it is stiff."""
-        given = self.interface
+        given = self.hardware
         clay = self.clay
         if clay is None or clay.groove is None:
             return
@@ -307,7 +307,7 @@ class Scenario:
             raise ParameterError("integrator", self.integrator, bound)
         if given and (given.passivity or given.coupling):
             bound = "must be without passivity controller and coupling in clay that stays cut"
-            raise ParameterError("interface", given, bound)
+            raise ParameterError("hardware", given, bound)
         b, most = clay.largest, self._soft_damping()
         if b > most:
             bound = (

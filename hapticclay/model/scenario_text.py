@@ -40,7 +40,7 @@ def scenario_rows(scenario: Scenario) -> list[tuple[str, str]]:
     rows.append(("ends at", f"{goal}{s.t_max:g} s"))
     plain = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
     own = [name for name, default in plain.items() if getattr(s, name) != default]
-    own += ["interface"] * (s.interface is not None)
+    own += ["hardware"] * (s.hardware is not None)
     if own:
         rows.append(("of its own", ", ".join(own)))
     return rows

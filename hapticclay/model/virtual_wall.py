@@ -13,7 +13,7 @@ from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from .arm import Arm
 from .constants import B_MAX
-from .hardware import Interface
+from .hardware import Hardware
 from .operator import NO_HAND, Operator
 from .sampled_controller import Controller
 from .scenario import Scenario
@@ -190,7 +190,7 @@ class VirtualWall:
             control="sampled",
             muscle=muscle,
             stop=False,
-            interface=Interface(
+            hardware=Hardware(
                 encoder=counts,
                 velocity=self.velocity,
                 window=self.window if differs else 1,

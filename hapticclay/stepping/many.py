@@ -37,7 +37,7 @@ SHARED = (
     "jitter", "lost", "encoder", "velocity", "window", "velocity_filter", "adc_bits", "adc_range",
     "force_noise", "force_filter", "filter_order", "dac_bits", "dac_range", "friction", "passivity",
     "coupling",
-)  # fmt: skip  # of an interface, all but its delay; without noise its seed has no effect
+)  # fmt: skip  # of the hardware, all but its delay; without noise its seed has no effect
 _scene = operator.attrgetter(
     "control", "shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
 )
@@ -203,7 +203,7 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
     Args:
         s: the scenario.
     """
-    clay, wires, hand = s.clay, s.interface, s.operator
+    clay, wires, hand = s.clay, s.hardware, s.operator
     if (
         s.muscle is not None
         or s.command is not None
@@ -295,7 +295,7 @@ class Pattern:
         Args:
             jobs: their scenarios.
         """
-        longest = max((s.interface.delay for s in jobs if s.interface), default=0.0)
+        longest = max((s.hardware.delay for s in jobs if s.hardware), default=0.0)
         held = self.parts.sampler
         if held and held.delay and longest > held.delay.delay:
             self.parts = scene.for_delays(self.parts, longest)
@@ -319,7 +319,7 @@ class Pattern:
         if at.hand is not None:
             self._put_hands(out, jobs)
         if at.sampler is not None and at.sampler.delay is not None:
-            self._put_delays(out, [s.interface.delay for s in jobs if s.interface])
+            self._put_delays(out, [s.hardware.delay for s in jobs if s.hardware])
         return out
 
     def _put_hands(self, out: np.ndarray, jobs: Sequence[Scenario]) -> None:
@@ -481,7 +481,7 @@ def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
     ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
     work = made.work.T
     balance = energy.balance(work[:5], work[5:7], work[7:9])
-    if like.interface is not None and any(like.interface.friction):
+    if like.hardware is not None and any(like.hardware.friction):
         balance["residual"] = balance["residual"] - work[9]
     last, crossed = made.last, made.crossed
     v, b, fe = last[:, 4:6], last[:, 12:14], made.force

@@ -353,7 +353,7 @@ class Run:
     def _draw(self, n: int) -> None:
         """Draws the random effects on the control samples of the next n whole steps."""
         x, k = self.parts.sampler.chance, self.state.loop.machine.samples.k
-        io: Any = self.scenario.interface
+        io: Any = self.scenario.hardware
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
         if x.first <= k and k + most <= x.first + len(x.numbers) // 4:
             return
@@ -723,7 +723,7 @@ class Run:
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
         """What the hardware takes; of it friction is no part of the motors."""
-        x, io = self.state.work.hardware, self.scenario.interface
+        x, io = self.state.work.hardware, self.scenario.hardware
         if x is None or io is None:
             return {}
         used = any(io.friction), io.passivity, io.coupling is not None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..model import compensator, groove, pieces, regions
-from ..model import hardware as interface
+from ..model import hardware
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, Controller, LawCaller
 from ..model.scenario import Scenario
@@ -177,7 +177,7 @@ def sampler(s: Scenario, controller, clay, special):
     """
     if s.control != "sampled":
         return None
-    ratio, io = round((s.Ts or s.dt) / s.dt), s.interface
+    ratio, io = round((s.Ts or s.dt) / s.dt), s.hardware
     Ts = ratio * float(s.dt)
     axes = list(zip(s.servo, s.compensators, s.gain, strict=True))
     lags = [c.lag for c in s.compensators]
@@ -200,17 +200,17 @@ def hardware_parts(s: Scenario, io, Ts):
     """The parts of a Sampler from `chance` on.
 
     Args:
-        io: the Interface.
+        io: the Hardware.
     """
     chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
     if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / Ts), NOISE_AHEAD) + 8
-        chance = p_.Chance(interface.SampleNoise(io).table(0, n).ravel(), 0)
+        chance = p_.Chance(hardware.SampleNoise(io).table(0, n).ravel(), 0)
     if io.velocity == "difference":
         cutoff = float(io.velocity_filter) if io.velocity_filter else None
         difference = p_.Difference(io.window, cutoff, np.zeros(3 * io.window))
     if io.force_filter is not None:
-        lag = interface.butterworth(io.force_filter, io.filter_order, Ts)
+        lag = hardware.butterworth(io.force_filter, io.filter_order, Ts)
     if io.adc_bits:
         adc = p_.Converter(io.adc_bits, (float(io.adc_range), float(io.adc_range)))
     if io.dac_bits:
@@ -291,7 +291,7 @@ def blocks(parts, s: Scenario):
     axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
     growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
     hit = s_.Hit(INF, 0.0) if parts.hits else None
-    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.interface and parts.sampler else None
+    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.hardware and parts.sampler else None
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
         first_reaction(parts.special), first_laws(parts.special, NONE),
@@ -315,7 +315,7 @@ def traits(s: Scenario) -> tuple[Any, ...]:
     Args:
         s: the scenario.
     """
-    clay, io, own, law, wires = s.clay, s.interface, s.controller, None, None
+    clay, io, own, law, wires = s.clay, s.hardware, s.controller, None, None
     if clay is not None:
         block, hard = clay.groove, hardness(s, largest_damping(s))
         law = (

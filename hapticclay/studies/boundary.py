@@ -16,7 +16,7 @@ from ..model.arm import Arm
 from ..model.clay import Clay, Profile
 from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
-from ..model.hardware import Interface
+from ..model.hardware import Hardware
 from ..model.scenario import Position, Scenario, TorqueLimit
 from ..model.spring import Spring
 from ..simulation.record import Record
@@ -90,7 +90,7 @@ class PushedLoop(Loop):
             dt=self.Ts or TS,
             control="sampled" if self.Ts else "continuous",
             render=self.render if self.Ts else "held",
-            interface=Interface(delay=self.delay) if self.delay else None,
+            hardware=Hardware(delay=self.delay) if self.delay else None,
             origin=(x + self.pose[0], y + self.pose[1]),
             torque_limit=self.torque_limit,
             length=None,

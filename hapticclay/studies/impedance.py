@@ -144,10 +144,10 @@ def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> P
         ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
     """
     loop, i = Loop.of(scenario, axis, b), AXES.index(choice("axis", axis, AXES))
-    given = scenario.interface
+    given = scenario.hardware
     if given and replace(given, delay=0.0, seed=0) != type(given)():
         bound = "must have no hardware but a delay: the impedance is that of a linear loop"
-        raise ParameterError("interface", given, bound)
+        raise ParameterError("hardware", given, bound)
     return PushedLoop(
         loop.axis,
         b=loop.b,

@@ -61,7 +61,7 @@ class Trials:
 
     Parameters have dotted names: those of the base ("b", "K", "delay", "pose.x", "operator.mass",
     "servo.G.damping"; of a wall "K", "B", "device.damper"), else those of the scenario of its runs
-    ("interface.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
+    ("hardware.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
 
     Attributes:
         base: what does not vary: a PushedLoop or a VirtualWall. Its own push does not matter.
@@ -195,7 +195,7 @@ class Trials:
             scenario = base.scenario(t_max, push=push, steps=zwidth.growth_steps(base))
         made = with_fields(scenario, others) if others else scenario
         if isinstance(base, VirtualWall):
-            hardware = made.interface
+            hardware = made.hardware
             rough = hardware and (hardware.encoder or any(hardware.friction))
             if base.surface or rough:
                 bound = "must be a wall without surface, friction and encoder; see hc.zwidth"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, number
-from ..model.hardware import Interface
+from ..model.hardware import Hardware
 from ..model.scenario import Scenario
 from ..model.virtual_wall import VirtualWall
 from ..simulation.record import Record, port_energy
@@ -82,7 +82,7 @@ class EnergyOverTime:
 
     Attributes:
         without: the run as it is.
-        controlled: the same with `Interface(passivity=True)`.
+        controlled: the same with `Hardware(passivity=True)`.
     """
 
     without: Record
@@ -219,9 +219,9 @@ def energy_over_time(scenario: Scenario) -> EnergyOverTime:
     if scenario.control != "sampled" or scenario.render != "held" or scenario.clay is None:
         bound = "must be 'held' under control = 'sampled', in clay: the controller acts on that"
         raise ParameterError("render", scenario.render, bound)
-    parts = scenario.interface or Interface()
+    parts = scenario.hardware or Hardware()
     without, controlled = (
-        simulate(replace(scenario, interface=replace(parts, passivity=x))) for x in (False, True)
+        simulate(replace(scenario, hardware=replace(parts, passivity=x))) for x in (False, True)
     )
     return EnergyOverTime(without, controlled)
 

@@ -154,7 +154,7 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
     """Mean force of the wall over the kicks at t, for a device at these places at the samples."""
     scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.window
-    counts = (scenario.interface.encoder if scenario.interface else None) or 0
+    counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
     assert scenario.controller is not None
     params, state = scenario.controller.params, (0.0, 0.0)
     lever = params[3]

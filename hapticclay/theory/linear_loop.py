@@ -89,7 +89,7 @@ class Loop:
     def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
         """The loop of one axis of a scenario, at the nominal pose of its arm.
 
-        Muscle force, pose, friction and what else the interface has besides its delay are not part
+        Muscle force, pose, friction and what else the hardware has besides its delay are not part
         of it. Of clay that yields or springs back it has b alone: Fy, K and springs are left out,
         so that in clay of b = 0 a gain limit may be inf however large Fy is. For clay that yields
         see `push_outcomes` and `limit_cycles`.
@@ -121,7 +121,7 @@ class Loop:
             compensator=scenario.compensators[i],
             K=scenario.gain[i],
             Ts=(scenario.Ts or scenario.dt) if sampled else None,
-            delay=scenario.interface.delay if scenario.interface else 0.0,
+            delay=scenario.hardware.delay if scenario.hardware else 0.0,
             render=scenario.render if sampled else "held",
             mobility=bare if shaped else None,
         )

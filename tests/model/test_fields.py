@@ -27,7 +27,7 @@ PARTS = {  # a valid one of each, and what its errors put before the field
     "pulse.": (hc.Pulse((1.0, 0.0), 1.0, 5e-4, 1.0),),
     "chirp.": (hc.Chirp((1.0, 0.0), 1.0, 2.0, 3.0),),
     "coupling.": (hc.Coupling(100.0, 1.0),),
-    "interface.": (hc.Interface(),),
+    "hardware.": (hc.Hardware(),),
     "arm.": (hc.Arm(),),
     "servo.": (
         hc.SecondOrder(910.19, 41.8, 910.19),

@@ -62,10 +62,10 @@ def profiles(draw):
 
 
 @st.composite
-def interfaces(draw):
+def hardwares(draw):
     difference = draw(st.booleans())
     more = dict(window=draw(st.integers(1, 9))) if difference else {}
-    return hc.Interface(
+    return hc.Hardware(
         lost=draw(floats(0.0, 0.9)),
         encoder=draw(st.none() | st.integers(4, 2**40)),
         velocity="difference" if difference else "exact",
@@ -88,7 +88,7 @@ def scenarios(draw):
     dt = draw(floats(1e-5, 0.0099))  # below 1 over the fastest mode of SERVOS
     loop = dict(control="sampled", Ts=draw(st.none() | st.just(3 * dt))) if sampled else {}
     if sampled:
-        loop["interface"] = draw(st.none() | interfaces())
+        loop["hardware"] = draw(st.none() | hardwares())
     return hc.Scenario(
         name=draw(st.text(st.characters(exclude_categories=["Cs"]), min_size=1)),
         clay=draw(st.none() | st.builds(hc.Clay, profiles(), profiles())),
@@ -463,7 +463,7 @@ def test_units_of_names():
         ("operator.y.mass", "kg"),
         ("servo.x.G.damping", "1/s"),
         ("clay.x.values.1", "N.s/m"),
-        ("interface.friction.x", "N.m"),
+        ("hardware.friction.x", "N.m"),
         ("muscle.low", "Hz"),
         ("nothing.at.all", ""),
     ):
@@ -654,7 +654,7 @@ def test_nested_names():
     }
 
 
-NOT_GIVEN = ("muscle.", "command.", "interface.", "controller.", "clay.groove.")
+NOT_GIVEN = ("muscle.", "command.", "hardware.", "controller.", "clay.groove.")
 
 
 def test_the_fields_of_a_scenario_are_all_there():

@@ -10,7 +10,7 @@ from hapticclay.simulation import record
 
 HARDWARE = dataclasses.replace(
     hc.constant_cut(control="sampled", t_max=3.5),
-    interface=hc.Interface(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
+    hardware=hc.Hardware(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
 )
 SCENES = {  # name: scenario, engine, every
     "fast": (hc.constant_cut(), "python", 1),

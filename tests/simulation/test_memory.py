@@ -12,7 +12,7 @@ from hapticclay.simulation import memory, simulate
 
 GB = 10**9
 WIRED = dataclasses.replace(
-    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.75), interface=hc.Interface()
+    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.75), hardware=hc.Hardware()
 )
 
 

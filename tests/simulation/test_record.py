@@ -212,7 +212,7 @@ BEFORE_PARTS = {  # a scenario as release 0.1 wrote it in its records
     },
     "command": None,
     "stop": False,
-    "interface": {"delay": 0.0001, "coupling": {"spring": 1e4, "damper": 10.0}, "seed": 3},
+    "hardware": {"delay": 0.0001, "coupling": {"spring": 1e4, "damper": 10.0}, "seed": 3},
 }
 
 
@@ -236,7 +236,7 @@ def test_a_record_of_the_release_before_is_read(run, tmp_path):
         control="sampled",
         muscle=hc.Multisine(seed=7),
         stop=False,
-        interface=hc.Interface(delay=1e-4, coupling=hc.Coupling(1e4, 10.0), seed=3),
+        hardware=hc.Hardware(delay=1e-4, coupling=hc.Coupling(1e4, 10.0), seed=3),
     )
 
 

@@ -15,7 +15,7 @@ from hapticclay.simulation.simulate import has_numba
 pytestmark = pytest.mark.plain
 fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03)
-HARD = hc.Interface(
+HARD = hc.Hardware(
     delay=5e-4, encoder=100_000, velocity="difference", window=3, jitter=1e-4, force_noise=0.1,
     passivity=True,
 )  # fmt: skip
@@ -25,7 +25,7 @@ SCENES = {
     "stiff": hc.constant_cut(b=1e6, clay=(0.001, 0.00102), length=0.0011, t_max=2.0),
     "accurate": replace(CUT, integrator="accurate"),
     "sampled": replace(CUT, control="sampled", Ts=7.2e-4),
-    "hardware": replace(CUT, control="sampled", Ts=7.2e-4, interface=HARD),
+    "hardware": replace(CUT, control="sampled", Ts=7.2e-4, hardware=HARD),
     "driven": hc.stability_test(t_max=0.2),
     "driven accurate": replace(hc.stability_test(t_max=0.1), integrator="accurate"),
     "driven sampled": hc.stability_test(t_max=0.1, control="sampled"),

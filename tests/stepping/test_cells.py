@@ -264,7 +264,7 @@ def test_turned_clay_that_is_stiff_is_refused_and_the_bound_named():
 @pytest.mark.parametrize("parts", [dict(passivity=True), dict(coupling=hc.Coupling(100.0, 1.0))])
 def test_turned_clay_behind_parts_of_one_axis_is_refused(parts):
     with pytest.raises(ParameterError, match="clay.angle = 0.3: must be 0 for a passivity"):
-        path_through(everywhere(90.0, 0.0, 0.3), control="sampled", interface=hc.Interface(**parts))
+        path_through(everywhere(90.0, 0.0, 0.3), control="sampled", hardware=hc.Hardware(**parts))
 
 
 def test_the_nearest_gain_limit_of_a_grid_is_found():

@@ -368,7 +368,7 @@ def test_nothing_that_a_scene_lacks_is_compiled(tmp_path):
     assert "hand" in with_hand and more > count
     assert with_hand - used <= {"hand", "operator"}
     hardware, _ = modules(
-        "hc.Scenario(t_max=0.1, control='sampled', interface=hc.Interface(force_filter=30.0))"
+        "hc.Scenario(t_max=0.1, control='sampled', hardware=hc.Hardware(force_filter=30.0))"
     )
     assert {"sampled", "hardware"} <= hardware and hardware.isdisjoint(lacks[3:])
 

@@ -195,7 +195,7 @@ def test_clay_hit_at_speed(b, speed, control):
         ("native", dict()),
         ("python", dict(integrator="accurate", dt=1.8e-3)),
         ("python", dict(control="sampled")),
-        ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
+        ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, hardware=hc.Hardware())),
     ],
 )
 def test_command_is_counted_from_the_start(engine, kw):

@@ -88,7 +88,7 @@ def binary(model):
         {"control": "sampled"},
         {
             "control": "sampled",
-            "interface": hc.Interface(encoder=4096, friction=(0.1, 0.1), passivity=True),
+            "hardware": hc.Hardware(encoder=4096, friction=(0.1, 0.1), passivity=True),
         },
     ],
     ids=lambda part: "-".join(part),

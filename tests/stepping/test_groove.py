@@ -282,7 +282,7 @@ VARIANTS = {
         dict(
             control="sampled",
             render="implicit",
-            interface=hc.Interface(delay=2e-4, encoder=8192),
+            hardware=hc.Hardware(delay=2e-4, encoder=8192),
             force=(2.5, 0.5),
         ),
     ),
@@ -387,9 +387,9 @@ def test_what_it_does_not_go_with_is_refused():
             hc.Clay(law, soft, groove=BLOCK)
     with pytest.raises(ParameterError, match="integrator .* 'fast' in clay that stays cut"):
         grooved(BLOCK, integrator="accurate")
-    for device in (hc.Interface(passivity=True), hc.Interface(coupling=hc.Coupling(1e3, 10.0))):
-        with pytest.raises(ParameterError, match="interface .* in clay that stays cut"):
-            grooved(BLOCK, control="sampled", interface=device)
+    for device in (hc.Hardware(passivity=True), hc.Hardware(coupling=hc.Coupling(1e3, 10.0))):
+        with pytest.raises(ParameterError, match="hardware .* in clay that stays cut"):
+            grooved(BLOCK, control="sampled", hardware=device)
     with pytest.raises(ParameterError, match="dt .* in a groove where b reaches"):
         grooved(dataclasses.replace(BLOCK, damping=1e9))
     with pytest.raises(ParameterError, match="ground"):

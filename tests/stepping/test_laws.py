@@ -23,7 +23,7 @@ METHODS = {
     "hardware": dict(
         control="sampled",
         render="held",
-        interface=hc.Interface(jitter=2e-5, delay=4e-4, passivity=True, friction=(0.01, 0.01)),
+        hardware=hc.Hardware(jitter=2e-5, delay=4e-4, passivity=True, friction=(0.01, 0.01)),
     ),
 }
 
@@ -186,7 +186,7 @@ def test_borders_and_clay_that_yields_lie_beside_the_law(both, name):
 def test_what_a_law_refuses_is_refused_at_the_door(hardening):
     flat = hc.Profile((), (CLAY,))
     turned = dataclasses.replace(scene(), clay=hc.Clay(flat, flat, angle=0.1))
-    coupled = scene(control="sampled", interface=hc.Interface(coupling=hc.Coupling(3000.0, 300.0)))
+    coupled = scene(control="sampled", hardware=hc.Hardware(coupling=hc.Coupling(3000.0, 300.0)))
     for s, told in ((turned, "must not be turned"), (coupled, "without a coupling")):
         with pytest.raises(ParameterError, match=told) as e:
             hc.simulate(s)

@@ -472,7 +472,7 @@ def test_friction_with_another_arm(seed):
     s, b = some_scene(seed, control="sampled", force=(4.0, -3.0), t_max=0.16)
     s = dataclasses.replace(
         s, operator=None, clay=Clay(Profile((), b[1:2]), Profile((), b[1:2])),
-        interface=hc.Interface(friction=rubs),
+        hardware=hc.Hardware(friction=rubs),
     )  # fmt: skip
     r = hc.simulate(s)
     later = slice(round(0.01 / s.dt), None)
@@ -506,8 +506,8 @@ def test_both_engines_and_a_batch_agree_to_the_last_bit(how):
         s, b = some_scene(seed, **kw)
         x, y = Profile((1e-3, 4e-3), b[:3]), Profile((1e-3,), b[1:3], along="y")
         s = dataclasses.replace(s, clay=Clay(x, y), muscle=wave if seed % 2 else None)
-        parts_of = hc.Interface(**WIRED, seed=seed) if how == "wired" else None
-        scenes.append(dataclasses.replace(s, interface=parts_of))
+        parts_of = hc.Hardware(**WIRED, seed=seed) if how == "wired" else None
+        scenes.append(dataclasses.replace(s, hardware=parts_of))
     for s, batched in zip(scenes, hc.simulate_batch(scenes), strict=True):
         native = hc.simulate(s, engine="native")
         assert np.abs(native.p).max() > 1e-5

@@ -47,7 +47,7 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
         dict(),
         dict(start=(0.06, 0.0), velocity=(0.05, -0.02)),
         dict(shaping=True),
-        dict(interface=hc.Interface()),
+        dict(hardware=hc.Hardware()),
     ],
 )
 def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
@@ -84,9 +84,9 @@ def test_the_recorded_force_belongs_to_its_sample(operator, late):
     drive = Multisine((1.0, 0.5), low=2.0, high=8.0, period=1.0, seed=2)
     error, lead = [], []
     for Ts in (2e-3, 1e-3):
-        parts = hc.Interface(delay=late * Ts) if late else None
+        parts = hc.Hardware(delay=late * Ts) if late else None
         s = hc.constant_cut(control="sampled", dt=Ts, t_max=0.5, force=(0.0, 0.0))
-        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, interface=parts))
+        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, hardware=parts))
         want = drive(r.t)[1:-1]
         if operator:
             want -= 6.0 * r.p[1:-1] + 2.0 * r.v[1:-1] + 0.25 * np.diff(r.p, 2, axis=0) / Ts**2

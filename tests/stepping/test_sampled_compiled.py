@@ -48,8 +48,8 @@ def scene(name):
     more = {x: kw.pop(x) for x in ("torque_limit", "muscle", "command") if x in kw}
     if not isinstance(kw["clay"], tuple):
         more["clay"] = kw.pop("clay")
-    parts = hc.Interface(**parts) if parts else None
-    return dataclasses.replace(hc.constant_cut(**kw), interface=parts, **more)
+    parts = hc.Hardware(**parts) if parts else None
+    return dataclasses.replace(hc.constant_cut(**kw), hardware=parts, **more)
 
 
 @fast

@@ -183,7 +183,7 @@ WAYS = [
     dict(),
     dict(integrator="accurate", dt=1e-3),
     dict(control="sampled", Ts=1.44e-3),
-    dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface(jitter=5e-5, delay=1e-4)),
+    dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, hardware=hc.Hardware(jitter=5e-5, delay=1e-4)),
 ]
 ARRAYS = ("t", "p", "v", "fh", "fe", "tau", "delta", "q", "qd")
 

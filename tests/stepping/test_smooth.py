@@ -20,7 +20,7 @@ METHODS = {
     "accurate": dict(integrator="accurate", dt=1e-3),
     "held": dict(control="sampled"),
     "implicit": dict(control="sampled", render="implicit"),
-    "late": dict(control="sampled", render="implicit", interface=hc.Interface(delay=2e-4)),
+    "late": dict(control="sampled", render="implicit", hardware=hc.Hardware(delay=2e-4)),
     "hand": dict(operator=hc.Operator(), shaping=True),
     "muscle": dict(muscle=hc.Multisine(rms=(1.0, 0.5), high=3.0)),
 }

@@ -165,7 +165,7 @@ def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
     clay = wall(hc.Spring(k=k), edges=(0.0,))
     s = dataclasses.replace(
         hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.06, length=None, stop=False, dt=1e-4,
-        Ts=5e-4, control="sampled", render="held", interface=hc.Interface(encoder=counts),
+        Ts=5e-4, control="sampled", render="held", hardware=hc.Hardware(encoder=counts),
     )  # fmt: skip
     a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
     for name in ("t", "p", "v", "fh", "fe", "tau"):
@@ -188,7 +188,7 @@ def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
         length=None, stop=False, dt=1e-4, Ts=5e-4, control="sampled", render="held",
     )  # fmt: skip
     exact = hc.simulate(s)
-    fine = hc.simulate(dataclasses.replace(s, interface=hc.Interface(encoder=2**36)))
+    fine = hc.simulate(dataclasses.replace(s, hardware=hc.Hardware(encoder=2**36)))
     assert exact.energy["springs_lost"] > 0.0
     # 2 pi/2^36 of 0.25 m is 2e-11 m, times 2.5 kN/m 6e-8 N
     assert np.abs(fine.fe - exact.fe).max() < 1e-5

@@ -38,7 +38,7 @@ def scene(flow, along=True, parts=None, **kw):
     kw = dict(t_max=0.3, force=(4.0, 0.4), control="sampled") | kw
     clay = dataclasses.replace(hc.slab(flow, 0.01, 0.1), isotropic=along)
     own = dict(stop=False, operator=None) | own
-    return dataclasses.replace(hc.constant_cut(**kw), clay=clay, interface=parts, **own)
+    return dataclasses.replace(hc.constant_cut(**kw), clay=clay, hardware=parts, **own)
 
 
 # ---- beside SciPy
@@ -143,7 +143,7 @@ def test_held_clay_chatters_where_it_should_hold_and_physical_clay_holds():
     assert (np.abs(np.diff(np.sign(held.v[late, 0]))) > 1.0).mean() > 0.3
     assert np.hypot(*held.fe[late].T).min() >= 3.0  # never less: no rest at all
     assert physical.stops and physical.stops[0].axis == "xy" and not held.stops
-    guarded = hc.simulate(scene(flow, render="held", parts=hc.Interface(passivity=True), **kw))
+    guarded = hc.simulate(scene(flow, render="held", parts=hc.Hardware(passivity=True), **kw))
     assert guarded.v[late].min() > 0.0  # it creeps, without chatter
 
 
@@ -188,7 +188,7 @@ def test_a_tool_at_rest_is_held_by_the_clay_and_the_handle_by_the_coupling():
     kw = dict(force=(2.0, 0.0), start=(0.02, 0.0), gain=(0.0, 0.0), t_max=1.5)
     for along in (True, False):
         r = hc.simulate(
-            scene(hc.Flow(Fy=3.0), along, hc.Interface(coupling=coupling), **kw),
+            scene(hc.Flow(Fy=3.0), along, hc.Hardware(coupling=coupling), **kw),
         )
         # the servo's spring bears its part; the coupling's deflection, what is left over
         np.testing.assert_allclose(r.fe[-1, 0], 3000.0 * (r.p[-1, 0] - 0.02), rtol=1e-6)
@@ -201,7 +201,7 @@ def test_a_tool_at_rest_is_held_by_the_clay_and_the_handle_by_the_coupling():
 
 @pytest.mark.parametrize("along", [True, False])
 @pytest.mark.parametrize("dt", [3.6e-4, 1e-2, 1e-5])
-@pytest.mark.parametrize("parts", [None, hc.Interface(friction=(0.05, 0.02))])
+@pytest.mark.parametrize("parts", [None, hc.Hardware(friction=(0.05, 0.02))])
 def test_clay_that_holds_the_handle_leaves_no_motion_at_all(along, dt, parts):
     kw = dict(force=(1.0, 0.5), velocity=(0.05, 0.02), start=(0.02, 0.0), gain=(0.0, 0.0))
     s = scene(hc.Flow(Fy=9.0, b=5.0), along, parts, render="implicit", dt=dt, **kw)
@@ -236,7 +236,7 @@ def test_the_sensor_shows_the_whole_push_of_a_hand_at_rest():
 
 def started(**kw):
     """A run in clay that yields, before its first step."""
-    s = scene(hc.Flow(Fy=2.0), False, hc.Interface(friction=(0.3, 0.2)), render="implicit", **kw)
+    s = scene(hc.Flow(Fy=2.0), False, hc.Hardware(friction=(0.3, 0.2)), render="implicit", **kw)
     return Run(dataclasses.replace(s, start=(0.02, 0.0)), 1)
 
 
@@ -281,7 +281,7 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
 def test_friction_beside_clay_elsewhere_is_that_without_it():
     # the same motion by the two ways to friction: in a scene that yields, and in one that does not
     kw = dict(render="implicit", t_max=0.2, start=(0.02, 0.0), velocity=(0.1, 0.05))
-    parts = hc.Interface(friction=(0.05, 0.02))
+    parts = hc.Hardware(friction=(0.05, 0.02))
     a = scene(hc.Flow(b=20.0), False, parts, **kw)
     edges = a.clay.x.edges
     flows = tuple([0.0] * len(edges) + [0.0, 9.0])
@@ -324,7 +324,7 @@ def test_physical_clay_takes_energy_and_the_ledger_closes(  # noqa: PLR0913  # a
         length=None,
         stop=False,
         torque_limit=(50.0, 50.0),
-        interface=hc.Interface(friction=friction) if friction else None,
+        hardware=hc.Hardware(friction=friction) if friction else None,
     )
     r = hc.simulate(s)
     e = r.energy
@@ -350,10 +350,10 @@ SCENES = {
     "physical by axis": (PASTE, False, None, dict(render="implicit", Ts=3 * TS)),
     "at rest": (hc.Flow(Fy=6.0), False, None, dict(render="implicit", velocity=(0.1, 0.05))),
     "stiff": (hc.Flow(Fy=2.0, b=1e5), True, None, dict(render="implicit")),
-    "all": (WEAK, False, hc.Interface(**ALL), dict(operator=hc.Operator())),
-    "all, along": (PASTE, True, hc.Interface(**ALL), {}),
-    "all, physical": (WEAK, False, hc.Interface(**PHYSICAL), dict(render="implicit")),
-    "all, stiff": (hc.Flow(1.0, 2.0, 0.5, 1e5), True, hc.Interface(**PHYSICAL),
+    "all": (WEAK, False, hc.Hardware(**ALL), dict(operator=hc.Operator())),
+    "all, along": (PASTE, True, hc.Hardware(**ALL), {}),
+    "all, physical": (WEAK, False, hc.Hardware(**PHYSICAL), dict(render="implicit")),
+    "all, stiff": (hc.Flow(1.0, 2.0, 0.5, 1e5), True, hc.Hardware(**PHYSICAL),
                    dict(render="implicit", operator=hc.Operator())),
 }  # fmt: skip
 

@@ -106,9 +106,9 @@ def test_the_loop_of_a_scenario():
     found = subject_of(scenario, "y", 50.0)
     assert (found.axis, found.b, found.K) == ("y", 50.0, scenario.gain[1])
     assert found.linear == replace(found.linear, b=50.0)
-    late = replace(scenario, control="sampled", interface=hc.Interface(delay=1e-3))
+    late = replace(scenario, control="sampled", hardware=hc.Hardware(delay=1e-3))
     assert subject_of(late).delay == 1e-3
-    rough = replace(late, interface=hc.Interface(encoder=1000))
+    rough = replace(late, hardware=hc.Hardware(encoder=1000))
     with pytest.raises(ParameterError, match="no hardware but a delay"):
         subject_of(rough)
 

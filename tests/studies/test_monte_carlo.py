@@ -190,7 +190,7 @@ def test_what_cannot_be_run_is_not_counted():
     "given, told",
     [
         (dict(vary={"operator.mas": GAIN}), "operator.mass"),
-        (dict(vary={"interface.frictio": GAIN}), "friction"),
+        (dict(vary={"hardware.frictio": GAIN}), "friction"),
         (dict(vary={}), "must hold a distribution"),
         (dict(vary={"K": GAIN}, grid={"K": Range(1.0, 2.0, 2)}), "given once"),
         (dict(vary={"K": GAIN}, grid={"b": Range(1.0, 2.0)}), "with a count"),
@@ -204,9 +204,9 @@ def test_impossible_trials_are_refused(given, told):
 
 def test_any_field_of_the_scenario_may_vary():
     cutoff = hc.Distribution("uniform", 500.0, 2000.0)
-    trials = hc.Trials(replace(SAMPLED, K=2.0), {"interface.force_filter": cutoff}, runs=6)
+    trials = hc.Trials(replace(SAMPLED, K=2.0), {"hardware.force_filter": cutoff}, runs=6)
     values = trials.middle()
-    assert trials.scenario(values, 0.1).interface.force_filter == pytest.approx(1250.0)
+    assert trials.scenario(values, 0.1).hardware.force_filter == pytest.approx(1250.0)
     assert hc.monte_carlo(trials).total.runs == 6
 
 

@@ -144,13 +144,13 @@ def test_any_field_of_any_part_is_varied_by_name(tmp_path):
         "compensator.den.1": lambda s: s.compensator.den[1],
         "clay.x.values.1": lambda s: s.clay.x.values[1],
         "torque_limit.elbow": lambda s: s.torque_limit[1],
-        "interface.friction.x": lambda s: s.interface.friction[0],
+        "hardware.friction.x": lambda s: s.hardware.friction[0],
         "muscle.rms.x": lambda s: s.muscle.rms[0],
         "operator.y.mass": lambda s: s.operator[1].mass,
     }
     grid = " ".join(f"{name}=0.3:0.4:2" for name in names)
     sampled = {
-        "control": "sampled", "interface.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
+        "control": "sampled", "hardware.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
         "impedance": True,
     }  # fmt: skip
     s = Sweep("constant", parse_grid(grid), sampled)

@@ -515,7 +515,7 @@ def test_the_loop_of_a_scenario_is_the_one_spelled_out():
         compensator=(lead, hc.Compensator()),
         operator=(None, th),
         gain=(0.7, 0.3),
-        interface=hc.Interface(delay=5e-4),
+        hardware=hc.Hardware(delay=5e-4),
         render="held",
         origin=(0.3, 0.3),
         length=None,
