@@ -51,7 +51,7 @@ def jobs(b: float) -> dict[str, Scenario]:
     s = Scenario(
         clay=slab(b, *EDGES[:2]),
         length=None,
-        shaping=True,
+        inertia_shaping=True,
         torque_limit=STRONG,
         origin=NOMINAL_BORDER,
     )
@@ -164,7 +164,7 @@ def scene(seed: int) -> Scenario:
         gain=(1.0, 0.3),
         force=(along[0] * push + along[1] * across, along[1] * push + along[0] * across),
         operator=hand if rng.random() < 0.5 else None,
-        shaping=bool(rng.random() < 0.5),
+        inertia_shaping=bool(rng.random() < 0.5),
         start=(along[0] * ahead, along[1] * ahead),
         velocity=(along[0] * v, along[1] * v),
         origin=ORIGIN if axis == 0 else (0.33, 0.16),
@@ -194,7 +194,7 @@ def against_reference(
     n = min(len(x.p), int(np.searchsorted(index, len(r.p))))
     return {
         "seed": seed,
-        "shaping": s.shaping,
+        "inertia_shaping": s.inertia_shaping,
         "hand": s.operator is not None,
         "crossings": len(x.crossings),
         "crossing": max((error for speed, error in late if speed > SLOW), default=0.0),

@@ -88,7 +88,7 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     "cut": (CUT, {}),
     "one sample in 100 recorded": (CUT, {"every": 100}),
     "no clay": (dataclasses.replace(CUT, clay=None, gain=(0.01, 0.01)), {}),
-    "shaping": (dataclasses.replace(CUT, shaping=True), {}),
+    "inertia_shaping": (dataclasses.replace(CUT, inertia_shaping=True), {}),
     "Th": (dataclasses.replace(CUT, operator=hc.Operator(), force=(2.0, 0.0)), {}),
     "clay that grows": (hc.variable_cut(start=(0.06, 0.06)), {}),
     "muscle force": (dataclasses.replace(CUT, muscle=WAVE), {}),
@@ -100,7 +100,7 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     ),
     "sampled, D/A": (_sampled(dac_bits=16), {}),
     "sampled, delay": (_sampled(delay=1e-4), {}),
-    "sampled, jitter, lost samples": (_sampled(jitter=1e-5, lost=0.01), {}),
+    "sampled, jitter, lost samples": (_sampled(jitter=1e-5, dropout_probability=0.01), {}),
     "sampled, friction": (_sampled(friction=(0.01, 0.01)), {}),
     "sampled, passivity observer": (_sampled(passivity=True), {}),
     "sampled, virtual coupling": (_sampled(coupling=Coupling(2000.0, 20.0)), {}),
@@ -126,7 +126,9 @@ def step(model: mujoco.MjModel, steps: int) -> float:
 def run(name: str, steps: int, engine: str = "python") -> float:
     """Seconds a step of the whole loop."""
     scenario, how = LOOP[name]
-    scenario = dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, stop=False)
+    scenario = dataclasses.replace(
+        scenario, t_max=(steps + 0.5) * scenario.dt, stop_when_unstable=False
+    )
     r = hc.simulate(scenario, engine=engine, **how)
     return r.wall_time / r.steps
 

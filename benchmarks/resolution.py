@@ -44,7 +44,7 @@ def run(
         encoder=counts, velocity=velocity, window=span, adc_bits=bits, dac_bits=bits, delay=delay
     )
     s = dataclasses.replace(
-        hc.constant_cut(force=(FORCE, 0.0), shaping=True, control="sampled", length=END),
+        hc.constant_cut(force=(FORCE, 0.0), inertia_shaping=True, control="sampled", length=END),
         hardware=parts,
     )
     r = hc.simulate(s)

@@ -37,7 +37,7 @@ def cases() -> dict[str, tuple[hc.Trials, list[str], int]]:
     """Trials of each case; the parameters that quadrature nodes are laid over; how many of each."""
     continuous = PushedLoop("x", b=90.0, operator=HAND)
     sampled = PushedLoop("x", b=90.0, operator=HAND, Ts=0.5e-3)
-    turned = PushedLoop("x", b=90.0, operator=HAND, shaping=False)
+    turned = PushedLoop("x", b=90.0, operator=HAND, inertia_shaping=False)
     hand = ["operator.mass", "operator.damper", "operator.spring"]
     return {
         "hand and gain, continuous": (

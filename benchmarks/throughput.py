@@ -36,7 +36,7 @@ SHORT, SHORT_QUICK, SHORT_STEPS = 1_000_000, 10_000, 100  # runs, steps of each
 OFTEN = 5  # compiled runs to one in Python, which takes as long
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
-    "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
+    "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), inertia_shaping=True),
     "constant cut, Th": hc.constant_cut(
         start=(0.06, 0.0), operator=hc.Operator(), force=(2.0, 0.0)
     ),

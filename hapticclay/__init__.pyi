@@ -47,8 +47,8 @@ from .model.virtual_wall import VirtualWall as VirtualWall
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record
-from .simulation.record import irregularity as irregularity
 from .simulation.record import observed_passivity as observed_passivity
+from .simulation.record import out_of_band_ratio as out_of_band_ratio
 from .simulation.record import port_energy as port_energy
 from .simulation.simulate import simulate as simulate
 from .simulation.stepwise import Sample as Sample

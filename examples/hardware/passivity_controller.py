@@ -20,12 +20,12 @@ base = hc.Scenario(
     control="sampled",
     Ts=Ts,
     force=(0.2, 0.0),
-    shaping=True,
+    inertia_shaping=True,
     start=(0.049, 0.0),
     torque_limit=(1e6, 1e6),  # N.m, so that nothing but the hold matters
     length=None,
     t_max=0.15,
-    stop=False,
+    stop_when_unstable=False,
 )
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.8))
 for name, on in (("without", False), ("with the controller", True)):

@@ -15,7 +15,12 @@ plt.style.use("hapticclay.views.figure")
 
 chirp = hc.Chirp((0.01, 0.0), low=0.2, high=12.0, duration=30.0)  # m, Hz, s
 scenario = hc.Scenario(
-    gain=(0.0, 0.0), force=(0.0, 0.0), command=chirp, shaping=True, length=None, t_max=30.996
+    gain=(0.0, 0.0),
+    force=(0.0, 0.0),
+    command=chirp,
+    inertia_shaping=True,
+    length=None,
+    t_max=30.996,
 )
 record = hc.simulate(scenario, every=3)
 position = np.round(record.p[:, 0] / 1e-5) * 1e-5

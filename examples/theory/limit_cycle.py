@@ -28,11 +28,11 @@ for push, name in ((0.05, "pushed at 5 cm/s"), (1e-4, "pushed at 0.1 mm/s")):
         gain=(0.0, 1.0),
         force=(0.0, 0.0),
         velocity=(0.0, push),
-        shaping=True,
+        inertia_shaping=True,
         torque_limit=(1e6, 1e6),
         length=None,
         t_max=3.0,
-        stop=False,
+        stop_when_unstable=False,
     )
     record = hc.simulate(scenario)
     ax.plot(record.t, 100 * record.v[:, 1], lw=1, label=name)

@@ -52,10 +52,10 @@ for share in (0.95, 1.0, 1.05):
         gain=(0.0, share * limit),
         force=(0.0, 0.0),
         velocity=(0.0, 0.01),
-        shaping=True,
+        inertia_shaping=True,
         length=None,
         t_max=3.0,
-        stop=False,
+        stop_when_unstable=False,
     )
     run = hc.simulate(scenario)
     ax.plot(run.t, 100 * run.v[:, 1], lw=1, label=f"K = {share:g} of {limit:.4f}")

@@ -82,7 +82,9 @@ class PassivityCommand:
             cut = load_scenario(self.cut)
             return cut, cut
         stiff: Any = dict(b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=33 * TS)
-        return constant_cut(), replace(constant_cut(control="sampled", **stiff), stop=False)
+        return constant_cut(), replace(
+            constant_cut(control="sampled", **stiff), stop_when_unstable=False
+        )
 
     def _save(
         self,

@@ -35,7 +35,7 @@ class RobustnessCommand:
         gain: K of the compensator, where nothing varies it.
         Ts: Control sample [s]; None for continuous time.
         delay: From a measurement to the torque computed from it [s], with --Ts.
-        shaping: Let the servo shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: Let the servo shape the inertia, so that Sh holds at every pose.
         hands: Name of a population; hapticclay robustness --list prints them.
         variation: Take log-normal hands around the population's hand of medians, with this
             standard deviation over the mean: an assumption.
@@ -58,7 +58,7 @@ class RobustnessCommand:
     gain: float | None = None
     Ts: float | None = None
     delay: float = 0.0
-    shaping: bool = True
+    inertia_shaping: bool = True
     hands: str = "published range"
     variation: float | None = None
     vary: str = ""
@@ -133,7 +133,7 @@ class RobustnessCommand:
             operator=None,
             Ts=self.Ts,
             delay=self.delay,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
         )
         hands = hands_of(self.hands)
         if self.variation is not None:

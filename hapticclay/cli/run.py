@@ -166,13 +166,15 @@ def run_table(record: Record) -> str:
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     lines += _crossing_lines(record) + _stop_lines(record)
-    if isinstance(s.muscle, Multisine) and len(record.t) >= 32:  # the fewest for irregularity()
+    if (
+        isinstance(s.muscle, Multisine) and len(record.t) >= 32
+    ):  # the fewest for out_of_band_ratio()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
     elif _chatters(s, [r for _, r in pieces]):
-        lines.append("advice: --render implicit; clay that motors render cannot hold the handle")
+        lines.append("advice: --render physical; clay that motors render cannot hold the handle")
     if record.error is not None:
         lines.append(f"error: {record.error}")
         if record.error.note:
@@ -241,8 +243,8 @@ def _table_row(way: str, r: dict[str, Any]) -> list[str]:
 
 
 def _maneuver_line(record: Record, axis: str) -> str:
-    from ..simulation.record import irregularity
+    from ..simulation.record import out_of_band_ratio
 
     rms = float((record.fh[:, AXES.index(axis)] ** 2).mean() ** 0.5)
-    measured = f"rms {rms:.4g} N, irregularity {irregularity(record, axis):.4f}"
+    measured = f"rms {rms:.4g} N, out of band {out_of_band_ratio(record, axis):.4f}"
     return f"operator's force along {axis}: {measured}"

@@ -49,10 +49,11 @@ class StabilityCommand:
         num: Numerator of the compensator, descending powers of s.
         den: Denominator of the compensator, descending powers of s.
         G: Gain, damping and stiffness of the position loop G; by default as printed.
-        S: Gain, damping and stiffness of Sh, by default as printed; the gain with --shaping, else
-            it is that of the arm.
+        S: Gain, damping and stiffness of Sh, by default as printed; the gain with
+            --inertia-shaping, else it is that of the arm.
         impedance: Put the operator's arm Th (Eq. 19) in the loop.
-        shaping: Let the servo of the runs shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: Let the servo of the runs shape the inertia, so that Sh holds at every
+            pose.
         clay: Clay that yields, Fy=5 K=2 n=0.5 beside b, or a material, "stiff clay": predict what
             sticks, and limit cycles.
         map: Plane of the map: a boundary in K or b over clay, delay or pose; or what a push ends
@@ -72,7 +73,7 @@ class StabilityCommand:
     G: tuple[float, float, float] | None = None
     S: tuple[float, float, float] | None = None
     impedance: bool = True
-    shaping: bool = False
+    inertia_shaping: bool = False
     clay: tuple[str, ...] | None = None
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose", "gain-yield"] = "none"
     out: Path = Path("out/stability")
@@ -96,7 +97,7 @@ class StabilityCommand:
             compensator=Compensator(self.num, self.den),
             Ts=self.Ts,
             delay=self.delay if self.Ts else 0.0,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
         )
         rows = verdicts(loop, self.delay)
         if flow:
@@ -108,7 +109,7 @@ class StabilityCommand:
         operator = loop.operator and asdict(loop.operator)
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": operator, "Ts": self.Ts,
                  "compensator": asdict(loop.compensator), "servo": asdict(loop.servo),
-                 "delay": self.delay, "shaping": self.shaping, "map": self.map,
+                 "delay": self.delay, "inertia_shaping": self.inertia_shaping, "map": self.map,
                  "quick": self.quick}  # fmt: skip
         chart = self._map(loop)
         found = {"schema": VERDICTS_SCHEMA, "asked": asked, "units": VERDICTS_UNITS,

@@ -36,10 +36,10 @@ class DeviceOptions:
         Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
         delay: From a sample to the force computed from it [s].
         velocity: How it is measured, by default the difference of positions.
-        window: Samples that the difference spans, by default 1.
+        velocity_window: Samples that the difference spans, by default 1.
         filter: Low-pass behind the difference [Hz], or none.
         hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
-        surface: The wall has a surface and never pulls.
+        unilateral: The wall has a surface and never pulls.
     """
 
     mass: Quantity = None
@@ -49,10 +49,10 @@ class DeviceOptions:
     Ts: Quantity = None
     delay: Quantity = None
     velocity: Literal["difference", "exact"] | None = None
-    window: Quantity = None
+    velocity_window: Quantity = None
     filter: Quantity = None
     hand: Hand | None = None
-    surface: bool = False
+    unilateral: bool = False
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -70,12 +70,12 @@ class DeviceOptions:
         from ..model.virtual_wall import VirtualWall
 
         wall = VirtualWall.load(source) if source else with_fields(VirtualWall(), base)
-        names = [n for n in self.given if n not in ("hand", "surface")]
+        names = [n for n in self.given if n not in ("hand", "unilateral")]
         changes = quantities({n: getattr(self, n) for n in names})
         wall = with_fields(wall, {WALL_FIELDS.get(n, n): x for n, x in changes.items()})
         if self.hand:
             wall = replace(wall, operator=operator_of(self.hand))
-        return replace(wall, surface=True) if self.surface else wall
+        return replace(wall, unilateral=True) if self.unilateral else wall
 
     def refuse(self, bound: str, but: tuple[str, ...] = ()) -> None:
         """Refuses what was given.

@@ -91,7 +91,8 @@ class Experiment:
 
     Attributes:
         operator: the operator's arm Th in the loop (Eq. 19); None for a pure force.
-        shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
+        inertia_shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every
+            pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, a part of Ts.
         t_max: longest simulated time [s], > 0, at most 1e5.
         origin: world position of p = 0 [m].
@@ -99,11 +100,11 @@ class Experiment:
         control: "continuous", part of the differential equation, or "sampled": measured and held
             every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
-        render: clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
+        render: clay of a sampled loop: its force "held" by the motors, or "physical" (physical).
     """
 
     operator: Operator | None = None
-    shaping: bool = False
+    inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     origin: Position = ORIGIN
@@ -296,7 +297,7 @@ class StabilityTest(Experiment):
             force=(0.0, 0.0),
             muscle=Multisine((self.rms, 0.0) if i == 0 else (0.0, self.rms), seed=self.seed),
             length=None,
-            stop=False,
+            stop_when_unstable=False,
         )
 
 

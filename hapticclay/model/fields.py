@@ -209,7 +209,7 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
 
 
 def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "shaping=true", "dt=0.1ms".
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms".
 
     Args:
         field: name for the error.

@@ -43,10 +43,11 @@ class Hardware:
     Attributes:
         jitter: how far a sampling instant is off its time, uniform, rms [s], at most 0.28 Ts, so
             that samples keep their order.
-        lost: probability that a sample is lost, 0 to 0.99; the torque is then held for one more.
+        dropout_probability: probability that a sample is lost, 0 to 0.99; the torque is then held
+            for one more.
         encoder: counts per turn of each joint, 4 to 2^40; None measures angles exactly.
         velocity: of the joints: "exact" (a tachometer) or "difference" of measured angles.
-        window: samples that the difference spans, 1 to 10000.
+        velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
         adc_bits: bits of the converter of the hand's force, 2 to 32; None for none.
         adc_range: that converter spans -range to range on each axis [N].
@@ -66,10 +67,10 @@ class Hardware:
     """
 
     jitter: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
-    lost: Annotated[float, Bound(0.0, 0.99)] = 0.0
+    dropout_probability: Annotated[float, Bound(0.0, 0.99)] = 0.0
     encoder: Annotated[int | None, Bound(4, 2**40)] = None
     velocity: Literal["exact", "difference"] = "exact"
-    window: Annotated[int, Bound(1, 10_000)] = 1
+    velocity_window: Annotated[int, Bound(1, 10_000)] = 1
     velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     adc_bits: Annotated[int | None, Bound(2, 32)] = None
     adc_range: Annotated[float, Bound(0.0, 1e6, "N", above=True)] = 50.0
@@ -88,7 +89,9 @@ class Hardware:
 
     def __post_init__(self):
         check_fields(self, "hardware.")
-        if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
+        if self.velocity == "exact" and (
+            self.velocity_filter is not None or self.velocity_window != 1
+        ):
             raise ParameterError(
                 "hardware.velocity", self.velocity, "must be 'difference' for a window or a filter"
             )
@@ -403,6 +406,6 @@ class SampleNoise:
         s, (time, loss, noise) = self.parts, self._streams
         width = s.jitter * sqrt(3.0)
         late = time.uniform(-width, width, NOISE_BLOCK)
-        lost = loss.random(NOISE_BLOCK) < s.lost
+        lost = loss.random(NOISE_BLOCK) < s.dropout_probability
         hiss = s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))
         return np.column_stack((late, lost, hiss))

@@ -35,7 +35,7 @@ class Controller:
     [N] (x, y), force of the hand on the handle as it is measured; state and params tuples of
     floats. The torques (shoulder, elbow) [N.m] are held for a sample, within the torque limits and
     behind converter and delay of the hardware. The state is handed to the next call. Rendering
-    the clay is up to the law, unless the scenario's `render` is "implicit", where it is physical.
+    the clay is up to the law, unless the scenario's `render` is "physical", where it is physical.
 
     Runs compile the function with numba where they are compiled themselves and it can be; Python
     runs it otherwise, to the same numbers, and a line says so. Variables outside of the function

@@ -39,7 +39,7 @@ TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, 
 SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
-Render = Literal["held", "implicit"]
+Render = Literal["held", "physical"]
 RENDERS = get_args(Render)
 
 
@@ -58,7 +58,8 @@ class Scenario:
         force: constant part of the operator's muscle force uh on each axis [N].
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
             pure force (Th = 0).
-        shaping: whether the servo shapes the handle's inertia, so that Sh holds at every pose.
+        inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
+            pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, 0.36 ms, or the
             longest whole part of Ts that is no longer.
         t_max: the run ends at this time [s], > 0, at most 1e5 ...
@@ -74,12 +75,12 @@ class Scenario:
             equation; or "sampled", the paper's hardware: measured, computed and held every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
         render: where control is sampled, the clay is "held" (the motors hold its force, computed
-            from the sample) or "implicit" (physical, there all the time).
+            from the sample) or "physical" (physical, there all the time).
         muscle: variable part of uh [N], any signal or sum of signals; None for none.
         command: displacement added to the compensator's output [m]: the signal less its value at
             t = 0, so that the run starts without a jump; None for none.
-        stop: whether the run ends when an axis is judged unstable; False lets it go on against
-            the torque limits.
+        stop_when_unstable: whether the run ends when an axis is judged unstable; False lets it go
+            on against the torque limits.
         hardware: hardware of a sampled loop; None for an ideal one.
         arm: the two-link arm.
         servo: G and Sh of each axis, (x, y).
@@ -94,7 +95,7 @@ class Scenario:
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
     force: Force = (1.0, 0.0)
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
-    shaping: bool = False
+    inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     length: Annotated[float | None, Bound(-10.0, 10.0, "m")] = PATH_LENGTH
@@ -108,7 +109,7 @@ class Scenario:
     render: Render = "held"
     muscle: Signal | None = None
     command: Signal | None = None
-    stop: bool = True
+    stop_when_unstable: bool = True
     hardware: Hardware | None = None
     arm: Arm = PAPER
     servo: tuple[Servo, Servo] = SERVO
@@ -138,9 +139,11 @@ class Scenario:
             raise ParameterError(
                 "control", self.control, "must be 'sampled' with a controller of one's own"
             )
-        if self.controller is not None and self.shaping:
+        if self.controller is not None and self.inertia_shaping:
             raise ParameterError(
-                "shaping", self.shaping, "must be False with a controller, which replaces the servo"
+                "inertia_shaping",
+                self.inertia_shaping,
+                "must be False with a controller, which replaces the servo",
             )
         self._check_servo()
         self._check_interface()

@@ -67,10 +67,10 @@ class VirtualWall:
         Ts: control sample [s], 1e-6 to 1.
         delay: from a sample to the force computed from it [s], 0 to 100 Ts.
         velocity: "difference" of measured positions, or "exact" (a tachometer).
-        window: samples that the difference spans, 1 to 10000.
+        velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
-        surface: whether the wall has a surface at x = 0, pushes where x > 0 and never pulls; else
-            it acts everywhere and the loop is linear.
+        unilateral: whether the wall has a surface at x = 0, pushes where x > 0 and never pulls;
+            else it acts everywhere and the loop is linear.
     """
 
     K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
@@ -81,14 +81,16 @@ class VirtualWall:
     Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
     delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
     velocity: Literal["difference", "exact"] = "difference"
-    window: Annotated[int, Bound(1, 10_000)] = 1
+    velocity_window: Annotated[int, Bound(1, 10_000)] = 1
     velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
-    surface: bool = False
+    unilateral: bool = False
 
     def __post_init__(self):
         check_fields(self, "wall.")
         number("wall.delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
-        if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
+        if self.velocity == "exact" and (
+            self.velocity_filter is not None or self.velocity_window != 1
+        ):
             bound = "must be 'difference' for a window or a filter"
             raise ParameterError("wall.velocity", self.velocity, bound)
 
@@ -189,11 +191,11 @@ class VirtualWall:
             torque_limit=STRONG,
             control="sampled",
             muscle=muscle,
-            stop=False,
+            stop_when_unstable=False,
             hardware=Hardware(
                 encoder=counts,
                 velocity=self.velocity,
-                window=self.window if differs else 1,
+                velocity_window=self.velocity_window if differs else 1,
                 velocity_filter=self.velocity_filter if differs else None,
                 delay=self.delay,
                 friction=(d.friction * lever, 0.0),
@@ -202,7 +204,7 @@ class VirtualWall:
             controller=Controller(
                 wall_law,
                 state=(0.0, 0.0),
-                params=(self.K, self.B, self.M, lever, self.Ts, float(self.surface)),
+                params=(self.K, self.B, self.M, lever, self.Ts, float(self.unilateral)),
             ),
         )
 

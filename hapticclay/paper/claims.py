@@ -36,7 +36,7 @@ from ..model.constants import (
 from ..model.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from ..simulation.record import Record, irregularity
+from ..simulation.record import Record, out_of_band_ratio
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at
 from ..studies.identification import Identified, identify
@@ -290,7 +290,7 @@ def machine(runs: Runs) -> Iterator[Row]:
         (None, float(max(ends)), None),
         "not recoverable",
         f"the printed Sh holds at one pose: Λx is {Lambda[0, 0]:.4g} kg there and "
-        f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; shaping=True keeps it",
+        f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; inertia_shaping=True keeps it",
     )
     yield row(
         "sampling period | Sec. 4 | 0.36 ms | s",
@@ -491,7 +491,7 @@ def constant(runs: Runs) -> Iterator[Row]:
         f"K f/(10 + K b) with 1 N; it varies by {100 * np.ptp(v) / v.mean():.1g} % over the steady "
         "part",
     )
-    first = runs.constant(shaping=True)
+    first = runs.constant(inertia_shaping=True)
     dampings = (0.0, B_CONSTANT, 0.0)
     exact = linear_loop.crossing_times(Loop(K=1.0), r.scenario.force[0], edges, dampings)
     for c, when, name in zip(first.crossings, exact, ("enters", "leaves", "ends"), strict=True):
@@ -543,7 +543,7 @@ def variable(runs: Runs) -> Iterator[Row]:
     Args:
         runs: the runs behind the rows.
     """
-    r, shaped = runs.variable("none"), runs.variable("none", shaping=True)
+    r, shaped = runs.variable("none"), runs.variable("none", inertia_shaping=True)
     yield row(
         "input force | Sec. 4.2 | 1 N at 45 degrees | N",
         (1.0, math.hypot(*r.scenario.force), 1e-12),
@@ -657,8 +657,8 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         pole = rightmost("x", K, B_STABILITY, TH)
         rms = float(np.sqrt(np.mean(r.fh[:, 0] ** 2)))
         yield row(
-            f"irregularity of the force, K = {K:g} | Sec. 4.3, Fig. 11 | {where[K]} | 1",
-            (0.0 if stable else 1.0, irregularity(r), 0.05),
+            f"force out of the band, K = {K:g} | Sec. 4.3, Fig. 11 | {where[K]} | 1",
+            (0.0 if stable else 1.0, out_of_band_ratio(r), 0.05),
             "given",
             f"0 is a force in the band of the maneuver, 1 one wholly outside; "
             f"rms {rms:.3g} N; rightmost pole {pole.real:+.3g} ± {abs(pole.imag):.3g}j 1/s; "
@@ -672,10 +672,10 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         "given",
         "bounded by the torque limits alone, which are not printed",
     )
-    other = runs.stability(GAINS_FIG11[1], axis="y", shaping=True)
+    other = runs.stability(GAINS_FIG11[1], axis="y", inertia_shaping=True)
     yield row(
         "axis of Fig. 11 | Fig. 11 | force in x, position y | 1",
-        (None, irregularity(other, "y"), None),
+        (None, out_of_band_ratio(other, "y"), None),
         "contradicted",
         f"run in x; in y K = 3 is unstable as well ({other.status}), so the figure's two cases "
         "tell apart in x only",

@@ -86,7 +86,7 @@ class Record:
             damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
             what is left over (residual) and what went through (throughput) [J]; of clay that
             springs back, what its springs hold of the clay's share and have lost (springs_stored,
-            springs_lost).
+            springs_dissipated).
         steps: engine steps made.
         wall_time: run time [s].
         versions: of the packages used.
@@ -620,7 +620,7 @@ def observed_passivity(record: Record) -> Verdict:
 
 
 @checked
-def irregularity(record: Record, axis: str = "x") -> float:
+def out_of_band_ratio(record: Record, axis: str = "x") -> float:
     """Share of the rms of the operator's force above the band of the maneuver.
 
     A stable linear loop answers a maneuver within its band and gives 0; white noise gives nearly 1.

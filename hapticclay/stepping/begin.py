@@ -183,7 +183,7 @@ def first_own(own):
 def first_rates(part, sampler, body):
     if part is None:
         return part
-    ring, n, q, w = part.ring, part.window, body.q, body.w
+    ring, n, q, w = part.ring, part.velocity_window, body.q, body.w
     for i in range(n):  # before the start the joints have turned so for long
         j = i - n
         q1, q2 = q[0] + j * sampler.Ts * w[0], q[1] + j * sampler.Ts * w[1]

@@ -34,12 +34,13 @@ LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so
 FEWEST = 4  # runs of a kind that repay its pattern
 PATTERNS = 64  # kinds that are kept
 SHARED = (
-    "jitter", "lost", "encoder", "velocity", "window", "velocity_filter", "adc_bits", "adc_range",
+    "jitter", "dropout_probability", "encoder", "velocity", "velocity_window", "velocity_filter",
+    "adc_bits", "adc_range",
     "force_noise", "force_filter", "filter_order", "dac_bits", "dac_range", "friction", "passivity",
     "coupling",
 )  # fmt: skip  # of the hardware, all but its delay; without noise its seed has no effect
 _scene = operator.attrgetter(
-    "control", "shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
+    "control", "inertia_shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
 )
 _shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
 
@@ -209,7 +210,7 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         or s.command is not None
         or s.controller is not None
         or s.integrator != "fast"
-        or not s.stop
+        or not s.stop_when_unstable
         or s.t_max > LONGEST * s.dt
         or (laws.TABLE and laws.parts_of(s) is not None)
     ):
@@ -224,7 +225,7 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         law = x.edges, x.along, y.edges, y.along, y is x or y == x, hard
     parts: Any = None
     if wires is not None:
-        if wires.jitter or wires.lost or wires.force_noise:
+        if wires.jitter or wires.dropout_probability or wires.force_noise:
             return None
         parts = _shared(wires), wires.delay > 0.0
     held = hand is not None and (not isinstance(hand, tuple) or any(hand))

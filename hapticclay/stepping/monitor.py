@@ -96,7 +96,7 @@ class StabilityMonitor:
             step = first + n - 1
             code = "limit cycle" if cause == LIMITS else "diverged"
             verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
-            if self.scenario.stop:
+            if self.scenario.stop_when_unstable:
                 return n, verdict
             self.onset = self.onset or verdict
         if good == rows.shape[1]:
@@ -195,7 +195,7 @@ class StabilityMonitor:
             self.unbound = self.seen + last - int((~bound)[::-1].argmax())
         self.often += int(bound.sum())
         self.seen += last + 1
-        if not self.scenario.stop:
+        if not self.scenario.stop_when_unstable:
             last = max(1, round(WHILE / self.scenario.dt))
             self.bound = np.concatenate((self.bound, bound))[-last:]
 
@@ -234,7 +234,7 @@ class StabilityMonitor:
                 cause = "" if self.onset or i in verdicts else self._verdict(i)
                 if cause:
                     verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
-                    if self.scenario.stop:
+                    if self.scenario.stop_when_unstable:
                         break
             if before != len(turns) - 1 and i not in verdicts:
                 self.swings[i] = []
@@ -319,7 +319,7 @@ class StabilityMonitor:
             return f"{self._raise_limit()}: the motors saturate"
         if s.controller is not None:
             return "change the controller, or lower dt or Ts"
-        if not s.shaping:
+        if not s.inertia_shaping:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"

@@ -92,7 +92,7 @@ def largest_lightness(scenario: Scenario) -> float:
     """
     W, through = scenario.arm.links[4], 0.0
     for servo, shape, K in zip(scenario.servo, scenario.compensators, scenario.gain, strict=True):
-        if scenario.shaping:
+        if scenario.inertia_shaping:
             W = max(W, servo.S.gain)
         if len(shape.num) == len(shape.den):  # C passes a force on at once
             through = max(through, K * servo.G.gain * abs(shape.num[0]))

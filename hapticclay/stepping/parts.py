@@ -308,12 +308,12 @@ class Difference(NamedTuple):
     """Joint rates by the difference of measured angles.
 
     Attributes:
-        window: samples that it spans.
+        velocity_window: samples that it spans.
         cutoff: of the low-pass behind it [Hz].
         ring: index and angles of past samples, three numbers each.
     """
 
-    window: int
+    velocity_window: int
     cutoff: Any
     ring: Any
 

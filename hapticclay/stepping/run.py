@@ -289,7 +289,7 @@ class Run:
         self.end_time: float | None = None
         self.without_samples = brief
         # nothing to report so far; later the monitor may want all rows once more
-        self.calm = kernel.quiet is not None and scenario.stop and not watched
+        self.calm = kernel.quiet is not None and scenario.stop_when_unstable and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self.first = energy.stored(self.parts, self.state)
         self._saved = self.saved()
@@ -718,7 +718,7 @@ class Run:
         laws = self.state.clay.laws
         if laws is not None and laws.elastic is not None:
             x = laws.elastic
-            out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
+            out |= {"springs_stored": float(x.stored), "springs_dissipated": float(x.lost)}
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
@@ -767,7 +767,7 @@ def completed(
     Returns:
         The run, and the seconds it took.
     """
-    brief = brief and scenario.stop
+    brief = brief and scenario.stop_when_unstable
     watched = every > 1 and progress is not None  # which must not begin anew
     while True:
         run = Run(scenario, every, kernel, store, brief, watched)

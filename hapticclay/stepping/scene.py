@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..model import compensator, groove, pieces, regions
-from ..model import hardware
+from ..model import hardware as devices
 from ..model.constants import B_MAX
 from ..model.sampled_controller import DESK, Controller, LawCaller
 from ..model.scenario import Scenario
@@ -143,7 +143,7 @@ def parts_of(s: Scenario, controller: Controller | None = None):
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo),
-        1 if s.shaping else None, lag, form, hand_parts(s),
+        1 if s.inertia_shaping else None, lag, form, hand_parts(s),
         p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
         sampler(s, controller or s.controller, *clay[::3]), *accurate_parts(s),
@@ -203,14 +203,14 @@ def hardware_parts(s: Scenario, io, Ts):
         io: the Hardware.
     """
     chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
-    if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
+    if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / Ts), NOISE_AHEAD) + 8
-        chance = p_.Chance(hardware.SampleNoise(io).table(0, n).ravel(), 0)
+        chance = p_.Chance(devices.SampleNoise(io).table(0, n).ravel(), 0)
     if io.velocity == "difference":
         cutoff = float(io.velocity_filter) if io.velocity_filter else None
-        difference = p_.Difference(io.window, cutoff, np.zeros(3 * io.window))
+        difference = p_.Difference(io.velocity_window, cutoff, np.zeros(3 * io.velocity_window))
     if io.force_filter is not None:
-        lag = hardware.butterworth(io.force_filter, io.filter_order, Ts)
+        lag = devices.butterworth(io.force_filter, io.filter_order, Ts)
     if io.adc_bits:
         adc = p_.Converter(io.adc_bits, (float(io.adc_range), float(io.adc_range)))
     if io.dac_bits:
@@ -323,7 +323,11 @@ def traits(s: Scenario) -> tuple[Any, ...]:
             block is not None and bool(block.damping), block is not None, hard,
         )  # fmt: skip
     if io is not None:
-        random = io.jitter > 0.0, io.lost > 0.0 or io.force_noise > 0.0, io.delay > 0.0
+        random = (
+            io.jitter > 0.0,
+            io.dropout_probability > 0.0 or io.force_noise > 0.0,
+            io.delay > 0.0,
+        )
         order = io.filter_order if io.force_filter is not None else 0
         wires = (
             *random, order, io.velocity == "difference" and bool(io.velocity_filter), io.velocity,
@@ -334,8 +338,8 @@ def traits(s: Scenario) -> tuple[Any, ...]:
     forms = ((c.lag and c.lag[0], c.order) for c in s.compensators)
     more = kind_of(laws.parts_of(s)) if laws.TABLE else None
     return (
-        s.control, s.render, s.integrator, bool(s.shaping), any(s.operators), *driven, *forms, law,
-        wires, own and len(own.state), more,
+        s.control, s.render, s.integrator, bool(s.inertia_shaping), any(s.operators), *driven,
+        *forms, law, wires, own and len(own.state), more,
     )  # fmt: skip
 
 

@@ -48,7 +48,8 @@ class PushedLoop(Loop):
         b: clay on both axes [N.s/m].
         k: stiffness of it on both axes, with its rest where the handle starts [N/m].
         K: compensator gain, > 0, at most 1e6.
-        shaping: as in Scenario; without it the arm's mobility takes the place of the gain of Sh.
+        inertia_shaping: as in Scenario; without it the arm's mobility takes the place of the gain
+            of Sh.
         pose: place of the handle, from its nominal position [m].
         push: velocity of the handle at the start [m/s]. Where C does not integrate no state of it
             goes with a velocity; a constant force then would give it to a free handle in PUSH_TIME.
@@ -58,7 +59,7 @@ class PushedLoop(Loop):
 
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
     K: Annotated[float, Bound(0.0, 1e6, above=True)] = 1.0
-    shaping: bool = True
+    inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
     push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
     torque_limit: TorqueLimit = TORQUE_LIMIT
@@ -68,12 +69,12 @@ class PushedLoop(Loop):
         super().__post_init__()
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
-    def scenario(self, t_max: float = GROWTH_SPAN, stop: bool = True) -> Scenario:
+    def scenario(self, t_max: float = GROWTH_SPAN, stop_when_unstable: bool = True) -> Scenario:
         """Build the scenario of a run of it.
 
         Args:
             t_max: length of the run [s].
-            stop: as in Scenario.
+            stop_when_unstable: as in Scenario.
         """
         i, everywhere = AXES.index(self.axis), Profile((), (self.b,), springs=(Spring(self.k),))
         x, y = self._nominal
@@ -86,7 +87,7 @@ class PushedLoop(Loop):
             force=(0.0, 0.0) if moves else along(self.push / (self.servo.S.gain * PUSH_TIME)),
             velocity=along(self.push) if moves else (0.0, 0.0),
             operator=self.operator,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
             dt=self.Ts or TS,
             control="sampled" if self.Ts else "continuous",
             render=self.render if self.Ts else "held",
@@ -95,7 +96,7 @@ class PushedLoop(Loop):
             torque_limit=self.torque_limit,
             length=None,
             t_max=t_max,
-            stop=stop,
+            stop_when_unstable=stop_when_unstable,
             arm=self.arm,
             servo=(self.servo, SERVO[1]) if i == 0 else (SERVO[0], self.servo),
             compensator=self.compensator,
@@ -169,7 +170,7 @@ def classify_run(loop: PushedLoop) -> str:
     """
     limit = (1.0 - 1e-9) * np.array(loop.torque_limit)
     for t_max in CLASSIFIED_SPANS:
-        record = simulate(loop.scenario(t_max, stop=False))
+        record = simulate(loop.scenario(t_max, stop_when_unstable=False))
         code = record.outcome.code
         if code in ("diverged", "out of reach", "singular"):
             return "diverges"
@@ -328,8 +329,8 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
     W = np.array([[xx, xy], [xy, yy]])
     if loop.Ts is None:
-        return linear_loop.state_space(*loops, mobility=None if loop.shaping else W)[0]
-    less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.shaping))
+        return linear_loop.state_space(*loops, mobility=None if loop.inertia_shaping else W)[0]
+    less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.inertia_shaping))
     return np.eye(len(less)) + less + beta @ np.diag([x.gain for x in loops]) @ gamma
 
 
@@ -386,8 +387,8 @@ def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
         ("saturation", dict(torque_limit=(1e6, 1e6))),
         ("size of the motion", dict(push=SMALL_PUSH)),
     ]
-    if not loop.shaping:
-        changes.insert(0, ("pose-dependent Lambda", dict(shaping=True)))
+    if not loop.inertia_shaping:
+        changes.insert(0, ("pose-dependent Lambda", dict(inertia_shaping=True)))
     if loop.Ts:
         changes.insert(0, ("sampling", dict(Ts=None, delay=0.0)))
     if loop.delay:

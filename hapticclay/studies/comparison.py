@@ -33,7 +33,9 @@ RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
 LEAST_DECAY = 10.0  # [1/s] B/M of the least mass: that of the paper's compensator
 PUSHED = 0.01  # [m/s] of a device in its run
 PUSHED_TIME = 0.5  # [s] of that run
-WALL_WORDS = frozenset(("device", "K", "B", "M", "window", "velocity_filter", "surface"))
+WALL_WORDS = frozenset(
+    ("device", "K", "B", "M", "velocity_window", "velocity_filter", "unilateral")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +165,7 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
     low, high = wall_limits.stiffness_band(wall)
     passive = wall_limits.colgate_schenkel_limit(wall)
     region = zwidth(wall, quick=True).regions[0]
-    linear = replace(wall, device=replace(wall.device, friction=0.0, quantum=0.0), surface=False)
+    linear = replace(wall, device=replace(wall.device, friction=0.0, quantum=0.0), unilateral=False)
     spread = dynamic_range(linear, 2.0 * math.pi * RANGE_AT[RANGE_AT < 0.5 / wall.Ts])
     edge = math.pi / wall.Ts
     omega = np.geomspace(1e-4 * edge, edge * (1.0 - 1e-9), 2000)

@@ -261,7 +261,7 @@ class Identification:
         axis: "x" or "y".
         what: "G", "S" (Sh) or "Th".
         origin: world position about which the handle moves [m].
-        shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
         noise: of the sensors; None for none.
         seed: of the phases and of the noise.
         band: lowest and highest frequency [Hz], to 0.1/dt; None for (0.15, 20), Th (0.08, 3).
@@ -281,7 +281,7 @@ class Identification:
     what: str = "G"
     _: KW_ONLY
     origin: tuple[float, float] = NOMINAL_POSE
-    shaping: bool = False
+    inertia_shaping: bool = False
     noise: Noise | None = None
     seed: int = 0
     band: tuple[float, float] | None = None
@@ -302,7 +302,7 @@ class Identification:
             force=(0.0, 0.0),
             origin=pair("origin", self.origin, unit="m"),
             operator=Operator() if self.what == "Th" else None,
-            shaping=flag("shaping", self.shaping),
+            inertia_shaping=flag("inertia_shaping", self.inertia_shaping),
             control=self.control,
             dt=self.dt,
             length=None,
@@ -331,7 +331,9 @@ class Identification:
         length = number("period", length, 0.1, 1000.0, unit="s")
         base = self.scenario()
         n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
-        gain = S[i].gain if self.shaping or what != "S" else endpoint_mobility(*base.origin)[i]
+        gain = (
+            S[i].gain if self.inertia_shaping or what != "S" else endpoint_mobility(*base.origin)[i]
+        )
         rms = size * S[i].stiffness / gain if what == "S" else size
         along = (rms, 0.0) if i == 0 else (0.0, rms)
         band = IDENTIFICATION_BAND[what] if self.band is None else self.band
@@ -355,7 +357,7 @@ class Identification:
         found = estimate_response(np.array(signals), n, bins)
         # The difference equation of the continuous loop; none of second order describes a hold.
         step = base.dt if self.control == "continuous" else None
-        settling = SHAPED if what == "S" and self.shaping else SETTLING[what]
+        settling = SHAPED if what == "S" and self.inertia_shaping else SETTLING[what]
         floor = settling * (size / AMPLITUDE[what]) ** 2
         fitted = fitted_coefficients(what, self.axis, frequency, found, step, floor)
         return Identified(

@@ -158,7 +158,7 @@ def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> P
         Ts=loop.Ts,
         delay=loop.delay,
         render=loop.render,
-        shaping=scenario.shaping,
+        inertia_shaping=scenario.inertia_shaping,
         torque_limit=scenario.torque_limit,
         arm=scenario.arm,
         k=loop.k,
@@ -230,9 +230,9 @@ def measure_impedance(
 def _check_subject(subject: Subject) -> None:
     """Refuse what no steady response exists of."""
     if isinstance(subject, VirtualWall):
-        if subject.surface:
+        if subject.unilateral:
             bound = "must be False: a wall that acts on one side alone is not linear"
-            raise ParameterError("wall.surface", True, bound)
+            raise ParameterError("wall.unilateral", True, bound)
         if not _rough(subject) and not stable_wall(subject):
             bound = (
                 f"must leave the wall stable with this hand: between {{:.4g}} and {{:.4g}} N/m "
@@ -273,7 +273,7 @@ def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
 def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
     if isinstance(subject, VirtualWall):
         return subject.scenario(t_max, muscle=wave, steps=round(subject.Ts / dt))
-    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop=True)
+    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop_when_unstable=True)
     base = replace(subject, pose=(0.0, 0.0)).scenario(t_max)
     return replace(base, name="impedance", muscle=wave, dt=dt, Ts=subject.Ts, **still)
 

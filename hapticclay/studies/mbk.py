@@ -188,7 +188,7 @@ def device_mbk(
     columns = integer("columns", columns, 0, 100)
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
-    wall = replace(wall, device=linear, surface=False)
+    wall = replace(wall, device=linear, unilateral=False)
     regions = {plane: renderable(wall, plane, points) for plane in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)

@@ -189,7 +189,9 @@ class Trials:
         own, others = self._split(values)
         base = with_fields(self.base, own)
         if isinstance(base, PushedLoop):
-            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(t_max, stop=False)
+            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(
+                t_max, stop_when_unstable=False
+            )
         else:
             push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
             scenario = base.scenario(t_max, push=push, steps=zwidth.growth_steps(base))
@@ -197,7 +199,7 @@ class Trials:
         if isinstance(base, VirtualWall):
             hardware = made.hardware
             rough = hardware and (hardware.encoder or any(hardware.friction))
-            if base.surface or rough:
+            if base.unilateral or rough:
                 bound = "must be a wall without surface, friction and encoder; see hc.zwidth"
                 raise ParameterError("base", base, bound)
         return made
@@ -573,7 +575,7 @@ def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
     """Largest stable K of the linear loop."""
     if isinstance(loop, VirtualWall):
         return wall_limits.stiffness_band(loop)[1]
-    placed = loop.pose != (0.0, 0.0) and not loop.shaping
+    placed = loop.pose != (0.0, 0.0) and not loop.inertia_shaping
     return boundary.pose_limit(loop) if placed else boundary.nominal_limit(loop)
 
 

@@ -277,9 +277,9 @@ def rendered_energy(record: Record) -> np.ndarray:
 
 
 def _check_linear(wall: VirtualWall) -> None:
-    if wall.surface:
+    if wall.unilateral:
         bound = "must be False: the index is that of a wall that acts everywhere"
-        raise ParameterError("wall.surface", True, bound)
+        raise ParameterError("wall.unilateral", True, bound)
     if wall.velocity == "exact" and (wall.B or wall.M):
         bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
         raise ParameterError("wall.velocity", wall.velocity, bound)

@@ -119,11 +119,11 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
     d, Ts = wall.device, wall.Ts
     if wall.operator is not None:
         raise ParameterError("wall.operator", wall.operator, "must be None: the path is the hand")
-    if wall.surface:
-        raise ParameterError("wall.surface", True, "must be False: the wall acts along the path")
+    if wall.unilateral:
+        raise ParameterError("wall.unilateral", True, "must be False: the wall acts along the path")
     steps = min(integer("steps", steps, 2, 10_000), max(2, int(Ts / LEAST_STEP)))
     n, h = len(path.places), Ts / steps
-    memory = wall.window + math.ceil(wall.delay / Ts) + 2.0
+    memory = wall.velocity_window + math.ceil(wall.delay / Ts) + 2.0
     if wall.velocity_filter is not None:
         memory += FILTER_TIMES / (2.0 * math.pi * wall.velocity_filter * Ts)
     first = math.ceil(memory / n)
@@ -153,7 +153,7 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
 
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
     """Mean force of the wall over the kicks at t, for a device at these places at the samples."""
-    scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.window
+    scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.velocity_window
     counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
     assert scenario.controller is not None
     params, state = scenario.controller.params, (0.0, 0.0)

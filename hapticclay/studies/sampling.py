@@ -266,7 +266,7 @@ def parse_grid(text: str) -> dict[str, Range]:
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
-    """Reads "t_max=2 shaping=true force=1,0 growth=30/s arm.l1=30cm".
+    """Reads "t_max=2 inertia_shaping=true force=1,0 growth=30/s arm.l1=30cm".
 
     Args:
         text: the values.

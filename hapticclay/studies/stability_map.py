@@ -217,9 +217,9 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
 def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
     fine = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
     x = np.linspace(-MAP_POSES, MAP_POSES, columns).tolist()
-    loop_at = replace(loop, shaping=False)
+    loop_at = replace(loop, inertia_shaping=False)
     plain = [replace(loop_at, pose=(dx, 0.0)) for dx in x]
-    shaped = [replace(each, shaping=True) for each in plain]
+    shaped = [replace(each, inertia_shaping=True) for each in plain]
     nominal = nominal_limit(loop)
     how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {

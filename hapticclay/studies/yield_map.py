@@ -127,7 +127,7 @@ def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
         flow: the law of the clay.
         t_max: length of the run [s].
     """
-    scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop=False)
+    scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop_when_unstable=False)
     return replace(scenario, clay=slab(flow))
 
 

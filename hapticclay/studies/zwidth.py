@@ -37,7 +37,7 @@ VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit
     "friction": ("device.friction", "N", 1.0),
     "mass": ("device.mass", "kg", 1.0),
     "filter": ("velocity_filter", "Hz", 1.0),
-    "window": ("window", "samples", 1.0),
+    "velocity_window": ("velocity_window", "samples", 1.0),
 }
 VARIED_ARM = {
     "Ts": VARIED_DEVICE["Ts"],
@@ -296,7 +296,7 @@ def zwidth(
         wall: device, hand and timing; its own K and B do not matter. Or the arm with its servo and
             compensator: the plane is then that of the clay's b and k, under the gain of the loop.
         vary: what differs in a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
-            "filter" or "window", of an arm "Ts", "delay" or "gain"; "" for one region.
+            "filter" or "velocity_window", of an arm "Ts", "delay" or "gain"; "" for one region.
         values: of what differs [SI]; None among those of "filter" is no filter.
         B: virtual damping to try [N.s/m], ascending; None for 0 and others up to the largest that
             is stable.
@@ -408,7 +408,7 @@ def is_linear(wall: Wall) -> bool:
     """
     if isinstance(wall, boundary.PushedLoop):
         return True
-    return not (wall.surface or wall.device.friction or wall.device.quantum)
+    return not (wall.unilateral or wall.device.friction or wall.device.quantum)
 
 
 def theoretical_damping(wall: Wall) -> float:
@@ -504,7 +504,7 @@ def _theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]
         line("exact, linear loop", "exact", _exact, "sampled loop at the nominal pose")
         return parts
     left_out = [n for n in ("friction", "quantum") if getattr(wall.device, n)]
-    left_out += ["surface"] if wall.surface else []
+    left_out += ["surface"] if wall.unilateral else []
     note = f"of the linear loop: {' and '.join(left_out)} left out" if left_out else "eigenvalues"
     line("exact, linear loop", "exact", _exact, note)
     line(
@@ -514,7 +514,7 @@ def _theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]
         "passive: stable in every passive hand"
         + (", but for the quantum" * bool(wall.device.quantum)),
     )
-    if wall.velocity == "difference" and wall.window == 1 and wall.velocity_filter is None:
+    if wall.velocity == "difference" and wall.velocity_window == 1 and wall.velocity_filter is None:
         note = "linear rule, for (b + B) Ts and K Ts^2 far below the mass"
         line("Hulin et al. 2006", "rule", wall_limits.hulin_limit, note)
     if wall.delay == 0.0 and wall.M == 0.0:
@@ -661,7 +661,7 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
         third do not count [rad/s, 1/s].
     """
     omega = math.sqrt((wall.K + wall.hand.spring) / _mass(wall))
-    order = wall.window + wall.delay / wall.Ts
+    order = wall.velocity_window + wall.delay / wall.Ts
     n = max(
         FEWEST_SAMPLES + 12.0 * order,
         READ_SWINGS * math.tau / max(omega * wall.Ts, 1e-9) if omega else 0.0,

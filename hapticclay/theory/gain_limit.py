@@ -108,7 +108,7 @@ def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
         [rad/s]; 0 for none.
     """
     loop = Loop.of(scenario, AXES[i], 0.0)
-    if not scenario.shaping:
+    if not scenario.inertia_shaping:
         S = replace(loop.servo.S, gain=scenario.arm.links[4])
         loop = replace(loop, servo=replace(loop.servo, S=S))
     num, den = linear_loop.device_admittance(loop)

@@ -215,7 +215,7 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     Ts, th, b, k, n = loop.Ts, loop.hand, loop.b, loop.k, loop.compensator.order
     assert Ts is not None
-    s, physical = 1j * omega, float(loop.render == "implicit")
+    s, physical = 1j * omega, float(loop.render == "physical")
     W = loop.servo.S.gain if loop.mobility is None else loop.mobility
     shaped = loop.servo.S.gain / W - 1.0  # share of the net force that shapes the inertia
     total = 1.0 / W + th.mass
@@ -249,8 +249,8 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
 def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     """What the hand at a virtual wall feels, over frequency: the fundamental, exact.
 
-    The wall acts everywhere (surface=False), without Coulomb friction and encoder steps. The arm of
-    the operator sends sidebands back, so another arm changes the answer a little.
+    The wall acts everywhere (unilateral=False), without Coulomb friction and encoder steps. The arm
+    of the operator sends sidebands back, so another arm changes the answer a little.
 
     Args:
         wall: the wall; its device's friction and quantum do not matter.
@@ -269,7 +269,7 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
         speed = rate
     else:
         keep = math.exp(-2.0 * math.pi * wall.velocity_filter * Ts) if wall.velocity_filter else 0.0
-        slope = -np.expm1(-s * Ts * wall.window) / (wall.window * Ts)
+        slope = -np.expm1(-s * Ts * wall.velocity_window) / (wall.velocity_window * Ts)
         place = place + rate * slope * (1.0 - keep) / (1.0 - keep * z1)
     held = place * arm.held_place + speed * arm.held_speed
     asked = -(place * arm.place + speed * arm.speed) / (1.0 + held)

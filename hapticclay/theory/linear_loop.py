@@ -56,11 +56,11 @@ class Loop:
         delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts.
             Everything the motors do is late by it: the servo's feedback, what the compensator
             commands, and clay that is held.
-        render: the clay is "held" (a force of the motors) or "implicit" (physical, never late).
+        render: the clay is "held" (a force of the motors) or "physical" (physical, never late).
         mobility: of the bare handle where the servo shapes its inertia [1/kg], which tells with
             sampling or delay; None for the gain of Sh.
         k: stiffness of the clay, an elastic wall with its rest at p = 0, Te = b s + k [N/m], 0 to
-            1e9; held, implicit or late as b is.
+            1e9; held, physical or late as b is.
     """
 
     axis: Literal["x", "y"] = "x"
@@ -112,12 +112,14 @@ class Loop:
             raise ParameterError("controller", scenario.controller, bound)
         i, clay = AXES.index(choice("axis", axis, AXES)), scenario.clay
         servo, bare = scenario.servo[i], scenario.arm.nominal_mobility[i]
-        shaped = scenario.shaping and bare != servo.S.gain
+        shaped = scenario.inertia_shaping and bare != servo.S.gain
         sampled = scenario.control == "sampled"
         loop = Loop(
             axis=AXES[i],
             operator=scenario.operators[i],
-            servo=servo if scenario.shaping else replace(servo, S=replace(servo.S, gain=bare)),
+            servo=servo
+            if scenario.inertia_shaping
+            else replace(servo, S=replace(servo.S, gain=bare)),
             compensator=scenario.compensators[i],
             K=scenario.gain[i],
             Ts=(scenario.Ts or scenario.dt) if sampled else None,
@@ -393,7 +395,7 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
     without shaping) and T = Te + Th,
 
-        0 = s^2 + W (Th + [implicit] Te) + late (kd s + kp + [held] W Te + (Wn - W) T
+        0 = s^2 + W (Th + [physical] Te) + late (kd s + kp + [held] W Te + (Wn - W) T
             + (s^2 + kd s + kp) G C T)
 
     times the denominator of G C.
@@ -405,7 +407,7 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
         (physical, motors, driven).
     """
     s, th, cg = loop.servo.S, loop.hand, _forward_denominator(loop)
-    k, b = (loop.k, loop.b) if loop.render == "implicit" else (0.0, 0.0)  # physical
+    k, b = (loop.k, loop.b) if loop.render == "physical" else (0.0, 0.0)  # physical
     W = s.gain if loop.mobility is None else loop.mobility
     physical = cg * Polynomial([W * (th.spring + k), W * (th.damper + b), 1.0 + W * th.mass])
     motors = cg * Polynomial([s.stiffness + W * (loop.k - k), s.damping + W * (loop.b - b)])
@@ -535,7 +537,7 @@ def sampled_differences(
         of the gains.
     """
     n, at, first = len(loops), _places(loops), loops[0]
-    Ts, implicit = first.Ts, first.render == "implicit"
+    Ts, implicit = first.Ts, first.render == "physical"
     assert Ts is not None
     nominal = _shaped_mobility(loops)
     W, shaping = _nominal_pose(loops) if pose is None else pose

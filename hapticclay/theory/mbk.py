@@ -262,7 +262,7 @@ def dynamic_range(
         ParameterError: a value is out of its bounds, or no wall is stable.
     """
     omega, share = frequencies(omega), number("share", share, 0.1, 0.999)
-    off = replace(wall, K=0.0, B=0.0, M=0.0, surface=False)
+    off = replace(wall, K=0.0, B=0.0, M=0.0, unilateral=False)
     low, high = stable_band(off, "B")
     if not high > low:
         raise ParameterError("wall", wall, "must be stable with some virtual damper")

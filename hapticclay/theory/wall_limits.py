@@ -105,13 +105,15 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
     change, soon, late, whole, part = _motion(wall)
     Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
     differs = moves and wall.velocity == "difference"
-    window = wall.window if differs else 0
+    window = wall.velocity_window if differs else 0
     filtered = int(differs and wall.velocity_filter is not None)
     queue = whole + (part > 0.0)
     at = np.cumsum([2, window, filtered, int(wall.M != 0.0), queue])
     n = int(at[-1])
     if n > MOST_STATES:
-        raise ParameterError("wall.window", wall.window, f"must lie below {MOST_STATES - whole}")
+        raise ParameterError(
+            "wall.velocity_window", wall.velocity_window, f"must lie below {MOST_STATES - whole}"
+        )
     steps, smooth, last, first = (int(x) for x in at[:-1])  # where each kind of state begins
     unit = np.eye(n)
     speed = unit[1]
@@ -199,7 +201,7 @@ def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray
         return 0.0 * back, law
     keep = _kept(wall)
     smooth = (1.0 - keep) / ((1.0 - keep) + keep * back)
-    rate = -np.expm1(-1j * turn * wall.window) / (wall.window * wall.Ts)
+    rate = -np.expm1(-1j * turn * wall.velocity_window) / (wall.velocity_window * wall.Ts)
     return law * smooth * rate, 0.0 * back
 
 
@@ -294,7 +296,9 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
     b, Ts = wall.device.damper, wall.Ts
     if wall.velocity == "exact" and (wall.B or wall.M):
         return 0.0
-    plain = not wall.delay and not wall.M and (wall.velocity == "exact" or wall.window == 1)
+    plain = (
+        not wall.delay and not wall.M and (wall.velocity == "exact" or wall.velocity_window == 1)
+    )
     if plain and wall.velocity_filter is None:
         return max(0.0, 2.0 * (b - abs(wall.B)) / Ts)
     whole, part = _split_delay(wall)
@@ -398,7 +402,7 @@ def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
 
 def _turns(wall: VirtualWall) -> np.ndarray:
     """omega Ts, dense enough for window and delay."""
-    n = TRIED_ANGLES + 40 * (wall.window + _split_delay(wall)[0])
+    n = TRIED_ANGLES + 40 * (wall.velocity_window + _split_delay(wall)[0])
     slow = np.geomspace(SLOWEST_TURN, math.pi, TRIED_ANGLES)[:-1]
     return np.union1d(slow, np.linspace(0.0, math.pi, n)[1:])
 
@@ -479,7 +483,7 @@ def jury_limit(wall: VirtualWall) -> float:
     if part or whole > 1:
         raise ParameterError("wall.delay", wall.delay, "must be 0 or Ts")
     plain = VirtualWall()
-    for field in ("M", "velocity", "window", "velocity_filter"):
+    for field in ("M", "velocity", "velocity_window", "velocity_filter"):
         if getattr(wall, field) != getattr(plain, field):
             bound = f"must be {getattr(plain, field)} here"
             raise ParameterError(f"wall.{field}", getattr(wall, field), bound)

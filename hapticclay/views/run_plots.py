@@ -704,7 +704,7 @@ def _scenario_parts(s: Scenario) -> list[str]:
     printed = {"arm": PAPER, "servo": SERVO, "compensator": (PRINTED, PRINTED)}
     own = {"arm": s.arm, "servo": s.servo, "compensator": s.compensators}
     out += [f"another {name}" for name, part in own.items() if part != printed[name]]
-    return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.shaping
+    return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.inertia_shaping
 
 
 def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:

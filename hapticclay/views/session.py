@@ -545,7 +545,7 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
         command=None,
         length=None,
         t_max=LONGEST_SESSION,
-        stop=False,
+        stop_when_unstable=False,
     )
 
 

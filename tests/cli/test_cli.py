@@ -44,7 +44,15 @@ def test_run_constant_writes_record_summary_and_plots(capsys, tmp_path):
 
 def test_run_free_and_no_plots(capsys, tmp_path):
     code, out, _ = run(
-        capsys, "run", "free", "--shaping", "--no-plots", "--every", "10", "--out", str(tmp_path)
+        capsys,
+        "run",
+        "free",
+        "--inertia-shaping",
+        "--no-plots",
+        "--every",
+        "10",
+        "--out",
+        str(tmp_path),
     )
     assert code == 0 and "border x = 20 cm" in out
     assert sorted(os.listdir(tmp_path)) == ["record.npz", "scenario.toml", "summary.json"]

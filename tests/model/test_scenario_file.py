@@ -64,9 +64,9 @@ def profiles(draw):
 @st.composite
 def hardwares(draw):
     difference = draw(st.booleans())
-    more = dict(window=draw(st.integers(1, 9))) if difference else {}
+    more = dict(velocity_window=draw(st.integers(1, 9))) if difference else {}
     return hc.Hardware(
-        lost=draw(floats(0.0, 0.9)),
+        dropout_probability=draw(floats(0.0, 0.9)),
         encoder=draw(st.none() | st.integers(4, 2**40)),
         velocity="difference" if difference else "exact",
         dac_range=draw(st.none() | pairs(0.1, 9.0)),
@@ -95,7 +95,7 @@ def scenarios(draw):
         gain=draw(pairs(0.0, 1e6)),
         force=draw(pairs(-1e6, 1e6)),
         operator=draw(each(OPERATORS)),
-        shaping=draw(st.booleans()),
+        inertia_shaping=draw(st.booleans()),
         dt=dt,
         t_max=draw(floats(1e-3, 1e5)),
         length=None,
@@ -104,7 +104,7 @@ def scenarios(draw):
         torque_limit=draw(pairs(1e-3, 1e6)),
         muscle=draw(st.none() | MULTISINES),
         command=draw(st.none() | MULTISINES),
-        stop=draw(st.booleans()),
+        stop_when_unstable=draw(st.booleans()),
         arm=arm,
         servo=draw(st.tuples(SERVOS, SERVOS)),
         compensator=draw(each(COMPENSATORS)),
@@ -423,7 +423,7 @@ def test_any_number_of_any_part_is_changed_by_name(scenario, data):
         ({"muscle.rms.y": 1.0}, dict(muscle=hc.Multisine((1.0, 1.0)))),
         ({"servo": hc.Scenario().servo[1]}, dict(servo=(hc.Scenario().servo[1],) * 2)),
         ({"length": "None"}, dict(length=None)),
-        ({"shaping": 1.0}, dict(shaping=True)),
+        ({"inertia_shaping": 1.0}, dict(inertia_shaping=True)),
     ],
 )
 def test_changes_by_name(changes, expected):
@@ -633,11 +633,18 @@ def test_every_unit_of_a_bound_is_known():
 
 
 def test_words():
-    words = ["arm.l1=0.3", "gain=1,0.5", "shaping=TRUE", "dt=0.1ms", "growth=30/s", "clay=4cm,6cm"]
+    words = [
+        "arm.l1=0.3",
+        "gain=1,0.5",
+        "inertia_shaping=TRUE",
+        "dt=0.1ms",
+        "growth=30/s",
+        "clay=4cm,6cm",
+    ]
     assert named_values("--set", words) == {
         "arm.l1": 0.3,
         "gain": [1.0, 0.5],
-        "shaping": True,
+        "inertia_shaping": True,
         "dt": "0.1ms",
         "growth": "30/s",
         "clay": ["4cm", "6cm"],

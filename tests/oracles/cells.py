@@ -23,7 +23,7 @@ def cells(  # noqa: PLR0913  # a case, spelt out
     uh,
     times,
     th=(0.0, 0.0, 0.0),
-    shaping=False,
+    inertia_shaping=False,
     angle=0.0,
     grows=None,
     length=np.inf,
@@ -49,7 +49,7 @@ def cells(  # noqa: PLR0913  # a case, spelt out
         fe = R @ (now * (R.T @ v))
         y2 = G0 * (delta - y) - G1 * yr
         want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if shaping else W
+        S = np.diag(SG) if inertia_shaping else W
         rest = uh - d * v - k * p - fe
         acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)
         f = rest - m * acc

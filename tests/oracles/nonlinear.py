@@ -41,7 +41,7 @@ def nonlinear(  # noqa: PLR0913  # a case, spelt out
     K,
     uh,
     th=None,
-    shaping=False,
+    inertia_shaping=False,
     t_max=60.0,
     t_eval=None,
     rtol=1e-11,
@@ -55,7 +55,7 @@ def nonlinear(  # noqa: PLR0913  # a case, spelt out
     Forward crossings of x only; ends at the last edge. Solved at the times t_eval before the end.
     """
     pieces = nonlinear_pieces(
-        b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0, t_eval is not None
+        b_of_region, edges, K, uh, th, inertia_shaping, t_max, rtol, atol, p0, t_eval is not None
     )
     t = np.empty(0) if t_eval is None else t_eval[t_eval < pieces.spans[-1][1]]
     there = pieces(t) if len(t) else (np.empty((0, 2)), np.empty((0, 2)))
@@ -68,7 +68,7 @@ def nonlinear_pieces(  # noqa: PLR0913  # a case, spelt out
     K,
     uh,
     th,
-    shaping,
+    inertia_shaping,
     t_max,
     rtol,
     atol,
@@ -89,7 +89,7 @@ def nonlinear_pieces(  # noqa: PLR0913  # a case, spelt out
         Lam = np.linalg.inv(W)
         y2 = G0 * (delta - y) - G1 * yr
         want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if shaping else W
+        S = np.diag(SG) if inertia_shaping else W
         # p'' = want + S f,  f = uh - m p'' - d v - k p - b v
         rest = uh - d * v - k * p - b * v
         acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)

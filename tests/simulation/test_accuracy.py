@@ -44,20 +44,20 @@ def scenes(draw):
         gain=(real(0.5, 1.2), real(0.2, 0.4)),
         force=put(push, 0.0 if shaped else across),
         operator=hc.Operator(real(0.1, 0.5), real(1.0, 5.0), real(0.0, 60.0)) if hand else None,
-        shaping=shaped,
+        inertia_shaping=shaped,
         start=put(ahead, 0.0),
         velocity=put(v, 0.0),
         origin=ORIGIN if not shaped else (0.35, 0.19) if axis else hits.NOMINAL_BORDER,
         torque_limit=hits.STRONG if strong else TORQUE_LIMIT,
         length=None,
         t_max=real(0.3, 0.8),
-        stop=False,
+        stop_when_unstable=False,
     )
 
 
 def exact(s, times):
     """Crossings as (axis, border, time), and positions at the ascending times."""
-    if not s.shaping:
+    if not s.inertia_shaping:
         x = reference.solve(s, times)
         return [(AXES[i], border, t) for i, border, t in x.crossings], x.p
     i, th = AXES.index(s.clay.x.along), (0.0, 0.0, 0.0)
@@ -118,7 +118,7 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
 
 def test_sampled_control_keeps_its_samples_and_the_physics_its_error():
     """Beside the hybrid system, exact between samples: steps divide Ts, and the error is kept."""
-    s = hc.constant_cut(control="sampled", dt=4e-3, render="implicit", t_max=0.75)
+    s = hc.constant_cut(control="sampled", dt=4e-3, render="physical", t_max=0.75)
     r = hc.simulate(s, error="1e-7 m")
     e, Ts = r.error, r.scenario.Ts
     assert Ts == 4e-3 and e.reached and (Ts / e.dt) % 1.0 == 0.0 and e.dt < Ts

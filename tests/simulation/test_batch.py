@@ -19,8 +19,8 @@ pytest.importorskip("numba")
 CUT = hc.constant_cut(start=(0.02, 0.0), t_max=0.05)
 WIRED = dataclasses.replace(CUT, control="sampled", hardware=hc.Hardware(delay=2e-4))
 RICH = hc.Hardware(
-    delay=1e-4, encoder=4000, velocity="difference", window=3, velocity_filter=80.0, adc_bits=12,
-    dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
+    delay=1e-4, encoder=4000, velocity="difference", velocity_window=3, velocity_filter=80.0,
+    adc_bits=12, dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
 )  # fmt: skip
 GUARDED = hc.Hardware(delay=1e-4, passivity=True, coupling=hc.Coupling(5e3, 5.0))
 REPAID = [  # scenes whose kinds are compiled here, each some 20 s
@@ -70,7 +70,7 @@ def kinds(rng):
         yield varied(CUT, rng, clay=clay)
         yield varied(dataclasses.replace(CUT, operator=hc.Operator()), rng)
         yield varied(CUT, rng, clay=hc.slab(1e5 * b, 0.05, 0.15))  # stiff
-        yield varied(CUT, rng, clay=None, shaping=True)
+        yield varied(CUT, rng, clay=None, inertia_shaping=True)
         yield varied(CUT, rng, operator=(hc.Operator(0.2, b, 1.0), None))
         yield varied(CUT, rng, servo=(other if b > 100.0 else SERVO[0], SERVO[1]))
         yield varied(CUT, rng, origin=(rng.uniform(0.0, 0.02), 0.15), torque_limit=(9.0, 5.0))
@@ -83,7 +83,7 @@ def kinds(rng):
         yield varied(dataclasses.replace(WIRED, hardware=None), rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, hardware=RICH), rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, hardware=GUARDED), rng, clay=clay, Ts=7.2e-4)
-        yield varied(WIRED, rng, clay=clay, render="implicit")
+        yield varied(WIRED, rng, clay=clay, render="physical")
         yield dataclasses.replace(CUT, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
         # and, one by one
         yield dataclasses.replace(grown, start=(rng.uniform(0.0, 0.01), 0.0))

@@ -418,7 +418,7 @@ def test_fit_and_identify_read_the_csv(tmp_path):
         gain=(0.0, 0.0),
         force=(0.0, 0.0),
         muscle=hc.Multisine((0.3, 0.0), low=0.2, high=8.0, period=10.0),
-        shaping=True,
+        inertia_shaping=True,
         length=None,
         t_max=30.0,
         dt=1e-3,

@@ -22,8 +22,8 @@ METHODS = {
     "default": {},
     "accurate": dict(integrator="accurate", dt=1e-3),
     "held": dict(control="sampled"),
-    "implicit": dict(control="sampled", render="implicit"),
-    "hand": dict(operator=hc.Operator(), shaping=True),
+    "physical": dict(control="sampled", render="physical"),
+    "hand": dict(operator=hc.Operator(), inertia_shaping=True),
     "muscle": dict(muscle=hc.Multisine(rms=(1.0, 0.5), high=3.0)),
 }
 X, Y = tuple(0.02 * i for i in range(1, 9)), tuple(0.005 * i for i in range(-2, 9))
@@ -40,7 +40,7 @@ def same(a, b, steps=True):
 
 def path_through(clay, **more):
     """A slanted path through the random cells."""
-    free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), shaping=True, t_max=4.0)
+    free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), inertia_shaping=True, t_max=4.0)
     return dataclasses.replace(free, clay=clay, length=None, **more)
 
 
@@ -97,7 +97,7 @@ def test_borders_of_cells_are_passed_when_they_should_be(angle, limit):
     s = path_through(random_clay(angle))
     exact = cells(
         (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [4.0],
-        shaping=True, angle=angle,
+        inertia_shaping=True, angle=angle,
     )  # fmt: skip
     r = hc.simulate(s)
     assert len(exact.crossings) >= 8
@@ -115,7 +115,8 @@ def test_borders_of_cells_are_passed_when_they_should_be(angle, limit):
 def test_the_order_is_kept_in_cells_of_an_arm_that_is_not_shaped(kind, order, angle):
     th, steps = hc.Operator(0.25, 2.0, 6.0), np.array([4e-3, 2e-3, 1e-3])
     s = dataclasses.replace(
-        path_through(random_clay(angle), integrator=kind, operator=th, t_max=2.0), shaping=False
+        path_through(random_clay(angle), integrator=kind, operator=th, t_max=2.0),
+        inertia_shaping=False,
     )
     exact = cells(
         (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [2.0],
@@ -135,7 +136,7 @@ def test_cells_along_one_axis_are_those_of_the_matrix_exponential():
     edges = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2)
     values = np.array([[0.0, 90.0, 30.0, 120.0, 0.0, 60.0, 0.0], [500.0] * 7]).T
     grid = hc.Grid(edges, (0.05,), values)  # the line of 500 N.s/m is not reached
-    s = hc.constant_cut(shaping=True)
+    s = hc.constant_cut(inertia_shaping=True)
     r = hc.simulate(dataclasses.replace(s, clay=hc.Clay(grid, grid)))
     exact, _ = piecewise_linear(edges, values[:-1, 0], s.gain[0], s.force[0])
     assert len(r.crossings) == len(exact) == 6
@@ -148,7 +149,7 @@ def test_each_cell_grows_from_its_first_entry():
     s = path_through(random_clay(growth=rates), t_max=2.0)
     exact = cells(
         (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [2.0],
-        shaping=True, grows=lambda i, j: (rates[i, j], 0.0),
+        inertia_shaping=True, grows=lambda i, j: (rates[i, j], 0.0),
     )  # fmt: skip
     for engine in ENGINES:
         r = hc.simulate(s, engine=engine)
@@ -193,12 +194,12 @@ THS = {"": (None, 0.0), "hand": (hc.Operator(0.25, 2.0, 0.0), 2.0)}
 @settings(max_examples=12, deadline=None)
 @given(
     st.floats(0.0, 500.0), st.floats(0.0, 500.0), st.floats(-math.pi, math.pi),
-    st.sampled_from(sorted(THS)), st.sampled_from(["default", "accurate", "held", "implicit"]),
+    st.sampled_from(sorted(THS)), st.sampled_from(["default", "accurate", "held", "physical"]),
 )  # fmt: skip
 def test_steady_speed_in_turned_clay_has_a_closed_form(bx, by, angle, hand, method):
     """(diag(10/K) + B + d) v = uh; servo and compensator settle within 6 s to 1e-6 of it."""
     th, d = THS[hand]
-    free = hc.free(force=(0.02, -0.015), shaping=True, t_max=6.0)
+    free = hc.free(force=(0.02, -0.015), inertia_shaping=True, t_max=6.0)
     s = dataclasses.replace(
         free, clay=everywhere(bx, by, angle), length=None, operator=th, gain=(1.0, 0.2),
         **{"dt": 1e-3, **METHODS[method]},

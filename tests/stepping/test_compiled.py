@@ -56,7 +56,7 @@ MORE = {
     "diverged": hc.constant_cut(gain=(1.0, 1.0)),
     "thrown out of reach": hc.constant_cut(gain=(1e4, 1e4), torque_limit=(1e6, 1e6)),
     "unstable, goes on": dataclasses.replace(
-        hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop=False
+        hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop_when_unstable=False
     ),
     "stretched": hc.constant_cut(force=(1.0, 50.0)),
     "stalled": hc.constant_cut(force=(0.0, 0.0), t_max=2.0),
@@ -88,7 +88,7 @@ def test_native_is_python_bit_for_bit(name):
 STILL = {
     "cut": hc.constant_cut(),
     "shaping, Th": hc.constant_cut(
-        operator=hc.Operator(), shaping=True, force=(2.0, 0.0), t_max=3.0
+        operator=hc.Operator(), inertia_shaping=True, force=(2.0, 0.0), t_max=3.0
     ),
     "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
     "stiff: substeps": hc.constant_cut(b=2e4, t_max=0.8),
@@ -113,7 +113,11 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
     from hapticclay.stepping import compiled
 
     s = hc.constant_cut(
-        gain=(4.2, 0.2), shaping=True, operator=hc.Operator(), start=(0.05, 0.0), force=(0.5, 0.0)
+        gain=(4.2, 0.2),
+        inertia_shaping=True,
+        operator=hc.Operator(),
+        start=(0.05, 0.0),
+        force=(0.5, 0.0),
     )
     late, watched = (run.Run(s, 1, compiled.KERNEL) for _ in range(2))
     watched.calm = False

@@ -72,7 +72,7 @@ def test_varying_muscle_force_and_command(kw, tolerance):
     muscle = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
     command = Multisine(rms=(1e-3, 2e-3), low=0.5, high=3.0, period=5.0, seed=6)
     s = dataclasses.replace(
-        hc.free(shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0),
+        hc.free(inertia_shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0),
         length=None,
         muscle=muscle,
         command=command,
@@ -117,7 +117,7 @@ def test_varying_scenes_converge_at_second_order():
 )
 def test_growing_clay_counts_from_entry(kw, tolerance):
     clay = Clay(Profile((0.02,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
-    s = dataclasses.replace(hc.free(shaping=True, t_max=6.0), clay=clay, **kw)
+    s = dataclasses.replace(hc.free(inertia_shaping=True, t_max=6.0), clay=clay, **kw)
     r = hc.simulate(s)
     first = axis_solution(0, lambda t: 50.0, 1.0, lambda t: 1.0, (0, 0, 0), 6.0, edge=0.02)
     entry = first.t[-1]
@@ -140,7 +140,7 @@ def test_growth_counts_from_the_first_entry():
     clay = Clay(Profile((0.0,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
     muscle = Multisine(rms=(3.0, 0.0), low=0.5, high=0.5, period=2.0, seed=1)
     s = dataclasses.replace(
-        hc.free(shaping=True, t_max=4.0, force=(0.0, 0.0)),
+        hc.free(inertia_shaping=True, t_max=4.0, force=(0.0, 0.0)),
         clay=clay,
         length=None,
         muscle=muscle,
@@ -163,10 +163,10 @@ def test_clay_hit_at_speed(b, speed, control):
     s = dataclasses.replace(
         hc.constant_cut(
             b=b,
-            shaping=True,
+            inertia_shaping=True,
             t_max=0.7,
             control=control,
-            render="implicit",
+            render="physical",
             torque_limit=(1e5, 1e5),
         ),
         velocity=(speed, 0.0),
@@ -204,7 +204,7 @@ def test_command_is_counted_from_the_start(engine, kw):
     delta is the command less its value at t = 0, however the run is stepped; p = G delta.
     """
     command = Multisine(rms=(1e-3, 0.0), low=1.0, high=2.0, period=1.0, seed=2)
-    s = hc.free(force=(0.0, 0.0), shaping=True, t_max=8000 * 3.6e-4)
+    s = hc.free(force=(0.0, 0.0), inertia_shaping=True, t_max=8000 * 3.6e-4)
     s = dataclasses.replace(s, gain=(0.0, 0.0), length=None, command=command, **kw)
     r, sig = hc.simulate(s, engine=engine), command
     assert abs(sig(0.0)[0]) > 1e-4  # a jump, if it were not counted from there
@@ -231,6 +231,6 @@ def test_driven_records_survive_the_disk(tmp_path):
         command=Multisine(rms=(1e-3, 0.0)),
         operator=Operator(),
         velocity=(0.1, 0.0),
-        stop=False,
+        stop_when_unstable=False,
     )
     assert hc.Record.load(hc.simulate(s).save(tmp_path)).scenario == s

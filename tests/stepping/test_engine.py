@@ -83,7 +83,7 @@ def binary(model):
     "part",
     [
         {"operator": hc.Operator()},
-        {"shaping": True},
+        {"inertia_shaping": True},
         {"muscle": Multisine(rms=(1.0, 1.0), low=0.2, high=3.0, period=5.0, seed=1)},
         {"control": "sampled"},
         {

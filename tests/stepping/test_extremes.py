@@ -115,7 +115,7 @@ def test_a_scene_that_raises_is_a_row(monkeypatch):
 
 
 def test_reference_is_the_matrix_exponential_where_the_loop_is_linear():
-    s = hc.constant_cut(shaping=True, operator=hc.Operator(), force=(2.0, 0.0), t_max=3.0)
+    s = hc.constant_cut(inertia_shaping=True, operator=hc.Operator(), force=(2.0, 0.0), t_max=3.0)
     t = np.linspace(0.0, 2.9, 50)
     x = reference.solve(s, t)
     crossings, position = piecewise_linear(

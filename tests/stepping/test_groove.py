@@ -35,7 +35,7 @@ def led(block, stops, speed=0.05, **more):
     t = np.concatenate(((0.0,), np.cumsum(ways))) / speed
     command = hc.Samples(tuple(t), tuple(stops))
     t_max = float(t[-1]) + 0.1
-    still = dict(force=(0, 0), gain=(0, 0), length=None, shaping=True)
+    still = dict(force=(0, 0), gain=(0, 0), length=None, inertia_shaping=True)
     return grooved(block, command=command, t_max=t_max, **still, **more)
 
 
@@ -199,7 +199,7 @@ def test_the_work_is_that_of_the_volume():
 def test_sampled_control_tends_to_the_continuous():
     """Of first order in the sample; what is removed, too, whoever renders the clay."""
     first = hc.simulate(grooved(BLOCK, force=(2.5, 0.5), t_max=0.3, dt=1e-4))
-    for render in ("held", "implicit"):
+    for render in ("held", "physical"):
         errors = []
         for dt in (4e-4, 1e-4):
             s = grooved(BLOCK, force=(2.5, 0.5), t_max=0.3, dt=dt, control="sampled", render=render)
@@ -210,7 +210,7 @@ def test_sampled_control_tends_to_the_continuous():
         assert errors[0] < 1e-4 and errors[1] < 0.5 * errors[0], errors
 
 
-@pytest.mark.parametrize("control", [{}, dict(control="sampled", render="implicit")])
+@pytest.mark.parametrize("control", [{}, dict(control="sampled", render="physical")])
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
 def test_it_holds_the_tool_below_its_strength(angle, control):
     """Not a bit of motion below, from rest in fresh clay; and motion above."""
@@ -229,7 +229,7 @@ def test_it_lets_the_tool_go_back():
     """Pushed into the clay and held there, it is free to leave by its groove."""
     pulse = hc.Samples((0.0, 0.3, 0.31, 1.0), ((1.5, 0), (1.5, 0), (-0.3, 0), (-0.3, 0)))
     r = hc.simulate(
-        grooved(BLOCK, force=(0, 0), muscle=pulse, length=None, shaping=True, t_max=1.0)
+        grooved(BLOCK, force=(0, 0), muscle=pulse, length=None, inertia_shaping=True, t_max=1.0)
     )
     far = r.p[:, 0].max()
     back = (r.t > 0.5) & (r.p[:, 0] > 1e-3) & (r.p[:, 0] < far - 1e-3)
@@ -252,7 +252,7 @@ def test_it_damps_by_the_volume_rate():
     """b = damping x cross-section, gone where the clay is."""
     block = dataclasses.replace(BLOCK, pressure=0.0, damping=1e6)
     b = 1e6 * WIDTH * DEPTH
-    s = grooved(block, force=(0.5, 0.0), shaping=True)
+    s = grooved(block, force=(0.5, 0.0), inertia_shaping=True)
     r = hc.simulate(s)
     late = (r.p[:, 0] > 0.01) & (r.p[:, 0] < 0.055)
     np.testing.assert_allclose(r.b[late], b, rtol=3e-3)
@@ -266,22 +266,22 @@ def test_it_damps_by_the_volume_rate():
 
 VARIANTS = {
     "plain": (BLOCK, {}),
-    "hand": (BLOCK, dict(operator=hc.Operator(), shaping=True, force=(4.0, 1.0))),
+    "hand": (BLOCK, dict(operator=hc.Operator(), inertia_shaping=True, force=(4.0, 1.0))),
     "damping": (dataclasses.replace(BLOCK, damping=2e5, gradient=1e6), dict(force=(2.5, 0.8))),
     "muscle": (BLOCK, dict(muscle=hc.Multisine(rms=(2.0, 2.0), high=4.0), length=None)),
     "limit": (BLOCK, dict(torque_limit=(0.3, 0.2), force=(2.5, 1.5))),
     "layers": (dataclasses.replace(BLOCK, damping=1e5), dict(force=(3.0, 1.0))),
     "long": (BLOCK, dict(dt=1.5e-3, force=(3.0, 1.0))),
     "held": (BLOCK, dict(control="sampled", force=(2.5, 0.5))),
-    "implicit": (
+    "physical": (
         dataclasses.replace(BLOCK, damping=2e5),
-        dict(control="sampled", render="implicit", force=(2.5, 0.5)),
+        dict(control="sampled", render="physical", force=(2.5, 0.5)),
     ),
     "late": (
         BLOCK,
         dict(
             control="sampled",
-            render="implicit",
+            render="physical",
             hardware=hc.Hardware(delay=2e-4, encoder=8192),
             force=(2.5, 0.5),
         ),

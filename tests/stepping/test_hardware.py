@@ -41,7 +41,7 @@ def ring(axis, K, b, parts=None, **kw):
         length=None,
         control="sampled",
         hardware=parts,
-        stop=False,
+        stop_when_unstable=False,
         **kw,
     )
 
@@ -56,7 +56,7 @@ def cut(parts, **kw):
 
 @pytest.mark.parametrize(
     "kw",
-    [dict(), dict(render="implicit", operator=hc.Operator(), force=(2.0, 0.3)), dict(Ts=3 * TS)],
+    [dict(), dict(render="physical", operator=hc.Operator(), force=(2.0, 0.3)), dict(Ts=3 * TS)],
 )
 def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
     kw = dict(clay=(0.02, 0.15), t_max=0.4) | kw
@@ -64,7 +64,7 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
     assert a.crossings and a.crossings == b.crossings and a.energy == b.energy
     for name in ("t", "p", "v", "fh", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
-    if kw.get("render") == "implicit":
+    if kw.get("render") == "physical":
         np.testing.assert_array_equal(a.fe, b.fe)
     elif (
         "Ts" not in kw
@@ -88,7 +88,7 @@ def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
 
 def test_random_effects_are_drawn_part_by_part(monkeypatch):
     """No run holds those of all its samples; return to a sample brings them back."""
-    s = cut(hc.Hardware(jitter=5e-5, lost=0.1, force_noise=0.1), t_max=0.1)
+    s = cut(hc.Hardware(jitter=5e-5, dropout_probability=0.1, force_noise=0.1), t_max=0.1)
     whole = hc.simulate(s)
     monkeypatch.setattr(scene, "NOISE_AHEAD", 8)
     run = Run(s, 1)
@@ -106,7 +106,7 @@ def test_random_effects_are_drawn_part_by_part(monkeypatch):
 
 
 def test_seeds_repeat_and_differ():
-    parts = hc.Hardware(jitter=5e-5, lost=0.1, force_noise=0.1, seed=3)
+    parts = hc.Hardware(jitter=5e-5, dropout_probability=0.1, force_noise=0.1, seed=3)
     a, b, c = (hc.simulate(cut(x, t_max=0.1)) for x in (parts, parts, replace(parts, seed=4)))
     np.testing.assert_array_equal(a.p, b.p)
     np.testing.assert_array_equal(a.tau, b.tau)
@@ -117,7 +117,7 @@ def test_scenario_survives_the_record(tmp_path):
     parts = hc.Hardware(
         encoder=4096,
         velocity="difference",
-        window=3,
+        velocity_window=3,
         delay=1e-4,
         coupling=hc.Coupling(1e3, 10.0),
         friction=(0.01, 0.0),
@@ -135,10 +135,10 @@ def test_scenario_survives_the_record(tmp_path):
     [
         (dict(jitter=-1.0), "hardware.jitter"),
         (dict(jitter=0.5 * TS), "hardware.jitter"),
-        (dict(lost=1.0), "hardware.lost"),
+        (dict(dropout_probability=1.0), "hardware.dropout_probability"),
         (dict(encoder=2.5), "hardware.encoder"),
         (dict(velocity="diff"), "hardware.velocity"),
-        (dict(window=2), "hardware.velocity"),
+        (dict(velocity_window=2), "hardware.velocity"),
         (dict(adc_bits=1), "hardware.adc_bits"),
         (dict(filter_order=3), "hardware.filter_order"),
         (dict(dac_range=(1.0,)), "hardware.dac_range"),
@@ -159,7 +159,7 @@ def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
     with pytest.raises(ParameterError, match="sampled"):
         replace(hc.constant_cut(), hardware=hc.Hardware())
     with pytest.raises(ParameterError, match="held"):
-        cut(hc.Hardware(passivity=True), render="implicit")
+        cut(hc.Hardware(passivity=True), render="physical")
     with pytest.raises(ParameterError):
         hc.Coupling(0.0, 1.0)
 
@@ -263,7 +263,7 @@ def test_difference_lags_half_its_window_in_a_run():
     """Under a steady acceleration the mean over m samples is the rate m Ts/2 ago."""
     s = hc.free(control="sampled", t_max=0.02)
     for m in (1, 4):
-        run = Run(replace(s, hardware=hc.Hardware(velocity="difference", window=m)), 1)
+        run = Run(replace(s, hardware=hc.Hardware(velocity="difference", velocity_window=m)), 1)
         shown = []
         for _ in range(run.parts.time.last):
             run.advance(run.filled + 1)  # one step; the kick to its sample ended with event.w
@@ -304,7 +304,10 @@ def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
 
 def test_noise_has_its_rms_and_each_part_its_own_stream():
     n = 20_000
-    a, b = (hardware.SampleNoise(hc.Hardware(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
+    a, b = (
+        hardware.SampleNoise(hc.Hardware(force_noise=0.3, dropout_probability=x, seed=5))
+        for x in (0.0, 0.5)
+    )
     noise = a.table(0, n)[:, 2:]
     assert np.all(np.abs(noise.std(axis=0) - 0.3) < 5 * 0.3 / math.sqrt(2 * n))
     assert np.abs(np.corrcoef(noise.T)[0, 1]) < 5 / math.sqrt(n)
@@ -502,7 +505,12 @@ def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
 
 
 @pytest.mark.parametrize(
-    "parts", [dict(), dict(force_noise=0.1, adc_bits=12, dac_bits=12), dict(jitter=1e-5, lost=0.01)]
+    "parts",
+    [
+        dict(),
+        dict(force_noise=0.1, adc_bits=12, dac_bits=12),
+        dict(jitter=1e-5, dropout_probability=0.01),
+    ],
 )
 def test_the_controller_leaves_passive_clay_alone(parts):
     kw = dict(t_max=0.8, clay=(0.02, 0.15))
@@ -514,7 +522,7 @@ def test_the_controller_leaves_passive_clay_alone(parts):
 @pytest.mark.parametrize("parts", [dict(encoder=65536), dict(velocity="difference")])
 def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exact(parts):
     """On the idle axis, whose velocity passes zero: some 1e-7 J and 1e-6 m, of 5 N and 20 cm."""
-    kw = dict(shaping=True, force=(5.0, 0.0))
+    kw = dict(inertia_shaping=True, force=(5.0, 0.0))
     a, b = (hc.simulate(cut(hc.Hardware(passivity=x, **parts), **kw)) for x in (False, True))
     n = min(len(a.p), len(b.p))
     assert 0.0 < np.abs(a.p[:n] - b.p[:n]).max() < 1e-5
@@ -557,9 +565,9 @@ def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
 
 def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():
     parts = hc.Hardware(
-        encoder=65536, velocity="difference", window=16, adc_bits=12, dac_bits=12, delay=TS
+        encoder=65536, velocity="difference", velocity_window=16, adc_bits=12, dac_bits=12, delay=TS
     )
-    r = hc.simulate(cut(parts, shaping=True, force=(4.0, 0.0)))
+    r = hc.simulate(cut(parts, inertia_shaping=True, force=(4.0, 0.0)))
     assert r.outcome.code == "finished"
     inside = (r.p[:, 0] > 0.08) & (r.p[:, 0] < 0.14)
     v, fe = r.v[inside, 0].mean(), r.fe[inside, 0].mean()

@@ -18,7 +18,7 @@ ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
 METHODS = {
     "continuous": dict(),
     "accurate": dict(integrator="accurate", dt=2e-3),
-    "physical": dict(control="sampled", render="implicit"),
+    "physical": dict(control="sampled", render="physical"),
     "held": dict(control="sampled", render="held"),
     "hardware": dict(
         control="sampled",
@@ -40,7 +40,7 @@ def both(monkeypatch):
 
 def scene(**kw):
     flat = hc.Profile((), (CLAY,))
-    s = hc.free(shaping=True, force=(1.0, 0.0), t_max=0.6)
+    s = hc.free(inertia_shaping=True, force=(1.0, 0.0), t_max=0.6)
     return dataclasses.replace(s, length=None, clay=hc.Clay(flat, flat), **kw)
 
 
@@ -112,7 +112,7 @@ def moved_by(s, r, f_clay):
     return np.array(out)
 
 
-@pytest.mark.parametrize("render", ["implicit", "held"])
+@pytest.mark.parametrize("render", ["physical", "held"])
 def test_the_law_converges_under_held_torques(hardening, render):
     """The arm between control samples of 2 ms, at ever shorter steps."""
     errors = []
@@ -120,7 +120,7 @@ def test_the_law_converges_under_held_torques(hardening, render):
         s = scene(control="sampled", render=render, Ts=2e-3, dt=2e-3 / n)
         s = dataclasses.replace(s, t_max=0.2, force=(1.0, 0.4))
         r = hc.simulate(s)
-        z = moved_by(s, r, render == "implicit")
+        z = moved_by(s, r, render == "physical")
         errors.append(np.abs(r.q[n::n][: len(z)] - z[:, :2]).max())
         if render == "held":  # what the motors hold is the law at the control samples
             gone = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(r.p, axis=0).T))))

@@ -33,13 +33,13 @@ def same(a, b, names=ARRAYS):
         dict(operator=hc.Operator()),
         dict(Ts=1.44e-3, force=(1.0, 0.3)),
         dict(torque_limit=(0.05, 0.05)),
-        dict(hardware=hc.Hardware(delay=5e-4, jitter=1e-5, lost=0.1, dac_bits=12)),
+        dict(hardware=hc.Hardware(delay=5e-4, jitter=1e-5, dropout_probability=0.1, dac_bits=12)),
     ],
     ids=["ideal", "hand", "slow", "limits", "hardware"],
 )
 def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine):
     if kw.get("hardware"):  # a lost sample holds the torque, but the compensator goes on
-        kw = {"hardware": replace(kw["hardware"], lost=0.0)}
+        kw = {"hardware": replace(kw["hardware"], dropout_probability=0.0)}
     s = replace(CUT, **kw)
     params = [0.01, 0.02, 90.0, *paper_law.memory(s.gain, s.Ts or s.dt)]
     own = replace(s, controller=hc.Controller(paper_law.paper, [0.0] * 8, params))
@@ -61,7 +61,7 @@ def to_pose(t, q, qd, fh, state, params):
 
 POSE = hc.Scenario(
     control="sampled",
-    render="implicit",
+    render="physical",
     clay=hc.constant_cut(b=30.0).clay,
     controller=hc.Controller(to_pose, (0.0, 0.0), (20.0, 2.0, 0.01)),
     start=(0.05, 0.02),
@@ -220,7 +220,7 @@ def burst(t, q, qd, fh, state, params):
         (lambda: hc.Controller(to_pose, params=(math.nan,)), "controller.params[0]"),
         (lambda: replace(POSE, control="continuous", Ts=None, render="held"), "control"),
         (lambda: replace(POSE, render="held", hardware=hc.Hardware(passivity=True)), "hardware"),
-        (lambda: replace(POSE, shaping=True), "shaping"),
+        (lambda: replace(POSE, inertia_shaping=True), "inertia_shaping"),
         (lambda: hc.Scenario(controller=to_pose), "controller"),
     ],
 )
@@ -282,7 +282,9 @@ def idle(t, q, qd, fh, state, params):
 
 @pytest.mark.parametrize("when", [0.0, 0.05])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, GeneratorExit])
-@pytest.mark.parametrize("parts", [None, hc.Hardware(delay=2e-3, lost=0.2)], ids=["bare", "late"])
+@pytest.mark.parametrize(
+    "parts", [None, hc.Hardware(delay=2e-3, dropout_probability=0.2)], ids=["bare", "late"]
+)
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_what_a_law_raises_ends_the_run_and_is_raised(engine, parts, error, when):
     asked, raised = [], error("as asked")

@@ -23,7 +23,7 @@ from tests.oracles.laws import servo_kick
 EDGES = (0.05, 0.15, 0.20)
 CASES = {
     "plain": dict(),
-    "shaped": dict(shaping=True),
+    "shaped": dict(inertia_shaping=True),
     "hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
     "off axis": dict(force=(1.0, 0.3)),
 }
@@ -35,8 +35,8 @@ def test_fourth_order_and_1e_9_s_at_2_ms(name):
     th = (0.25, 2.0, 6.0) if s.operator else None
     grid = np.arange(1, 15_000) * 4e-3  # in every dt below
     exact = store.solution(
-        f"fourth-order-{name}", nonlinear, (0, 90, 0), EDGES, s.gain, s.force, th, s.shaping, 60.0,
-        grid, 1e-13, 1e-15,
+        f"fourth-order-{name}", nonlinear, (0, 90, 0), EDGES, s.gain, s.force, th,
+        s.inertia_shaping, 60.0, grid, 1e-13, 1e-15,
     )  # fmt: skip
     steps, border, place = np.array([4e-3, 2e-3, 1e-3]), [], []
     for dt in steps:
@@ -83,9 +83,9 @@ def test_residual_of_the_energy_converges_at_fourth_order():
 
 def test_free_path_and_a_last_step_that_is_shorter():
     exact, position = piecewise_linear((0.20,), (0.0,), 1.0, 1.0)
-    r = hc.simulate(hc.free(shaping=True, integrator="accurate", dt=2e-3))
+    r = hc.simulate(hc.free(inertia_shaping=True, integrator="accurate", dt=2e-3))
     assert r.crossings[0].time == pytest.approx(exact[0], abs=1e-10)
-    r = hc.simulate(hc.free(shaping=True, integrator="accurate", dt=2e-3, t_max=0.1234567))
+    r = hc.simulate(hc.free(inertia_shaping=True, integrator="accurate", dt=2e-3, t_max=0.1234567))
     assert r.t[-1] == 0.1234567 and r.p[-1, 0] == pytest.approx(position(r.t[-1:])[0], abs=1e-10)
 
 
@@ -144,7 +144,7 @@ STAGES = CASES | {
     "weak": dict(torque_limit=(0.2, 0.1)),
     "other": OTHER,
     "two hands": dict(operator=HANDS, **OTHER),
-    "hand on y": dict(operator=(None, HANDS[1]), shaping=True, **OTHER),
+    "hand on y": dict(operator=(None, HANDS[1]), inertia_shaping=True, **OTHER),
     "formed": dict(compensator=ZEROS),
     "all": dict(compensator=ZEROS, operator=HANDS, **OTHER),
 }
@@ -176,7 +176,11 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     u = arm.jacobian(q1, q2, links)
     p = np.subtract(arm.handle_position(q1, q2, links), s.origin).tolist()
     v, c = arm.handle_velocity(w1, w1 + w2, u), arm.centripetal(w1, w1 + w2, u)
-    W = [s.servo[0].S.gain, 0.0, s.servo[1].S.gain] if s.shaping else [*arm.mobility(u, links)]
+    W = (
+        [s.servo[0].S.gain, 0.0, s.servo[1].S.gain]
+        if s.inertia_shaping
+        else [*arm.mobility(u, links)]
+    )
     fe = clay.viscous_force(b, b, *v)
     a, hand, shown, feed = [], [], [dx, dy], [0.0, 0.0]
     for i, (y, yd) in enumerate(((yx, ydx), (yy, ydy))):

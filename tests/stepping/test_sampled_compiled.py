@@ -10,24 +10,25 @@ from hapticclay.stepping.run import EngineStore, Run, completed
 from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast, same
 
 ALL = dict(
-    jitter=5e-5, lost=0.05, encoder=65536, velocity="difference", window=5, velocity_filter=200.0,
+    jitter=5e-5, dropout_probability=0.05, encoder=65536, velocity="difference",
+    velocity_window=5, velocity_filter=200.0,
     adc_bits=12, force_noise=0.05, force_filter=400.0, dac_bits=14, dac_range=(30.0, 20.0),
     delay=1.7 * TS, friction=(0.02, 0.01), passivity=True, coupling=hc.Coupling(3000.0, 300.0),
     seed=4,
 )  # fmt: skip
 PHYSICAL = {name: x for name, x in ALL.items() if name not in ("passivity", "coupling")}
 HAND = dict(operator=hc.Operator())
-STIFF = dict(render="implicit", b=1e5, gain=(1.0, 0.1))
+STIFF = dict(render="physical", b=1e5, gain=(1.0, 0.1))
 SCENES = {
     "ideal": (None, {}),
-    "physical": (None, dict(render="implicit", **HAND)),
-    "substeps": (None, dict(dt=1e-4, Ts=4e-4, shaping=True)),
+    "physical": (None, dict(render="physical", **HAND)),
+    "substeps": (None, dict(dt=1e-4, Ts=4e-4, inertia_shaping=True)),
     "stiff": (None, STIFF | HAND),
     "not stable": (None, dict(b=8e3, start=(0.02, 0.0), gain=(1.0, 0.1), t_max=1.0)),
     "not on the grid": (None, dict(t_max=0.1001)),
     "weak": (None, dict(torque_limit=(0.3, 0.2))),
     "layers": (ALL, dict(clay=LAYERS)),
-    "growing": (None, dict(clay=GROWING, render="implicit", muscle=WAVE)),
+    "growing": (None, dict(clay=GROWING, render="physical", muscle=WAVE)),
     "driven": (ALL, dict(muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))),
     "driven in substeps": (None, dict(dt=1e-4, Ts=4e-4, muscle=WAVE, command=WAVE)),
     "all": (ALL, HAND),
@@ -35,10 +36,13 @@ SCENES = {
     "all, slow": (ALL | dict(delay=0.01), dict(dt=1e-4, Ts=0.05)),
     "first order": (dict(force_filter=500.0, filter_order=1), {}),
     "a sample late": (dict(delay=TS, passivity=True), {}),
-    "jitter and delay": (dict(jitter=8e-5, delay=0.4 * TS, lost=0.1), {}),
+    "jitter and delay": (dict(jitter=8e-5, delay=0.4 * TS, dropout_probability=0.1), {}),
 } | {
     name: ({name: ALL[name]}, {})
-    for name in ("jitter", "lost", "encoder", "adc_bits", "force_noise", "dac_bits", "friction")
+    for name in (
+        "jitter", "dropout_probability", "encoder", "adc_bits", "force_noise", "dac_bits",
+        "friction",
+    )
 }  # fmt: skip
 
 

@@ -115,7 +115,7 @@ def solved(times, breaks, uh=lambda t: 0.0, command=lambda t: 0.0, axis=0):
 
 
 def scene(**kw):
-    s = hc.free(shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=T_MAX)
+    s = hc.free(inertia_shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=T_MAX)
     return dataclasses.replace(s, length=None, **kw)
 
 
@@ -172,7 +172,7 @@ def test_sampled_runs_converge_at_second_order_under_a_jump():
     A jump of 2 N that is a tenth of a step late moves the handle by 1e-5 m.
     """
     s = scene(muscle=CASES["step off the samples"][0], control="sampled", Ts=2.88e-3, dt=2.88e-3)
-    s = dataclasses.replace(s, t_max=0.576, render="implicit")
+    s = dataclasses.replace(s, t_max=0.576, render="physical")
     parts = np.array([1, 2, 4, 8])
     *p, exact = (hc.simulate(dataclasses.replace(s, dt=2.88e-3 / n)).p[::n] for n in (*parts, 64))
     constants = [np.abs(x - exact).max() * n**2 for x, n in zip(p, parts, strict=True)]

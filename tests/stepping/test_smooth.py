@@ -19,9 +19,9 @@ METHODS = {
     "default": {},
     "accurate": dict(integrator="accurate", dt=1e-3),
     "held": dict(control="sampled"),
-    "implicit": dict(control="sampled", render="implicit"),
-    "late": dict(control="sampled", render="implicit", hardware=hc.Hardware(delay=2e-4)),
-    "hand": dict(operator=hc.Operator(), shaping=True),
+    "physical": dict(control="sampled", render="physical"),
+    "late": dict(control="sampled", render="physical", hardware=hc.Hardware(delay=2e-4)),
+    "hand": dict(operator=hc.Operator(), inertia_shaping=True),
     "muscle": dict(muscle=hc.Multisine(rms=(1.0, 0.5), high=3.0)),
 }
 RANDOM = np.random.default_rng(3)
@@ -33,14 +33,14 @@ SPLINES = tuple(even_spline(*spans, values) for spans, values in zip(SPANS, VALU
 
 def path_through(clay, **more):
     """A slanted path through the clay."""
-    free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), shaping=True, t_max=2.0)
+    free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), inertia_shaping=True, t_max=2.0)
     return dataclasses.replace(free, **{"clay": clay, "length": None, **more})
 
 
 def exact(s, angle=0.0):
     th = (s.operator.mass, s.operator.damper, s.operator.spring) if s.operator else (0.0,) * 3
     return cells(
-        ((), ()), None, s.gain, s.force, [0.5 * s.t_max, s.t_max], th, s.shaping, angle,
+        ((), ()), None, s.gain, s.force, [0.5 * s.t_max, s.t_max], th, s.inertia_shaping, angle,
         place=lambda p: [b(p) for b in SPLINES],
     )  # fmt: skip
 
@@ -56,7 +56,7 @@ def same(a, b):
 @pytest.mark.parametrize("hand,shaping", [(None, True), (hc.Operator(0.25, 2.0, 6.0), False)])
 @pytest.mark.parametrize("kind,order,limit", [("fast", 2, 1e-7), ("accurate", 4, 1e-11)])
 def test_the_order_is_kept(kind, order, limit, hand, shaping, angle):
-    s = path_through(hc.Clay(*LAWS, angle), integrator=kind, operator=hand, shaping=shaping)
+    s = path_through(hc.Clay(*LAWS, angle), integrator=kind, operator=hand, inertia_shaping=shaping)
     truth, errors, steps = exact(s, angle), [], np.array([4e-3, 2e-3, 1e-3])
     for dt in steps:
         r = hc.simulate(dataclasses.replace(s, dt=float(dt)))
@@ -67,7 +67,7 @@ def test_the_order_is_kept(kind, order, limit, hand, shaping, angle):
     assert errors[-1] < limit
 
 
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_control_is_that_of_the_oracle(render):
     """Second order in the step of the physics, Ts kept."""
     values, Ts = [[10.0], [100.0], [30.0], [120.0], [60.0]], 4e-3
@@ -85,7 +85,7 @@ def test_sampled_control_is_that_of_the_oracle(render):
     assert 1.7 < order < 2.6, errors
 
 
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_control_tends_to_the_continuous(render):
     """Of first order in Ts."""
     s = path_through(hc.Clay(*LAWS), control="sampled", render=render)
@@ -166,7 +166,7 @@ def test_steady_motion_feels_the_clay_of_the_place():
     law = hc.Smooth.of_function(
         lambda x, y: 20.0 + 2e3 * min(x, 0.02), (0.0, 0.04), (0.0, 1.0), (21, 1)
     )
-    s = dataclasses.replace(hc.constant_cut(shaping=True), clay=hc.Clay(law, law))
+    s = dataclasses.replace(hc.constant_cut(inertia_shaping=True), clay=hc.Clay(law, law))
     r = hc.simulate(s)
     assert r.v[-1, 0] == pytest.approx(s.gain[0] * s.force[0] / (10.0 + s.gain[0] * 60.0), rel=1e-6)
     b = even_spline((0.0, 0.04), (0.0, 1.0), law.values)
@@ -189,7 +189,7 @@ def test_stiff_smooth_clay_is_refused_and_the_step_named():
     ):
         assert path_through(hc.Clay(soft, stiff), **more).clay != s.clay
     with pytest.raises(ParameterError, match="must be at most"):
-        path_through(hc.Clay(soft, stiff), control="sampled", render="implicit")
+        path_through(hc.Clay(soft, stiff), control="sampled", render="physical")
 
 
 def test_a_run_goes_on_step_by_step_as_in_one():

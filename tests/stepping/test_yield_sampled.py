@@ -37,7 +37,7 @@ def scene(flow, along=True, parts=None, **kw):
     own = {x: kw.pop(x) for x in ("operator", "gain", "velocity", "stop", "muscle") if x in kw}
     kw = dict(t_max=0.3, force=(4.0, 0.4), control="sampled") | kw
     clay = dataclasses.replace(hc.slab(flow, 0.01, 0.1), isotropic=along)
-    own = dict(stop=False, operator=None) | own
+    own = dict(stop_when_unstable=False, operator=None) | own
     return dataclasses.replace(hc.constant_cut(**kw), clay=clay, hardware=parts, **own)
 
 
@@ -62,7 +62,7 @@ def solved(name):
 
 def beside(name, ratio):
     """A run with so many steps in a control sample, at the samples."""
-    c = dict(along=False, render="implicit") | CASES[name]
+    c = dict(along=False, render="physical") | CASES[name]
     s = hc.Scenario(
         clay=everywhere(c["along"], *c["law"]),
         gain=GAIN,
@@ -74,7 +74,7 @@ def beside(name, ratio):
         velocity=c["v0"],
         control="sampled",
         render=c["render"],
-        stop=False,
+        stop_when_unstable=False,
         torque_limit=(1e3, 1e3),
     )
     r = hc.simulate(s)
@@ -107,7 +107,7 @@ def test_physical_clay_tends_to_the_continuous_loop_as_the_samples_get_shorter()
     flow = hc.Flow(Fy=3.0, b=20.0)
     error = []
     for dt in (4e-4, 1e-4):
-        s = scene(flow, render="implicit", dt=dt, t_max=0.3, force=(4.0, 0.0), velocity=(0.1, 0.0))
+        s = scene(flow, render="physical", dt=dt, t_max=0.3, force=(4.0, 0.0), velocity=(0.1, 0.0))
         a = hc.simulate(s)
         b = hc.simulate(dataclasses.replace(s, control="continuous", render="held"))
         error.append(np.abs(a.p - b.p).max())
@@ -138,7 +138,7 @@ def test_held_clay_is_the_law_typed_out_bit_for_bit(flow, engine):
 def test_held_clay_chatters_where_it_should_hold_and_physical_clay_holds():
     flow = hc.Flow(Fy=3.0, b=5.0)
     kw = dict(force=(1.0, 0.3), start=(0.02, 0.0), gain=(0.0, 0.0))
-    held, physical = (hc.simulate(scene(flow, render=x, **kw)) for x in ("held", "implicit"))
+    held, physical = (hc.simulate(scene(flow, render=x, **kw)) for x in ("held", "physical"))
     late = held.t > 0.2
     assert (np.abs(np.diff(np.sign(held.v[late, 0]))) > 1.0).mean() > 0.3
     assert np.hypot(*held.fe[late].T).min() >= 3.0  # never less: no rest at all
@@ -204,7 +204,7 @@ def test_a_tool_at_rest_is_held_by_the_clay_and_the_handle_by_the_coupling():
 @pytest.mark.parametrize("parts", [None, hc.Hardware(friction=(0.05, 0.02))])
 def test_clay_that_holds_the_handle_leaves_no_motion_at_all(along, dt, parts):
     kw = dict(force=(1.0, 0.5), velocity=(0.05, 0.02), start=(0.02, 0.0), gain=(0.0, 0.0))
-    s = scene(hc.Flow(Fy=9.0, b=5.0), along, parts, render="implicit", dt=dt, **kw)
+    s = scene(hc.Flow(Fy=9.0, b=5.0), along, parts, render="physical", dt=dt, **kw)
     r = hc.simulate(dataclasses.replace(s, t_max=max(60.0 * dt, 0.1), operator=hc.Operator()))
     held = r.t > max(x.start for x in r.stops) + dt
     assert held.sum() > 5 and not r.v[held].any() and not r.qd[held].any()
@@ -222,7 +222,7 @@ def test_the_sensor_shows_the_whole_push_of_a_hand_at_rest():
         return (0.0, 0.0), state
 
     hand = hc.Operator(2.0, 10.0, 50.0)
-    s = scene(hc.Flow(Fy=9.0), render="implicit", start=(0.02, 0.0), force=(3.0, 1.0), t_max=0.01)
+    s = scene(hc.Flow(Fy=9.0), render="physical", start=(0.02, 0.0), force=(3.0, 1.0), t_max=0.01)
     s = dataclasses.replace(s, controller=hc.Controller(law), operator=hand)
     r = hc.simulate(s, engine="python")
     assert not r.v.any()
@@ -236,7 +236,7 @@ def test_the_sensor_shows_the_whole_push_of_a_hand_at_rest():
 
 def started(**kw):
     """A run in clay that yields, before its first step."""
-    s = scene(hc.Flow(Fy=2.0), False, hc.Hardware(friction=(0.3, 0.2)), render="implicit", **kw)
+    s = scene(hc.Flow(Fy=2.0), False, hc.Hardware(friction=(0.3, 0.2)), render="physical", **kw)
     return Run(dataclasses.replace(s, start=(0.02, 0.0)), 1)
 
 
@@ -280,7 +280,7 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
 
 def test_friction_beside_clay_elsewhere_is_that_without_it():
     # the same motion by the two ways to friction: in a scene that yields, and in one that does not
-    kw = dict(render="implicit", t_max=0.2, start=(0.02, 0.0), velocity=(0.1, 0.05))
+    kw = dict(render="physical", t_max=0.2, start=(0.02, 0.0), velocity=(0.1, 0.05))
     parts = hc.Hardware(friction=(0.05, 0.02))
     a = scene(hc.Flow(b=20.0), False, parts, **kw)
     edges = a.clay.x.edges
@@ -319,10 +319,10 @@ def test_physical_clay_takes_energy_and_the_ledger_closes(  # noqa: PLR0913  # a
         dt=TS,
         Ts=ratio * TS,
         control="sampled",
-        render="implicit",
+        render="physical",
         t_max=0.05,
         length=None,
-        stop=False,
+        stop_when_unstable=False,
         torque_limit=(50.0, 50.0),
         hardware=hc.Hardware(friction=friction) if friction else None,
     )
@@ -346,15 +346,15 @@ WEAK, PASTE = hc.Flow(Fy=1.5, b=20.0), hc.Flow(0.5, 2.0, 0.4, 10.0)
 SCENES = {
     "held": (WEAK, True, None, {}),
     "held by axis": (PASTE, False, None, dict(operator=hc.Operator())),
-    "physical": (WEAK, True, None, dict(render="implicit", operator=hc.Operator())),
-    "physical by axis": (PASTE, False, None, dict(render="implicit", Ts=3 * TS)),
-    "at rest": (hc.Flow(Fy=6.0), False, None, dict(render="implicit", velocity=(0.1, 0.05))),
-    "stiff": (hc.Flow(Fy=2.0, b=1e5), True, None, dict(render="implicit")),
+    "physical": (WEAK, True, None, dict(render="physical", operator=hc.Operator())),
+    "physical by axis": (PASTE, False, None, dict(render="physical", Ts=3 * TS)),
+    "at rest": (hc.Flow(Fy=6.0), False, None, dict(render="physical", velocity=(0.1, 0.05))),
+    "stiff": (hc.Flow(Fy=2.0, b=1e5), True, None, dict(render="physical")),
     "all": (WEAK, False, hc.Hardware(**ALL), dict(operator=hc.Operator())),
     "all, along": (PASTE, True, hc.Hardware(**ALL), {}),
-    "all, physical": (WEAK, False, hc.Hardware(**PHYSICAL), dict(render="implicit")),
+    "all, physical": (WEAK, False, hc.Hardware(**PHYSICAL), dict(render="physical")),
     "all, stiff": (hc.Flow(1.0, 2.0, 0.5, 1e5), True, hc.Hardware(**PHYSICAL),
-                   dict(render="implicit", operator=hc.Operator())),
+                   dict(render="physical", operator=hc.Operator())),
 }  # fmt: skip
 
 
@@ -391,7 +391,7 @@ def test_step_by_step_and_in_a_batch_it_is_the_run(name):
 
 def test_turned_clay_by_its_own_axes_is_that_along_x_and_y_seen_from_elsewhere():
     # along the motion, the angle of the axes makes no difference
-    s = scene(hc.Flow(Fy=2.0, b=30.0), render="implicit", velocity=(0.1, 0.03))
+    s = scene(hc.Flow(Fy=2.0, b=30.0), render="physical", velocity=(0.1, 0.03))
     turned = dataclasses.replace(s, clay=dataclasses.replace(s.clay, angle=0.7))
     a, b = hc.simulate(s), hc.simulate(turned)
     np.testing.assert_allclose(a.p, b.p, atol=1e-12)

@@ -88,12 +88,14 @@ def test_boundary_with_a_delay_and_no_hand():
 
 
 def test_without_shaping_the_gap_is_that_of_the_pose():
-    loop = Loop(shaping=False, pose=(0.10, 0.0))
+    loop = Loop(inertia_shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
     nominal = hc.gain_limit("x", 90.0, TH)
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
-    assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
+    assert boundary.pose_limit(replace(loop, inertia_shaping=True)) == pytest.approx(
+        nominal, rel=1e-6
+    )
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
 
 
@@ -103,19 +105,19 @@ def test_sampled_loop_at_a_pose(delay):
     for operator in (TH, None):
         exact = hc.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
         for shaping in (True, False):
-            nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
+            nominal = replace(loop, operator=operator, pose=(0.0, 0.0), inertia_shaping=shaping)
             assert boundary.pose_limit(nominal) == pytest.approx(
                 exact, rel=1e-9
             )  # both are found to 1e-10
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
-    loop = replace(loop, shaping=False)
+    loop = replace(loop, inertia_shaping=False)
     exact = boundary.pose_limit(loop)
     assert exact < 0.8 * hc.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
     assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
 
 
 def test_pose_matrix_has_the_poles_of_both_axes_where_they_are_decoupled():
-    A = boundary.pose_matrix(Loop(K=2.0, shaping=False))
+    A = boundary.pose_matrix(Loop(K=2.0, inertia_shaping=False))
     parts = [Linear(i, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles() for i, K in ((0, 2.0), (1, 0.0))]
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.concatenate(parts)), atol=1e-6
@@ -176,13 +178,15 @@ def test_motors_that_leave_their_limits_late_are_no_divergence():
 def test_causes():
     push = dict(push=boundary.LARGE_PUSH)
     assert (
-        boundary.explain_disagreement(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False)
+        boundary.explain_disagreement(
+            Loop(K=2.8, inertia_shaping=False, pose=(0.1, 0.0), **push), False
+        )
         == "pose-dependent Lambda"
     )
     Ts = 4e-3
     K = 0.5 * (hc.gain_limit("x", 90.0, TH) + hc.gain_limit("x", 90.0, TH, Ts=Ts))
     assert boundary.explain_disagreement(Loop(K=K, Ts=Ts, **push), False) == "sampling"
-    both = Loop(K=K, Ts=Ts, shaping=False, pose=(0.1, 0.0), **push)
+    both = Loop(K=K, Ts=Ts, inertia_shaping=False, pose=(0.1, 0.0), **push)
     assert boundary.explain_disagreement(both, False) == "sampling and pose-dependent Lambda"
     K = 0.5 * sum(hc.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
     assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
@@ -210,7 +214,7 @@ def test_bad_loops_are_refused(kw, field):
 
 @pytest.fixture(scope="module")
 def poses():
-    return stability_map._gain_pose(Loop(shaping=False), 2, 3, iter)
+    return stability_map._gain_pose(Loop(inertia_shaping=False), 2, 3, iter)
 
 
 def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(poses):
@@ -243,7 +247,7 @@ def hatched(figure):
 def test_picture_hatches_gains_above_the_limit_of_the_loop_of_the_runs(poses, x, factor):
     """The limit at both ends of the path is worked out anew, for the loop that the runs are of."""
     (area,) = hatched(study_plots.stability_map_plot(poses))
-    K = factor * boundary.pose_limit(replace(Loop(shaping=False), pose=(x, 0.0)))
+    K = factor * boundary.pose_limit(replace(Loop(inertia_shaping=False), pose=(x, 0.0)))
     inside = 0.999 * 100.0 * x  # [cm], just within the edge
     assert area.get_paths()[0].contains_point((inside, K)) == (factor > 1.0)
     assert area.get_label() == "gain margin < 1"
@@ -312,7 +316,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
         },
         "Ts": 0.36e-3,
         "delay": 1e-3,
-        "shaping": False,
+        "inertia_shaping": False,
         "map": "gain-pose",
         "quick": False,
     }
@@ -325,7 +329,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
 
 
 def test_command_takes_a_compensator_and_a_servo_as_numbers(capsys, tmp_path):
-    words = "stability --b 50 --gain 0.5 --num 1 20 --den 1 40 0 --shaping --Ts 1e-3"
+    words = "stability --b 50 --gain 0.5 --num 1 20 --den 1 40 0 --inertia-shaping --Ts 1e-3"
     words += " --G 800 40 900 --S 0.5 40 400 --out"
     assert app.main([*words.split(), str(tmp_path)]) == 0
     capsys.readouterr()
@@ -354,7 +358,7 @@ ARM = hc.Arm(0.3, 0.32, 0.09, 0.7)
         dict(
             compensator=hc.Compensator((0.2, 1.0), (1.0, 8.0)), servo=SERVO, operator=None, b=20.0
         ),
-        dict(servo=SERVO, arm=ARM, shaping=False, pose=(0.05, 0.0)),
+        dict(servo=SERVO, arm=ARM, inertia_shaping=False, pose=(0.05, 0.0)),
         dict(servo=SERVO, arm=ARM, Ts=2e-3, delay=1e-3),
         dict(compensator=hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)), Ts=2e-3),
     ],

@@ -213,7 +213,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
 )
 def test_any_seed_and_any_band_about_the_corner(block, seed, low, high, shaping):
     """Corners lie at 3.3 to 4.8 Hz. Tolerance: (omega dt)^2/6 at 20 Hz is 3.4e-4."""
-    r = quick(*block, seed=seed, band=(low, high), period=1.2, shaping=shaping)
+    r = quick(*block, seed=seed, band=(low, high), period=1.2, inertia_shaping=shaping)
     np.testing.assert_allclose(r.values, PRINTED["".join(block)], rtol=5e-4)
 
 
@@ -325,7 +325,7 @@ def test_same_seed_same_result():
         (dict(noise=0.1), "noise"),
         (dict(seed=-1), "seed"),
         (dict(origin=(0.5, 0.5)), "start"),
-        (dict(shaping=1), "shaping"),
+        (dict(inertia_shaping=1), "inertia_shaping"),
         (dict(band=(1.0, 1e4)), "band[high]"),
         (dict(band=(2.0, 1.0)), "band"),
         (dict(band=(1.0, 1.1)), "band"),

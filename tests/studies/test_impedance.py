@@ -28,9 +28,9 @@ CLOSE = 3e-4
         dict(),
         dict(Ts=1e-3),
         dict(Ts=1e-3, delay=1.5e-3, b=40.0, k=200.0),
-        dict(Ts=1e-3, render="implicit", axis="y", K=0.5),
+        dict(Ts=1e-3, render="physical", axis="y", K=0.5),
     ],
-    ids=["continuous", "sampled", "late", "implicit"],
+    ids=["continuous", "sampled", "late", "physical"],
 )
 def test_the_arm_feels_as_computed(parts, operator):
     found = measure_impedance(PushedLoop(operator=operator, **parts), lines=12)
@@ -44,7 +44,9 @@ def test_the_arm_feels_as_computed(parts, operator):
     "wall",
     [
         hc.VirtualWall(300.0, 2.0, device=DEVICE),
-        hc.VirtualWall(2000.0, 3.0, 0.05, DEVICE, TH, delay=1e-3, window=3, velocity_filter=90.0),
+        hc.VirtualWall(
+            2000.0, 3.0, 0.05, DEVICE, TH, delay=1e-3, velocity_window=3, velocity_filter=90.0
+        ),
         hc.VirtualWall(100.0, 1.0, -0.02, DEVICE, Ts=4e-3, velocity="exact"),
     ],
 )
@@ -79,7 +81,7 @@ def test_friction_is_measured_and_noted():
     [
         (PushedLoop(operator=TH, K=6.0), "K = 6.0: must leave the loop stable"),
         (hc.VirtualWall(3e4, 2.0, device=DEVICE), "wall.K = 30000.0: must leave the wall stable"),
-        (hc.VirtualWall(300.0, 2.0, device=DEVICE, surface=True), "must be False"),
+        (hc.VirtualWall(300.0, 2.0, device=DEVICE, unilateral=True), "must be False"),
         (hc.Device(), "must be a PushedLoop or a VirtualWall"),
     ],
 )

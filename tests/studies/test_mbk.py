@@ -52,7 +52,7 @@ def test_least_mass_of_the_arm_by_runs():
 
 
 def test_a_device_without_runs():
-    wall = replace(WALL, device=hc.Device(0.1, 0.5, 0.1, 1e-5), surface=True)
+    wall = replace(WALL, device=hc.Device(0.1, 0.5, 0.1, 1e-5), unilateral=True)
     found = mbk.device_mbk(wall, columns=0, points=7)
     assert math.isnan(found.gap) and found.wall.device.friction == 0.0
     assert len(impedance_plots.mbk_plot(found).axes) == 3

@@ -22,7 +22,7 @@ from tests.oracles.sampled_wall import sample_map
 HANDS = hc.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
 GAIN = hc.Distribution("log-normal", 4.0, 1.0)
 CLAY = hc.Distribution("log-uniform", 10.0, 1000.0)
-SAMPLED = PushedLoop("x", Ts=0.5e-3, shaping=False)
+SAMPLED = PushedLoop("x", Ts=0.5e-3, inertia_shaping=False)
 MOVED = {
     "K": GAIN,
     "b": CLAY,
@@ -95,7 +95,7 @@ def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
         (hc.VirtualWall(B=20.0, device=hc.Device(0.1, 0.5), Ts=1e-3), None),
         (hc.VirtualWall(B=5.0, device=hc.Device(0.5, 2.0), Ts=1e-3), HANDS),
         (hc.VirtualWall(B=20.0, device=hc.Device(2.0, 5.0), Ts=1e-2, delay=1.5e-2), HANDS),
-        (hc.VirtualWall(B=2.0, device=hc.Device(0.1, 1.0), Ts=1e-4, window=4), None),
+        (hc.VirtualWall(B=2.0, device=hc.Device(0.1, 1.0), Ts=1e-4, velocity_window=4), None),
     ],
     ids=["light, late", "light", "with hands", "slow", "fast, window"],
 )
@@ -121,7 +121,7 @@ def test_a_wall_is_judged_as_its_eigenvalues_are(wall, hands):
 @pytest.mark.parametrize(
     "change",
     [
-        dict(surface=True),
+        dict(unilateral=True),
         dict(device=hc.Device(friction=0.1)),
         dict(device=hc.Device(quantum=1e-6)),
     ],

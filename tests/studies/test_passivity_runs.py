@@ -16,7 +16,7 @@ from hapticclay.views import passivity_plots as plots
 WALL = hc.VirtualWall(K=1000.0, device=hc.Device(0.1, 1.0), Ts=1e-3)
 STIFF = replace(
     hc.constant_cut(control="sampled", b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.012),
-    stop=False,
+    stop_when_unstable=False,
 )
 
 
@@ -107,7 +107,7 @@ def test_the_active_half_is_named_where_there_is_room(index):
 
 
 @pytest.mark.parametrize("wrong,field", [
-    (dict(surface=True), "wall.surface"), (dict(velocity="exact", B=1.0), "wall.velocity"),
+    (dict(unilateral=True), "wall.unilateral"), (dict(velocity="exact", B=1.0), "wall.velocity"),
 ])  # fmt: skip
 def test_walls_without_an_index_are_refused(wrong, field):
     with pytest.raises(ParameterError) as told:

@@ -34,7 +34,7 @@ def test_the_path_is_imposed_and_its_energy_is_that_of_the_derivation():
         dict(device=hc.Device(0.1, 2.0), delay=1e-3),
         dict(device=hc.Device(0.1, 2.0), delay=5e-4),
         dict(device=hc.Device(0.1, 2.0), delay=1.25e-3, B=0.5),
-        dict(device=hc.Device(0.1, 2.0), B=1.5, window=3),
+        dict(device=hc.Device(0.1, 2.0), B=1.5, velocity_window=3),
         dict(device=hc.Device(0.1, 2.0), B=1.5, velocity_filter=50.0),
     ],
 )
@@ -85,7 +85,7 @@ def test_a_device_that_takes_nothing_has_no_passive_wall():
     ("wall", "field"),
     [
         (hc.VirtualWall(operator=hc.Operator()), "wall.operator"),
-        (hc.VirtualWall(surface=True), "wall.surface"),
+        (hc.VirtualWall(unilateral=True), "wall.unilateral"),
         (hc.VirtualWall(B=1.0, velocity="exact"), "wall.velocity"),
     ],
 )

@@ -118,13 +118,15 @@ def test_parameters_reach_the_scenario():
     s = Sweep(
         "constant",
         vary,
-        parse_fixed("shaping=true operator.damper=3 operator.spring=6 t_max=5 clay=0.01,0.02"),
+        parse_fixed(
+            "inertia_shaping=true operator.damper=3 operator.spring=6 t_max=5 clay=0.01,0.02"
+        ),
     )
     scenario = s.run_scenario(s.points(0, 1)[0])
     assert (
         scenario.gain == (1.0, 0.3)
         and scenario.force == (2.0, 2.0)
-        and scenario.shaping
+        and scenario.inertia_shaping
         and scenario.t_max == 5.0
     )
     assert (

@@ -15,7 +15,7 @@ from hapticclay.studies.yield_map import measured_cycle, yielding_run
 from hapticclay.theory.relay_cycle import critical_push
 from hapticclay.views.study_plots import yield_map_plot
 
-Y = PushedLoop("y", K=1.0, shaping=True)
+Y = PushedLoop("y", K=1.0, inertia_shaping=True)
 
 
 def cycle_of(flow, speed, dt=3.6e-4, t_max=6.0):

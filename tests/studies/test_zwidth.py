@@ -52,7 +52,7 @@ def largest_stiffness(wall):
         {"delay": 1e-3},
         {"delay": 2.6e-3},
         {"velocity": "exact"},
-        {"velocity_filter": 60.0, "window": 4},
+        {"velocity_filter": 60.0, "velocity_window": 4},
         {"operator": Operator(0.3, 2.0, 40.0), "delay": 0.5e-3},
         {"device": hc.Device(2.0, 1.0), "Ts": 2e-4},
         {"device": hc.Device(0.1, 50.0), "Ts": 1e-2},
@@ -170,7 +170,7 @@ def test_rest_is_the_verdict_of_loops_that_are_not_linear():
     assert r.verdict == BY_REST and not r.linear and math.isnan(r.gap())
     # a surface that is pressed is the linear wall; 1 % is what the decay of a swing resolves
     exact = largest_stiffness(replace(BARE, B=1.0))
-    walls = [replace(BARE, surface=True, B=1.0, K=share * exact) for share in (0.99, 1.01)]
+    walls = [replace(BARE, unilateral=True, B=1.0, K=share * exact) for share in (0.99, 1.01)]
     assert come_to_rest(walls) == [True, False]
 
 
@@ -271,7 +271,7 @@ def test_a_wall_is_saved_and_loaded(tmp_path, ending):
         ("quantum", (0.0, "10um", 6e-5), ["Delta = 0 um", "Delta = 10 um", "Delta = 60 um"]),
         ("Ts", ("0.5 ms", 1e-3), ["Ts = 0.5 ms", "Ts = 1 ms"]),
         ("filter", (None, "none", 150.0), ["no filter", "no filter", "filter = 150 Hz"]),
-        ("window", (1, 4.0), ["window = 1 samples", "window = 4 samples"]),
+        ("velocity_window", (1, 4.0), ["window = 1 samples", "window = 4 samples"]),
     ],
 )
 def test_a_family_is_named_by_symbol_and_unit(vary, values, names):

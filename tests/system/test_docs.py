@@ -125,7 +125,7 @@ def test_every_limit_in_the_stability_page_is_recomputed():
         dict(Ts=Ts),
         dict(Ts=Ts, delay=Ts),
         dict(delay=1e-3),
-        dict(Ts=Ts, render="implicit"),
+        dict(Ts=Ts, render="physical"),
     )
     assert len(rows) == 12
     for axis, hand, b, cells in rows:

@@ -147,7 +147,7 @@ def test_clay_without_a_yield_force():
 
 
 def test_cycles_of_a_scenario_are_those_of_its_loop():
-    flow, cut = hc.Flow(Fy=5.0), hc.constant_cut(shaping=True, gain=(1.0, 1.0))
+    flow, cut = hc.Flow(Fy=5.0), hc.constant_cut(inertia_shaping=True, gain=(1.0, 1.0))
     assert hc.limit_cycles(cut, "y", flow) == hc.limit_cycles(hc.Loop.of(cut, "y"), flow)
     assert hc.limit_cycles("y", flow, 1.0) == hc.limit_cycles(Y, flow=flow)
 

@@ -116,7 +116,7 @@ def period(  # noqa: PLR0913  # one loop, in floats or in Decimals
     g0, g1, s0, s1, sg = (number(float(x["xy".index(axis)])) for x in (G0, G1, S0, S1, SG))
     K, b, Ts, delay, m, d, k = (number(x) for x in (K, b, Ts, delay, *hand))
     mass = 1 / sg + m
-    physical = b if render == "implicit" else 0
+    physical = b if render == "physical" else 0
     blocks = exponential(
         Ts
         * np.array(
@@ -164,7 +164,7 @@ CASES = list(
 
 
 @pytest.mark.parametrize("axis,hand,timing", CASES)
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_limits_against_the_period_map(axis, hand, timing, render):
     Ts, delay = timing
     hand = HANDS[hand]
@@ -193,7 +193,7 @@ def test_sampled_limits_of_random_loops():
             for x in ((-2.0, 1.5), (-1.0, 2.5), (-1.0, 5.0))
         ]
         delay = float(rng.choice([0.0, Ts * rng.uniform(0.0, 4.0), Ts * rng.integers(0, 4)]))
-        axis, render = "xy"[rng.integers(2)], ("held", "implicit")[rng.integers(2)]
+        axis, render = "xy"[rng.integers(2)], ("held", "physical")[rng.integers(2)]
         found = limit(axis, b, hand, Ts=Ts, delay=delay, render=render)
 
         def beyond(K):
@@ -264,10 +264,10 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
 
     Judged with 150 digits, by another criterion.
     """
-    found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="implicit")
+    found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="physical")
     assert 0.0 < found < np.inf
     for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
-        stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "implicit")
+        stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "physical")
         assert stable == (share < 1.0)
         assert (
             gain_limit.is_stable(
@@ -278,7 +278,7 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
                     K=share * found,
                     Ts=Ts,
                     delay=delay,
-                    render="implicit",
+                    render="physical",
                 )
             )
             == stable
@@ -287,7 +287,7 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
 @pytest.mark.parametrize("Ts,delay", [(1e-6, 0.0), (3.6e-4, 0.0), (3.6e-4, 6e-4)])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, delay, render):
     """The pole that K moves is at -K k/10.
 
@@ -350,7 +350,7 @@ def test_late_limit_against_pade(axis, hand, delay):
     assert all(beyond(K) < 0 for K in np.geomspace(0.01, 0.999, 25) * found)
 
 
-@pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "implicit"])))
+@pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "physical"])))
 def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
     exact = limit(axis, 90.0, delay=2e-3, render=render)
     gap = [exact - limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render) for Ts in (4e-4, 2e-4, 1e-4)]
@@ -374,7 +374,7 @@ def test_limits_at_the_ends():
         assert hc.gain_limit("x", 0.0, **kw) == float("inf")  # nothing to feel
     for kw in (dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-4, delay=2e-3), dict(delay=1.0)):
         assert limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
-    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
+    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="physical") < float("inf")
 
 
 def test_a_narrow_unstable_window_is_not_missed():
@@ -415,7 +415,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
             tuple(gain),
             tuple(force),
             operator=th,
-            shaping=True,
+            inertia_shaping=True,
             dt=Ts / 8,
             Ts=Ts,
             control="sampled",

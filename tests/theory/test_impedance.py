@@ -31,14 +31,14 @@ def test_continuous_impedance_is_that_of_python_control(axis, K, b, k, held):
     device = G * K / (s**2 + 10 * s) + S
     s = 1j * OMEGA
     Z = 1.0 / (s * device(s)) + b + k / s
-    loop = hc.Loop(axis, b, TH, K=K, k=k, render="held" if held else "implicit")
+    loop = hc.Loop(axis, b, TH, K=K, k=k, render="held" if held else "physical")
     found = loop_response(loop, OMEGA)
     np.testing.assert_allclose(found.Z, Z, rtol=1e-10)  # a ratio of polynomials of degree 6
     np.testing.assert_allclose(found.felt, margins.transparency(loop, OMEGA), rtol=1e-10)
     np.testing.assert_allclose(found.felt, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
 
 
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
     """The servo's law written out with every motor force late (docs/equations.md, section 3)."""
     loop = hc.Loop("x", 90.0, None, K=2.0, delay=4e-3, k=300.0, render=render, mobility=1.3)
@@ -47,7 +47,7 @@ def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
     late, e = np.exp(-s * loop.delay), loop.b * s + loop.k
     net_to_y = G.gain / (s**2 + G.damping * s + G.stiffness) * loop.gain / (s**2 + 10.0 * s)
     # p = X fh solves s^2 p = W (fh - now) + late (asked + (Wn/W - 1) W f - held), f = fh - e p
-    W, now, held = 1.3, (e if render == "implicit" else 0.0), (e if render == "held" else 0.0)
+    W, now, held = 1.3, (e if render == "physical" else 0.0), (e if render == "held" else 0.0)
     servo = s**2 + S.damping * s + S.stiffness
     pull = S.damping * s + S.stiffness
     right = W + late * (S.gain - W + servo * net_to_y)
@@ -56,7 +56,7 @@ def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
 
 
 @pytest.mark.parametrize("operator", [None, TH, hc.Operator(2.0, 1.0, 0.0)])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 @pytest.mark.parametrize("delay", [0.0, 1.7e-3, 5e-3])
 def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
     """Ts = 5 ms, where the hold costs a third of the damping at 20 Hz."""
@@ -65,7 +65,7 @@ def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
         "x", b, operator, K=K, k=k, Ts=Ts, delay=delay, render=render, mobility=W
     )  # fmt: skip
     G, S, hand = SERVO[0].G, SERVO[0].S, loop.hand
-    implicit = render == "implicit"
+    implicit = render == "physical"
     A = np.zeros((5, 5))  # delta, delta', y, y', f
     A[0, 1] = A[2, 3] = 1.0
     A[1] = [0.0, -10.0, 0.0, 0.0, K]
@@ -102,7 +102,9 @@ def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
         hc.VirtualWall(K=300.0, B=2.0),
         hc.VirtualWall(K=300.0, B=2.0, M=0.03, operator=TH),
         hc.VirtualWall(K=100.0, B=1.0, M=-0.02, delay=3e-3, velocity="exact"),
-        hc.VirtualWall(K=100.0, B=2.0, M=0.02, delay=3.7e-3, window=3, velocity_filter=40.0),
+        hc.VirtualWall(
+            K=100.0, B=2.0, M=0.02, delay=3.7e-3, velocity_window=3, velocity_filter=40.0
+        ),
     ],
 )
 def test_wall_impedance_is_that_of_a_march_in_time(wall):
@@ -113,11 +115,13 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     keep = math.exp(-2.0 * math.pi * cutoff * Ts) if cutoff else 0.0
 
     def law(p, v, muscle, acted, z):
-        past, smooth, before = z or ([p] * wall.window, 0.0, 0.0)
-        smooth = keep * smooth + (1.0 - keep) * (p - past[-wall.window]) / (wall.window * Ts)
+        past, smooth, before = z or ([p] * wall.velocity_window, 0.0, 0.0)
+        smooth = keep * smooth + (1.0 - keep) * (p - past[-wall.velocity_window]) / (
+            wall.velocity_window * Ts
+        )
         rate = v if wall.velocity == "exact" else smooth
         force = -(wall.K * p + wall.B * rate + wall.M * (rate - before) / Ts)
-        return force, ([*past, p][-wall.window :], smooth, rate)
+        return force, ([*past, p][-wall.velocity_window :], smooth, rate)
 
     mass, damper = d.mass + hand.mass, d.damper + hand.damper
     omega = 2.0 * np.pi * np.array([2.0, 10.0, 25.0])
@@ -135,12 +139,12 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     B=st.floats(-1.0, 20.0),
     M=st.floats(-0.05, 0.1),
     delay=st.floats(0.0, 4e-3),
-    window=st.integers(1, 5),
+    velocity_window=st.integers(1, 5),
 )
 @settings(max_examples=25)
 def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, window):
     """Two derivations of one number; the hand's sidebands are none without its arm."""
-    wall = hc.VirtualWall(K, B, M, hc.Device(0.2, 0.7), delay=delay, window=window)
+    wall = hc.VirtualWall(K, B, M, hc.Device(0.2, 0.7), delay=delay, velocity_window=window)
     found = wall_response(wall, OMEGA)
     np.testing.assert_allclose(found.Z, hc.wall_impedance(wall, OMEGA), rtol=1e-8)
     # the device itself is left: fh = (m s + b) v + fe

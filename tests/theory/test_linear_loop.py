@@ -180,7 +180,7 @@ def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
 
 
 @pytest.mark.parametrize("delay", [0.0, 4e-4, 1e-3, 2.3e-3])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(delay, render):
     loops = [hc.Loop(axis, 90.0, TH, Ts=1e-3, delay=delay, render=render) for axis in "xy"]
     less, beta, gamma = linear_loop.sampled_differences(*loops)

@@ -264,7 +264,7 @@ def late_crossing(loop):
         s, late = 1j * w, np.exp(-1j * w * loop.delay)
         Th, be = m * s * s + d * s + k, loop.b * s
         f = -(Th + be)  # net force over place
-        free = s * s + W * Th + (W * be if loop.render == "implicit" else 0.0)
+        free = s * s + W * Th + (W * be if loop.render == "physical" else 0.0)
         held = s_.damping * s + s_.stiffness - (s_.gain - W) * f
         held = held + (W * be if loop.render == "held" else 0.0)
         lead = (s * s + s_.damping * s + s_.stiffness) * G(s) * C(s) * f
@@ -283,7 +283,7 @@ def late_crossing(loop):
 @given(
     loop=LOOPS,
     delay=st.floats(2e-4, 8e-3),
-    render=st.sampled_from(["held", "implicit"]),
+    render=st.sampled_from(["held", "physical"]),
     bare=st.none() | st.floats(0.3, 3.0),
 )
 def test_late_limits_are_those_of_a_direct_search(loop, delay, render, bare):
@@ -325,7 +325,7 @@ def period(loop, K):
         a, b, o, D = np.zeros((0, 0)), np.zeros(0), np.zeros(0), K * c.num[0] / c.den[0]
     n = len(b)
     W = s.gain if loop.mobility is None else loop.mobility
-    mass, physical = 1.0 / W + m, loop.b if loop.render == "implicit" else 0.0
+    mass, physical = 1.0 / W + m, loop.b if loop.render == "physical" else 0.0
     waits = int(loop.delay / Ts + 1e-9) + 1
     changes = loop.delay - (waits - 1) * Ts
     plant = np.array([[0, 1, 0], [-k / mass, -(d + physical) / mass, 1 / mass], [0, 0, 0]])
@@ -366,7 +366,7 @@ def radius(loop, K):
     loop=LOOPS,
     Ts=st.floats(5e-4, 5e-3),
     share=st.sampled_from([0.0, 0.0, 0.4, 1.0, 2.3]),
-    render=st.sampled_from(["held", "implicit"]),
+    render=st.sampled_from(["held", "physical"]),
     bare=st.none() | st.floats(0.3, 3.0),
 )
 def test_sampled_limits_are_those_of_the_period_map(loop, Ts, share, render, bare):
@@ -525,7 +525,7 @@ def test_the_loop_of_a_scenario_is_the_one_spelled_out():
     bare = dataclasses.replace(servo, S=dataclasses.replace(servo.S, gain=wx))
     spelled = hc.Loop("x", 50.0, None, bare, lead, 0.7, **timing)
     assert hc.Loop.of(cut, "x", 50.0) == spelled
-    shaped = hc.Loop.of(dataclasses.replace(cut, shaping=True), "x", 50.0)
+    shaped = hc.Loop.of(dataclasses.replace(cut, inertia_shaping=True), "x", 50.0)
     assert shaped == dataclasses.replace(spelled, servo=servo, mobility=wx)
     y = hc.Loop.of(cut, "y", 50.0)
     assert (y.operator, y.compensator, y.K, y.servo.S.gain) == (th, hc.Compensator(), 0.3, wy)

@@ -16,9 +16,9 @@ from hapticclay.theory.linear_loop import Loop
 
 TIMINGS = [
     dict(),
-    dict(delay=3e-3, render="implicit"),
-    dict(Ts=1e-3, render="implicit"),
-    dict(Ts=1e-3, delay=1.3e-3, render="implicit"),
+    dict(delay=3e-3, render="physical"),
+    dict(Ts=1e-3, render="physical"),
+    dict(Ts=1e-3, delay=1.3e-3, render="physical"),
 ]
 
 
@@ -65,7 +65,7 @@ def test_a_late_stiffness_is_the_loop_of_the_definition():
         dict(),
         dict(Ts=1e-3),
         dict(Ts=1e-3, delay=1.5e-3),
-        dict(Ts=1e-3, delay=1.5e-3, render="implicit"),
+        dict(Ts=1e-3, delay=1.5e-3, render="physical"),
     ],
 )
 def test_runs_grow_beyond_the_limit_of_k_and_decay_below(timing):

@@ -34,7 +34,7 @@ def walls(draw, whole=False):
         Ts=Ts,
         delay=delay * Ts,
         velocity="exact" if exact else "difference",
-        window=1 if exact else draw(st.integers(1, 4)),
+        velocity_window=1 if exact else draw(st.integers(1, 4)),
         velocity_filter=None if exact else draw(st.sampled_from([None, 0.05 / Ts])),
     )
 
@@ -52,7 +52,7 @@ class Stepped:
         self.a[3, 3] = 1j * omega
         self.z = np.array([x, v, 0.0, 1.0], dtype=complex)
         self.wall, self.past, self.w, self.last, self.queue = wall, [], 0.0, 0.0, []
-        self.past = [0.0] * (wall.window + 1)
+        self.past = [0.0] * (wall.velocity_window + 1)
 
     def sample(self):
         """One sample; yields the pieces of the hold as (state before, length)."""
@@ -61,7 +61,7 @@ class Stepped:
         self.past = [*self.past[1:], x]
         v = self.z[1]
         if w.velocity == "difference":
-            v = (x - self.past[0]) / (w.window * T)
+            v = (x - self.past[0]) / (w.velocity_window * T)
             if w.velocity_filter is not None:
                 keep = math.exp(-2.0 * math.pi * w.velocity_filter * T)
                 v = keep * self.w + (1.0 - keep) * v
@@ -176,7 +176,7 @@ def test_the_linear_rule_holds_in_its_range(samples, one, five):
         dict(delay=5e-4),
         dict(delay=1e-3),
         dict(delay=2e-3),
-        dict(delay=3e-4, window=3),
+        dict(delay=3e-4, velocity_window=3),
     ],
 )
 def test_runs_grow_beyond_the_band_and_decay_within_it(parts):
@@ -205,7 +205,7 @@ def test_the_passive_stiffness_is_that_of_colgate_and_schenkel(b, B, Ts):
 @settings(max_examples=25, deadline=None)
 @given(walls(whole=True))
 def test_with_window_filter_and_delay_the_condition_decides(wall):
-    wall = replace(wall, velocity="difference", window=wall.window, operator=None)
+    wall = replace(wall, velocity="difference", velocity_window=wall.velocity_window, operator=None)
     K, Ts = hc.colgate_schenkel_limit(wall), wall.Ts
     whole = round(wall.delay / Ts)
     keep = (
@@ -213,7 +213,12 @@ def test_with_window_filter_and_delay_the_condition_decides(wall):
     )
 
     def H(z, K):
-        D = (1.0 - z**-wall.window) / (wall.window * Ts) * (1.0 - keep) / (1.0 - keep / z)
+        D = (
+            (1.0 - z**-wall.velocity_window)
+            / (wall.velocity_window * Ts)
+            * (1.0 - keep)
+            / (1.0 - keep / z)
+        )
         return (K + (wall.B + wall.M * (1.0 - 1.0 / z) / Ts) * D) / z**whole
 
     def passive(K):
@@ -289,7 +294,7 @@ def test_friction_and_quantum():
     "parts",
     [
         dict(),
-        dict(delay=0.4e-3, window=3, velocity_filter=80.0),
+        dict(delay=0.4e-3, velocity_window=3, velocity_filter=80.0),
         dict(delay=2e-3, M=0.02),
         dict(velocity="exact", delay=1e-3),
     ],
@@ -352,8 +357,8 @@ def test_a_free_device_is_stable_if_it_is_damped():
         (lambda w: hc.wall_impedance(w, [0.0]), "omega"),
         (lambda w: hc.passivity_index(w, [[1.0]]), "omega"),
         (lambda w: hc.jury_limit(replace(w, delay=5e-4)), "wall.delay"),
-        (lambda w: hc.jury_limit(replace(w, window=2)), "wall.window"),
-        (lambda w: hc.stable_wall(replace(w, window=700)), "wall.window"),
+        (lambda w: hc.jury_limit(replace(w, velocity_window=2)), "wall.velocity_window"),
+        (lambda w: hc.stable_wall(replace(w, velocity_window=700)), "wall.velocity_window"),
         (lambda w: hc.hulin_boundary(0.1, 1.0, 1e-3, 101.0), "samples"),
     ],
 )

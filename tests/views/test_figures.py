@@ -54,7 +54,7 @@ def record(name):
     return hc.simulate(
         {
             "constant": hc.constant_cut(t_max=4.0),
-            "variable": hc.variable_cut(operator=HAND, shaping=True, t_max=3.0),
+            "variable": hc.variable_cut(operator=HAND, inertia_shaping=True, t_max=3.0),
             "driven": hc.stability_test(25.0, t_max=3.0),
             "yields": hc.Scenario(clay=yields, force=(5.0, 0.0), t_max=3.0),
             "ground": hc.Scenario(clay=across, force=(5.0, 0.0), t_max=2.0),
@@ -147,7 +147,7 @@ def passive(what):
     wall = hc.VirtualWall(K=500.0, B=0.2, device=hc.Device(0.1, 1.0), delay=5e-4)
     if what == "energy":
         stiff = hc.constant_cut(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=0.012)
-        return passivity_runs.energy_over_time(dataclasses.replace(stiff, stop=False))
+        return passivity_runs.energy_over_time(dataclasses.replace(stiff, stop_when_unstable=False))
     if what == "index":
         omega = np.geomspace(3.0, 3000.0, 50)
         index, some = hc.passivity_index(wall, omega), omega[::9]
@@ -188,7 +188,9 @@ def z_width(kind):
         return ZWidth((z_region("", wall, box=True),))
     if kind == "rest":
         device = hc.Device(0.1, 0.5, friction=0.02, quantum=2e-5)
-        wall = dataclasses.replace(wall, device=device, surface=True, operator=HAND, window=4)
+        wall = dataclasses.replace(
+            wall, device=device, unilateral=True, operator=HAND, velocity_window=4
+        )
         return ZWidth((z_region("", wall, rest=True, box=True),))
     dampers = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
     walls = [dataclasses.replace(wall, device=hc.Device(0.1, b)) for b in dampers]

@@ -205,9 +205,9 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
 def test_table_advises_physical_clay_where_motors_would_have_to_hold_the_handle():
     clay = hc.slab(hc.material("soft clay"), 0.05, 0.15)
     s = dataclasses.replace(hc.constant_cut(t_max=1.0), clay=clay, control="sampled")
-    assert "advice: --render implicit" in run_table(hc.simulate(s))
+    assert "advice: --render physical" in run_table(hc.simulate(s))
     for other in (
-        dataclasses.replace(s, render="implicit"),
+        dataclasses.replace(s, render="physical"),
         dataclasses.replace(s, clay=hc.slab(hc.Flow(Fy=0.5, b=40.0), 0.05, 0.15)),
     ):
         assert "advice" not in run_table(hc.simulate(other))
@@ -338,7 +338,7 @@ def led(stops, speed=0.2):
         gain=FREE,
         clay=hc.Clay.of_groove(BLOCK),
         length=None,
-        shaping=True,
+        inertia_shaping=True,
         command=hc.Samples(tuple(t), tuple(stops)),
     )
 
