@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ENDS = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 SET_HELP = (
     "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
-    "compensator.den=1,40,0 impedance=true operator.mass=500g; hapticclay fields lists the names."
+    "compensator.den=1,40,0 operator=true operator.mass=500g; hapticclay fields lists the names."
 )
 Changes = Annotated[  # words NAME=VALUE behind each --set
     tuple[tuple[str, ...], ...],

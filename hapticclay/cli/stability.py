@@ -51,7 +51,7 @@ class StabilityCommand:
         G: Gain, damping and stiffness of the position loop G; by default as printed.
         S: Gain, damping and stiffness of Sh, by default as printed; the gain with
             --inertia-shaping, else it is that of the arm.
-        impedance: Put the operator's arm Th (Eq. 19) in the loop.
+        operator: Put the operator's arm Th (Eq. 19) in the loop.
         inertia_shaping: Let the servo of the runs shape the inertia, so that Sh holds at every
             pose.
         clay: Clay that yields, Fy=5 K=2 n=0.5 beside b, or a material, "stiff clay": predict what
@@ -72,7 +72,7 @@ class StabilityCommand:
     den: tuple[float, ...] = C_DEN
     G: tuple[float, float, float] | None = None
     S: tuple[float, float, float] | None = None
-    impedance: bool = True
+    operator: bool = True
     inertia_shaping: bool = False
     clay: tuple[str, ...] | None = None
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose", "gain-yield"] = "none"
@@ -92,7 +92,7 @@ class StabilityCommand:
             self.axis,
             b=flow.b if flow else b,
             K=GAIN[i] if self.gain is None else self.gain,
-            operator=Operator() if self.impedance else None,
+            operator=Operator() if self.operator else None,
             servo=self._servo(i),
             compensator=Compensator(self.num, self.den),
             Ts=self.Ts,

@@ -17,7 +17,7 @@ from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, field_types, flag
+from ..errors import Bound, ParameterError, check_fields, field_types
 from .clay import Clay, Profile, slab
 from .constants import (
     AXES,
@@ -47,7 +47,6 @@ from .fields import (
     dotted_names,
     field_descriptions,
     function_of,
-    laid_over,
     make_part,
     merged_values,
     nested,
@@ -344,7 +343,7 @@ class Parameter(NamedTuple):
 
 @functools.cache
 def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
-    """Parameters of an experiment by name; `impedance`, a bool, stands for the nominal operator.
+    """Parameters of an experiment by name; `operator` is a bool, true for the arm of the paper.
 
     Args:
         kind: the experiment.
@@ -355,7 +354,7 @@ def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
         if name == "operator":
             nominal = given.default is not None
             about = "put the operator's arm Th (Eq. 19) in the loop."
-            out["impedance"] = Parameter(bool, nominal, "", about)
+            out[name] = Parameter(bool, nominal, "", about)
         else:
             out[name] = Parameter(hint, given.default, bound.unit if bound else "", told[name])
     return out
@@ -375,10 +374,10 @@ def from_words(
         ParameterError: as `Experiment.scenario`; or there is no such parameter or field.
     """
     values, others = dict(words), []
-    if "impedance" in values:
-        values["operator"] = _impedance(values.pop("impedance"))
+    if "operator" in values:
+        values["operator"] = _operator(values["operator"])
     split = [_split_names(kind, nested(given)) for given in changes]
-    before = values.get("operator", parameters(kind)["impedance"].default or None)
+    before = values.get("operator", parameters(kind)["operator"].default or None)
     check_added_hand(before, *(own for own, _ in split))
     for own, other in split:
         values = merged_values(kind, own, values)
@@ -387,9 +386,11 @@ def from_words(
     return experiment.changed(*others) if others else experiment.scenario()
 
 
-def _impedance(given: Any) -> Operator | None:
-    on = bool(given) if given in (0.0, 1.0) and isinstance(given, float) else given
-    return Operator() if flag("impedance", on) else None
+def _operator(given: Any) -> Any:
+    """The arm of the paper, or none, where a flag stands for it; a sweep gives flags as floats."""
+    if isinstance(given, bool) or (isinstance(given, float) and given in (0.0, 1.0)):
+        return Operator() if given else None
+    return given
 
 
 def _split_names(
@@ -398,9 +399,13 @@ def _split_names(
     """Plain data of the parameters of an experiment, and of other fields of the scenario."""
     types, known = field_types(kind), field_types(Scenario)
     data, own, other = dict(data), {}, {}
-    if "impedance" in data:
-        hand = _impedance(data.pop("impedance"))
-        data["operator"] = laid_over({ENTIRE: hand}, data.get("operator", {}))
+    if "operator" in data:
+        hand = (
+            data["operator"]
+            if isinstance(data["operator"], Mapping)
+            else {ENTIRE: data["operator"]}
+        )
+        data["operator"] = {k: _operator(v) if k is ENTIRE else v for k, v in hand.items()}
     for name, value in data.items():
         if name in types and (name not in known or _reaches(types[name], value)):
             own[name] = value

@@ -12,11 +12,12 @@ from typing import Any
 
 from ..errors import ParameterError, choice
 from ..files import atomic
+from .earlier_names import with_present_names
 from .experiments import EXPERIMENTS, from_words, parameter_names
 from .fields import check_added_hand, merged_values, nested, no_field, plain_data, values_of
 from .scenario import Scenario
 
-SCENARIO_SCHEMA = "hapticclay-scenario-1"
+SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
 SCENARIO_FILES = (".toml", ".json")
 
 
@@ -76,7 +77,7 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
             fault = f"byte {error.start} is no UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError("scenario", str(path), bound) from None
-    return {"name": file.stem, **data}
+    return {"name": file.stem, **with_present_names(data)}
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -105,7 +106,8 @@ def scenario_of(settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Sce
         ParameterError: there is no such field, or a value was refused.
     """
     data = nested(settings)
-    choice("schema", data.pop("schema", SCENARIO_SCHEMA), (SCENARIO_SCHEMA,))
+    given = data.pop("schema", SCENARIO_SCHEMA)
+    choice("schema", given, (SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2))
     if "experiment" in data:
         kind = EXPERIMENTS[choice("experiment", data.pop("experiment"), tuple(EXPERIMENTS))]
         return from_words(kind, {}, data, *changes)

@@ -23,7 +23,7 @@ from .spring import STIFFNESS_MAX
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
 STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
 UPRIGHT = 0.5 * math.pi  # [rad] joint 1 where x = 0
-WALL_SCHEMA = "hapticclay-wall-1"
+WALL_SCHEMA, WALL_SCHEMA_0_2 = "hapticclay-wall-2", "hapticclay-wall-1"
 SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
 MASS_MAX = 1e6  # [kg]
 
@@ -110,7 +110,7 @@ class VirtualWall:
         try:
             data = read_settings(path)
             del data["name"]
-            choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA,))
+            choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA, WALL_SCHEMA_0_2))
             return make_part(cls, nested(data))
         except ParameterError as error:
             field = "wall" if error.field == "scenario" else error.field

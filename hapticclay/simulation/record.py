@@ -18,6 +18,7 @@ from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
 from ..model.constants import AXES
+from ..model.earlier_names import with_present_names
 from ..model.fields import make_part, plain_data
 from ..model.scenario import Scenario
 from ..model.scenario_text import scenario_rows
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from ..views.record_plots import RecordPlots
     from .accuracy import Accuracy
 
-RECORD_SCHEMA = "hapticclay-record-1"
+RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
 ARRAYS = {
     "t": "s",
     "p": "m",
@@ -470,9 +471,9 @@ class Record:
                 ground = z["ground"] if "ground" in z else None
             _check(arrays | extra)
             schema = head["schema"]
-            if schema == RECORD_SCHEMA:
+            if schema in (RECORD_SCHEMA, RECORD_SCHEMA_0_2):
                 check_head(head)
-                scenario, lost = _scenario(head["scenario"])
+                scenario, lost = _scenario(with_present_names(head["scenario"]))
                 _check_ground(ground, scenario)
                 check_times(arrays["t"])
                 return cls(
@@ -480,7 +481,7 @@ class Record:
                     scenario=scenario,
                     outcome=Outcome(**head["outcome"]),
                     crossings=tuple(Crossing(**c) for c in head["crossings"]),
-                    energy=head["energy"],
+                    energy=with_present_names(head["energy"]),
                     steps=head["steps"],
                     wall_time=head["wall_time_s"],
                     versions=head["versions"],

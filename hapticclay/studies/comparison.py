@@ -15,7 +15,7 @@ from ..errors import ParameterError
 from ..model.fields import plain_data
 from ..model.scenario import Scenario
 from ..model.scenario_file import load_scenario, read_settings
-from ..model.virtual_wall import WALL_SCHEMA, VirtualWall
+from ..model.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import design, margins, wall_limits
@@ -111,7 +111,9 @@ def is_wall_file(path: str | os.PathLike[str]) -> bool:
         path: the file, .toml or .json.
     """
     data = read_settings(path)
-    return data.get("schema") == WALL_SCHEMA or bool(WALL_WORDS & {k.split(".")[0] for k in data})
+    return data.get("schema") in (WALL_SCHEMA, WALL_SCHEMA_0_2) or bool(
+        WALL_WORDS & {k.split(".")[0] for k in data}
+    )
 
 
 def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Compared:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import ParameterError, choice, integer
 from ..files import versions
+from ..model.earlier_names import with_present_names
 from ..model.experiments import EXPERIMENTS
 from ..model.fields import join_names, named_values
 from ..model.scenario import Scenario
@@ -313,7 +314,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
     for name in ("vary", "fixed"):
         if not isinstance(data.get(name, {}), dict):
             raise ParameterError(name, data[name], "must be a table")
-        data[name] = _flat(data.get(name, {}))
+        data[name] = _flat(with_present_names(data.get(name, {})))
     if "scenario" in data:
         if "experiment" in data or not isinstance(data["scenario"], str):
             bound = "must be the path of a scenario file, without an experiment beside it"

@@ -175,11 +175,11 @@ def test_the_first_parameters_are_positional():
 
 
 @pytest.mark.parametrize("name", experiments.EXPERIMENTS)
-def test_the_word_impedance_is_the_nominal_operator(name):
+def test_a_flag_is_the_nominal_operator(name):
     kind = experiments.EXPERIMENTS[name]
     for on, operator in ((True, hc.Operator()), (False, None)):
-        assert experiments.from_words(kind, {"impedance": on}) == hc.SCENARIOS[name](
+        assert experiments.from_words(kind, {"operator": on}) == hc.SCENARIOS[name](
             operator=operator
         )
-    with pytest.raises(ParameterError, match="impedance = 1: must be True or False"):
-        experiments.from_words(kind, {"impedance": 1})
+    with pytest.raises(ParameterError, match="operator = 1: must be"):
+        experiments.from_words(kind, {"operator": 1})

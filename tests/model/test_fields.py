@@ -170,6 +170,6 @@ def test_docstrings_name_the_unit_of_every_bound(kind):
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_parameters_of_an_experiment_make_its_scenario(name):
     known = parameters(EXPERIMENTS[name])
-    assert "operator" not in known and known["impedance"].default is (name == "stability")
+    assert "impedance" not in known and known["operator"].default is (name == "stability")
     assert all(p.about for p in known.values())
     assert issubclass(EXPERIMENTS[name], Experiment) and EXPERIMENTS[name]().scenario().name == name

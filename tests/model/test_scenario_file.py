@@ -189,7 +189,7 @@ def test_a_file_is_short_and_has_units(tmp_path):
     changes["operator.y"] = hc.Operator(0.5)
     scenario = with_fields(hc.free(), {**changes, "operator.x": None, "length": None})
     assert scenario.save(tmp_path / "s.toml").read_text() == (
-        'schema = "hapticclay-scenario-1"\n'
+        'schema = "hapticclay-scenario-2"\n'
         'name = "free"\n'
         "gain = [2.0, 0.5]  # 1/kg\n"
         'length = "none"  # m\n'
@@ -297,7 +297,7 @@ def test_a_pair_may_be_a_list_of_tables(tmp_path):
         ("experiment = 'constant'\nbb = 3", "bb = 3: no such field; did you mean 'b'?"),
         ("experiment = 'constant'\nb = -3", "b = -3: must be a finite number >= 0"),
         ("b = 3", "b = 3: no such field"),
-        ("schema = 'hapticclay-record-1'", "must be one of hapticclay-scenario-1"),
+        ("schema = 'hapticclay-record-1'", "must be one of hapticclay-scenario-2"),
         ("dt.x = 3", "dt.x = 3: no such field: dt has no parts"),
         ("'' = 3", " = 3: no such field"),
         ("x.''.'y.z' = 3", "no such field"),
@@ -445,7 +445,7 @@ def test_an_experiment_takes_parameters_and_fields_at_once():
     s = from_words(kind, {"b": 50.0}, {**small, "clay.x.values.1": 7.0})  # no reach without
     assert s.arm == hc.Arm(0.05, 0.05) and s.length == 0.02
     assert (s.clay.x.values, s.clay.y.values) == ((0.0, 7.0, 0.0), (0.0, 50.0, 0.0))
-    s = from_words(kind, {}, {"clay.begin": 0.06, "impedance": True, "operator.mass": 1.0})
+    s = from_words(kind, {}, {"clay.begin": 0.06, "operator": True, "operator.mass": 1.0})
     assert s.clay.x.edges == (0.06, 0.15) and s.operator == hc.Operator(1.0)
     s = from_words(EXPERIMENTS["stability"], {}, {"gain": 3.0, "gain.y": 0.2, "muscle.seed": 5.0})
     assert s.gain == (3.0, 0.2) and s.muscle.seed == 5

@@ -153,7 +153,7 @@ def test_any_field_of_any_part_is_varied_by_name(tmp_path):
     grid = " ".join(f"{name}=0.3:0.4:2" for name in names)
     sampled = {
         "control": "sampled", "hardware.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
-        "impedance": True,
+        "operator": True,
     }  # fmt: skip
     s = Sweep("constant", parse_grid(grid), sampled)
     assert len(s) == 2 ** len(names)
@@ -167,7 +167,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     (tmp_path / "mine.toml").write_text('experiment = "free"\ngain = [1, 0.4]\n[arm]\nl1 = 0.3\n')
     spec = tmp_path / "spec.toml"
     spec.write_text('scenario = "mine.toml"\n[vary]\narm.l2 = "0.3:0.4:2"\n"gain.x" = [1, 2]\n'
-                    "[fixed]\nt_max = 0.01\nimpedance = true\noperator.mass = 0.5\n")  # fmt: skip
+                    '[fixed]\nt_max = 0.01\noperator = true\n"operator.mass" = 0.5\n')  # fmt: skip
     s = Sweep(**sampling.load_sweep(spec))
     assert s.title == "mine" and list(s.vary) == ["arm.l2", "gain.x"]
     got = s.run_scenario(s.points(1, 2)[0])

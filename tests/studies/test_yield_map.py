@@ -142,7 +142,7 @@ def test_a_loop_that_never_buzzes_has_no_map(monkeypatch):
 def test_the_command_predicts(tmp_path, capsys):
     folder = tmp_path / ("long" * 20)  # a path has the length that it has
     command = stability.StabilityCommand(
-        "y", gain=1.0, impedance=False, clay=("Fy=5", "b=30"), out=folder
+        "y", gain=1.0, operator=False, clay=("Fy=5", "b=30"), out=folder
     )
     assert command() == 0
     out = capsys.readouterr().out
