@@ -96,21 +96,6 @@ def jacobians(q1: Any, q2: Any, links: Links) -> tuple[Any, ...]:
     return -l1 * np.sin(q1), l1 * np.cos(q1), -l2 * np.sin(a), l2 * np.cos(a)
 
 
-def handle_position(q1: float, q2: float, links: Links) -> tuple[float, float]:
-    """World position of the handle.
-
-    Args:
-        q1: angle of link 1 [rad].
-        q2: angle of link 2 against link 1 [rad].
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (x, y) [m].
-    """
-    u1x, u1y, u2x, u2y = jacobian(q1, q2, links)
-    return u1y + u2y, -u1x - u2x
-
-
 def mobility(u, links):
     """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987).
 
@@ -193,25 +178,6 @@ def joint_torques(fx, fy, u):
     u1x, u1y, u2x, u2y = u
     t2 = u2x * fx + u2y * fy
     return u1x * fx + u1y * fy + t2, t2
-
-
-def handle_acceleration(a1, a2, fx, fy, u, links):
-    """Acceleration of a handle at rest, from link accelerations and a force.
-
-    Args:
-        a1: acceleration of link 1 [rad/s^2].
-        a2: acceleration of link 2 [rad/s^2].
-        fx: force on the handle, x [N].
-        fy: force on the handle, y [N].
-        u: from `jacobian` [m].
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (ax, ay) [m/s^2].
-    """
-    ax, ay = handle_velocity(a1, a2, u)
-    wxx, wxy, wyy = mobility(u, links)
-    return ax + wxx * fx + wxy * fy, ay + wxy * fx + wyy * fy
 
 
 def joint_velocity(vx, vy, u, n):

@@ -99,21 +99,6 @@ def slow_force(g, W, share, f):
     return x, y
 
 
-def viscous_force(bx, by, vx, vy):
-    """Resisting force of the clay, fe = b v (Eqs. 3, 4). Numbers, or arrays of one shape.
-
-    Args:
-        bx: damping, x [N.s/m].
-        by: damping, y [N.s/m].
-        vx: velocity, x [m/s].
-        vy: velocity, y [m/s].
-
-    Returns:
-        (fex, fey) [N].
-    """
-    return bx * vx, by * vy
-
-
 def turned_force(c, s, bx, by, vx, vy):
     """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
 
@@ -145,21 +130,6 @@ def turned_damping(c, s, bx, by):
         (xx, yy, xy) [N.s/m].
     """
     return c * c * bx + s * s * by, s * s * bx + c * c * by, c * s * (bx - by)
-
-
-def constant_profile(b: float, start: float, end: float, along: Literal["x", "y"] = "x") -> Profile:
-    """Constant damping in one interval of a coordinate, none elsewhere.
-
-    Args:
-        b: damping [N.s/m].
-        start: lower border [m].
-        end: upper border [m].
-        along: coordinate that decides, "x" or "y".
-
-    Returns:
-        The profile.
-    """
-    return Profile(edges=(start, end), values=(0.0, b, 0.0), along=along)
 
 
 @checked

@@ -30,7 +30,6 @@ HALF = tuple(
     for k in range(SECTORS)
 )
 RIM = 4 * 4 * SECTORS  # numbers of the rim: four a sector, see `cut`
-BLOCK_NUMBERS = 10  # numbers of Groove.numbers
 
 
 def outside(u):

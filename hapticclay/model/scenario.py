@@ -6,7 +6,7 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from ..arguments import named
 from ..display import html_table, one_line
@@ -40,7 +40,6 @@ SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
-RENDERS = get_args(Render)
 
 
 @named

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..model import arm, regions
-from . import borders, grooves, hardware, sampled, yielding
+from . import borders, grooves, hardware, sampled, viscous, yielding
 from .engine_step import put
 from .kick import handle_at, place
 from .parts import INF
@@ -74,15 +74,9 @@ def clay_at(parts, blocks, body, p):
     )
     at = handle_at(parts.arm, body, 0.0)
     clay = borders.clay_in(parts, clay, index, 0.0, at.p, -1, 1.0)
-    growth = same_growth(blocks.growth, clay.growth)
+    growth = viscous.same_growth(blocks.growth, clay.growth)
     clay = Clay(clay.region, clay.b, clay.b, growth, clay.hit, clay.reaction, clay.laws)
     return cut_at(parts.special, clay, at)
-
-
-def same_growth(blocks, growth):
-    if blocks is None:
-        return growth
-    return Growth(growth.rate, growth.rate)
 
 
 def cut_at(special, clay, at):

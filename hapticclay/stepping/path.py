@@ -22,7 +22,6 @@ from .state import (
     Clay,
     Clock,
     Filled,
-    Growth,
     Laws,
     State,
     Status,
@@ -98,12 +97,6 @@ def closed(s):
 # ---- a step --------------------------------------------------------------------------------------
 
 
-def same_growth(part, growth):
-    if part is None:
-        return growth
-    return Growth(growth.rate, growth.rate)
-
-
 def noted(special, e, before, after, t, n):
     """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
@@ -135,7 +128,7 @@ def clay_behind(part, parts, clay, hit, reaction, body, h):
     """
     if part is None:
         return clay
-    growth = same_growth(part.growth, clay.growth)
+    growth = viscous.same_growth(part.growth, clay.growth)
     c = clay
     clay = Clay(c.region, c.b, c.b, growth, hit, reaction, c.laws)
     return laws_behind(parts.special, parts, clay, body, h)

@@ -6,12 +6,13 @@ torques, which brings the velocity to the sample, where it is measured, and one 
 
 from __future__ import annotations
 
-from ..model import arm, compensator, controller, operator
+from ..model import arm, compensator, controller
 from ..model import flow as yielding_law
 from ..model import spring as spring_law
 from . import friction, grooves, hardware, laws, rows, servo, viscous, yielding
 from .driver import behind, pushed
 from .engine_step import moved_arm, put
+from .hand import masses, with_hand_now
 from .kick import (
     at_rates,
     clipped,
@@ -51,13 +52,6 @@ FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample,
 # ---- the operator's force on the sensor, and that of clay that yields, at an instant -------------
 
 
-def masses(hand):
-    """Masses of the hand, (x, y) [kg]."""
-    if hand is None:
-        return NONE
-    return hand[0].mass, hand[1].mass
-
-
 def instant_acceleration(parts, at, tau, f):
     """Acceleration of the handle and its hand under torques and a force, (x, y) [m/s^2]."""
     x, y = masses(parts.hand)
@@ -69,13 +63,7 @@ def instant_acceleration(parts, at, tau, f):
 
 def resisted(hand, uh, at):
     """Muscle force less that of the hand without its acceleration along the way, (x, y) [N]."""
-    if hand is None:
-        return uh
-    (x, y), p, v, c = hand, at.p, at.v, at.c
-    return (
-        uh[0] - operator.operator_force(x.spring, x.mass, x.damper, p[0], c[0], v[0]),
-        uh[1] - operator.operator_force(y.spring, y.mass, y.damper, p[1], c[1], v[1]),
-    )
+    return with_hand_now(hand, Load(uh, (0.0, 0.0, 0.0)), at).f
 
 
 def without_clay(part, sampler, grain, s, at, f):

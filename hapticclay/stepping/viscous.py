@@ -110,6 +110,13 @@ def smooth_damping(smooth, table, b, p):
     return regions.smooth_clay(table, smooth, p[0], p[1], b[0], b[1])
 
 
+def same_growth(part, growth):
+    """Growth behind a step: the clay before the sample is that of now."""
+    if part is None:
+        return growth
+    return Growth(growth.rate, growth.rate)
+
+
 def at_place(smooth, table, clay, p):
     """The clay at a place, where it is smooth: that before the sample too."""
     if smooth is None:

@@ -2,6 +2,7 @@
 
 import math
 from decimal import Decimal
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -15,6 +16,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import compensator
 from hapticclay.model.compensator import ORDER, Compensator
+from hapticclay.stepping import servo
 
 EPS = np.finfo(float).eps
 OMEGA = np.logspace(-2, 5, 40)
@@ -425,20 +427,22 @@ def test_a_kick_shows_the_output_at_its_sample_and_ends_half_a_step_later(c, bef
     kick, work = [0.0] * (2 * compensator.KICK), [0.0] * compensator.WORK
     for i in (0, 1):
         compensator.form_kick(form, max(n, 1), i, before, after, work, kick)
-    z = [0.0] * ORDER + list(x[:n]) + [0.0] * (ORDER - n)
+    z = list(x[:n]) + [0.0] * (ORDER - n)
     _, B, C, D = c.state_space()
     held_force, early, whole = (f, 0.0, 0.0) if before == after else (0.0, after, before + after)
     at = expm(augmented(c, 0.5 * before)) @ (*x[:n], held_force)
     kicked = at[:n] + 0.5 * whole * B * f
     end = expm(augmented(c, 0.5 * after)) @ (*kicked, held_force)
     at[:n] += 0.5 * early * B * f
-    shown = compensator.form_output(kick, z, 1) + kick[compensator.KICK + compensator.FEED] * f
+    part = SimpleNamespace(kick=kick, gain=(1.0, 1.0))
+    shown, feed = servo.shown_axis(part, 1, z)
+    shown += feed * f
     scale = np.abs(C).sum() + abs(D)
     assert shown == pytest.approx(C @ at[:n] + D * f, abs=1e-11 * scale * (1 + np.abs(at).max()))
-    compensator.form_advance(kick, z, 1, f)
+    z = servo.state_after(part, 1, z, f)
     bound = 1e-11 * (1 + np.abs(end).max())
-    np.testing.assert_allclose(z[ORDER : ORDER + n], end[:n], atol=bound)
-    assert not any(z[:ORDER]) and not any(z[ORDER + n :])
+    np.testing.assert_allclose(z[:n], end[:n], atol=bound)
+    assert not any(z[n:])
 
 
 @given(shapes(), st.tuples(*[st.floats(-1, 1)] * 5))
@@ -449,19 +453,13 @@ def test_four_stages_are_a_step_of_runge_kutta(c, x):
     h = 0.1 / fastest if fastest else 0.1
     M = augmented(c, h)
     out = sum(np.linalg.matrix_power(M, k) / math.factorial(k) for k in range(5)) @ (*x[:n], f)
-    start = [0.0] * ORDER + list(x[:n]) + [0.0] * (ORDER - n)
-    s = dict(
-        form=[0.0] * compensator.FORM + compensator.form_numbers(c),
-        form_states=start,
-        form_point=[*start],
-        form_sums=[0.0] * (2 * ORDER),
-    )
+    start = z = np.array(list(x[:n]) + [0.0] * (ORDER - n))
+    numbers = [0.0] * compensator.FORM + compensator.form_numbers(c)
+    part, end = SimpleNamespace(numbers=numbers, gain=(1.0, 1.0)), start
     for weight, ahead in ((1.0, 0.5 * h), (2.0, 0.5 * h), (2.0, h), (1.0, 0.0)):
-        compensator.form_stage(s, 1, f, weight, ahead)
-    end = np.array(start) + h / 6.0 * np.array(s["form_sums"])
-    np.testing.assert_allclose(
-        end[ORDER : ORDER + n], out[:n], atol=1e-13 * (1 + np.abs(out).max())
-    )
+        rate = np.array(servo.form_rates(part, 1, z, f))
+        end, z = end + h / 6.0 * weight * rate, start + ahead * rate
+    np.testing.assert_allclose(end[:n], out[:n], atol=1e-13 * (1 + np.abs(out).max()))
 
 
 # ---- states at the start

@@ -1,6 +1,7 @@
 """The MJCF files compile without a warning and mean what they say."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.model import arm
 from hapticclay.model.signals import Multisine
-from hapticclay.stepping import engine, path
+from hapticclay.stepping import engine, kick, path
 from hapticclay.views import stage
 from tests.oracles.links import Links
 
@@ -168,7 +169,8 @@ def test_the_model_is_that_of_any_arm(a, q1, q2):
     own, links, bound = Links(a.l1, a.l2, a.I1, a.I2), a.links, 1e-14 * max(1.0, a.l1 + a.l2)
     p, J, M = engine.arm_at((q1, q2), a)
     np.testing.assert_allclose(p, own.forward((q1, q2)), atol=bound)
-    np.testing.assert_allclose(p, arm.handle_position(q1, q2, links), atol=bound)
+    here = kick.place(SimpleNamespace(links=links, ox=0.0, oy=0.0), (q1, q2))
+    np.testing.assert_allclose(here, p, atol=bound)
     np.testing.assert_allclose(J, own.jacobian((q1, q2)), atol=bound)
     np.testing.assert_allclose(M, own.M, rtol=1e-13)
     u = arm.jacobian(q1, q2, links)

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import hapticclay as hc
-from hapticclay.model import arm, clay, controller
+from hapticclay.model import arm, clay
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping import driver, kick, path, sampled
 from hapticclay.stepping import run as runs
 from hapticclay.stepping.run import Run
 from hapticclay.stepping.state import Axis, Loop
-from tests.oracles import Arm
-from tests.oracles.laws import servo_kick
+from tests.oracles import Arm, laws
+from tests.oracles.links import Links
 
 OTHER = dict(  # parts that have nothing in common with the paper's
     arm=hc.Arm(0.3, 0.25, 0.05, 0.4),
@@ -85,7 +85,7 @@ def kick_by_laws(run, state, before, after):
     formed = state.loop.form is not None
     hands, links = [th or NO_HAND for th in s.operators], s.arm.links
     u = arm.jacobian(*state.body.q, links)
-    p = [a - b for a, b in zip(arm.handle_position(*state.body.q, links), s.origin, strict=True)]
+    p = Links(*links[:4]).forward(state.body.q) - s.origin
     (w1, w2), (g1, g2) = state.body.w, state.body.g
     v = arm.handle_velocity(w1, w1 + w2, u)
     c = arm.centripetal(w1 + 0.5 * before * g1, w1 + w2 + 0.5 * before * g2, u)
@@ -105,7 +105,7 @@ def kick_by_laws(run, state, before, after):
         th, compensator, K = hands[i], s.compensators[i], s.gain[i]
         delta, yi, ydi = (x, y)[i].delta, (x, y)[i].y, (x, y)[i].yrate
         ratio = s.servo[i].G.gain / s.servo[i].G.stiffness
-        keep, take, ni, mi, spring = controller.servo_coefficients(s.servo[i].numbers, H, L, R)
+        keep, take, ni, mi, spring = laws.servo_weights(s.servo[i], H, L, R)
         feed.append((0.0, 0.0))
         if formed:  # what it shows at the sample without the force of the kick, and per N
             _, B, C, D = compensator.state_space()
@@ -117,14 +117,14 @@ def kick_by_laws(run, state, before, after):
             feed[i] = K * (C @ moved + D), take
             W[2 * i] += ni * take * ratio * feed[i][0]
         vr = keep * ydi + take * (ratio * delta - yi)
-        a.append(controller.servo_acceleration((ni, mi, spring), vr, ydi, v[i], yi, p[i], c[i]))
+        a.append(laws.servo_acceleration(ni, mi, spring, (ydi, vr), v[i], yi, p[i], c[i]))
         n.append(ni)
         rate.append([vr, delta, ratio])
         mass = th.mass + 0.25 * th.spring * H * H
         th0, th1 = th.damper * L - mass / H, th.damper * R + mass / H
         f.append(s.force[i] - (b0x, b0y)[i] * v[i] - (th.spring * p[i] - mass * c[i] + th0 * v[i]))
         d.append((b1x, b1y)[i] + th1)
-    ux, uy, _, _, *ff, t1, t2 = servo_kick(H, v, u, links, n, a, W, f, d)
+    ux, uy, _, _, *ff, t1, t2 = laws.servo_kick(H, v, u, links, (n, a, W), (f, d))
     each = list(zip(rate, feed, ff, strict=True))
     rates = [vr + take * ratio * e * x for (vr, _, ratio), (e, take), x in each]
     shown = [delta + e * x for (_, delta, _), (e, _), x in each]
@@ -139,7 +139,7 @@ def kick_by_laws(run, state, before, after):
                 kicked = held(compensator, 0.5 * before, z, 0.0) + H * B * drive
                 states += [*held(compensator, 0.5 * after, kicked, 0.0)]
         else:
-            keep, take = controller.compensator_coefficients(compensator.den[1], H, L, R)
+            keep, take = laws.trapezoid(compensator.den[1], H, L, R)
             states.append(keep * (x, y)[i].rate + take * s.gain[i] * ff[i])
     return (ux, uy), ff, (t1, t2), rates, shown, states
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm, clay, controller, operator
+from hapticclay.model import arm, controller
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping.instant import instant
 from hapticclay.stepping.run import PLAIN, Run
 from hapticclay.stepping.state import Axis, Moment, Point
-from tests.oracles import nonlinear, piecewise_linear, store
-from tests.oracles.laws import servo_kick
+from tests.oracles import laws, nonlinear, piecewise_linear, store
+from tests.oracles.links import Links
 
 EDGES = (0.05, 0.15, 0.20)
 CASES = {
@@ -174,14 +174,14 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     now = instant(parts, Moment(0.0, 0.0, -1, 0.0), z, clay_now, None)
     hands = [th or NO_HAND for th in s.operators]
     u = arm.jacobian(q1, q2, links)
-    p = np.subtract(arm.handle_position(q1, q2, links), s.origin).tolist()
+    p = (Links(*links[:4]).forward((q1, q2)) - s.origin).tolist()
     v, c = arm.handle_velocity(w1, w1 + w2, u), arm.centripetal(w1, w1 + w2, u)
     W = (
         [s.servo[0].S.gain, 0.0, s.servo[1].S.gain]
         if s.inertia_shaping
         else [*arm.mobility(u, links)]
     )
-    fe = clay.viscous_force(b, b, *v)
+    fe = b * v[0], b * v[1]
     a, hand, shown, feed = [], [], [dx, dy], [0.0, 0.0]
     for i, (y, yd) in enumerate(((yx, ydx), (yy, ydy))):
         th, servo = hands[i], s.servo[i]
@@ -192,14 +192,16 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
             W[2 * i] += servo.G.gain * feed[i]  # a force moves delta, and delta the reference
         ydd = servo.G.gain * shown[i] - servo.G.stiffness * y - servo.G.damping * yd
         k, d = servo.S.stiffness, servo.S.damping
-        a.append(controller.servo_acceleration((1.0, -d, k), ydd, yd, v[i], y, p[i], c[i]))
+        a.append(laws.servo_acceleration(1.0, -d, k, (yd, ydd), v[i], y, p[i], c[i]))
         law = controller.feedback_law(servo.numbers, shown[i], y, yd, p[i], v[i], c[i])
         np.testing.assert_allclose(law, (a[i], ydd), rtol=1e-12, atol=1e-11)
-        resists = operator.operator_force(th.spring, th.mass, th.damper, p[i], c[i], v[i])
+        resists = th.spring * p[i] - th.mass * c[i] + th.damper * v[i]
         hand.append(s.force[i] - resists)
     net = hand[0] - fe[0], hand[1] - fe[1]
     mass = hands[0].mass, hands[1].mass
-    out = servo_kick(1.0, (0.0, 0.0), u, links, (1.0, 1.0), a, W, net, mass, s.torque_limit)
+    out = laws.servo_kick(
+        1.0, (0.0, 0.0), u, links, ((1.0, 1.0), a, W), (net, mass), s.torque_limit
+    )
     fh = out[4] + fe[0], out[5] + fe[1]
     delta = shown[0] + feed[0] * out[4], shown[1] + feed[1] * out[5]
     expected = (*p, *v, *fh, *out[6:8], *delta)

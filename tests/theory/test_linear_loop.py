@@ -14,7 +14,7 @@ from hapticclay.model import controller
 from hapticclay.model.controller import SERVO
 from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop
-from tests.oracles import Linear, piecewise_linear
+from tests.oracles import Linear, laws, piecewise_linear
 
 TH = Operator()
 
@@ -166,9 +166,9 @@ def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
     i = "xy".index(axis)
     servo = SERVO[i]
     p, v, delta, _, y, yd = state
-    keep, take, *weights = controller.servo_coefficients(servo.numbers, H, 1.0, 0.0)
+    keep, take, *weights = laws.servo_weights(servo, H, 1.0, 0.0)
     ahead = keep * yd + take * (delta - y)
-    law = controller.servo_acceleration(weights, ahead, yd, v, y, p, 0.0) - v / H
+    law = laws.servo_acceleration(*weights, (yd, ahead), v, y, p, 0.0) - v / H
     size = np.abs(state) @ np.abs(controller.feedback_vector(servo))
     assert law == pytest.approx(
         controller.feedback_vector(servo) @ state, abs=1e-14 * (size + 4.0 / H)
