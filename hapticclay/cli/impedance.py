@@ -120,15 +120,15 @@ def impedance_table(found: MeasuredImpedance) -> str:
     """
     m, c = found.measured, found.computed
     off = abs(m.Z / c.Z - 1.0)
-    columns = zip(m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.felt), strict=True)
+    columns = zip(m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.transparency), strict=True)
     rows = [
         [
             f"{f:.4g}",
             *(console.significant(float(x)) for x in (stiffness, damping, mass)),
             f"{100.0 * gap:.4f} %",
-            console.significant(float(felt)),
+            console.significant(float(transparency)),
         ]
-        for f, stiffness, damping, mass, gap, felt in columns
+        for f, stiffness, damping, mass, gap, transparency in columns
     ]
     head = ["Hz", "stiffness [N/m]", "damping [N.s/m]", "mass [kg]", "off theory", "|fe/fh|"]
     lines = [

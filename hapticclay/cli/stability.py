@@ -356,8 +356,8 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
         passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
         "N.s/m to spare",
     )
-    felt = margins.transparency(linear, np.array([ONE_HZ]))[0]
-    response("transparency |fe/fh| at 1 Hz", float(abs(felt)), "1 at best", ONE_HZ)
+    transparency = margins.transparency(linear, np.array([ONE_HZ]))[0]
+    response("transparency |fe/fh| at 1 Hz", float(abs(transparency)), "1 at best", ONE_HZ)
     return rows
 
 

@@ -14,9 +14,9 @@ from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
 from .fields import function_name
 
-# floats of the desk that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
+# floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
 # measured, hand force [N], torques [N.m]; then the law's state now and after, and its parameters
-DESK = 9
+BUFFER = 9
 TORQUE = 7  # place of the torques
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*(:[^\W\d]\w*(\.[^\W\d]\w*)*)?")
 
@@ -98,11 +98,11 @@ class LawFailed(RuntimeError):
 
 
 class LawCaller:
-    """Calls a law between the loop's reading of the desk and its taking the torques.
+    """Calls a law between the loop's reading of the buffer and its taking the torques.
 
     Args:
         controller: whose law.
-        desk: the shared floats, shape (n,).
+        buffer: the shared floats, shape (n,).
 
     Attributes:
         law: the function.
@@ -111,14 +111,14 @@ class LawCaller:
         called: what machine code calls, once it does.
     """
 
-    def __init__(self, controller: Controller, desk: Any):
+    def __init__(self, controller: Controller, buffer: Any):
         self.controller, self.law = controller, controller.function()
-        self.desk: Any = memoryview(desk)
+        self.buffer: Any = memoryview(buffer)
         self.error: BaseException | None = None
         self.pointer: Any = None
         self.called: Any = None
         self._returned = 0.0, 0.0
-        self._ends = DESK + len(controller.state), DESK + 2 * len(controller.state)
+        self._ends = BUFFER + len(controller.state), BUFFER + 2 * len(controller.state)
 
     def __call__(self, _desk: object = None) -> None:
         try:  # machine code drops what is raised here: it ends the run, and `check` raises it
@@ -126,12 +126,12 @@ class LawCaller:
                 self._answer()
         except BaseException as error:
             self.error = error
-            self.desk[TORQUE] = self.desk[TORQUE + 1] = math.nan
+            self.buffer[TORQUE] = self.buffer[TORQUE + 1] = math.nan
 
     def _answer(self) -> None:
-        t, q1, q2, w1, w2, fx, fy = self.desk[:TORQUE].tolist()
+        t, q1, q2, w1, w2, fx, fy = self.buffer[:TORQUE].tolist()
         middle, end = self._ends
-        state = tuple(self.desk[DESK:middle].tolist())
+        state = tuple(self.buffer[BUFFER:middle].tolist())
         answer: Any = self.law(t, (q1, q2), (w1, w2), (fx, fy), state, self.controller.params)
         try:
             (t1, t2), after = answer
@@ -142,13 +142,13 @@ class LawCaller:
         if len(after) != len(state):
             raise TypeError(f"state must have {len(state)} numbers, not {len(after)}")
         for j, x in enumerate(after):
-            self.desk[middle + j] = x
+            self.buffer[middle + j] = x
         self._returned = t1, t2
-        self.desk[TORQUE], self.desk[TORQUE + 1] = t1, t2
+        self.buffer[TORQUE], self.buffer[TORQUE + 1] = t1, t2
 
     def finite(self) -> bool:
         """Whether the torques are."""
-        return all(map(math.isfinite, self.desk[TORQUE : TORQUE + 2].tolist()))
+        return all(map(math.isfinite, self.buffer[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
         """Raises LawFailed if a call has failed; machine code of it leaves torques not finite.
@@ -161,11 +161,11 @@ class LawCaller:
                 self()  # in Python, which says why
             elif all(map(math.isfinite, self._returned)):
                 self.error = KeyboardInterrupt()  # it came before the call could keep it
-            torques = tuple(self.desk[TORQUE : TORQUE + 2].tolist())
-            if self.error is None and self.desk[0] <= 0.0:
+            torques = tuple(self.buffer[TORQUE : TORQUE + 2].tolist())
+            if self.error is None and self.buffer[0] <= 0.0:
                 self.error = ValueError(f"torques must be finite, not {torques}")
         if isinstance(self.error, Exception):
             what = f"{type(self.error).__name__}: {self.error}"
-            raise LawFailed(f"controller.law at t = {self.desk[0]:g} s: {what}") from self.error
+            raise LawFailed(f"controller.law at t = {self.buffer[0]:g} s: {what}") from self.error
         if self.error is not None:
             raise self.error

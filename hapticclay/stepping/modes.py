@@ -63,16 +63,16 @@ def is_rough(law, i):
     return law[3 * i + 1] > 0.0 and n != math.floor(n)
 
 
-def creep_speed(lightness, dt, K, n):
+def creep_speed(mobility, dt, K, n):
     """Speed below which clay of n < 1 is too stiff for SUBSTEPS a sample [m/s]; else 0."""
     if K <= 0.0 or n >= 1.0:
         return 0.0
-    return (dt * lightness * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
+    return (dt * mobility * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
 
 
 def slowest(modal, law, i):
     """As `creep_speed`, of an axis."""
-    return creep_speed(modal.lightness, modal.dt, law[3 * i + 1], law[3 * i + 2])
+    return creep_speed(modal.mobility, modal.dt, law[3 * i + 1], law[3 * i + 2])
 
 
 def holding_force(modal, law, i):
@@ -199,7 +199,7 @@ def across(B, e):
 
 
 def acceleration(x):
-    """Acceleration of the handle as felt, along the axes of the clay [m/s^2]."""
+    """Acceleration of the handle that the clay sees, along the axes of the clay [m/s^2]."""
     return left_of(x.a, x.B, x.f)
 
 

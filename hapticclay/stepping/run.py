@@ -90,7 +90,7 @@ def one_plainly(run: Run, step: Callable[..., State]) -> None:
 
     Args:
         run: the run.
-        step: path.step or path.careful.
+        step: path.step or path.step_to_event.
     """
     try:
         run.state = step(run.views, run.state, run.e)
@@ -176,11 +176,11 @@ class EngineStore:
         self.room_for(parts)
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
-        felt: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
+        probed: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
         step, forward, *engine_ = kernel.calls(model, data)
         probe = None
         if parts.accurate is not None:
-            probe = Probe(forward, *engine_, *map(kernel.place, felt))
+            probe = Probe(forward, *engine_, *map(kernel.place, probed))
         places = map(kernel.place, [*own, *(x.reshape(-1) for x in kept)])
         rest: Any = *places, CROSSINGS - 3, max(len(self.stops) - 8, 1), probe
         return Engine(step, *engine_, *rest)
@@ -329,7 +329,7 @@ class Run:
             self.give_up()
         elif code == NOT_FINITE:
             self._end(
-                monitor.Outcome("out of reach", self.t, self.i, cause=scene.beyond(self.parts))
+                monitor.Outcome("out of reach", self.t, self.i, cause=scene.cause_of_end(self.parts))
             )
         elif code != OPEN:
             self.finish("finished" if code == FINISHED else "time limit")

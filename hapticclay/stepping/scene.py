@@ -10,7 +10,7 @@ import numpy as np
 from ..model import compensator, groove, pieces, regions
 from ..model import hardware as devices
 from ..model.constants import B_MAX
-from ..model.sampled_controller import DESK, Controller, LawCaller
+from ..model.sampled_controller import BUFFER, Controller, LawCaller
 from ..model.scenario import Scenario
 from . import begin, hardware, laws, pace, rows
 from . import parts as p_
@@ -181,18 +181,18 @@ def sampler(s: Scenario, controller, clay, special):
     Ts = ratio * float(s.dt)
     axes = list(zip(s.servo, s.compensators, s.gain, strict=True))
     lags = [c.lag for c in s.compensators]
-    memory = formed = own = None
+    memory = state_space = own = None
     if all(x and x[0] == 1.0 for x in lags):
         memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
     else:
-        formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
+        state_space = np.ravel([formed_memory(*axis, Ts) for axis in axes])
     if controller is not None:
         state = controller.state
-        desk = np.array([0.0] * DESK + [*state, *state, *controller.params])
-        own = p_.Own(LawCaller(controller, desk), desk, tuple(map(float, state)))
+        buffer = np.array([0.0] * BUFFER + [*state, *state, *controller.params])
+        own = p_.Own(LawCaller(controller, buffer), buffer, tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
-    first: Any = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
+    first: Any = ratio, Ts, *physical, 1 if told else None, memory, state_space, own, None
     return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
 
 
@@ -259,9 +259,9 @@ def first_reaction(special):
     """What clay left to the first kick."""
     if special is None:
         return None
-    felt = s_.Felt(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
+    contact = s_.Contact(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
     split = s_.Split(0.0, NONE, NONE) if special.stiff else None
-    return s_.Reaction(NONE, split, felt if special.flow else None)
+    return s_.Reaction(NONE, split, contact if special.flow else None)
 
 
 def first_laws(special, p):
@@ -372,7 +372,7 @@ def own_law(parts):
     return parts.sampler.own.law
 
 
-def beyond(parts):
+def cause_of_end(parts):
     """Why no step can go on."""
     law = own_law(parts)
     if law is not None and not law.finite():

@@ -60,7 +60,7 @@ class Compared:
     record: Record
     region: ZRegion | None = None
 
-    def felt(self, omega: np.ndarray) -> Impedance:
+    def impedance(self, omega: np.ndarray) -> Impedance:
         """What a hand feels that is not in the loop; of a controller in continuous time.
 
         Args:
@@ -231,7 +231,7 @@ def _felt_numbers(found: Compared) -> dict[str, float]:
     out: dict[str, float] = {}
     for f in FELT_AT:
         known = not isinstance(found.subject, VirtualWall) or f < 0.5 / found.subject.Ts
-        Z = found.felt(np.array([2.0 * math.pi * f])) if known else None
+        Z = found.impedance(np.array([2.0 * math.pi * f])) if known else None
         for part, unit in (("stiffness", "N/m"), ("damping", "N.s/m"), ("mass", "kg")):
             value = float(getattr(Z, part)[0]) if Z else math.nan
             out[f"effective {part} at {f:g} Hz [{unit}]"] = value

@@ -73,10 +73,10 @@ class MeasuredImpedance:
     @property
     def felt_gap(self) -> float:
         """Largest relative difference of the measured fe/fh from the computed; NaN without any."""
-        there = self.computed.felt != 0.0
+        there = self.computed.transparency != 0.0
         if not np.any(there):
             return math.nan
-        ratio = self.measured.felt[there] / self.computed.felt[there]
+        ratio = self.measured.transparency[there] / self.computed.transparency[there]
         return float(np.max(np.abs(ratio - 1.0)))
 
     def over(self, frequency: np.ndarray) -> Impedance:
@@ -98,8 +98,8 @@ class MeasuredImpedance:
                 "effective stiffness [N/m]": x.stiffness.tolist(),
                 "effective damping [N.s/m]": x.damping.tolist(),
                 "effective mass [kg]": x.mass.tolist(),
-                "|fe/fh|": np.abs(x.felt).tolist(),
-                "phase of fe/fh [deg]": np.degrees(np.angle(x.felt)).tolist(),
+                "|fe/fh|": np.abs(x.transparency).tolist(),
+                "phase of fe/fh [deg]": np.degrees(np.angle(x.transparency)).tolist(),
                 "|Z/Ze|": np.abs(x.ratio).tolist(),
                 "phase of Z/Ze [deg]": np.degrees(np.angle(x.ratio)).tolist(),
             }
@@ -217,9 +217,9 @@ def measure_impedance(
         part = slice(settling * n, (settling + 2) * n)
         measured, deviation = _measured(subject, record, part, n, steps, i, wave)
         if deviation.max() <= STEADY_RESPONSE or _rough(subject):
-            felt = replace(measured, rendered=computed.rendered)
+            seen = replace(measured, rendered=computed.rendered)
             notes = _notes(subject, dt)
-            return MeasuredImpedance(subject, felt, computed, deviation, scenario, notes)
+            return MeasuredImpedance(subject, seen, computed, deviation, scenario, notes)
     bound = (
         f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
         f"after {settling} periods of {wave.period:.3g} s; give a longer period"
@@ -299,13 +299,13 @@ def _measured(
     bins = np.round(wave.omega / (2.0 * math.pi) * wave.period).astype(int)
     reference = wave(record.t[part])[:, i]
     Z = estimate_response(np.array([[reference, v, fh]]), n, bins)
-    felt = np.zeros_like(Z.response)
+    transparency = np.zeros_like(Z.response)
     if np.any(fe):
-        felt = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
+        transparency = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
     if held:
         turn = 1j * wave.omega * wave.period / n
-        felt = felt * -np.expm1(-turn) / turn
-    found = Impedance(wave.omega, Z.response, felt, np.zeros_like(felt))
+        transparency = transparency * -np.expm1(-turn) / turn
+    found = Impedance(wave.omega, Z.response, transparency, np.zeros_like(transparency))
     return found, Z.deviation / np.abs(Z.response)
 
 

@@ -38,13 +38,13 @@ class Impedance:
     Attributes:
         omega: [rad/s], shape (n,).
         Z: fh/v, hand force over handle velocity [N.s/m], complex, shape (n,).
-        felt: transparency fe/fh, the share of the hand's force that is rendered, complex, (n,).
+        transparency: fe/fh, the share of the hand's force that is rendered, complex, (n,).
         rendered: Ze, the impedance that is to be rendered [N.s/m], complex, shape (n,).
     """
 
     omega: np.ndarray
     Z: np.ndarray
-    felt: np.ndarray
+    transparency: np.ndarray
     rendered: np.ndarray
 
     @property

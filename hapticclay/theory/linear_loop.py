@@ -745,10 +745,10 @@ def crossing_times(
         if t >= t_max:
             break
 
-        def beyond(h: float, A=A, z=z, edge=edge) -> float:
+        def gap(h: float, A=A, z=z, edge=edge) -> float:
             return float((controller.matrix_exponential(A * h) @ z)[0]) - edge
 
-        h: Any = brentq(beyond, 0.0, step, xtol=1e-15)
+        h: Any = brentq(gap, 0.0, step, xtol=1e-15)
         z, t = controller.matrix_exponential(A * h) @ z, t + h
         out.append(t)
     return out

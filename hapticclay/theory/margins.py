@@ -427,10 +427,10 @@ def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
     """
     z, e = linear_loop.device_impedance(loop)
     s = 1j * array_of("omega", omega)
-    felt, device = loop.b * e(s), z(s)
+    clay, device = loop.b * e(s), z(s)
     if loop.k:
-        felt, device = (loop.b * s + loop.k) * e(s), s * device
-    return felt / (felt + device)
+        clay, device = (loop.b * s + loop.k) * e(s), s * device
+    return clay / (clay + device)
 
 
 # ---- the worst case over hands -------------------------------------------------------------------

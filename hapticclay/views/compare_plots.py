@@ -143,7 +143,7 @@ def spare_plot(found: Sequence[Compared]) -> Figure:
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
             return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
         omega = _shown_band(x)
-        return omega / (2.0 * math.pi), x.felt(omega).damping
+        return omega / (2.0 * math.pi), x.impedance(omega).damping
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
     return _zero(_overlay(found, spare, xscale="log", **labels))
@@ -158,7 +158,7 @@ def impedance_overlay(found: Sequence[Compared]) -> Figure:
 
     def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         omega = _shown_band(x)
-        return omega / (2.0 * math.pi), np.abs(x.felt(omega).Z)
+        return omega / (2.0 * math.pi), np.abs(x.impedance(omega).Z)
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("|f$_h$/v| [N.s/m]"))
     return _overlay(found, size, xscale="log", yscale="log", **labels)
@@ -172,17 +172,17 @@ def parts_overlay(found: Sequence[Compared]) -> Figure:
     """
     panels = {"stiffness": "[N/m]", "damping": "[N.s/m]", "mass": "[kg]"}
     curves = [(look, _shown_band(x), x) for x, look in _looks(found)]
-    felt = [(look, omega, x.felt(omega), x.name) for look, omega, x in curves]
+    known = [(look, omega, x.impedance(omega), x.name) for look, omega, x in curves]
     panels = {
         p: u
         for p, u in panels.items()
-        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in felt)
+        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in known)
     }
     with figure_style():
         figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (part, unit) in zip(axes, panels.items(), strict=True):
-            for look, omega, Z, name in felt:
+            for look, omega, Z, name in known:
                 ax.plot(omega / (2.0 * math.pi), getattr(Z, part), label=name, **look)
             ax.axhline(0.0, color=BLACK, lw=stroke(0.8), zorder=1)
             ax.set(xscale="log", ylabel=unit_text(f"{part} {unit}"))

@@ -84,7 +84,7 @@ def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
     m = found.measured
     fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
     line = found.over(fine)
-    curves = [("f$_e$/f$_h$", m.felt, line.felt, BLUE, "-", "o")]
+    curves = [("f$_e$/f$_h$", m.transparency, line.transparency, BLUE, "-", "o")]
     if np.any(line.rendered):
         curves.append(("Z/Z$_e$", m.ratio, line.ratio, VERMILION, "--", "s"))
     with figure_style():

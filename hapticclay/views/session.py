@@ -168,9 +168,9 @@ class LiveRun(Run):
     def held(self) -> tuple[bool, bool]:
         """Whether clay that yields holds the handle still, along x and along y."""
         reaction = self.state.clay.reaction
-        if reaction is None or reaction.felt is None:
+        if reaction is None or reaction.contact is None:
             return False, False
-        x, y = reaction.felt.stuck
+        x, y = reaction.contact.stuck
         return bool(x), bool(y)
 
     def judge(self, made: np.ndarray) -> int:

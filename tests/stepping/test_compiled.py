@@ -301,7 +301,7 @@ def test_compiled_code_is_kept_on_disk(tmp_path):
         "import time, hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); a = time.process_time(); "
         "hc.simulate(hc.free(t_max=0.01), engine='native'); print(time.process_time() - a); "
         "from hapticclay.stepping import compiled; "
-        "print(sum(compiled.GLIDE.stats.cache_hits.values()))"
+        "print(sum(compiled.WHOLE_STEPS.stats.cache_hits.values()))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     took, said = [], []

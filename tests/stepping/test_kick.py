@@ -204,7 +204,7 @@ def test_engine_does_what_the_kick_foretold(name, monkeypatch):
 @pytest.mark.parametrize("name", CASES)
 def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
     gliding = hc.simulate(CASES[name], engine="python")
-    monkeypatch.setattr(path, "glide", lambda parts, s, e, room: s)
+    monkeypatch.setattr(path, "run_whole_steps", lambda parts, s, e, room: s)
     careful = hc.simulate(CASES[name], engine="python")
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(gliding, field), getattr(careful, field), field)

@@ -322,11 +322,11 @@ def test_ctrl_c_at_any_moment_of_a_law_ends_the_run():
     asked = []
 
     class Signalled(LawCaller):
-        def __call__(self, desk=None):
+        def __call__(self, buffer=None):
             asked.append(1)
             if len(asked) == 3:
                 raise KeyboardInterrupt
-            super().__call__(desk)
+            super().__call__(buffer)
 
     s = replace(POSE, controller=hc.Controller(counting()), t_max=0.2)
     with pytest.MonkeyPatch.context() as patch:

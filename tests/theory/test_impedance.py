@@ -34,8 +34,8 @@ def test_continuous_impedance_is_that_of_python_control(axis, K, b, k, held):
     loop = hc.Loop(axis, b, TH, K=K, k=k, render="held" if held else "physical")
     found = loop_response(loop, OMEGA)
     np.testing.assert_allclose(found.Z, Z, rtol=1e-10)  # a ratio of polynomials of degree 6
-    np.testing.assert_allclose(found.felt, margins.transparency(loop, OMEGA), rtol=1e-10)
-    np.testing.assert_allclose(found.felt, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
+    np.testing.assert_allclose(found.transparency, margins.transparency(loop, OMEGA), rtol=1e-10)
+    np.testing.assert_allclose(found.transparency, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
 
 
 @pytest.mark.parametrize("render", ["held", "physical"])
@@ -131,7 +131,7 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
         s = 1j * w
         fh = 1.0 - (hand.mass * s + hand.damper + hand.spring / s) * v
         assert found.Z[i] == pytest.approx(fh / v, rel=1e-7)  # as above
-        assert found.felt[i] == pytest.approx(-u / fh, rel=1e-7)
+        assert found.transparency[i] == pytest.approx(-u / fh, rel=1e-7)
 
 
 @given(
@@ -150,7 +150,7 @@ def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, w
     # the device itself is left: fh = (m s + b) v + fe
     s = 1j * OMEGA
     own = (0.2 * s + 0.7) / found.Z
-    np.testing.assert_allclose(found.felt + own, 1.0, atol=1e-9 * np.abs(own).max())
+    np.testing.assert_allclose(found.transparency + own, 1.0, atol=1e-9 * np.abs(own).max())
 
 
 def test_a_fast_sampled_loop_is_the_continuous_one():

@@ -199,13 +199,13 @@ def z_width(kind):
 
 
 @functools.cache
-def felt(kind):
+def measured(kind):
     """Impedances of the arm, and of a wall, as if measured with an error."""
     wall = hc.VirtualWall(300.0, 2.0, 0.05, hc.Device(0.1, 0.5), HAND, delay=5e-4)
     subject = wall if kind == "wall" else PushedLoop("x", b=90.0, k=40.0, operator=HAND, Ts=1e-3)
     there = computed_impedance(subject, 2.0 * math.pi * np.geomspace(0.5, 30.0, 24))
     off = np.linspace(0.99, 1.01, 24)
-    seen = dataclasses.replace(there, Z=off * there.Z, felt=off * there.felt)
+    seen = dataclasses.replace(there, Z=off * there.Z, transparency=off * there.transparency)
     return MeasuredImpedance(subject, seen, there, np.zeros(24), hc.constant_cut())
 
 
@@ -324,7 +324,7 @@ CASES = {
         for kind in ("region", "rest", "family")
     },
     **{
-        f"{name} of {kind}": lambda kind=kind, plot=plot: plot(felt(kind))
+        f"{name} of {kind}": lambda kind=kind, plot=plot: plot(measured(kind))
         for kind in ("arm", "wall")
         for name, plot in {
             "impedance": impedance_plots.impedance_plot,
