@@ -120,7 +120,9 @@ def impedance_table(found: MeasuredImpedance) -> str:
     """
     m, c = found.measured, found.computed
     off = abs(m.Z / c.Z - 1.0)
-    columns = zip(m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.transparency), strict=True)
+    columns = zip(
+        m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.transparency), strict=True
+    )
     rows = [
         [
             f"{f:.4g}",

@@ -77,7 +77,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
         return []
     told = []
     for i, axis in enumerate(AXES):
-        laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+        laws = clay.laws_on(i)
         values = sorted({b for law in laws for b in law.within(*EVERYWHERE)})
         step = max(1, -(-len(values) // MOST_CLAYS))
         limits = [(gain_limit.continuous_limit(scenario, axis, b), b) for b in values[::step]]

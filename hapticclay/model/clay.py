@@ -99,11 +99,11 @@ def slow_force(g, W, share, f):
     return x, y
 
 
-def turned_force(c, s, bx, by, vx, vy):
-    """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
+def rotated_force(c, s, bx, by, vx, vy):
+    """Force of clay with rotated axes, fe = R diag(bx, by) R' v.
 
     Args:
-        c: cosine of the angle by which it is turned.
+        c: cosine of the angle by which its axes are rotated.
         s: sine of that angle.
         bx: damping along its first axis [N.s/m].
         by: damping along its second axis [N.s/m].
@@ -117,11 +117,11 @@ def turned_force(c, s, bx, by, vx, vy):
     return c * first - s * second, s * first + c * second
 
 
-def turned_damping(c, s, bx, by):
-    """The damping tensor of clay that is turned, R diag(bx, by) R'.
+def rotated_damping(c, s, bx, by):
+    """The damping tensor of clay with rotated axes, R diag(bx, by) R'.
 
     Args:
-        c: cosine of the angle by which it is turned.
+        c: cosine of the angle by which its axes are rotated.
         s: sine of that angle.
         bx: damping along its first axis [N.s/m].
         by: damping along its second axis [N.s/m].
@@ -780,9 +780,9 @@ class Clay:
     also yields, with Fy_i sign v_i + K_i |v_i|^n_i sign v_i beside it along each axis.
 
     Attributes:
-        x: law of motion along x, or along the clay's own first axis where it is turned.
+        x: law of motion along x, or along the clay's own first axis where they are rotated.
         y: law of motion along y, or along the clay's own second axis.
-        angle: by which those axes are turned from x and y, counterclockwise [rad], -pi to pi.
+        angle: by which those axes are rotated from x and y, counterclockwise [rad], -pi to pi.
         isotropic: whether Fy and K, alike on both axes, resist along the motion whatever its
             direction, (Fy + K |v|^n) v/|v|; else each axis yields by itself.
         groove: a block of clay that stays cut, beside x and y, which then neither yield, grow nor
@@ -819,6 +819,14 @@ class Clay:
     def laws(self) -> tuple[Profile | Grid | Smooth, Profile | Grid | Smooth]:
         """Of x and of y."""
         return self.x, self.y
+
+    def laws_on(self, i: int) -> tuple[Profile | Grid | Smooth, ...]:
+        """Laws that resist along an axis: both where the axes of the clay are rotated.
+
+        Args:
+            i: axis, 0 for x, 1 for y.
+        """
+        return self.laws if self.angle else self.laws[i : i + 1]
 
     @property
     def smooth(self) -> int:

@@ -90,10 +90,10 @@ def velocity_per_force(n, W, d):
 
 
 def along_axes(c, s, x, y):
-    """Components of a vector along axes that are turned.
+    """Components of a vector along rotated axes.
 
     Args:
-        c: cosine of the angle by which they are turned.
+        c: cosine of the angle by which they are rotated.
         s: sine of that angle.
         x: component along x.
         y: component along y.

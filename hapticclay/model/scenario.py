@@ -146,7 +146,7 @@ class Scenario:
             )
         self._check_servo()
         self._check_interface()
-        self._check_turned_clay()
+        self._check_rotated_axes()
         self._check_smooth_clay()
         self._check_springs()
         self._check_groove()
@@ -244,14 +244,14 @@ class Scenario:
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 
     @property
-    def turned(self) -> bool:
+    def rotated(self) -> bool:
         """Whether clay ties the axes together, its own not being x and y."""
         return self.clay is not None and self.clay.angle != 0.0
 
-    def _check_turned_clay(self) -> None:
-        """Refuses turned clay where no law of it is known: see docs/equations.md, section 4."""
+    def _check_rotated_axes(self) -> None:
+        """Refuses rotated axes where no law of it is known: see docs/equations.md, section 4."""
         given, clay = self.hardware, self.clay
-        if clay is None or not self.turned:
+        if clay is None or not self.rotated:
             return
         if given and (given.passivity or given.coupling):
             bound = "must be 0 for a passivity controller or a coupling, which act along x and y"

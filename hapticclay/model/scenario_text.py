@@ -64,7 +64,7 @@ def clay_text(clay: Clay) -> str:
     told = _range(v for law in clay.laws for v in law.damping.ravel().tolist())
     parts += [f"b = {told or '0'} N.s/m"] * bool(told or not parts)
     parts += ["grows"] * clay.grows + ["springs back"] * bool(clay.springs)
-    parts += [f"turned by {math.degrees(clay.angle):.4g} degrees"] * bool(clay.angle)
+    parts += [f"axes rotated by {math.degrees(clay.angle):.4g} degrees"] * bool(clay.angle)
     return ", ".join(parts)
 
 

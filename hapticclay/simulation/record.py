@@ -333,7 +333,7 @@ class Record:
 
         Returns:
             None where the force is not constant, a hand is at the handle, the clay changes over the
-            stretch, stays cut, springs back or is turned, or the controller is the user's own.
+            stretch, stays cut, springs back or has rotated axes, or the controller is your own.
         """
         i, s = AXES.index(axis), self.scenario
         if s.clay and (s.clay.groove or s.clay.springs):
@@ -345,7 +345,7 @@ class Record:
         if (
             not alone
             or s.controller is not None
-            or s.turned
+            or s.rotated
             or np.any(self.b[piece][:, axes] != b[axes])
         ):
             return None

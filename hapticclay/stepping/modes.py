@@ -18,7 +18,7 @@ from .kick import place
 from .parts import INF
 from .servo import net, solve
 from .state import Grip, Handle, Modes, Point, Response
-from .yielding import turned_matrix
+from .yielding import rotated_matrix
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most of them for one sample
@@ -126,7 +126,7 @@ def answer(modal, modes, law, load, at):
     if modal is None:
         return plain_answer(law, load)
     grain, c, g = modal.grain, at.c, solve(law, load)
-    B = turned_matrix(grain, controller.velocity_per_force(law.n, law.W, load.d))
+    B = rotated_matrix(grain, controller.velocity_per_force(law.n, law.W, load.d))
     v = viscous.along(grain, at.v[0], at.v[1])
     a = viscous.along(grain, g[0] - c[0], g[1] - c[1])
     if modes.mode[0] == 0.0 and modes.mode[1] == 0.0:

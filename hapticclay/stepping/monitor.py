@@ -327,7 +327,7 @@ class StabilityMonitor:
 
 def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
     """Dampings that may resist axis i in a box [N.s/m], ascending."""
-    laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+    laws = clay.laws_on(i)
     corners = (low[0], low[1]), (high[0], high[1])
     return np.unique([b for law in laws for b in law.within(*corners)])
 

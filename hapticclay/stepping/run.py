@@ -147,7 +147,7 @@ class EngineStore:
         model.opt.timestep = s.dt
         for i, limit in enumerate(s.torque_limit):
             model.actuator_ctrlrange[i] = -limit, limit
-        engine.turn_dampers(model, s)
+        engine.rotate_dampers(model, s)
         mujoco.mj_resetData(model, data)
         return model, data
 
@@ -329,7 +329,9 @@ class Run:
             self.give_up()
         elif code == NOT_FINITE:
             self._end(
-                monitor.Outcome("out of reach", self.t, self.i, cause=scene.cause_of_end(self.parts))
+                monitor.Outcome(
+                    "out of reach", self.t, self.i, cause=scene.cause_of_end(self.parts)
+                )
             )
         elif code != OPEN:
             self.finish("finished" if code == FINISHED else "time limit")

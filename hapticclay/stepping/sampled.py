@@ -126,7 +126,7 @@ def reaction_of(flow, sampler, parts, s, before, at, tau, uh):
     law = yielding.law_in_kick(sampler.special.groove, flow, clay, 1.0, B, v, a)
     ax, ay = viscous.along(grain, a[0], a[1])
     end = v[0] + h * ax, v[1] + h * ay
-    B = yielding.turned_matrix(grain, B)
+    B = yielding.rotated_matrix(grain, B)
     _, _, _, fs, _ = yielding.split_resist(yielding.resist_by(flow.along, B, v, end, law, 0.0))
     return viscous.across(grain, fs[0], fs[1])
 

@@ -87,7 +87,7 @@ def resist(part, groove, grain, clay, acting, law, load, u):
     ax, ay = viscous.along(grain, ax, ay)
     a = 0.0 if stuck[0] > 0.0 else ax, 0.0 if stuck[1] > 0.0 else ay
     fyk = law_in_kick(groove, part, clay, step.L, B, a, (ex, ey))
-    B = turned_matrix(grain, B)
+    B = rotated_matrix(grain, B)
     ex, ey = viscous.along(grain, ex, ey)
     place = viscous.along(grain, at.p[0], at.p[1])
     # an axis that rests beside one that slides stays where it came to rest: no step leads away
@@ -132,7 +132,7 @@ def stop_time(step, share):
     return step.H * (share - step.L) if share >= 0.0 else 0.0
 
 
-def turned_matrix(grain, B):
+def rotated_matrix(grain, B):
     """A matrix along the axes of the clay, R' B R."""
     if grain is None:
         return B

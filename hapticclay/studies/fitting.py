@@ -328,7 +328,7 @@ def _of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, An
         raise ParameterError("data", r.scenario.name, bound)
     axis = choice("axis", axis or ("path" if clay.isotropic else "x"), (*AXES, "path"))
     if clay.angle and axis != "path":
-        raise ParameterError("axis", axis, 'must be "path" in clay that is turned')
+        raise ParameterError("axis", axis, 'must be "path" in clay with rotated axes')
     if axis == "path" and clay.yields and not clay.isotropic:
         raise ParameterError("axis", axis, "must be x or y in clay whose axes yield by themselves")
     index = AXES.index(axis) if axis in AXES else 0

@@ -99,7 +99,7 @@ class Loop:
             axis: "x" or "y".
             b: clay [N.s/m]; None for that of the scenario's clay, before it grows, with the least
                 gain limit, 0 without clay. Of more than MOST_DAMPINGS values so many are tried;
-                turned clay resists by those of both of its own axes.
+                clay with rotated axes resists by those of both of its own axes.
 
         Raises:
             ParameterError: no scenario, one with a controller of the user's own, unknown axis, or b
@@ -131,7 +131,7 @@ class Loop:
             return replace(loop, b=b)
         from .gain_limit import gain_limit
 
-        laws = () if clay is None else clay.laws if clay.angle else clay.laws[i : i + 1]
+        laws = () if clay is None else clay.laws_on(i)
         dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
         if len(dampings) > MOST_DAMPINGS:
             dampings = dampings[np.linspace(0, len(dampings) - 1, MOST_DAMPINGS).astype(int)]

@@ -1,4 +1,4 @@
-"""The arm in joint space under SciPy, in clay of cells on a grid, turned or not."""
+"""The arm in joint space under SciPy, in clay of cells on a grid, with rotated axes or not."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Clay of cells on a grid and turned clay, against solutions that are not ours."""
+"""Clay of cells on a grid and clay with rotated axes, against solutions that are not ours."""
 
 import dataclasses
 import importlib.util
@@ -196,7 +196,7 @@ THS = {"": (None, 0.0), "hand": (hc.Operator(0.25, 2.0, 0.0), 2.0)}
     st.floats(0.0, 500.0), st.floats(0.0, 500.0), st.floats(-math.pi, math.pi),
     st.sampled_from(sorted(THS)), st.sampled_from(["default", "accurate", "held", "physical"]),
 )  # fmt: skip
-def test_steady_speed_in_turned_clay_has_a_closed_form(bx, by, angle, hand, method):
+def test_steady_speed_in_rotated_axes_has_a_closed_form(bx, by, angle, hand, method):
     """(diag(10/K) + B + d) v = uh; servo and compensator settle within 6 s to 1e-6 of it."""
     th, d = THS[hand]
     free = hc.free(force=(0.02, -0.015), inertia_shaping=True, t_max=6.0)
@@ -231,7 +231,7 @@ def test_a_quarter_turn_swaps_the_axes(name):
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_energy_closes_in_turned_clay_at_the_torque_limits_too(name):
+def test_energy_closes_in_rotated_axes_at_the_torque_limits_too(name):
     s = path_through(random_clay(0.5), **METHODS[name], torque_limit=(0.3, 0.15))
     e = hc.simulate(s).energy
     # the accurate method integrates the works, to fourth order; a hand is no part of the balance
@@ -247,7 +247,7 @@ def test_clay_alike_on_both_axes_has_no_angle():
         np.testing.assert_allclose(a.p, b.p, rtol=0.0, atol=1e-14)
 
 
-def test_turned_clay_that_is_stiff_is_refused_and_the_bound_named():
+def test_rotated_axes_that_is_stiff_is_refused_and_the_bound_named():
     s = path_through(everywhere(90.0, 0.0, 0.3))
     with pytest.raises(
         ParameterError, match="clay.angle = 0.3: must be 0 where clay is stiff"
@@ -263,7 +263,7 @@ def test_turned_clay_that_is_stiff_is_refused_and_the_bound_named():
 
 
 @pytest.mark.parametrize("parts", [dict(passivity=True), dict(coupling=hc.Coupling(100.0, 1.0))])
-def test_turned_clay_behind_parts_of_one_axis_is_refused(parts):
+def test_rotated_axes_behind_parts_of_one_axis_is_refused(parts):
     with pytest.raises(ParameterError, match="clay.angle = 0.3: must be 0 for a passivity"):
         path_through(everywhere(90.0, 0.0, 0.3), control="sampled", hardware=hc.Hardware(**parts))
 

@@ -187,7 +187,7 @@ def test_what_a_law_refuses_is_refused_at_the_door(hardening):
     flat = hc.Profile((), (CLAY,))
     turned = dataclasses.replace(scene(), clay=hc.Clay(flat, flat, angle=0.1))
     coupled = scene(control="sampled", hardware=hc.Hardware(coupling=hc.Coupling(3000.0, 300.0)))
-    for s, told in ((turned, "must not be turned"), (coupled, "without a coupling")):
+    for s, told in ((turned, "must not have rotated axes"), (coupled, "without a coupling")):
         with pytest.raises(ParameterError, match=told) as e:
             hc.simulate(s)
         assert e.value.field == "clay"

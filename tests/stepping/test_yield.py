@@ -258,7 +258,7 @@ def test_in_steady_motion_the_clay_and_the_compensator_share_the_push():
 
 
 @pytest.mark.parametrize("isotropic", [False, True])
-def test_turned_clay_is_felt_along_its_own_axes(isotropic):
+def test_rotated_axes_is_felt_along_its_own_axes(isotropic):
     # beside the accurate method, which errs by 1e-9: second order, in velocity as in place
     hard = hc.Profile((), (30.0,), Fy=(2.0,))
     soft = hard if isotropic else hc.Profile((), (10.0,), Fy=(1.0,))

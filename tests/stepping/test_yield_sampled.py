@@ -389,7 +389,7 @@ def test_step_by_step_and_in_a_batch_it_is_the_run(name):
     assert batch.stops == whole.stops
 
 
-def test_turned_clay_by_its_own_axes_is_that_along_x_and_y_seen_from_elsewhere():
+def test_rotated_axes_by_its_own_axes_is_that_along_x_and_y_seen_from_elsewhere():
     # along the motion, the angle of the axes makes no difference
     s = scene(hc.Flow(Fy=2.0, b=30.0), render="physical", velocity=(0.1, 0.03))
     turned = dataclasses.replace(s, clay=dataclasses.replace(s.clay, angle=0.7))
