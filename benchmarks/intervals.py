@@ -31,9 +31,9 @@ from hapticclay.studies import identification
 from . import common
 
 SENSORS = {
-    "20000 counts, no force noise": hc.Noise(20_000, 0.0),
-    "10000 counts, 0.1 N": hc.Noise(10_000, 0.1),
-    "2^30 counts, no force noise": hc.Noise(2**30, 0.0),
+    "20000 counts, no force noise": hc.studies.Noise(20_000, 0.0),
+    "10000 counts, 0.1 N": hc.studies.Noise(10_000, 0.1),
+    "2^30 counts, no force noise": hc.studies.Noise(2**30, 0.0),
 }
 BLOCKS: tuple[tuple[str, bool], ...] = (
     ("G", False),
@@ -70,7 +70,7 @@ def one(
             for what, shaping in blocks
             for axis in axes
             for name, noise in SENSORS.items()
-            for c in hc.identify(
+            for c in hc.studies.identify(
                 axis, what, inertia_shaping=shaping, noise=noise, seed=seed, **kw
             ).coefficients
         ]

@@ -39,15 +39,17 @@ def good():
     """Good values of the arguments that must be given, by name, and by function and name."""
     cut, wall = hc.constant_cut(t_max=0.01), hc.VirtualWall(K=100.0)
     profile, t = hc.Profile((), (40.0,)), np.linspace(0.0, 4.0, 400)
-    loop = hc.Loop(K=1.0, b=90.0)
+    loop = hc.theory.Loop(K=1.0, b=90.0)
     by_name = {
         "axis": "x", "K": 1.0, "b": 90.0, "wall": wall, "scenario": cut, "subject": wall,
-        "record": hc.simulate(cut, engine="python"), "loop": loop, "box": hc.Box(), "omega": [1.0],
+        "record": hc.simulate(cut, engine="python"), "loop": loop, "box": hc.theory.Box(),
+        "omega": [1.0],
         "flow": hc.Flow(Fy=1.0, b=5.0), "compensators": [hc.Compensator()], "V": 0.1,
-        "data": hc.Measurement(t, np.sin(t), np.cos(t)), "hands": next(iter(hc.POPULATIONS)),
+        "data": hc.studies.Measurement(t, np.sin(t), np.cos(t)),
+        "hands": next(iter(hc.studies.POPULATIONS)),
         "mass": 1.0, "damper": 1.0, "spring": 1.0, "Ts": 1e-3, "decay": 1.0, "name": "stiff clay",
-        "trials": hc.Trials(wall, {"K": hc.Distribution("uniform", 1.0, 9.0)}), "out": "nowhere",
-        "path": "nowhere",
+        "trials": hc.studies.Trials(wall, {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}),
+        "out": "nowhere", "path": "nowhere",
         "part": cut, "changes": {"gain.x": 1.0}, "scenarios": [cut], "resists": 90.0,
     }  # fmt: skip
     pushed = importlib.import_module("hapticclay.studies.boundary").PushedLoop()
@@ -68,7 +70,7 @@ def good():
         "Servo": {"G": hc.SecondOrder(1.0, 1.0, 1.0), "S": hc.SecondOrder(1.0, 1.0, 1.0)},
         "Spring": {"start": 0.0, "end": 0.1, "stiffness": 10.0},
         "Step": {"value": (1.0, 0.0), "start": 0.0}, "Sum": {"parts": (hc.Constant((1.0, 0.0)),)},
-        "Trials": {"base": wall, "vary": {"K": hc.Distribution("uniform", 1.0, 9.0)}},
+        "Trials": {"base": wall, "vary": {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function
@@ -141,10 +143,12 @@ def test_junk_is_refused_at_the_door(good, monkeypatch, tmp_path):
 
 
 def test_a_folder_that_holds_no_runs_is_refused(tmp_path):
-    trials = hc.Trials(hc.VirtualWall(K=100.0), {"K": hc.Distribution("uniform", 1.0, 9.0)})
+    trials = hc.studies.Trials(
+        hc.VirtualWall(K=100.0), {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}
+    )
     for out in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(ParameterError, match="holds no runs") as e:
-            hc.stored_runs(trials, out)
+            hc.studies.stored_runs(trials, out)
         assert e.value.field == "out"
 
 
@@ -200,7 +204,7 @@ def numbers_with_units(kind):
 PLACES = [
     (kind, name, bound)
     for kind in (*EXPERIMENTS.values(), hc.Scenario, hc.Arm, hc.Operator, hc.Flow, hc.VirtualWall,
-                 hc.Device, hc.Hardware, hc.Loop, hc.Press)
+                 hc.Device, hc.Hardware, hc.theory.Loop, hc.walls.Press)
     for name, hint, bound in numbers_with_units(kind)
     if not any(getattr(k, "__origin__", None) is tuple for k in app._members(hint))
 ]  # fmt: skip
@@ -255,7 +259,7 @@ def test_units_of_one_kind_are_taken(unit, x):
         (lambda: hc.variable_cut(growth="30/d"), "did you mean '30/s'"),
         (lambda: hc.Scenario(dt="1 furlong"), "must be a number in s; 'furlong'"),
         (lambda: hc.Compensator((1.0,), (1.0, "3 m")), "must be a number without a unit"),
-        (lambda: hc.drift_map("8 s"), "spacing = '8 s': must be a number in m, not in s"),
+        (lambda: hc.studies.drift_map("8 s"), "spacing = '8 s': must be a number in m, not in s"),
     ],
 )
 def test_another_kind_of_unit_is_refused_everywhere(ask, told):
@@ -270,10 +274,12 @@ def test_parts_functions_and_experiments_take_units():
     assert hc.variable_cut(growth="30 N.s/m per s") == hc.variable_cut(growth=30.0)
     cut = hc.constant_cut(control="sampled", Ts="1 ms")
     assert cut == hc.constant_cut(control="sampled", Ts=1e-3) and cut.dt < 1e-3
-    assert hc.Box(mass=("100 g", 1.0)) == hc.Box(mass=(0.1, 1.0))
-    assert hc.gain_limit("x", b="90 N.s/m") == hc.gain_limit("x", b=90.0)
+    assert hc.theory.Box(mass=("100 g", 1.0)) == hc.theory.Box(mass=(0.1, 1.0))
+    assert hc.theory.gain_limit("x", b="90 N.s/m") == hc.theory.gain_limit("x", b=90.0)
     wall = hc.VirtualWall(K=100.0)
-    trials = hc.Trials(wall, {"K": hc.Distribution("uniform", 1.0, 9.0)}, push="1 mm/s")
+    trials = hc.studies.Trials(
+        wall, {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}, push="1 mm/s"
+    )
     assert trials.push == 1e-3
 
 

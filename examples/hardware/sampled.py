@@ -26,9 +26,9 @@ loops["a sample late, with jitter"] = hc.with_fields(
 fig, axes = plt.subplots(len(loops), 1, sharex=True, sharey=True, figsize=(6.4, 6.0))
 for ax, (name, scenario) in zip(axes, loops.items(), strict=True):
     record = hc.simulate(scenario)
-    limit = hc.gain_limit(scenario, "x") if not scenario.hardware else float("nan")
+    limit = hc.theory.gain_limit(scenario, "x") if not scenario.hardware else float("nan")
     if scenario.hardware:
-        limit = hc.gain_limit("x", b, Ts=0.36e-3, delay=0.36e-3)
+        limit = hc.theory.gain_limit("x", b, Ts=0.36e-3, delay=0.36e-3)
     t = record.t - record.crossings[0].time
     ax.plot(t, 100 * record.v[:, 0])
     ax.set_title(f"{name}: K = {K:g} of {limit:.2f} 1/kg at most", fontsize=9, loc="left")

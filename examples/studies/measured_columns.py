@@ -2,8 +2,8 @@
 Identify from columns of your own
 =================================
 
-``hc.identify_data`` takes time, input and output as they were measured. Here they come from a run:
-a chirp as the command, the position rounded to counts.
+``hc.studies.identify_data`` takes time, input and output as they were measured. Here they come from
+a run: a chirp as the command, the position rounded to counts.
 """
 
 import matplotlib.pyplot as plt
@@ -24,8 +24,8 @@ scenario = hc.Scenario(
 )
 record = hc.simulate(scenario, every=3)
 position = np.round(record.p[:, 0] / 1e-5) * 1e-5
-data = hc.Measurement(record.t, input=record.delta[:, 0], output=position)
-found = hc.identify_data(data, "G", "x", band=(0.3, 10.0))
+data = hc.studies.Measurement(record.t, input=record.delta[:, 0], output=position)
+found = hc.studies.identify_data(data, "G", "x", band=(0.3, 10.0))
 for c in found.coefficients:
     print(f"{c.name}: {c.low:.2f} to {c.high:.2f} {c.unit}, true {c.printed:g}")
 

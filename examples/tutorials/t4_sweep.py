@@ -61,7 +61,9 @@ fig, ax = plt.subplots()
 for some, marker, label in ((~unstable, "o", "goes on"), (unstable, "x", "unstable")):
     ax.loglog(table.b[some], table["gain.y"][some], marker, label=f"run {label}")
 b = np.geomspace(5.0, 2000.0, 100)
-ax.plot(b, [hc.gain_limit("y", float(i)) for i in b], "--", color="0.3", lw=1, label="gain limit")
+ax.plot(
+    b, [hc.theory.gain_limit("y", float(i)) for i in b], "--", color="0.3", lw=1, label="gain limit"
+)
 ax.set(xlabel="damping of the clay b [N·s/m]", ylabel="K of y [1/kg]", ylim=(0.08, 4))
 ax.legend(ncols=3, loc="upper center")
 plt.show()

@@ -13,8 +13,8 @@ from . import console
 
 if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
-    from ..studies.monte_carlo import Cost, Instability, Trials
     from ..studies.population import Band
+    from ..studies.robustness import Cost, Instability, Trials
 
 ROBUSTNESS_SCHEMA = "hapticclay-robustness-1"
 GRIDS = {"x": "K=1:8:15 b=10:1000:11log", "y": "K=0.2:2:15 b=10:1000:11log"}
@@ -74,8 +74,8 @@ class RobustnessCommand:
 
     def __call__(self) -> int:
         from ..simulation.batch import cores
-        from ..studies import monte_carlo
         from ..studies.population import POPULATIONS, Draw, gain_band, hands_of
+        from ..studies.robustness import monte_carlo
 
         if self.list:
             rows = [hands.row(name) for name, hands in POPULATIONS.items()]
@@ -92,7 +92,7 @@ class RobustnessCommand:
         print(console.text_table([hands.row(self.hands)[:-1]], HANDS_HEAD, "lrrrrl"))
         try:
             with console.progress_bar(total=len(trials), unit="run", desc="runs") as bar:
-                result = monte_carlo.monte_carlo(
+                result = monte_carlo(
                     trials,
                     out=self.out,
                     workers=workers,
@@ -122,8 +122,8 @@ class RobustnessCommand:
         from ..model.constants import AXES, GAIN
         from ..studies.boundary import PushedLoop
         from ..studies.distribution import parse_laws
-        from ..studies.monte_carlo import Trials
         from ..studies.population import Hands, hands_of
+        from ..studies.robustness import Trials
         from ..studies.sampling import parse_grid
 
         base: PushedLoop = PushedLoop(

@@ -70,7 +70,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
     Args:
         scenario: the run.
     """
-    from ..theory import gain_limit
+    from ..theory import gain_limits
 
     clay = scenario.clay
     if clay is None or clay.yields or clay.springs:
@@ -80,7 +80,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
         laws = clay.laws_on(i)
         values = sorted({b for law in laws for b in law.within(*EVERYWHERE)})
         step = max(1, -(-len(values) // MOST_CLAYS))
-        limits = [(gain_limit.continuous_limit(scenario, axis, b), b) for b in values[::step]]
+        limits = [(gain_limits.continuous_limit(scenario, axis, b), b) for b in values[::step]]
         limit, b = min(limits, default=(math.inf, 0.0))
         if scenario.gain[i] > limit:
             told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit:.4g} at b = {b:g} N.s/m")

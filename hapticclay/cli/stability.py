@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
     from ..studies.stability_map import StabilityMap
     from ..studies.yield_map import YieldMap
-    from ..theory.margins import Verdict
+    from ..theory.stability_margins import Verdict
 
 VERDICTS_SCHEMA = "hapticclay-stability-1"
 VERDICTS_UNITS = {
@@ -313,7 +313,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     """
     import numpy as np
 
-    from ..theory import margins, passivity
+    from ..theory import loop_passivity, stability_margins
     from ..theory.linear_loop import TIMING
 
     K, Ts = loop.K, loop.Ts or TS
@@ -329,7 +329,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
         add(question, v.verdict, v.margin, what, v.omega)
 
     def stable(question: str, **late: Any) -> None:
-        v = margins.coupled_stability(replace(linear, **late))
+        v = stability_margins.coupled_stability(replace(linear, **late))
         add(question, v.verdict, v.margin * K, "largest stable K", v.omega)
 
     stable("stable with this hand")
@@ -337,7 +337,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     if delay:
         stable(f"... {1e3 * delay:g} ms late", delay=delay)
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
-    m = margins.margins(linear)
+    m = stability_margins.margins(linear)
 
     def response(question: str, value: float, what: str, omega: float) -> None:
         # an unstable loop has no steady state
@@ -348,15 +348,15 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     response("delay margin of the compensator", 1e3 * m.delay, "ms", m.delay_omega)
     response("disk margin", m.disk, "alpha", m.disk_omega)
     for equation in (11, 13):
-        small = margins.small_gain(linear, equation=equation)
+        small = stability_margins.small_gain(linear, equation=equation)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
-    judge("passive: stable with every hand", passivity.passivity(linear), "least Re Z [N.s/m]")
+    judge("passive: stable with every hand", loop_passivity.passivity(linear), "least Re Z [N.s/m]")
     judge(
         "held clay passive with this hand",
-        passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
+        loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
         "N.s/m to spare",
     )
-    transparency = margins.transparency(linear, np.array([ONE_HZ]))[0]
+    transparency = stability_margins.transparency(linear, np.array([ONE_HZ]))[0]
     response("transparency |fe/fh| at 1 Hz", float(abs(transparency)), "1 at best", ONE_HZ)
     return rows
 

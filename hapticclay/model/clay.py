@@ -150,7 +150,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
     if (start is None) != (end is None):
         raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
     if isinstance(resists, str) and not is_quantity(resists):
-        bound = f"must be a damping, or a flow as hc.material({resists!r}) returns"
+        bound = f"must be a damping, or a flow as hc.materials.material({resists!r}) returns"
         raise ParameterError("resists", resists, bound)
     flow = (
         resists

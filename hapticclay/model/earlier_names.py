@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import ParameterError
 
-NAMES = {
+NAMES: dict[str, str] = {
     "interface": "hardware",
     "lost": "dropout_probability",
     "window": "velocity_window",
@@ -35,7 +35,7 @@ def with_present_names(data: Any) -> Any:
         return data
     out: dict[str, Any] = {}
     for name, value in data.items():
-        now = ".".join(NAMES.get(x, x) for x in name.split("."))
+        now = ".".join(NAMES.get(x, x) for x in str(name).split("."))
         value = with_present_names(value)
         if name == "operator" and "impedance" in data and isinstance(value, Mapping):
             pairs = {f"{name}.{k}": v for k, v in value.items()}  # beside the flag

@@ -40,7 +40,7 @@ from ..simulation.record import Record, out_of_band_ratio
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at
 from ..studies.identification import Identified, identify
-from ..theory import gain_limit, linear_loop, margins
+from ..theory import gain_limits, linear_loop, stability_margins
 from ..theory.linear_loop import Loop
 
 STATUSES = {
@@ -216,7 +216,7 @@ def ledger_rows(runs: Runs | None = None) -> list[Row]:
         runs: the runs behind them; None for new ones.
     """
     runs = runs or Runs()
-    parts = (machine, blocks, constant, variable, gain_limits, maneuver)
+    parts = (machine, blocks, constant, variable, largest_gains, maneuver)
     return [each for part in parts for each in part(runs)]
 
 
@@ -377,25 +377,25 @@ def _corner(th: Operator) -> float:
     return float(omega[np.argmax((size > math.sqrt(2.0) * th.spring) & (omega > 1.0))])
 
 
-def gain_limits(runs: Runs) -> Iterator[Row]:
+def largest_gains(runs: Runs) -> Iterator[Row]:
     """The gain limit and the conditions for stability (Secs. 3, 4.3).
 
     Args:
         runs: the runs behind the rows.
     """
     text = "; ".join(
-        f"{axis}, b = {b:g}: {gain_limit.gain_limit(axis, b, TH):.4g} with Th, "
-        f"{gain_limit.gain_limit(axis, b):.4g} without"
+        f"{axis}, b = {b:g}: {gain_limits.gain_limit(axis, b, TH):.4g} with Th, "
+        f"{gain_limits.gain_limit(axis, b):.4g} without"
         for axis in AXES
         for b in (B_VARIABLE[0], B_CONSTANT, B_STABILITY)
     )
     yield row(
         "limit of K | Sec. 4.3 | should not exceed 5C | 1",
-        (GAIN_LIMIT_PRINTED, gain_limit.gain_limit("x", B_STABILITY, TH), None),
+        (GAIN_LIMIT_PRINTED, gain_limits.gain_limit("x", B_STABILITY, TH), None),
         "contradicted",
         f"exact limits of the printed loop: {text}. The printed 5 is nearest x at b = 50",
     )
-    y = gain_limit.gain_limit("y", B_STABILITY, TH)
+    y = gain_limits.gain_limit("y", B_STABILITY, TH)
     yield row(
         "limit of K on y, from which the 5C is derived | Sec. 4.3, Eqs. 16, 19 | should not exceed "
         "5C | 1",
@@ -404,8 +404,8 @@ def gain_limits(runs: Runs) -> Iterator[Row]:
         "Eq. 16 is the y axis, whose exact limit is below 1",
     )
     for axis in AXES:
-        verdict = margins.small_gain(axis, 1.0, B_STABILITY, TH, equation=11)
-        tiny = margins.small_gain(axis, 1e-3, B_STABILITY, TH, equation=11)
+        verdict = stability_margins.small_gain(axis, 1.0, B_STABILITY, TH, equation=11)
+        tiny = stability_margins.small_gain(axis, 1e-3, B_STABILITY, TH, equation=11)
         bands = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in verdict.fails)
         yield row(
             f"inequality (11) on {axis}, K = 1 | Eq. 11 | satisfied below 5C | 1",
@@ -417,7 +417,7 @@ def gain_limits(runs: Runs) -> Iterator[Row]:
             "no bound at low frequency, whatever K. The condition is sufficient, not necessary",
         )
     stiff = [
-        gain_limit.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
+        gain_limits.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
         for n in (1.0, 10.0, 100.0)
     ]
     yield row(
@@ -505,7 +505,7 @@ def constant(runs: Runs) -> Iterator[Row]:
     yield row(
         "fe/fh in the clay | Eq. 7 | a transfer function | 1",
         (
-            abs(complex(margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
+            abs(complex(stability_margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
             steady(r, "x", 1, "steady_fe_over_v") / steady(r, "x", 1, "steady_fh_over_v"),
             1e-3,
         ),
@@ -653,7 +653,7 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         GAINS_FIG11[2]: "25",
     }
     for K in GAINS_FIG11:
-        r, stable = runs.stability(K), K < gain_limit.gain_limit("x", B_STABILITY, TH)
+        r, stable = runs.stability(K), K < gain_limits.gain_limit("x", B_STABILITY, TH)
         pole = rightmost("x", K, B_STABILITY, TH)
         rms = float(np.sqrt(np.mean(r.fh[:, 0] ** 2)))
         yield row(

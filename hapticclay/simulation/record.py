@@ -26,7 +26,7 @@ from ..model.signals import Multisine
 from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
-from ..theory.margins import Verdict
+from ..theory.stability_margins import Verdict
 from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..theory import gain_limit
+from ..theory import gain_limits
 
 LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
@@ -279,7 +279,7 @@ class StabilityMonitor:
         """The clay with the least gain limit of the linear loop of axis i, and this limit."""
         for b in values:
             if (i, b) not in self._limits:
-                self._limits[i, b] = gain_limit.continuous_limit(self.scenario, AXES[i], b)
+                self._limits[i, b] = gain_limits.continuous_limit(self.scenario, AXES[i], b)
         return min(((b, self._limits[i, b]) for b in values), key=lambda x: x[1])
 
     def _dampings(self, i: int, visited: bool) -> list[float]:

@@ -11,7 +11,7 @@ from ..model.constants import B_MAX
 from ..model.operator import NO_HAND
 from ..model.scenario import Scenario
 from ..model.spring import RESOLVED
-from ..theory import gain_limit
+from ..theory import gain_limits
 from .march import GROWTH_BLOCK
 from .modes import STABLE_STEP, SUBSTEPS, creep_speed
 
@@ -40,7 +40,7 @@ def spring_step(scenario: Scenario) -> float:
     if scenario.control == "sampled":
         omega = math.sqrt(max(most) * scenario.mobility)
     else:
-        omega = max(gain_limit.spring_crossover(scenario, i, k) for i, k in enumerate(most))
+        omega = max(gain_limits.spring_crossover(scenario, i, k) for i, k in enumerate(most))
     longest = RESOLVED / omega if omega else math.inf
     if longest * SPRING_STEPS < scenario.dt:
         bound = (

@@ -21,7 +21,7 @@ from ..model.scenario import Position, Scenario, TorqueLimit
 from ..model.spring import Spring
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit, linear_loop
+from ..theory import gain_limits, linear_loop
 from ..theory.linear_loop import TIMING, Loop
 from ..theory.roots import first_failure
 
@@ -279,7 +279,7 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
         guess: start of the search [N/m]; None for the limit of the linear loop.
         most: end of the search [N/m].
     """
-    guess = gain_limit.stiffness_limit(loop.linear) if guess is None else guess
+    guess = gain_limits.stiffness_limit(loop.linear) if guess is None else guess
     return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
 
 
@@ -296,7 +296,7 @@ def nominal_limit(loop: PushedLoop) -> float:
     Args:
         loop: all but K.
     """
-    return gain_limit.gain_limit(loop.linear)
+    return gain_limits.gain_limit(loop.linear)
 
 
 def pose_matrix(loop: PushedLoop) -> np.ndarray:
@@ -367,7 +367,7 @@ def continuous_stable(loop: PushedLoop) -> bool:
     Args:
         loop: the loop.
     """
-    return gain_limit.is_stable(replace(loop.linear, **TIMING))
+    return gain_limits.is_stable(replace(loop.linear, **TIMING))
 
 
 def explain_disagreement(loop: PushedLoop, stable: bool) -> str:

@@ -18,15 +18,15 @@ from ..model.scenario_file import load_scenario, read_settings
 from ..model.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import design, margins, wall_limits
-from ..theory.gain_limit import gain_limit
+from ..theory import design, stability_margins, wall_limits
+from ..theory.gain_limits import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.linear_loop import TIMING, Loop
 from ..theory.mbk import dynamic_range, least_mass
 from .zwidth import ZRegion, zwidth
 
 MOST_COMPARED = 5  # as many looks as curves have
-COMPARED_HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
+COMPARED_HANDS = stability_margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
 SLOW = 1e-4  # [rad/s] at which motion counts as steady
 FELT_AT = (1.0, 10.0)  # [Hz] at which the table has the impedance, below and above the loop's swing
 RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
@@ -132,7 +132,7 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
     plain = replace(loop, **TIMING)
     record, error = run_and_error(scenario)
     alone = replace(plain, operator=None)
-    m = margins.margins(plain)
+    m = stability_margins.margins(plain)
     Z = loop_response(alone, np.array([SLOW])).Z[0]
     steady = Z.real - loop.b if SLOW * abs(Z.imag) < 1e-3 * max(abs(Z.real), 1.0) else math.nan
     numbers = {
@@ -195,11 +195,11 @@ def worst_limit(loop: Loop) -> float:
     Args:
         loop: one axis, in continuous time.
     """
-    return margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
+    return stability_margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
 
 
 def _passivity_margin(loop: Loop) -> float:
-    from ..theory.passivity import passivity
+    from ..theory.loop_passivity import passivity
 
     return passivity(loop).margin
 

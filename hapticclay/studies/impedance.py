@@ -22,7 +22,7 @@ from ..model.signals import Multisine
 from ..model.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit
+from ..theory import gain_limits
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.linear_loop import Loop
 from ..theory.wall_limits import stable_wall, stiffness_band
@@ -243,8 +243,8 @@ def _check_subject(subject: Subject) -> None:
         return
     if not isinstance(subject, PushedLoop):
         raise ParameterError("subject", subject, "must be a PushedLoop or a VirtualWall")
-    if not gain_limit.is_stable(subject.linear):
-        limit = gain_limit.gain_limit(subject.linear)
+    if not gain_limits.is_stable(subject.linear):
+        limit = gain_limits.gain_limit(subject.linear)
         bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
         raise ParameterError("K", subject.K, bound)
 

@@ -13,7 +13,6 @@ from ..arguments import checked
 from ..errors import integer, numbers_of
 from ..files import versions
 from ..model.virtual_wall import VirtualWall
-from ..theory.margins import Box
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
@@ -23,6 +22,7 @@ from ..theory.mbk import (
     renderable,
     stable_band,
 )
+from ..theory.stability_margins import Box
 from .boundary import PushedLoop, find_crossing, simulated_gain
 from .zwidth import growth_rates
 

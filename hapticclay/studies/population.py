@@ -14,9 +14,9 @@ from ..errors import Bound, ParameterError, check_fields, choice, integer, numbe
 from ..model.operator import Operator
 from ..model.virtual_wall import VirtualWall
 from ..theory import wall_limits
-from ..theory.gain_limit import gain_limit
+from ..theory.gain_limits import gain_limit
 from ..theory.linear_loop import Loop
-from ..theory.margins import Box
+from ..theory.stability_margins import Box
 from .distribution import LAWS, Distribution, normal_score
 from .stability_map import Progress
 

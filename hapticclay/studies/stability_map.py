@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import choice
 from ..model.constants import TS
-from ..theory import gain_limit, margins, passivity
+from ..theory import gain_limits, loop_passivity, stability_margins
 from ..theory.linear_loop import TIMING
 from ..theory.roots import bisect, first_failure
 from . import boundary
@@ -134,10 +134,10 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
         return fine, [law(b) for b in fine]
 
     def small_gain(b: float, K: float) -> bool:
-        return bool(margins.small_gain(replace(linear, b=b), K=K))
+        return bool(stability_margins.small_gain(replace(linear, b=b), K=K))
 
     def passive(b: float, K: float) -> bool:
-        return bool(passivity.passivity(replace(linear, b=b), K=K))
+        return bool(loop_passivity.passivity(replace(linear, b=b), K=K))
 
     lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
@@ -280,7 +280,7 @@ def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float
     linear = replace(loop.linear, Ts=Ts, delay=delay)
 
     def stable(b: float) -> bool:
-        return gain_limit.is_stable(replace(linear, b=b))
+        return gain_limits.is_stable(replace(linear, b=b))
 
     low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
     return high if low else 0.0
@@ -295,4 +295,4 @@ def _passive_damping(Ts: float, delay: float, damper: float) -> float:
     def late(z: np.ndarray) -> np.ndarray:
         return (1.0 - 1.0 / z) / Ts * z ** (-delay / Ts)
 
-    return damper / (damper - passivity.colgate_schenkel(late, Ts, damper, 2001).margin)
+    return damper / (damper - loop_passivity.colgate_schenkel(late, Ts, damper, 2001).margin)

@@ -32,7 +32,7 @@ from ..model.experiments import parameter_unit
 from ..simulation.batch import cores
 from ..simulation.record import Record
 from ..simulation.simulate import has_numba, simulate
-from ..theory import gain_limit
+from ..theory import gain_limits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
@@ -151,7 +151,7 @@ def result_row(
         clay = r and r.scenario.clay
         linear = not (clay and (clay.yields or clay.springs))  # the loop has b alone
         if r and linear and r.scenario.gain[i] > 0.0:
-            limit = gain_limit.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
+            limit = gain_limits.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
             margin = limit / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0

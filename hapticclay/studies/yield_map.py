@@ -17,7 +17,7 @@ from ..model.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory.describing import limit_cycles, push_outcomes
-from ..theory.gain_limit import gain_limit
+from ..theory.gain_limits import gain_limit
 from ..theory.linear_loop import TIMING, Loop
 from ..theory.relay_cycle import critical_push, exact_cycles
 from ..theory.roots import first_failure

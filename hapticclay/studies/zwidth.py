@@ -24,9 +24,9 @@ from ..model.spring import STIFFNESS_MAX
 from ..model.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
-from ..theory import gain_limit, wall_limits
-from ..theory.margins import Box
+from ..theory import gain_limits, wall_limits
 from ..theory.roots import bisect
+from ..theory.stability_margins import Box
 from . import boundary
 
 VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit that a label shows
@@ -423,7 +423,7 @@ def theoretical_damping(wall: Wall) -> float:
         tried = _at(wall, 0.0, B)
         if isinstance(tried, VirtualWall):
             return wall_limits.stable_wall(tried)
-        return gain_limit.is_stable(tried.linear)
+        return gain_limits.is_stable(tried.linear)
 
     grid = np.geomspace(1e-5 * unit, 1e3 * unit, 120).tolist()
     low = next((i for i, B in enumerate(grid) if stable(B)), None)
@@ -452,7 +452,7 @@ def _exact(wall: Wall) -> float:
     """Largest stable K of the linear loop."""
     if isinstance(wall, VirtualWall):
         return wall_limits.stiffness_band(wall)[1]
-    return gain_limit.stiffness_limit(wall.linear)
+    return gain_limits.stiffness_limit(wall.linear)
 
 
 def _softest(wall: Wall, top: float) -> float:

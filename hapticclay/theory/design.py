@@ -12,7 +12,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, number, pair
 from ..model.compensator import Compensator
-from . import gain_limit, margins
+from . import gain_limits, stability_margins
 from .linear_loop import TIMING, Loop, of_loop
 from .roots import first_failure
 
@@ -52,7 +52,7 @@ def design_gain(
     phase = number("phase_margin", phase_margin, 0.0, math.pi, unit="rad")
     disk = number("disk_margin", disk_margin, 0.0, 2.0)
     late = number("delay_margin", delay_margin, 0.0, unit="s")
-    top = gain_limit.gain_limit(loop)
+    top = gain_limits.gain_limit(loop)
     if loop.Ts is not None or loop.delay:
         if phase or disk or late or at != "compensator":
             bound = "must stay as they are with sampling or delay, where only gain_margin is known"
@@ -61,7 +61,7 @@ def design_gain(
         return top / gain
 
     def good(K: float) -> bool:
-        m = margins.margins(loop, K=K, at=at)
+        m = stability_margins.margins(loop, K=K, at=at)
         kept = m.phase >= phase and m.disk >= disk and m.delay >= late
         return m.stable and m.gain[1] >= gain and kept
 
@@ -90,7 +90,7 @@ class Design:
     compensator: Compensator
     K: float
     error: float
-    margins: margins.Margins
+    margins: stability_margins.Margins
 
 
 @of_loop("K", "b")
@@ -106,7 +106,7 @@ def transparency_error(loop: Loop, *, band: tuple[float, float] = DESIGN_BAND) -
 
     low, high = _design_band(band)
     x = np.linspace(math.log(low), math.log(high), 401)
-    error = np.abs(1.0 - margins.transparency(loop, np.exp(x))) ** 2
+    error = np.abs(1.0 - stability_margins.transparency(loop, np.exp(x))) ** 2
     return math.sqrt(float(simpson(error, x=x)) / (x[-1] - x[0]))
 
 
@@ -143,7 +143,7 @@ def compare(
             raise ParameterError("compensators", c, bound)
         tried = replace(tried, K=K)
         error = transparency_error(replace(tried, **TIMING), band=band)
-        out.append(Design(c, K, error, margins.margins(tried, at=at)))
+        out.append(Design(c, K, error, stability_margins.margins(tried, at=at)))
     return sorted(out, key=lambda d: d.error)
 
 

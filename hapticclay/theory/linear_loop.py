@@ -129,7 +129,7 @@ class Loop:
         )
         if b is not None:
             return replace(loop, b=b)
-        from .gain_limit import gain_limit
+        from .gain_limits import gain_limit
 
         laws = () if clay is None else clay.laws_on(i)
         dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))

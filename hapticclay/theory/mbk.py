@@ -20,11 +20,11 @@ from ..arguments import checked
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..model.virtual_wall import VirtualWall
-from . import gain_limit, margins
+from . import gain_limits, stability_margins
 from .impedance import frequencies, wall_response
 from .linear_loop import Loop
-from .margins import Box
 from .roots import bisect
+from .stability_margins import Box
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
@@ -201,9 +201,9 @@ def least_mass(
     decay = number("decay", decay, 0.0, 1e6, unit="1/s")
     loop = replace(loop, compensator=Compensator((1.0,), (1.0, decay, 0.0)), K=1.0)
     if box is None:
-        limit = gain_limit.gain_limit(loop)
+        limit = gain_limits.gain_limit(loop)
     else:
-        limit = margins.worst_case(loop, box, samples=samples).limit
+        limit = stability_margins.worst_case(loop, box, samples=samples).limit
     M = math.inf if limit == 0.0 else 1.0 / limit
     return M, decay * M if decay else 0.0
 

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from ..model.constants import AXES
 from ..model.virtual_wall import VirtualWall
 from ..studies.comparison import Compared
-from ..theory import margins, wall_limits
-from ..theory.gain_limit import gain_limit
+from ..theory import stability_margins, wall_limits
+from ..theory.gain_limits import gain_limit
 from ..theory.linear_loop import TIMING
 from . import figure as shown
 from .style import (
@@ -203,7 +203,7 @@ def transparency_overlay(found: Sequence[Compared]) -> Figure:
     def share(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         assert x.loop is not None
         loop = replace(x.loop, **TIMING)
-        return BAND / (2.0 * math.pi), np.abs(margins.transparency(loop, BAND))
+        return BAND / (2.0 * math.pi), np.abs(stability_margins.transparency(loop, BAND))
 
     labels = dict(xlabel="frequency [Hz]", ylabel="|f$_e$/f$_h$|")
     figure = _overlay(found, share, xscale="log", **labels)

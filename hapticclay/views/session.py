@@ -34,7 +34,7 @@ from ..stepping import monitor, path
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Kernel, Run
 from ..studies.removal import TOOL, Tool, removed
-from ..theory import gain_limit
+from ..theory import gain_limits
 
 if TYPE_CHECKING:
     from .stream import UdpStream
@@ -795,5 +795,5 @@ def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float,
         scenario: the run.
         b: damping of the clay at the handle [N.s/m].
     """
-    x, y = map(functools.partial(gain_limit.continuous_limit, scenario), AXES, b)
+    x, y = map(functools.partial(gain_limits.continuous_limit, scenario), AXES, b)
     return x, y

@@ -76,9 +76,9 @@ def objects(record):
         "yields": yields,
         "groove": groove,
         "own controller": own,
-        "passive": hc.passivity("x", 1.0, 90.0),
-        "not passive": hc.passivity("y", 0.5, 90.0),
-        "coupled": hc.coupled_stability("y", 1.0, 90.0, hc.Operator()),
+        "passive": hc.theory.passivity("x", 1.0, 90.0),
+        "not passive": hc.theory.passivity("y", 0.5, 90.0),
+        "coupled": hc.theory.coupled_stability("y", 1.0, 90.0, hc.Operator()),
         "observed": hc.observed_passivity(record),
     }
 

@@ -407,9 +407,9 @@ def test_fit_and_identify_read_the_csv(tmp_path):
     cut = hc.simulate(hc.constant_cut(), every=10)
     assert np.diff(cut.t)[-1] < 0.9 * np.diff(cut.t)[0]
     names = {"t": "t", "input": "fe_x", "output": "p_x"}
-    data = hc.Measurement.load(cut.export(tmp_path / "cut.csv"), names)
+    data = hc.studies.Measurement.load(cut.export(tmp_path / "cut.csv"), names)
     assert len(data.t) == len(cut.t) - 1
-    found = hc.fit_flow(data, place=(0.06, 0.14))
+    found = hc.studies.fit_flow(data, place=(0.06, 0.14))
     assert found.law == "viscous"
     # rounding alone
     assert found.parameters[0].value == pytest.approx(90.0, rel=1e-6)
@@ -424,8 +424,8 @@ def test_fit_and_identify_read_the_csv(tmp_path):
         dt=1e-3,
     )
     file = hc.simulate(push).export(tmp_path / "push.csv")
-    data = hc.Measurement.load(file, {"t": "t", "input": "fh_x", "output": "p_x"})
-    block = hc.identify_data(data, "S", "x")
+    data = hc.studies.Measurement.load(file, {"t": "t", "input": "fh_x", "output": "p_x"})
+    block = hc.studies.identify_data(data, "S", "x")
     for c in block.coefficients:
         assert c.value == pytest.approx(c.printed, rel=1e-2), c.name  # steps of 1 ms, 8 Hz
 

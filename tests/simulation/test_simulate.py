@@ -143,8 +143,8 @@ def test_any_stable_shaped_cut(b, K, f, hand):
 @settings(max_examples=5)
 @given(**stable_cut)
 def test_any_stable_cut_without_shaping(b, K, f):
-    assume(K < 0.6 * min(hc.gain_limit("x", b), 3.0))
-    Ky = 0.3 * min(hc.gain_limit("y", b), 1.0)
+    assume(K < 0.6 * min(hc.theory.gain_limit("x", b), 3.0))
+    Ky = 0.3 * min(hc.theory.gain_limit("y", b), 1.0)
     s = hc.constant_cut(b=b, gain=(K, Ky), force=(f, 0.0), t_max=3.0)
     exact, *_ = nonlinear((0, b, 0), EDGES, s.gain, s.force, t_max=3.0, rtol=1e-9, atol=1e-11)
     r = hc.simulate(s)
@@ -166,7 +166,7 @@ def test_clay_force_and_speeds_of_the_default_cut():
 @given(b=st.floats(1, 500), K=st.floats(0.2, 1.0), f=st.floats(0.5, 2.0))
 @settings(max_examples=15)
 def test_steady_speed_law(b, K, f):
-    assume(K < 0.5 * hc.gain_limit("x", b))
+    assume(K < 0.5 * hc.theory.gain_limit("x", b))
     r = hc.simulate(
         hc.constant_cut(
             b=b, gain=(K, 0.1), force=(f, 0.0), start=(0.06, 0.0), inertia_shaping=True, t_max=4.0

@@ -346,7 +346,7 @@ def test_its_numbers_take_units_and_names():
 
 def test_a_block_of_a_material_presses_as_its_flow():
     block = hc.Groove.of_material("stiff clay", (0.0, 0.1), (-0.02, 0.02), TOOL)
-    assert block.hardest == pytest.approx(hc.material("stiff clay", TOOL).Fy, rel=1e-14)
+    assert block.hardest == pytest.approx(hc.materials.material("stiff clay", TOOL).Fy, rel=1e-14)
     with pytest.raises(ParameterError, match="without K"):
         hc.Groove.of_material("printable paste", (0.0, 0.1), (-0.02, 0.02), TOOL)
 

@@ -356,7 +356,7 @@ def test_delayed_run_follows_the_lifted_map(axis, b, Ts, delay):
     """At the nominal pose the small motion of the arm is x(k+1) = M x(k), exact between samples."""
     K, i = 0.5, "xy".index(axis)
     less, beta, gamma = linear_loop.sampled_differences(
-        hc.Loop(axis, b, Operator(), Ts=Ts, delay=delay)
+        hc.theory.Loop(axis, b, Operator(), Ts=Ts, delay=delay)
     )
     A = np.eye(len(less)) + less + K * np.outer(beta, gamma)
     r = hc.simulate(ring(axis, K, b, hc.Hardware(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
@@ -384,7 +384,7 @@ def growth(record, i, span):
 
 @pytest.mark.parametrize("axis,b,Ts,delay", [("x", 90.0, 1e-3, 1.5e-3), ("y", 90.0, 1e-3, 1e-3)])
 def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(axis, b, Ts, delay):
-    limit = hc.gain_limit(axis, b, Operator(), Ts=Ts, delay=delay)
+    limit = hc.theory.gain_limit(axis, b, Operator(), Ts=Ts, delay=delay)
     found = []
     for factor in (0.98, 1.02):
         r = hc.simulate(ring(axis, factor * limit, b, hc.Hardware(delay=delay), dt=Ts, t_max=1.8))

@@ -49,7 +49,7 @@ def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
     assert f"{r.outcome.time:.4f}" in r.status
     assert 0.6 < r.outcome.time < 5.0 and r.t[-1] == pytest.approx(r.outcome.time, abs=1e-9)
     assert "gain[y]" in r.outcome.advice
-    limit = hc.gain_limit("y", 90.0, hc.Operator() if impedance else None)
+    limit = hc.theory.gain_limit("y", 90.0, hc.Operator() if impedance else None)
     assert f"{limit:.4g}" in r.outcome.advice
     assert r.summary()["outcome"]["advice"] == r.outcome.advice
     check_finite(r)
@@ -65,7 +65,7 @@ def test_growth_rate_is_that_of_the_unstable_poles():
     r = hc.simulate(
         hc.constant_cut(gain=(1.0, 1.0), inertia_shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0))
     )
-    sigma = hc.closed_loop_poles("y", 1.0, 90.0).real.max()
+    sigma = hc.theory.closed_loop_poles("y", 1.0, 90.0).real.max()
     v = r.v[:, 1]
     k = np.flatnonzero((v[1:-1] - v[:-2]) * (v[2:] - v[1:-1]) < 0) + 1
     k = k[len(k) // 2 :]
@@ -214,7 +214,10 @@ def test_how_a_stable_run_ends(kw, code, word):
 
 
 @pytest.mark.parametrize("clay,advice", [
-    (hc.slab(hc.material("stiff clay"), 0.05, 0.15), "above the yield force, 24.75 N, or lower Fy"),
+    (
+        hc.slab(hc.materials.material("stiff clay"), 0.05, 0.15),
+        "above the yield force, 24.75 N, or lower Fy",
+    ),
     (
         hc.Clay.of_groove(hc.Groove((0.02, 0.08), (-0.02, 0.02), pressure=40e3)),
         "above the yield force, 2 N, or lower the pressure",  # of 10 x 5 mm

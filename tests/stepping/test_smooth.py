@@ -203,8 +203,8 @@ def test_a_run_goes_on_step_by_step_as_in_one():
 def test_the_loop_of_a_scenario_has_the_control_point_of_the_least_limit():
     s = path_through(hc.Clay(*LAWS))
     for i, axis in enumerate("xy"):
-        least = min(VALUES[i].ravel(), key=lambda b: hc.gain_limit(axis, b))
-        assert hc.Loop.of(s, axis).b == least
+        least = min(VALUES[i].ravel(), key=lambda b: hc.theory.gain_limit(axis, b))
+        assert hc.theory.Loop.of(s, axis).b == least
 
 
 def test_the_monitor_names_the_limit_of_the_clay():

@@ -225,7 +225,7 @@ LIGHT = (hc.Servo(X.G, dataclasses.replace(X.S, gain=100.0)), Y)
 def test_a_step_resolves_a_spring_in_the_loop_that_it_closes(k, b, changes):
     """Mobility of a light handle, and of a force that the compensator passes on at once."""
     s = bonded(k, b, **changes)
-    loop = dataclasses.replace(hc.Loop.of(s, "x", b), k=k)
+    loop = dataclasses.replace(hc.theory.Loop.of(s, "x", b), k=k)
     A, B = linear_loop.state_space(loop)
     r = hc.simulate(s)
     assert r.outcome.code in ("time limit", "stalled")

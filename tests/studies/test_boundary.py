@@ -20,7 +20,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
-from hapticclay.theory import gain_limit
+from hapticclay.theory import gain_limits
 from hapticclay.views import study_plots
 from tests.oracles import Linear
 
@@ -72,18 +72,22 @@ def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
     found = boundary.simulated_gain(
         Loop(axis=axis), guess=3.0 if axis == "x" else 1.0
     )  # not told where
-    assert found == pytest.approx(hc.gain_limit(axis, 90.0, TH), rel=3e-3)  # CLOSE, and the step
+    assert found == pytest.approx(
+        hc.theory.gain_limit(axis, 90.0, TH), rel=3e-3
+    )  # CLOSE, and the step
 
 
 def test_boundary_of_the_sampled_arm():
-    exact = hc.gain_limit("x", 90.0, TH, Ts=2e-3)
+    exact = hc.theory.gain_limit("x", 90.0, TH, Ts=2e-3)
     assert boundary.simulated_gain(Loop(Ts=2e-3)) == pytest.approx(exact, rel=5e-3)
-    assert abs(exact / hc.gain_limit("x", 90.0, TH) - 1.0) > 0.1  # it would tell the two apart
+    assert (
+        abs(exact / hc.theory.gain_limit("x", 90.0, TH) - 1.0) > 0.1
+    )  # it would tell the two apart
 
 
 def test_boundary_with_a_delay_and_no_hand():
     loop = Loop(axis="y", operator=None, Ts=2e-3, delay=3e-3)
-    exact = hc.gain_limit("y", 90.0, Ts=2e-3, delay=3e-3)
+    exact = hc.theory.gain_limit("y", 90.0, Ts=2e-3, delay=3e-3)
     assert boundary.simulated_gain(loop) == pytest.approx(exact, rel=5e-3)
 
 
@@ -91,7 +95,7 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
     loop = Loop(inertia_shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
-    nominal = hc.gain_limit("x", 90.0, TH)
+    nominal = hc.theory.gain_limit("x", 90.0, TH)
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
     assert boundary.pose_limit(replace(loop, inertia_shaping=True)) == pytest.approx(
         nominal, rel=1e-6
@@ -103,7 +107,7 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
 def test_sampled_loop_at_a_pose(delay):
     loop = Loop(Ts=2e-3, delay=delay, pose=(0.10, 0.0))
     for operator in (TH, None):
-        exact = hc.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
+        exact = hc.theory.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
         for shaping in (True, False):
             nominal = replace(loop, operator=operator, pose=(0.0, 0.0), inertia_shaping=shaping)
             assert boundary.pose_limit(nominal) == pytest.approx(
@@ -112,7 +116,7 @@ def test_sampled_loop_at_a_pose(delay):
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
     loop = replace(loop, inertia_shaping=False)
     exact = boundary.pose_limit(loop)
-    assert exact < 0.8 * hc.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
+    assert exact < 0.8 * hc.theory.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
     assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
 
 
@@ -184,11 +188,11 @@ def test_causes():
         == "pose-dependent Lambda"
     )
     Ts = 4e-3
-    K = 0.5 * (hc.gain_limit("x", 90.0, TH) + hc.gain_limit("x", 90.0, TH, Ts=Ts))
+    K = 0.5 * (hc.theory.gain_limit("x", 90.0, TH) + hc.theory.gain_limit("x", 90.0, TH, Ts=Ts))
     assert boundary.explain_disagreement(Loop(K=K, Ts=Ts, **push), False) == "sampling"
     both = Loop(K=K, Ts=Ts, inertia_shaping=False, pose=(0.1, 0.0), **push)
     assert boundary.explain_disagreement(both, False) == "sampling and pose-dependent Lambda"
-    K = 0.5 * sum(hc.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
+    K = 0.5 * sum(hc.theory.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
     assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 
 
@@ -263,9 +267,9 @@ def test_picture_hatches_nothing_where_nothing_is_unstable(poses):
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
     b = stability_map._unstable_damping(Loop(), Ts, delay)
-    loop = hc.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
-    assert gain_limit.is_stable(replace(loop, b=0.999 * b))
-    assert not gain_limit.is_stable(replace(loop, b=1.001 * b))
+    loop = hc.theory.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
+    assert gain_limits.is_stable(replace(loop, b=0.999 * b))
+    assert not gain_limits.is_stable(replace(loop, b=1.001 * b))
     assert (
         stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it
@@ -298,7 +302,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     out = capsys.readouterr().out
     assert (
         "sampled every 0.36 ms" in out
-        and f" {hc.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
+        and f" {hc.theory.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
     )
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80
@@ -323,7 +327,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
     kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
     assert limits == pytest.approx(
-        [hc.gain_limit("x", 90.0, TH, **kw) for kw in kinds], rel=1e-12
+        [hc.theory.gain_limit("x", 90.0, TH, **kw) for kw in kinds], rel=1e-12
     )  # whatever K
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
@@ -336,13 +340,15 @@ def test_command_takes_a_compensator_and_a_servo_as_numbers(capsys, tmp_path):
     rows = json.loads((tmp_path / "stability.json").read_text())["verdicts"]
     servo = hc.Servo(SecondOrder(800.0, 40.0, 900.0), SecondOrder(0.5, 40.0, 400.0))
     c = hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))
-    loop = hc.Loop("x", 50.0, TH, servo, c, 0.5)
+    loop = hc.theory.Loop("x", 50.0, TH, servo, c, 0.5)
     bare = hc.Arm().nominal_mobility[0]
     limits = [r["value"] for r in rows if r["what"] == "largest stable K"]
-    sampled = hc.gain_limit(replace(loop, Ts=1e-3, mobility=bare))
+    sampled = hc.theory.gain_limit(replace(loop, Ts=1e-3, mobility=bare))
     assert limits[1] == pytest.approx(sampled, rel=1e-12)
     found = {r["question"]: r["value"] for r in rows}
-    assert found["phase margin"] == pytest.approx(math.degrees(hc.margins(loop).phase), rel=1e-12)
+    assert found["phase margin"] == pytest.approx(
+        math.degrees(hc.theory.margins(loop).phase), rel=1e-12
+    )
     assert app.main(["stability", "--num", "1", "2", "3", "4", "--out", str(tmp_path)]) == 2
     assert "compensator.num" in capsys.readouterr().err
 

@@ -35,7 +35,7 @@ def test_runs_stop_being_stable_where_theory_says(plane, x):
 
 
 def test_growth_of_a_pushed_device():
-    limit = hc.stiffness_band(WALL)[1]
+    limit = hc.walls.stiffness_band(WALL)[1]
     below, above = zwidth.growth_rates([replace(WALL, K=x * limit) for x in (0.99, 1.01)])
     assert below < 0.0 < above
     assert zwidth.growth_rates([replace(WALL, B=80.0)])[0] < -10.0  # faded to rounding

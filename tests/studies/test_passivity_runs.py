@@ -45,7 +45,7 @@ def test_a_spring_leaves_b_less_half_k_ts_by_theory_and_by_runs(index):
 
 def test_sines_find_the_real_part_of_the_impedance(index):
     """To 1 %: near half the sampling frequency the steps of the engine are (omega dt)^2/6 off."""
-    expected = hc.wall_impedance(WALL, index.measured_omega).real
+    expected = hc.walls.wall_impedance(WALL, index.measured_omega).real
     np.testing.assert_allclose(index.measured, expected, rtol=0.01)
     assert (index.damping >= index.index - 1e-9).all()  # one sine is never the worst hand
 
@@ -55,13 +55,13 @@ def test_late_damped_walls_too():
     wall = replace(WALL, K=500.0, B=0.2, delay=0.5e-3)
     found = study.wall_index(wall)
     edge = found.worst_omega * (1.0 - 1e-12)
-    np.testing.assert_allclose(found.worst, hc.passivity_index(wall, edge), rtol=0.01)
+    np.testing.assert_allclose(found.worst, hc.walls.passivity_index(wall, edge), rtol=0.01)
 
 
 def test_arm_is_passive_on_x_and_active_on_y():
     for axis, K, sign in (("x", 1.0, 1.0), ("y", 0.5, -1.0)):
         found = study.arm_index(subject_of(hc.constant_cut(), axis))
-        exact = hc.passivity(axis, K, 90.0).margin
+        exact = hc.theory.passivity(axis, K, 90.0).margin
         assert found.margin == pytest.approx(exact, rel=2e-3) and np.sign(exact) == sign
         near = np.interp(found.measured_omega, found.omega, found.damping)
         # large slopes between the points of the line, and 1 % of the largest

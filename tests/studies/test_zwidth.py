@@ -21,7 +21,7 @@ from hapticclay.studies.zwidth import (
     worst_hand,
     zwidth,
 )
-from hapticclay.theory import gain_limit
+from hapticclay.theory import gain_limits
 from hapticclay.views.style import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
 from tests.oracles.sampled_wall import sample_map
@@ -100,7 +100,7 @@ def test_automatic_dampings_reach_from_zero_to_the_largest():
 
 
 def test_every_hand_of_the_box_holds_the_limit_of_the_worst():
-    box = hc.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))
+    box = hc.theory.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))
     wall = replace(BARE, delay=1.5e-3, velocity_filter=100.0)
     r = zwidth(wall, B=(0.0, 3.0), box=box).regions[0]
     for B, K, found in zip(r.B, r.box_exact, r.box_K, strict=True):
@@ -133,7 +133,7 @@ def test_published_lines_where_they_are_exact():
 
 def test_friction_outweighs_the_encoder_up_to_the_limit_of_abbott_and_okamura():
     limit = 2.0 * 0.02 / 5e-5
-    assert hc.abbott_okamura_limit(ROUGH) == pytest.approx(limit)
+    assert hc.walls.abbott_okamura_limit(ROUGH) == pytest.approx(limit)
     walls = [replace(ROUGH, K=share * limit, B=2.0) for share in (0.3, 0.9, 0.98)]
     assert all(come_to_rest(walls))
     # above it half a quantum of force moves the device: it buzzes, if B is large enough for the
@@ -216,7 +216,7 @@ def test_clay_on_the_arm():
     for B, K, exact in zip(r.B, r.K, r.exact, strict=True):
         for share in (0.99, 1.01):
             tried = replace(loop, b=B, k=share * K).linear
-            assert gain_limit.is_stable(tried) == (share < 1.0)
+            assert gain_limits.is_stable(tried) == (share < 1.0)
         assert K == pytest.approx(exact, rel=3e-3)
 
 

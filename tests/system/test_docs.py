@@ -130,7 +130,7 @@ def test_every_limit_in_the_stability_page_is_recomputed():
     assert len(rows) == 12
     for axis, hand, b, cells in rows:
         for cell, kw in zip(cells.split("|"), columns, strict=True):
-            limit = hc.gain_limit(
+            limit = hc.theory.gain_limit(
                 axis, float(b), hc.Operator() if hand == "nominal" else None, **kw
             )
             assert f"{limit:.4f}" == cell.strip()

@@ -34,7 +34,7 @@ def loaded(code, names):
         ("import hapticclay as hc; hc.constant_cut()", (*HEAVY, "mujoco")),
         ("import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01))", HEAVY),
         (
-            "import hapticclay as hc; hc.gain_limit('x', 90.0)",
+            "import hapticclay as hc; hc.theory.gain_limit('x', 90.0)",
             ("matplotlib", "mujoco", "numba", "tyro"),
         ),
     ],

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.controller import SERVO
-from hapticclay.theory import impedance, margins
+from hapticclay.theory import impedance, stability_margins
 from hapticclay.theory.impedance import Impedance, loop_impedance, loop_response, wall_response
 from tests.oracles.multirate import fundamental
 
@@ -31,17 +31,19 @@ def test_continuous_impedance_is_that_of_python_control(axis, K, b, k, held):
     device = G * K / (s**2 + 10 * s) + S
     s = 1j * OMEGA
     Z = 1.0 / (s * device(s)) + b + k / s
-    loop = hc.Loop(axis, b, TH, K=K, k=k, render="held" if held else "physical")
+    loop = hc.theory.Loop(axis, b, TH, K=K, k=k, render="held" if held else "physical")
     found = loop_response(loop, OMEGA)
     np.testing.assert_allclose(found.Z, Z, rtol=1e-10)  # a ratio of polynomials of degree 6
-    np.testing.assert_allclose(found.transparency, margins.transparency(loop, OMEGA), rtol=1e-10)
+    np.testing.assert_allclose(
+        found.transparency, stability_margins.transparency(loop, OMEGA), rtol=1e-10
+    )
     np.testing.assert_allclose(found.transparency, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
 
 
 @pytest.mark.parametrize("render", ["held", "physical"])
 def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
     """The servo's law written out with every motor force late (docs/equations.md, section 3)."""
-    loop = hc.Loop("x", 90.0, None, K=2.0, delay=4e-3, k=300.0, render=render, mobility=1.3)
+    loop = hc.theory.Loop("x", 90.0, None, K=2.0, delay=4e-3, k=300.0, render=render, mobility=1.3)
     s = 1j * OMEGA
     G, S = loop.servo.G, loop.servo.S
     late, e = np.exp(-s * loop.delay), loop.b * s + loop.k
@@ -61,7 +63,7 @@ def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
 def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
     """Ts = 5 ms, where the hold costs a third of the damping at 20 Hz."""
     Ts, b, k, K, W = 5e-3, 30.0, 80.0, 0.6, 0.9
-    loop = hc.Loop(
+    loop = hc.theory.Loop(
         "x", b, operator, K=K, k=k, Ts=Ts, delay=delay, render=render, mobility=W
     )  # fmt: skip
     G, S, hand = SERVO[0].G, SERVO[0].S, loop.hand
@@ -146,7 +148,7 @@ def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, w
     """Two derivations of one number; the hand's sidebands are none without its arm."""
     wall = hc.VirtualWall(K, B, M, hc.Device(0.2, 0.7), delay=delay, velocity_window=window)
     found = wall_response(wall, OMEGA)
-    np.testing.assert_allclose(found.Z, hc.wall_impedance(wall, OMEGA), rtol=1e-8)
+    np.testing.assert_allclose(found.Z, hc.walls.wall_impedance(wall, OMEGA), rtol=1e-8)
     # the device itself is left: fh = (m s + b) v + fe
     s = 1j * OMEGA
     own = (0.2 * s + 0.7) / found.Z
@@ -154,9 +156,11 @@ def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, w
 
 
 def test_a_fast_sampled_loop_is_the_continuous_one():
-    exact = loop_impedance(hc.Loop("x", 90.0, TH, K=1.0), OMEGA)
+    exact = loop_impedance(hc.theory.Loop("x", 90.0, TH, K=1.0), OMEGA)
     gaps = [
-        np.abs(loop_impedance(hc.Loop("x", 90.0, TH, K=1.0, Ts=Ts), OMEGA) / exact - 1.0).max()
+        np.abs(
+            loop_impedance(hc.theory.Loop("x", 90.0, TH, K=1.0, Ts=Ts), OMEGA) / exact - 1.0
+        ).max()
         for Ts in (1e-5, 1e-6)
     ]
     assert gaps[0] == pytest.approx(10.0 * gaps[1], rel=0.02)  # first order in Ts
@@ -170,7 +174,7 @@ def test_low_frequencies_feel_the_steady_values():
     assert found.stiffness[0] == pytest.approx(500.0, rel=1e-6)
     # the difference is late by Ts/2, which at rest costs nothing more
     assert found.damping[0] == pytest.approx(0.5 + 3.0 - 500.0 * 0.5e-3, rel=1e-6)
-    loop = hc.Loop("x", 90.0, None, K=1.0)
+    loop = hc.theory.Loop("x", 90.0, None, K=1.0)
     slow = loop_response(loop, np.array([1e-4]))
     assert slow.damping[0] == pytest.approx(90.0 + 10.0, rel=1e-6)  # K f = (10 + K b) v
 
@@ -192,4 +196,4 @@ def test_effective_values_are_those_of_a_spring_a_damper_and_a_mass():
 @pytest.mark.parametrize("omega", [[0.0], [-1.0], [math.nan], [[1.0]], [math.inf]])
 def test_frequencies_are_above_zero(omega):
     with pytest.raises(ParameterError, match="omega"):
-        impedance.loop_response(hc.Loop("x", 90.0, K=1.0), np.array(omega))
+        impedance.loop_response(hc.theory.Loop("x", 90.0, K=1.0), np.array(omega))

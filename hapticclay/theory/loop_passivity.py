@@ -15,7 +15,7 @@ from ..arguments import checked
 from ..errors import number
 from . import linear_loop, roots
 from .linear_loop import Loop, of_loop
-from .margins import LINEAR, Verdict
+from .stability_margins import LINEAR, Verdict
 
 
 @of_loop("K", "b")

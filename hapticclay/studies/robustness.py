@@ -200,7 +200,7 @@ class Trials:
             hardware = made.hardware
             rough = hardware and (hardware.encoder or any(hardware.friction))
             if base.unilateral or rough:
-                bound = "must be a wall without surface, friction and encoder; see hc.zwidth"
+                bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
                 raise ParameterError("base", base, bound)
         return made
 

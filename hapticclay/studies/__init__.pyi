@@ -1,0 +1,29 @@
+# Questions that take many runs: public names, and the modules they come from.
+
+from .boundary import PushedLoop as PushedLoop
+from .distribution import Distribution as Distribution
+from .fitting import Fitted as Fitted
+from .fitting import fit_flow as fit_flow
+from .identification import Identified as Identified
+from .identification import Noise as Noise
+from .identification import identify as identify
+from .impedance import MeasuredImpedance as MeasuredImpedance
+from .impedance import measure_impedance as measure_impedance
+from .measurement import Measurement as Measurement
+from .measurement import identify_data as identify_data
+from .population import POPULATIONS as POPULATIONS
+from .population import Band as Band
+from .population import Draw as Draw
+from .population import Hands as Hands
+from .population import gain_band as gain_band
+from .removal import removed as removed
+from .robustness import Instability as Instability
+from .robustness import Trials as Trials
+from .robustness import monte_carlo as monte_carlo
+from .robustness import stored_runs as stored_runs
+from .sampling import Range as Range
+from .sampling import Sweep as Sweep
+from .sweep import read_sweep as read_sweep
+from .sweep import run_sweep as run_sweep
+from .workspace import Drift as Drift
+from .workspace import drift_map as drift_map

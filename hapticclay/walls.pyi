@@ -1,0 +1,31 @@
+# Virtual walls: limits, Z-width, what can be rendered; and the modules they come from.
+
+from .studies.mbk import ArmMBK as ArmMBK
+from .studies.mbk import Border as Border
+from .studies.mbk import DeviceMBK as DeviceMBK
+from .studies.mbk import arm_mbk as arm_mbk
+from .studies.mbk import device_mbk as device_mbk
+from .studies.mbk import wall_borders as wall_borders
+from .studies.population import wall_band as wall_band
+from .studies.zwidth import Limit as Limit
+from .studies.zwidth import Press as Press
+from .studies.zwidth import ZRegion as ZRegion
+from .studies.zwidth import ZWidth as ZWidth
+from .studies.zwidth import zwidth as zwidth
+from .theory.impedance import wall_impedance as wall_impedance
+from .theory.impedance import wall_response as wall_response
+from .theory.mbk import DynamicRange as DynamicRange
+from .theory.mbk import Region as Region
+from .theory.mbk import dynamic_range as dynamic_range
+from .theory.mbk import least_mass as least_mass
+from .theory.mbk import renderable as renderable
+from .theory.mbk import stable_band as stable_band
+from .theory.wall_limits import abbott_okamura_limit as abbott_okamura_limit
+from .theory.wall_limits import colgate_schenkel_limit as colgate_schenkel_limit
+from .theory.wall_limits import hand_box_limit as hand_box_limit
+from .theory.wall_limits import hulin_boundary as hulin_boundary
+from .theory.wall_limits import hulin_limit as hulin_limit
+from .theory.wall_limits import jury_limit as jury_limit
+from .theory.wall_limits import passivity_index as passivity_index
+from .theory.wall_limits import stable_wall as stable_wall
+from .theory.wall_limits import stiffness_band as stiffness_band
