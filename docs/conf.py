@@ -28,6 +28,7 @@ from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 import hapticclay as hc  # noqa: E402
 from hapticclay.model import scenario, spring  # noqa: E402
 from hapticclay.views.record_plots import RecordPlots  # noqa: E402
+from tests.public import NAMES, told_by, used_in  # noqa: E402
 
 CHECKED = {  # imported for type checks alone, or by the module of a base class
     "np": np,
@@ -274,11 +275,10 @@ def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
     """Examples by the public name that they use, and how many names each uses."""
     uses: dict[str, set[str]] = collections.defaultdict(set)
     for path in SOURCES:
-        for name in set(re.findall(r"\bhc\.(\w+)", path.read_text())):
+        for name in used_in(path.read_text()):
             uses[f"hapticclay.{name}"].add(os.path.relpath(path, DOCS))
-    for name in hc.__all__:  # what a function returns, as a Verdict
-        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
-        for result in set(re.findall(r"\w+", returned)) & set(hc.__all__):
+    for name in NAMES:  # what a function returns, as a Verdict, and what that consists of
+        for result in told_by(name):
             uses[f"hapticclay.{result}"] |= uses[f"hapticclay.{name}"]
     return uses, collections.Counter(path for paths in uses.values() for path in paths)
 

@@ -13,15 +13,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hapticclay as hc
-from hapticclay.studies.sampling import Sweep, parse_grid
-from hapticclay.studies.sweep import run_sweep
 
 plt.style.use("hapticclay.views.figure")
 
-grid = parse_grid("b=10:1000:7log gain.y=0.1,0.2,0.4,0.8,1.6")  # N.s/m, 1/kg
-sweep = Sweep("constant", grid, fixed={"t_max": 4.0, "length": 0.1}, chunk=35)
+grid = hc.studies.parse_grid("b=10:1000:7log gain.y=0.1,0.2,0.4,0.8,1.6")  # N.s/m, 1/kg
+sweep = hc.studies.Sweep("constant", grid, fixed={"t_max": 4.0, "length": 0.1}, chunk=35)
 with tempfile.TemporaryDirectory() as folder:
-    run_sweep(sweep, Path(folder), workers=1)
+    hc.studies.run_sweep(sweep, Path(folder), workers=1)
     table = hc.studies.read_sweep(folder).to_pandas()
 print(table[["b", "gain.y", "status", "end_time", "speed_x"]].head())
 

@@ -9,7 +9,6 @@ device light. Theory has the exact borders at each mass; runs find the one at M 
 import matplotlib.pyplot as plt
 
 import hapticclay as hc
-from hapticclay.studies.mbk import wall_borders
 
 plt.style.use("hapticclay.views.figure")
 
@@ -17,7 +16,7 @@ wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5), Ts=1e-3)  # kg, N.
 low, high = hc.walls.stable_band(wall, "M")
 print(f"M-width without damper: {low:.4g} to {high:.4g} kg")
 region = hc.walls.renderable(wall, "mass-damper")
-borders = wall_borders(wall, "mass-damper", 0.05)
+borders = hc.walls.wall_borders(wall, "mass-damper", 0.05)
 for found in borders:
     print(f"M = {found.x:g} kg: B to {found.y:.5g} by runs, {found.exact:.5g} N.s/m by theory")
 

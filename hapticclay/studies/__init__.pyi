@@ -3,7 +3,10 @@
 from .boundary import PushedLoop as PushedLoop
 from .distribution import Distribution as Distribution
 from .fitting import Fitted as Fitted
+from .fitting import FittedLaw as FittedLaw
+from .fitting import FlowParameter as FlowParameter
 from .fitting import fit_flow as fit_flow
+from .identification import Coefficient as Coefficient
 from .identification import Identified as Identified
 from .identification import Noise as Noise
 from .identification import identify as identify
@@ -17,12 +20,16 @@ from .population import Draw as Draw
 from .population import Hands as Hands
 from .population import gain_band as gain_band
 from .removal import removed as removed
+from .robustness import Cost as Cost
 from .robustness import Instability as Instability
+from .robustness import Probability as Probability
+from .robustness import RiskMap as RiskMap
 from .robustness import Trials as Trials
 from .robustness import monte_carlo as monte_carlo
 from .robustness import stored_runs as stored_runs
 from .sampling import Range as Range
 from .sampling import Sweep as Sweep
+from .sampling import parse_grid as parse_grid
 from .sweep import read_sweep as read_sweep
 from .sweep import run_sweep as run_sweep
 from .workspace import Drift as Drift
