@@ -6,10 +6,12 @@ import difflib
 import functools
 import inspect
 import os
+import re
+import sys
 import types
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from .errors import ParameterError
 
@@ -70,9 +72,56 @@ def named(made: F) -> F:
             raise
 
     if isinstance(made, type):
+        told = in_words(inspect.signature(inner), vars(sys.modules[made.__module__]))
+        guarded.__signature__ = told  # type: ignore[attr-defined]
+        made.__signature__ = told.replace(parameters=list(told.parameters.values())[1:])
         made.__init__ = guarded
         return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
+
+
+class Words(str):
+    """An annotation that a signature shows as it is."""
+
+    __repr__ = str.__str__
+
+
+def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.Signature:
+    """A signature with units in place of bounds: `float [N/m]`.
+
+    Args:
+        signature: of the constructor of a dataclass.
+        scope: names of its module.
+    """
+    return signature.replace(
+        parameters=[
+            p.replace(annotation=unit_in_words(p.annotation, scope))
+            for p in signature.parameters.values()
+        ]
+    )
+
+
+def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
+    """An annotation with a unit in place of a bound; any other as it is.
+
+    Args:
+        hint: the annotation, as it was written.
+        scope: names that stand for annotations.
+    """
+    if not isinstance(hint, str):
+        return hint
+    if (named_ := scope.get(hint)) is not None and get_origin(named_) is Annotated:
+        kind, bound = get_args(named_)
+        told = kind.__name__ if isinstance(kind, type) and not get_args(kind) else str(kind)
+        return Words(f"{told}{_of_unit(bound.unit)}")
+    if found := re.fullmatch(r"Annotated\[(.*), Bound\((.*)\)\]", hint, re.S):
+        unit = re.search(r"(?:, |unit=)'([^']+)'", found[2])
+        return Words(f"{found[1]}{_of_unit(unit[1] if unit else '')}")
+    return Words(hint)
+
+
+def _of_unit(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
 
 
 def checked(made: F) -> F:

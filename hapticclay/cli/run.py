@@ -90,7 +90,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
 def simulate_with_progress(
     scenario: Scenario,
     every: int,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[], bool] | None = None,
     error: str | None = None,
 ) -> Record:
     """Runs simulate() under a progress bar.
@@ -109,7 +109,7 @@ def simulate_with_progress(
         def progress(t: float, x: float) -> bool:
             way = (x - start) / (length - start) if length is not None else 0.0
             show(max(t / scenario.t_max, way))
-            return stop()
+            return stop is not None and stop()
 
         return simulate(scenario, every=every, progress=progress, error=error)
 

@@ -83,6 +83,14 @@ Search = Generator[float, Any, float]
 Share = Callable[[float], None]
 
 
+def unshown(share: float) -> None:
+    """Shows no progress.
+
+    Args:
+        share: of the work that is done.
+    """
+
+
 @named
 @dataclass(frozen=True)
 class Press:
@@ -283,7 +291,7 @@ def zwidth(
     box: Box | None = None,
     press: Press = Press(),
     quick: bool = False,
-    progress: Share = lambda share: None,
+    progress: Share = unshown,
 ) -> ZWidth:
     """Find the walls that a device renders stably, by runs, beside what theory says.
 
@@ -576,7 +584,7 @@ def _side_by_side(
     searches: Sequence[Search],
     wall: Callable[[int, float], Any],
     judge: Callable[[Sequence[Any]], Sequence[Any]],
-    show: Share = lambda share: None,
+    show: Share = unshown,
 ) -> list[float]:
     """Results of searches that each ask for one run at a time; a batch has one of each."""
     results = [math.nan] * len(searches)

@@ -155,6 +155,11 @@ def loop_family(loop: Loop) -> LoopFamily:
     return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
 
 
+def no_poles() -> int:
+    """Number of poles right of the axis, of an h without any."""
+    return 0
+
+
 @dataclass(frozen=True)
 class LoopFamily:
     """A loop for every gain.
@@ -176,7 +181,7 @@ class LoopFamily:
     ends: tuple[float, ...] = ()
     most: float = math.inf
     order: int = 0
-    right: Callable[[], int] = lambda: 0
+    right: Callable[[], int] = no_poles
 
 
 def first_instability(loop: LoopFamily) -> tuple[float, float]:
