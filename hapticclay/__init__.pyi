@@ -45,6 +45,7 @@ from .model.spring import Spring as Spring
 from .model.tool import Tool as Tool
 from .model.virtual_wall import Device as Device
 from .model.virtual_wall import VirtualWall as VirtualWall
+from .results import Result as Result
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.record import Record as Record

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import functools
 import inspect
 import os
+import pkgutil
 import re
 import sys
 import types
@@ -192,3 +194,16 @@ def _in_words(kind: Any) -> str:
     if kind is str:
         return IN_WORDS[os.PathLike]
     return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
+
+
+def function_name(function: Any) -> str:
+    """The name "package.module:name" by which others find a function; "" if they do not.
+
+    Args:
+        function: the function.
+    """
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    with contextlib.suppress(ImportError, AttributeError, ValueError):
+        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
+            return name
+    return ""

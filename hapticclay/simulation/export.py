@@ -12,7 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from ..display import one_line
-from ..errors import ParameterError, choice
+from ..errors import ParameterError, choice, needing
 from ..files import atomic
 from . import tables
 from .record import Record
@@ -52,7 +52,7 @@ def export_record(record: Record, path: str | os.PathLike[str], kind: str | None
 
 
 def _netcdf(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("nc", "h5netcdf"):
+    with needing("nc", "h5netcdf"):
         import h5netcdf  # noqa: F401  # xarray finds it by name
         import h5py  # noqa: F401
     file.write(record.to_xarray().to_netcdf(engine="h5netcdf"))
@@ -60,7 +60,7 @@ def _netcdf(record: Record, file: IO[bytes]) -> None:
 
 def _parquet(record: Record, file: IO[bytes]) -> None:
     frame = record.to_frame().reset_index()
-    with tables.needing("parquet", "pyarrow"):
+    with needing("parquet", "pyarrow"):
         import pyarrow as pa
         import pyarrow.parquet as pq
     units = frame.attrs["units"]
@@ -82,7 +82,7 @@ def _csv(record: Record, file: IO[bytes]) -> None:
 
 
 def _mcap(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("mcap", "mcap"):
+    with needing("mcap", "mcap"):
         from mcap.writer import Writer
     told = tables.told_of(record)
     writer = Writer(file)
@@ -126,7 +126,7 @@ def _sample_schema(record: Record) -> dict[str, Any]:
 
 
 def _rerun(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("rrd", "rerun-sdk", "rerun"):
+    with needing("rrd", "rerun-sdk", "rerun"):
         import rerun as rr
     told = tables.told_of(record)
     recording = rr.RecordingStream(RECORDING)

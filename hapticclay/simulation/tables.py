@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import needing
 from ..model.constants import AXES
 from ..model.fields import plain_data
 from ..model.hardware import JOINTS
@@ -38,25 +36,6 @@ LONG_NAMES = {
     "gain": "gain K of the compensator",
     "ground": "height of the clay that is left",
 }
-
-
-@contextlib.contextmanager
-def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
-    """Says how to install a package where importing it fails.
-
-    Args:
-        what: what needs it, for the error.
-        package: its name.
-        extra: of hapticclay, that brings it.
-
-    Raises:
-        ParameterError: the package is not installed.
-    """
-    try:
-        yield
-    except ImportError:
-        bound = f"is not installed: pip install 'hapticclay[{extra}]'"
-        raise ParameterError(what, package, bound) from None
 
 
 def recorded_arrays(record: Record) -> dict[str, np.ndarray]:

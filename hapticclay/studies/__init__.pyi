@@ -1,6 +1,9 @@
 # Questions that take many runs: public names, and the modules they come from.
 
 from .boundary import PushedLoop as PushedLoop
+from .comparison import Compared as Compared
+from .comparison import Comparison as Comparison
+from .comparison import compare_files as compare_files
 from .distribution import Distribution as Distribution
 from .fitting import Fitted as Fitted
 from .fitting import FittedLaw as FittedLaw

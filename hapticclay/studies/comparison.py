@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from ..model.fields import plain_data
 from ..model.scenario import Scenario
 from ..model.scenario_file import load_scenario, read_settings
 from ..model.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
+from ..results import Result
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import design, stability_margins, wall_limits
@@ -72,11 +73,41 @@ class Compared:
         return loop_response(replace(self.loop, operator=None, **TIMING), omega)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Files side by side, in the order in which they were given.
+
+    Attributes:
+        files: what each says, what theory says of it, and its run.
+    """
+
+    files: tuple[Compared, ...]
+
+    def __iter__(self) -> Iterator[Compared]:
+        return iter(self.files)
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __getitem__(self, i: int) -> Compared:
+        return self.files[i]
+
+    def headline(self) -> str:
+        """The files and how their runs ended, in one line."""
+        return "; ".join(f"{x.name}: {x.record.status}" for x in self.files)
+
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
+        """Key numbers of each file."""
+        names = dict.fromkeys(n for x in self.files for n in x.numbers)
+        columns = {n: [x.numbers.get(n, math.nan) for x in self.files] for n in names}
+        return {"numbers": {"file": [x.name for x in self.files], **columns}}
+
+
 def compare_files(
     paths: Sequence[str | os.PathLike[str]],
     axis: str = "x",
     progress: Callable[[Iterable], Iterable] = iter,
-) -> tuple[Compared, ...]:
+) -> Comparison:
     """Loads, judges and runs controllers (scenario files) or bare devices (files of walls).
 
     Args:
@@ -101,7 +132,8 @@ def compare_files(
     stems = [Path(p).stem for p in paths]
     names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]
     judge = compared_wall if kinds == {True} else compared_scenario
-    return tuple(judge(p, n, axis) for p, n in progress(list(zip(paths, names, strict=True))))
+    pairs = progress(list(zip(paths, names, strict=True)))
+    return Comparison(tuple(judge(p, n, axis) for p, n in pairs))
 
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
@@ -247,7 +279,7 @@ def _run_numbers(record: Record, error: float) -> dict[str, float]:
     }
 
 
-def differing_fields(found: Sequence[Compared]) -> dict[str, list[Any]]:
+def differing_fields(found: Comparison) -> dict[str, list[Any]]:
     """Fields that are not alike in all files: the value of each file, None where it has none.
 
     Args:

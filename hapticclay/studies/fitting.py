@@ -23,6 +23,7 @@ from ..errors import ParameterError, choice, number, numbers_of
 from ..files import versions
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
+from ..results import Result
 from ..simulation.record import Record
 from .measurement import Measurement
 from .trajectory import (
@@ -105,8 +106,8 @@ class FittedLaw:
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Fitted:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fitted(Result):
     """A law of resistance fitted to a motion.
 
     Attributes:
@@ -145,6 +146,14 @@ class Fitted:
     axis: str
     source: str
 
+    def headline(self) -> str:
+        """The law and its parameters with their intervals, in one line."""
+        told = (
+            f"{p.name} {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) {p.unit}".rstrip()
+            for p in self.parameters
+        )
+        return f"{self.law}: {', '.join(told)}"
+
     @property
     def flow(self) -> Flow:
         """The law as clay: `hc.slab(fitted.flow)`."""
@@ -170,6 +179,13 @@ class Fitted:
         """Returns what a figure of the fit shows: its samples, and the law over the velocity."""
         law = [self.flow.force(v) for v in self.v]
         return {
+            "parameters": {
+                "name": [p.name for p in self.parameters],
+                "unit": [p.unit for p in self.parameters],
+                "value": [p.value for p in self.parameters],
+                "low": [p.low for p in self.parameters],
+                "high": [p.high for p in self.parameters],
+            },
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
@@ -177,13 +193,6 @@ class Fitted:
                 "force of the law [N]": law,
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
-            },
-            "parameters": {
-                "name": [p.name for p in self.parameters],
-                "unit": [p.unit for p in self.parameters],
-                "value": [p.value for p in self.parameters],
-                "low": [p.low for p in self.parameters],
-                "high": [p.high for p in self.parameters],
             },
         }
 

@@ -25,6 +25,7 @@ from ..model.fields import function_of
 from ..model.operator import Operator
 from ..model.scenario import Control, Scenario
 from ..model.signals import Multisine
+from ..results import Result
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
@@ -118,8 +119,8 @@ class Estimate(NamedTuple):
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Identified:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identified(Result):
     """A frequency response and the coefficients fitted to it.
 
     Attributes:
@@ -152,6 +153,23 @@ class Identified:
     periods: int
     realisations: int
     source: str = ""
+
+    def headline(self) -> str:
+        """Block, axis and coefficients with their intervals, in one line."""
+        told = (
+            f"{c.name} {c.value:.5g} ({c.low:.5g} to {c.high:.5g}) {c.unit}"
+            for c in self.coefficients
+        )
+        return f"{self.what} of {self.axis}: {', '.join(told)}"
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Coefficients, and the response beside those of the fit and of the paper."""
+        rows = self.coefficients
+        names = ("name", "unit", "printed", "value", "low", "high")
+        return {
+            "coefficients": {name: [getattr(c, name) for c in rows] for name in names},
+            "response": response_tables([self])[self.axis],
+        }
 
     @property
     def estimate(self) -> str:

@@ -7,7 +7,6 @@ response is taken at its lines over whole periods, as in `identification`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -20,6 +19,7 @@ from ..model.constants import AXES
 from ..model.scenario import Scenario
 from ..model.signals import Multisine
 from ..model.virtual_wall import VirtualWall
+from ..results import Result
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limits
@@ -44,8 +44,8 @@ Subject = PushedLoop | VirtualWall
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class MeasuredImpedance:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredImpedance(Result):
     """An impedance measured on a run, beside the computed one at the same lines.
 
     Attributes:
@@ -64,6 +64,11 @@ class MeasuredImpedance:
     deviation: np.ndarray
     scenario: Scenario
     notes: tuple[str, ...] = ()
+
+    def headline(self) -> str:
+        """Band, and how far measured and computed are apart, in one line."""
+        f = self.measured.frequency
+        return f"{f[0]:.3g} to {f[-1]:.3g} Hz, {100.0 * self.gap:.2g} % from the computed one"
 
     @property
     def gap(self) -> float:
@@ -87,24 +92,10 @@ class MeasuredImpedance:
         """
         return computed_impedance(self.subject, 2.0 * math.pi * np.asarray(frequency, dtype=float))
 
-    def tables(self) -> dict[str, dict[str, Sequence[float]]]:
+    def tables(self) -> dict[str, dict[str, list[float]]]:
         """What the figures show, by table, columns headed with their units."""
-        out: dict[str, dict[str, Sequence[float]]] = {}
-        for name, x in (("measured", self.measured), ("computed", self.computed)):
-            out[name] = {
-                "f [Hz]": x.frequency.tolist(),
-                "Re Z [N.s/m]": x.Z.real.tolist(),
-                "Im Z [N.s/m]": x.Z.imag.tolist(),
-                "effective stiffness [N/m]": x.stiffness.tolist(),
-                "effective damping [N.s/m]": x.damping.tolist(),
-                "effective mass [kg]": x.mass.tolist(),
-                "|fe/fh|": np.abs(x.transparency).tolist(),
-                "phase of fe/fh [deg]": np.degrees(np.angle(x.transparency)).tolist(),
-                "|Z/Ze|": np.abs(x.ratio).tolist(),
-                "phase of Z/Ze [deg]": np.degrees(np.angle(x.ratio)).tolist(),
-            }
-        out["measured"]["deviation"] = self.deviation.tolist()
-        return out
+        (measured,), (computed,) = (x.tables().values() for x in (self.measured, self.computed))
+        return {"measured": measured | {"deviation": self.deviation.tolist()}, "computed": computed}
 
     def summary(self) -> dict[str, Any]:
         """Return everything, ready for JSON."""

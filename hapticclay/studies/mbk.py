@@ -13,6 +13,7 @@ from ..arguments import checked
 from ..errors import integer, numbers_of
 from ..files import versions
 from ..model.virtual_wall import VirtualWall
+from ..results import Result
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
@@ -50,8 +51,8 @@ class Border(NamedTuple):
     end: str
 
 
-@dataclass(frozen=True, eq=False)
-class DeviceMBK:
+@dataclass(frozen=True, eq=False, repr=False)
+class DeviceMBK(Result):
     """What a bare device renders: a region over each plane, and its dynamic range.
 
     Attributes:
@@ -65,6 +66,11 @@ class DeviceMBK:
     regions: dict[str, Region]
     found: dict[str, tuple[Border, ...]]
     range: DynamicRange
+
+    def headline(self) -> str:
+        """Dynamic range and stiffest wall, in one line."""
+        r = self.range
+        return f"{r.mean:.3g} dB from free motion to the stiffest wall of {r.stiffest.K:.4g} N/m"
 
     @property
     def gap(self) -> float:
@@ -111,8 +117,8 @@ class DeviceMBK:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class ArmMBK:
+@dataclass(frozen=True, eq=False, repr=False)
+class ArmMBK(Result):
     """The least masses that the arm renders as an admittance 1/(M s^2 + B s).
 
     Every larger mass of the same B/M is stable as well.
@@ -130,6 +136,11 @@ class ArmMBK:
     nominal: np.ndarray
     worst: np.ndarray
     found: tuple[Border, ...]
+
+    def headline(self) -> str:
+        """Least mass with the own hand and with any of the box, in one line."""
+        M, worst = self.nominal[0].min(), self.worst[0].min()
+        return f"masses from {M:.4g} kg with this hand, from {worst:.4g} kg with any of the box"
 
     @property
     def gap(self) -> float:

@@ -29,6 +29,7 @@ from ..model.constants import AXES
 from ..model.fields import nested, with_fields
 from ..model.scenario import Scenario
 from ..model.virtual_wall import VirtualWall
+from ..results import Result
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
 from . import boundary, growth, sweep, zwidth
@@ -436,8 +437,8 @@ class RiskMap:
 
 
 @named
-@dataclass(frozen=True)
-class Instability:
+@dataclass(frozen=True, repr=False)
+class Instability(Result):
     """Runs that were judged.
 
     Attributes:
@@ -451,6 +452,10 @@ class Instability:
     points: np.ndarray
     unstable: np.ndarray
     longer: np.ndarray
+
+    def headline(self) -> str:
+        """Probability of instability, in one line."""
+        return f"{self.total} of {self.total.runs} runs unstable"
 
     @property
     def refused(self) -> int:

@@ -22,6 +22,7 @@ from ..model.operator import Operator
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
 from ..model.virtual_wall import VirtualWall
+from ..results import Result
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
 from ..theory import gain_limits, wall_limits
@@ -225,8 +226,8 @@ class ZRegion:
 
 
 @named
-@dataclass(frozen=True)
-class ZWidth:
+@dataclass(frozen=True, repr=False)
+class ZWidth(Result):
     """Regions of stable walls: one, or a family.
 
     Attributes:
@@ -238,6 +239,15 @@ class ZWidth:
     regions: tuple[ZRegion, ...]
     vary: str = ""
     press: Press = Press()
+
+    def headline(self) -> str:
+        """Largest stiffness and damping of each region, in one line."""
+        told = (
+            f"{f'{r.name}: ' if r.name else ''}K to {r.largest_K:.4g} N/m, B to "
+            f"{r.largest_B:.4g} N.s/m"
+            for r in self.regions
+        )
+        return "; ".join(told)
 
     def gap(self) -> float:
         """Largest relative gap between runs and exact lines; NaN if no loop is linear."""

@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, number, pair
 from ..model.compensator import Compensator
+from ..results import Result
 from . import gain_limits, stability_margins
 from .linear_loop import TIMING, Loop, of_loop
 from .roots import first_failure
@@ -75,8 +76,8 @@ def design_gain(
 
 
 @named
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, repr=False)
+class Design(Result):
     """A compensator tuned to a margin; shape and gain are `Scenario.compensator` and `gain`.
 
     Attributes:
@@ -91,6 +92,26 @@ class Design:
     K: float
     error: float
     margins: stability_margins.Margins
+
+    def headline(self) -> str:
+        """Gain, transparency error and margins, in one line."""
+        m = self.margins
+        return (
+            f"K = {self.K:.5g}, transparency error {self.error:.4g}, gain margin {m.gain[1]:.4g}, "
+            f"phase margin {math.degrees(m.phase):.4g} degrees, disk margin {m.disk:.4g}"
+        )
+
+    def tables(self) -> dict[str, dict[str, list[float]]]:
+        """Gain, error and margins."""
+        m = self.margins
+        return {
+            "design": {
+                "K": [self.K], "transparency error": [self.error],
+                "gain margin, less": [m.gain[0]], "gain margin, more": [m.gain[1]],
+                "phase margin [rad]": [m.phase], "delay margin [s]": [m.delay],
+                "disk margin": [m.disk],
+            }
+        }  # fmt: skip
 
 
 @of_loop("K", "b")

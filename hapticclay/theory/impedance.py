@@ -20,6 +20,7 @@ from ..errors import ParameterError, array_of
 from ..model import controller
 from ..model.operator import Operator
 from ..model.virtual_wall import VirtualWall
+from ..results import Result
 from . import linear_loop
 from .linear_loop import Loop, of_loop
 
@@ -27,8 +28,8 @@ UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Impedance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Impedance(Result):
     """What a hand feels over frequency, computed or measured.
 
     Stiffness, damping and mass are the effective ones of Colonnese, Sketch, Okamura, Closed-loop
@@ -46,6 +47,29 @@ class Impedance:
     Z: np.ndarray
     transparency: np.ndarray
     rendered: np.ndarray
+
+    def headline(self) -> str:
+        """Band and range of |Z|, in one line."""
+        f, size = self.frequency, np.abs(self.Z)
+        span = f"{len(f)} lines, {f[0]:.3g} to {f[-1]:.3g} Hz"
+        return f"{span}, |Z| {size.min():.3g} to {size.max():.3g} N.s/m"
+
+    def tables(self) -> dict[str, dict[str, list[float]]]:
+        """What the figures show, columns headed with their units."""
+        return {
+            "impedance": {
+                "f [Hz]": self.frequency.tolist(),
+                "Re Z [N.s/m]": self.Z.real.tolist(),
+                "Im Z [N.s/m]": self.Z.imag.tolist(),
+                "effective stiffness [N/m]": self.stiffness.tolist(),
+                "effective damping [N.s/m]": self.damping.tolist(),
+                "effective mass [kg]": self.mass.tolist(),
+                "|fe/fh|": np.abs(self.transparency).tolist(),
+                "phase of fe/fh [deg]": np.degrees(np.angle(self.transparency)).tolist(),
+                "|Z/Ze|": np.abs(self.ratio).tolist(),
+                "phase of Z/Ze [deg]": np.degrees(np.angle(self.ratio)).tolist(),
+            }
+        }
 
     @property
     def frequency(self) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..model.constants import AXES
 from ..model.virtual_wall import VirtualWall
-from ..studies.comparison import Compared
+from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
 from ..theory.linear_loop import TIMING
@@ -35,14 +35,14 @@ CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s
 BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 
 
-def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Figure]]:
+def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
     """Returns the figures of a comparison by name, each with a title.
 
     Args:
         found: from `compare_files`, all of one kind.
     """
     if isinstance(found[0].subject, VirtualWall):
-        plots: dict[str, tuple[str, Callable[[Sequence[Compared]], Figure]]] = {
+        plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
             "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
             "passivity": ("Damping to spare over frequency", spare_plot),
             "impedance": ("Impedance that the hand feels", impedance_overlay),
@@ -63,8 +63,18 @@ def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Fig
     }
 
 
+def main_overlay(found: Comparison) -> Figure:
+    """Plots what tells the files apart first: walls that are stable, or velocity over position.
+
+    Args:
+        found: from `compare_files`.
+    """
+    walls = isinstance(found[0].subject, VirtualWall)
+    return wall_region_plot(found) if walls else velocity_overlay(found)
+
+
 def _overlay(
-    found: Sequence[Compared], curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
+    found: Comparison, curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
 ) -> Figure:
     """One curve a file, each in a look of its own."""
     with figure_style():
@@ -80,7 +90,7 @@ def _overlay(
     return figure
 
 
-def _looks(found: Sequence[Compared]) -> Iterator[tuple[Compared, dict[str, Any]]]:
+def _looks(found: Comparison) -> Iterator[tuple[Compared, dict[str, Any]]]:
     for x, (color, dash) in zip(found, CURVE_STYLES, strict=False):
         yield x, dict(color=color, ls=dash)
 
@@ -90,7 +100,7 @@ def _zero(figure: Figure) -> Figure:
     return figure
 
 
-def velocity_overlay(found: Sequence[Compared]) -> Figure:
+def velocity_overlay(found: Comparison) -> Figure:
     """Plots velocity over position of each run.
 
     Args:
@@ -101,7 +111,7 @@ def velocity_overlay(found: Sequence[Compared]) -> Figure:
     return _overlay(found, lambda x: (100.0 * x.record.p[:, i], x.record.v[:, i]), **labels)
 
 
-def gain_overlay(found: Sequence[Compared]) -> Figure:
+def gain_overlay(found: Comparison) -> Figure:
     """Plots the gain limit over b, with the sampling of each file; a mark at its own b and K.
 
     Args:
@@ -130,7 +140,7 @@ def _shown_band(x: Compared) -> np.ndarray:
     return BAND
 
 
-def spare_plot(found: Sequence[Compared]) -> Figure:
+def spare_plot(found: Comparison) -> Figure:
     """Plots the damping to spare: the index of a sampled wall, Re Z of an arm.
 
     Args:
@@ -149,7 +159,7 @@ def spare_plot(found: Sequence[Compared]) -> Figure:
     return _zero(_overlay(found, spare, xscale="log", **labels))
 
 
-def impedance_overlay(found: Sequence[Compared]) -> Figure:
+def impedance_overlay(found: Comparison) -> Figure:
     """Plots the size of the impedance fh/v over frequency.
 
     Args:
@@ -164,7 +174,7 @@ def impedance_overlay(found: Sequence[Compared]) -> Figure:
     return _overlay(found, size, xscale="log", yscale="log", **labels)
 
 
-def parts_overlay(found: Sequence[Compared]) -> Figure:
+def parts_overlay(found: Comparison) -> Figure:
     """Plots effective stiffness, damping and mass over frequency; a panel with none is left out.
 
     Args:
@@ -193,7 +203,7 @@ def parts_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def transparency_overlay(found: Sequence[Compared]) -> Figure:
+def transparency_overlay(found: Comparison) -> Figure:
     """Plots |fe/fh| over frequency, in continuous time.
 
     Args:
@@ -211,7 +221,7 @@ def transparency_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def wall_region_plot(found: Sequence[Compared]) -> Figure:
+def wall_region_plot(found: Comparison) -> Figure:
     """Plots the walls that each device renders stably, by runs and exact, and the wall itself.
 
     Args:
@@ -221,7 +231,7 @@ def wall_region_plot(found: Sequence[Compared]) -> Figure:
     return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
 
 
-def push_plot(found: Sequence[Compared]) -> Figure:
+def push_plot(found: Comparison) -> Figure:
     """Plots position over time after a push.
 
     Args:

@@ -314,6 +314,15 @@ def identification_plot(results: Sequence[Identified]) -> Figure:
     return figure
 
 
+def identified_plot(result: Identified) -> Figure:
+    """As `identification_plot` of one axis.
+
+    Args:
+        result: from `identify` or `identify_data`.
+    """
+    return identification_plot([result])
+
+
 def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     magnitude, phase, coherence = axes
     what, f = result.what, result.frequency

@@ -272,9 +272,8 @@ def compared(kind):
         loops = [Loop.of(x, "x") for x in scenes]
         found = zip(names, scenes, loops, [hc.simulate(x) for x in scenes], strict=True)
     region = z_region("", hc.VirtualWall(device=hc.Device(0.1, 1.0)))
-    return tuple(
-        comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found
-    )
+    files = (comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found)
+    return comparison.Comparison(tuple(files))
 
 
 def run_case(name, figure):
