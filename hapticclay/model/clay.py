@@ -17,6 +17,7 @@ from .constants import AXES, B_MAX
 from .flow import Consistency, Flow, FlowIndex, YieldForce
 from .groove import Groove
 from .spring import Spring
+from .traits import LEFT_OUT, Refusal, Trait
 
 
 def halved_damping(b0, b1, L, R):
@@ -802,9 +803,9 @@ class Clay:
             raise ParameterError(
                 "clay.isotropic", True, "must be False where Fy, K or n differ between the axes"
             )
-        if self.groove and (x.yields or y.yields or self.grows or self.smooth or self.springs):
-            bound = "must be None beside laws that yield, grow, spring back or are smooth"
-            raise ParameterError("clay.groove", self.groove, bound)
+        from .support import check_clay  # which asks all laws
+
+        check_clay(self)
 
     @classmethod
     def of_groove(cls, groove: Groove) -> Clay:
@@ -882,3 +883,18 @@ class Clay:
         """
         b = self.x.at(x, y)
         return np.stack([b, b if self.y is self.x else self.y.at(x, y)])
+
+
+_ACROSS = Refusal(
+    "clay.angle", "must be 0 for a passivity controller or a coupling, which act along x and y"
+)
+TRAITS = (
+    Trait("viscous", "clay", lambda c: any(x.damping.any() for x in c.laws)),
+    Trait("growth", "clay", lambda c: c.grows, LEFT_OUT),
+    Trait("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
+    Trait("smooth", "clay", lambda c: bool(c.smooth)),
+    Trait(
+        "rotated axes", "clay", lambda c: c.angle != 0.0,
+        refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
+    ),
+)  # fmt: skip

@@ -19,6 +19,7 @@ from ..arguments import named
 from ..errors import check_fields
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
+from .traits import Trait
 
 
 @named
@@ -179,3 +180,6 @@ def matrix_exponential(a: np.ndarray) -> np.ndarray:
     from scipy.linalg import expm
 
     return expm(a)
+
+
+TRAITS = (Trait("inertia shaping", "part", lambda s: s.inertia_shaping),)

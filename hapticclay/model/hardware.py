@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from . import flow
+from .traits import LEFT_OUT, YES, Refusal, Trait
 
 STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
@@ -409,3 +410,28 @@ class SampleNoise:
         lost = loss.random(NOISE_BLOCK) < s.dropout_probability
         hiss = s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))
         return np.column_stack((late, lost, hiss))
+
+
+_UNSAMPLED = Refusal("hardware", "must be None unless control is 'sampled'")
+_SAMPLED = {"fast": _UNSAMPLED, "accurate": _UNSAMPLED}
+_HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
+TRAITS = (
+    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _SAMPLED),
+    *(
+        Trait(name, "part", lambda s, of=of: s.hardware is not None and of(s.hardware), theory,
+              _SAMPLED | own)
+        for name, of, theory, own in (
+            ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {}),
+            ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {}),
+            ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {}),
+            ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {}),
+            ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}),
+            ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {}),
+            ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {}),
+            ("delay", lambda x: x.delay > 0.0, YES, {}),
+            ("joint friction", lambda x: any(x.friction), LEFT_OUT, {}),
+            ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD),
+            ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD),
+        )
+    ),
+)  # fmt: skip

@@ -13,6 +13,7 @@ from ..arguments import named
 from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
 from .fields import function_name
+from .traits import NO, Refusal, Trait
 
 # floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
 # measured, hand force [N], torques [N.m]; then the law's state now and after, and its parameters
@@ -169,3 +170,23 @@ class LawCaller:
             raise LawFailed(f"controller.law at t = {self.buffer[0]:g} s: {what}") from self.error
         if self.error is not None:
             raise self.error
+
+
+_ALONE = Refusal(
+    "hardware", "must be without passivity controller and coupling where the law is one's own"
+)
+_SAMPLED = Refusal("control", "must be 'sampled' with a controller of one's own")
+TRAITS = (
+    Trait(
+        "own controller", "part", lambda s: s.controller is not None, NO,
+        {
+            "fast": _SAMPLED,
+            "accurate": _SAMPLED,
+            "inertia shaping": Refusal(
+                "inertia_shaping", "must be False with a controller, which replaces the servo"
+            ),
+            "passivity controller": _ALONE,
+            "virtual coupling": _ALONE,
+        },
+    ),
+)  # fmt: skip

@@ -22,6 +22,7 @@ from .operator import Operator, mobility_with
 from .sampled_controller import Controller
 from .scenario_text import scenario_rows
 from .signals import Signal
+from .support import check_scene
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
 WHOLE = 1e-6  # by which Ts/dt may differ from a whole number
@@ -120,10 +121,7 @@ class Scenario:
             object.__setattr__(self, "compensator", _compensators(self.compensator))
         choose_step(self)
         check_fields(self)
-        if self.control == "sampled" and self.integrator != "fast":
-            raise ParameterError(
-                "integrator", self.integrator, "must be 'fast' where control is 'sampled'"
-            )
+        check_scene(self)
         if self.Ts is not None:
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
@@ -134,21 +132,10 @@ class Scenario:
                     f"{round(n) * self.dt:.10g} s; or dt = {self.Ts / round(n):.10g} s"
                 )
                 raise ParameterError("Ts", self.Ts, bound)
-        if self.controller is not None and self.control != "sampled":
-            raise ParameterError(
-                "control", self.control, "must be 'sampled' with a controller of one's own"
-            )
-        if self.controller is not None and self.inertia_shaping:
-            raise ParameterError(
-                "inertia_shaping",
-                self.inertia_shaping,
-                "must be False with a controller, which replaces the servo",
-            )
         self._check_servo()
         self._check_interface()
         self._check_rotated_axes()
         self._check_smooth_clay()
-        self._check_springs()
         self._check_groove()
         self._check_reach("start", self.start)
         if self.length is not None:
@@ -231,15 +218,6 @@ class Scenario:
         given, Ts = self.hardware, self.Ts or self.dt
         if given is None:
             return
-        if self.control != "sampled":
-            raise ParameterError("hardware", given, "must be None unless control is 'sampled'")
-        if (given.passivity or given.coupling) and self.render != "held":
-            raise ParameterError(
-                "render", self.render, "must be 'held' for a passivity controller or a coupling"
-            )
-        if self.controller and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling where the law is one's own"
-            raise ParameterError("hardware", given, bound)
         number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 
@@ -249,13 +227,10 @@ class Scenario:
         return self.clay is not None and self.clay.angle != 0.0
 
     def _check_rotated_axes(self) -> None:
-        """Refuses rotated axes where no law of it is known: see docs/equations.md, section 4."""
-        given, clay = self.hardware, self.clay
+        """Refuses rotated axes where clay is stiff: see docs/equations.md, section 4."""
+        clay = self.clay
         if clay is None or not self.rotated:
             return
-        if given and (given.passivity or given.coupling):
-            bound = "must be 0 for a passivity controller or a coupling, which act along x and y"
-            raise ParameterError("clay.angle", clay.angle, bound)
         b, most = clay.largest + self.t_max * clay.fastest, self._soft_damping()
         if b > most:
             bound = (
@@ -284,32 +259,11 @@ class Scenario:
             )
             raise ParameterError("dt", self.dt, bound)
 
-    def _check_springs(self) -> None:
-        """Refuses springs where no law of them is known."""
-        if self.clay is None or not self.clay.springs:
-            return
-        given = self.hardware
-        if given and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling in clay that springs back"
-            raise ParameterError("hardware", given, bound)
-        if self.integrator != "fast":
-            bound = "must be 'fast' in clay that springs back"
-            raise ParameterError("integrator", self.integrator, bound)
-        if self.clay.angle:
-            raise ParameterError("clay.angle", self.clay.angle, "must be 0 for springs")
-
     def _check_groove(self) -> None:
-        """Refuses clay that stays cut where no step takes it away, or where it is stiff."""
-        given = self.hardware
+        """Refuses clay that stays cut where it is stiff."""
         clay = self.clay
         if clay is None or clay.groove is None:
             return
-        if self.integrator != "fast":
-            bound = "must be 'fast' in clay that stays cut"
-            raise ParameterError("integrator", self.integrator, bound)
-        if given and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling in clay that stays cut"
-            raise ParameterError("hardware", given, bound)
         b, most = clay.largest, self._soft_damping()
         if b > most:
             bound = (

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
+from .traits import LEFT_OUT, Refusal, Trait
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
@@ -106,3 +107,19 @@ def relaxing_step(k, tau, way, z, dp, h):
         if way * new < 0.0:  # the handle has left it
             lost, new = 0.5 * k * abs(z) * max(0.0, abs(z) - abs(dp)), 0.0
     return new, k * new, 0.5 * k * new * new, max(lost, 0.0)
+
+
+_UNGUARDED = Refusal(
+    "hardware", "must be without passivity controller and coupling in clay that springs back"
+)
+TRAITS = (
+    Trait(
+        "springs", "clay", lambda c: bool(c.springs), LEFT_OUT,
+        {
+            "passivity controller": _UNGUARDED,
+            "virtual coupling": _UNGUARDED,
+            "accurate": Refusal("integrator", "must be 'fast' in clay that springs back"),
+            "rotated axes": Refusal("clay.angle", "must be 0 for springs"),
+        },
+    ),
+)  # fmt: skip
