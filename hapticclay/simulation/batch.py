@@ -305,7 +305,7 @@ class Plan:
         pattern = self.patterns.of(key, jobs[0])
         steps = 0.0 if is_ready(pattern.scene) else sum(s.t_max / s.dt for s in jobs)
         # half: runs tend to end before t_max
-        time = ALONE * len(jobs) + 0.5e-6 * saved_in_a_step(jobs[0]) * steps
+        time = ALONE * len(jobs) + 0.5 * saved_in_a_step(jobs[0]) * steps
         saved[pattern.kind] = saved.get(pattern.kind, 0.0) + time
 
     def _repay(self, key: Any, jobs: list[Scenario]) -> bool:

@@ -15,13 +15,13 @@ from ..model.scenario import Scenario
 from ..stepping import scene
 from ..stepping.engine import warnings_caught
 from ..stepping.machine_code import compile_time, is_kept, kind_of
-from ..stepping.run import PLAIN, Kernel, borrowed_store, completed
+from ..stepping.run import PLAIN, Kernel, Run, borrowed_store, completed, plainly
 from . import record
 from .memory import memory_left
 
 ENGINES = ("auto", "python", "native")
-# measured: time that machine code saves in a step, and in clay that stays cut [us]; to load it [s]
-SAVED, SAVED_IN_GROOVE = {"continuous": 50.0, "sampled": 90.0, "accurate": 150.0}, 400.0
+# measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
+SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
 LOADING = 0.8
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
@@ -106,12 +106,39 @@ def kernel_for(scenario: Scenario, engine: str) -> Kernel:
     """
     if engine == "native" and not has_numba():
         raise ParameterError("engine", engine, NUMBA)
-    if engine == "python" or (
-        engine == "auto" and not pays(scenario, scenario.t_max / scenario.dt)
-    ):
+    if engine == "python" or not has_numba():
         return PLAIN
+    kind = kind_of(scene.parts_of(scenario))
+    if engine == "auto" and not repays(kind, time_ahead(scenario, 0) + saved.get(kind, 0.0)):
+        return AUTO
     compiled = load_compiled()
     return compiled.KERNEL if compiled else PLAIN
+
+
+def time_ahead(scenario: Scenario, i: int) -> float:
+    """Time that machine code may save in the rest of a run [s]: half of it, as runs tend to end
+    before t_max.
+
+    Args:
+        scenario: what to run.
+        i: index of the sample at which the run is.
+    """
+    return 0.5 * saved_in_a_step(scenario) * max(scenario.t_max / scenario.dt - i, 0.0)
+
+
+def repays(kind: Any, time: float) -> bool:
+    """Whether machine code that saves some time repays loading or compiling it.
+
+    Args:
+        kind: of scene.
+        time: in this process, so far and ahead [s].
+    """
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
+    if compiled is not None and kind in compiled.ready:
+        return has_numba()
+    if time < LOADING or not has_numba():
+        return False
+    return is_kept(kind) or time >= compile_time(kind)
 
 
 def pays(scenario: Scenario, steps: float) -> bool:
@@ -123,18 +150,31 @@ def pays(scenario: Scenario, steps: float) -> bool:
         steps: how many steps of its kind are about to be made.
     """
     kind = kind_of(scene.parts_of(scenario))
-    compiled = sys.modules.get("hapticclay.stepping.compiled")
-    if compiled is not None and kind in compiled.ready:
-        return has_numba()
-    # half: runs tend to end before t_max
-    saved[kind] = saved.get(kind, 0.0) + 0.5e-6 * saved_in_a_step(scenario) * steps
-    if saved[kind] < LOADING or not has_numba():
-        return False
-    return is_kept(kind) or saved[kind] >= compile_time(kind)
+    saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(scenario) * steps
+    return repays(kind, saved[kind])
+
+
+def as_it_pays(run: Run, room: int) -> None:
+    """Makes steps in CPython, and from where machine code repays itself, compiled.
+
+    Args:
+        run: the run.
+        room: rows that it may have.
+    """
+    kind, s, i = run.kind, run.scenario, run.i
+    if repays(kind, time_ahead(s, i) + saved.get(kind, 0.0)) and (compiled := load_compiled()):
+        run.kernel = compiled.KERNEL
+        run.kernel.advance(run, room)
+        return
+    plainly(run, room)
+    saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * (run.i - i)
+
+
+AUTO = PLAIN._replace(advance=as_it_pays)
 
 
 def saved_in_a_step(scenario: Scenario) -> float:
-    """Time that machine code saves in a step [us].
+    """Time that machine code saves in a step [s].
 
     Args:
         scenario: what to run.

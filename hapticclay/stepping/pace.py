@@ -34,7 +34,7 @@ def spring_step(scenario: Scenario) -> float:
         ParameterError: dt would be divided into more than SPRING_STEPS.
     """
     laws = scenario.clay.laws if scenario.clay and scenario.clay.springs else ()
-    most = [max((x.k + x.k1 for x in law.springs), default=0.0) for law in laws]
+    most = [float((law.elastic[..., 0] + law.elastic[..., 2]).max()) for law in laws]
     if not any(most):
         return math.inf
     if scenario.control == "sampled":

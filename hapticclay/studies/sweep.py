@@ -31,12 +31,11 @@ from ..model.constants import AXES
 from ..model.experiments import parameter_unit
 from ..simulation.batch import cores
 from ..simulation.record import Record
-from ..simulation.simulate import has_numba, simulate
+from ..simulation.simulate import simulate
 from ..theory import gain_limits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-COMPILE_FROM = 2_000_000  # steps of a sweep from which compiling pays in every process
 MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's digest, chunk's number
 PROBES = 20  # runs that an estimate is made from ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
@@ -171,10 +170,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
     names = list(sweep.vary)
     try:
         scenario = sweep.run_scenario(point)
-        compiled = len(sweep) * scenario.t_max / scenario.dt >= COMPILE_FROM and has_numba()
-        return result_row(
-            index, names, point, simulate(scenario, engine="native" if compiled else "python")
-        )
+        return result_row(index, names, point, simulate(scenario))
     except ParameterError as error:
         return result_row(index, names, point, None, str(error))
 

@@ -516,7 +516,7 @@ def live_kernel(scenario: Scenario) -> Kernel:
     Args:
         scenario: that is played.
     """
-    if 1e-6 * saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
+    if saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
         return PLAIN
     compiled = load_compiled()
     if compiled is None:

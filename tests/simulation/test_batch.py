@@ -22,14 +22,12 @@ RICH = hc.Hardware(
     delay=1e-4, encoder=4000, velocity="difference", velocity_window=3, velocity_filter=80.0,
     adc_bits=12, dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
 )  # fmt: skip
-GUARDED = hc.Hardware(delay=1e-4, passivity=True, coupling=hc.Coupling(5e3, 5.0))
-REPAID = [  # scenes whose kinds are compiled here, each some 20 s
-    CUT,
-    dataclasses.replace(CUT, operator=hc.Operator()),
-    dataclasses.replace(CUT, clay=hc.slab(1e7, 0.05, 0.15)),
-    dataclasses.replace(WIRED, hardware=RICH),
+GUARDED = dataclasses.replace(RICH, passivity=True, coupling=hc.Coupling(5e3, 5.0))
+HELD = dataclasses.replace(CUT, operator=hc.Operator())
+REPAID = [
+    HELD,
     dataclasses.replace(WIRED, hardware=GUARDED),
-]
+]  # kinds compiled here: some 20 s each
 
 
 @pytest.fixture
@@ -68,7 +66,7 @@ def kinds(rng):
         b = rng.uniform(5.0, 300.0)
         clay = hc.slab(b, 0.05, 0.06)
         yield varied(CUT, rng, clay=clay)
-        yield varied(dataclasses.replace(CUT, operator=hc.Operator()), rng)
+        yield varied(HELD, rng)
         yield varied(CUT, rng, clay=hc.slab(1e5 * b, 0.05, 0.15))  # stiff
         yield varied(CUT, rng, clay=None, inertia_shaping=True)
         yield varied(CUT, rng, operator=(hc.Operator(0.2, b, 1.0), None))
@@ -84,7 +82,7 @@ def kinds(rng):
         yield varied(dataclasses.replace(WIRED, hardware=RICH), rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, hardware=GUARDED), rng, clay=clay, Ts=7.2e-4)
         yield varied(WIRED, rng, clay=clay, render="physical")
-        yield dataclasses.replace(CUT, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
+        yield dataclasses.replace(HELD, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
         # and, one by one
         yield dataclasses.replace(grown, start=(rng.uniform(0.0, 0.01), 0.0))
         yield varied(CUT, rng, clay=hc.slab(hc.Flow(Fy=0.5, b=b), 0.05, 0.15))
@@ -133,7 +131,7 @@ def test_runs_of_one_kind_are_made_together_and_others_are_left():
     places = sorted([*left, *(i for at, _ in done for i in at.tolist())])
     assert places == list(range(160))
     made = {i % 20 for i in places} - {i % 20 for i in left}
-    assert {1, 2, 12, 13} <= made
+    assert {1, 13} <= made
     assert 15 in {i % 20 for i in left}  # it diverges, and is judged by the monitor
 
 
@@ -258,7 +256,7 @@ def test_a_generator_is_taken_as_it_is_run():
 
     def generated():
         for i in range(1500):
-            s = dataclasses.replace(CUT, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
+            s = dataclasses.replace(HELD, t_max=400.5 * CUT.dt, gain=(0.2 + 1e-4 * i, 0.2))
             alive.add(s)
             most.append(len(alive))
             yield s
@@ -275,7 +273,7 @@ def test_a_generator_is_taken_as_it_is_run():
 def test_no_run_is_lost_where_summaries_grow():
     n = 3000
     gains = 0.2 + 0.5 * np.arange(n) / n
-    same = dataclasses.replace(CUT, t_max=20.5 * CUT.dt, length=None)
+    same = dataclasses.replace(HELD, t_max=20.5 * CUT.dt, length=None)
     found = hc.simulate_batch(
         (dataclasses.replace(same, gain=(k, 0.2)) for k in gains.tolist()), keep="summaries"
     )

@@ -99,7 +99,7 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
 
 def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
     monkeypatch.setattr(simulate, "memory_left", lambda: 4.0 * GB)
-    monkeypatch.setattr(simulate, "_kernel", lambda *a: pytest.fail("ran"))
+    monkeypatch.setattr(simulate, "kernel_for", lambda *a: pytest.fail("ran"))
     scenario = hc.constant_cut(dt=1e-6)
     with pytest.raises(hc.ParameterError) as error:
         hc.simulate(scenario)

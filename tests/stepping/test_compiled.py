@@ -230,7 +230,7 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
     monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)  # nothing is kept there
     cut = hc.constant_cut(t_max=5.0)
     kind = machine_code.kind_of(scene.parts_of(cut))
-    per_run = 0.5e-6 * simulate.saved_in_a_step(cut) * cut.t_max / cut.dt
+    per_run = 0.5 * simulate.saved_in_a_step(cut) * cut.t_max / cut.dt
     asked = [simulate.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
     cost = machine_code.compile_time(kind)
     assert asked == [(i + 1) * per_run >= cost for i in range(20)]
@@ -240,6 +240,29 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
     asked = [simulate.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
     assert asked == [(i + 1) * per_run >= simulate.LOADING for i in range(20)]
     assert simulate.kernel_for(cut, "python") is run.PLAIN
+
+
+@fast
+@pytest.mark.parametrize("name", ["plain", "hand"])
+def test_auto_takes_machine_code_in_the_middle_of_a_run_to_the_same_bits(name, monkeypatch):
+    from hapticclay.stepping import compiled
+
+    s = dataclasses.replace(CASES[name], t_max=4.0, length=None)
+    kind = machine_code.kind_of(scene.parts_of(s))
+    per_step, chunk = simulate.saved_in_a_step(s), run.CHUNK - 1
+    monkeypatch.setattr(simulate, "saved", {})
+    monkeypatch.setattr(compiled, "ready", set())
+    monkeypatch.setattr(simulate, "is_kept", lambda kind: False)
+    # half of the run and two chunks repay it
+    cost = per_step * (0.5 * s.t_max / s.dt + chunk - 1)
+    monkeypatch.setattr(simulate, "compile_time", lambda kind: cost)
+    monkeypatch.setattr(simulate, "LOADING", 0.0)
+    seen, plainly = [], simulate.plainly
+    monkeypatch.setattr(simulate, "plainly", lambda r, room: (seen.append(r), plainly(r, room)))
+    r = hc.simulate(s)
+    assert len(seen) == 2 and seen[0].kernel is compiled.KERNEL
+    assert simulate.saved == {kind: pytest.approx(2 * chunk * per_step)}
+    same(r, hc.simulate(s, engine="python"))
 
 
 @fast

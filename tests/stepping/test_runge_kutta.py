@@ -219,20 +219,19 @@ def cut(**parts):
 
 
 SHAKEN = dict(operator=hc.Operator(), muscle=hc.Multisine(rms=(2.0, 0.5), high=3.0))
-ONE_SOURCE = {
-    "hand": hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.3)),
+ONE_SOURCE = {  # four kinds, each compiled for some 10 s
     "stiff": hc.constant_cut(b=1e4, force=(20.0, 0.5)),
     "layers": dataclasses.replace(hc.free(force=(1.5, 0.7)), clay=LAYERS),
     "growing": hc.variable_cut(force=(3.0, 0.0)),
-    "muscle": dataclasses.replace(hc.constant_cut(b=1e3), **SHAKEN),
-    "command": dataclasses.replace(
-        hc.constant_cut(), command=hc.Multisine(rms=(0.01, 0.01), high=3.0)
-    ),
     "weak": dataclasses.replace(hc.constant_cut(torque_limit=(0.1, 0.15)), **SHAKEN),
     "unstable": hc.constant_cut(gain=(1.0, 1.0)),
-    "other": cut(operator=HANDS, force=(2.0, 0.3), **OTHER),
-    "formed": cut(compensator=ZEROS, force=(2.0, 0.3)),
-    "all": cut(compensator=ZEROS, operator=HANDS, force=(2.0, 0.3), **OTHER),
+    "all": cut(
+        compensator=ZEROS,
+        operator=HANDS,
+        force=(2.0, 0.3),
+        command=hc.Multisine(rms=(0.01, 0.01), high=3.0),
+        **OTHER,
+    ),
 }
 
 

@@ -273,3 +273,12 @@ def test_a_wall_reached_from_its_side_has_no_energy():
     s = slider(hc.Clay(law, hc.Profile((), (0.0,))), 1e-3, 0.2, v=(0.0, 0.2))
     r = hc.simulate(s)
     assert len(r.crossings) == 1 and np.abs(r.fe).max() < 1e-6
+
+
+def test_cells_on_one_axis_may_lie_beside_springs_on_the_other():
+    cells = hc.Grid((0.02,), (0.0,), ((1.0, 2.0), (3.0, 20.0)))
+    spring = hc.Profile((0.005,), (0.0, 5.0), "y", springs=(hc.Spring(), hc.Spring(k=200.0)))
+    s = hc.Scenario(clay=hc.Clay(cells, spring), force=(0.5, 4.0), t_max=0.5, length=None)
+    r = hc.simulate(s)
+    assert r.outcome.code == "time limit" and r.p[-1, 1] > 0.005
+    assert r.energy["springs_stored"] > 0.0 and abs(r.energy["residual"]) < 1e-6

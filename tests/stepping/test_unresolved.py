@@ -78,7 +78,7 @@ def test_steps_of_clay_that_grows_depend_on_the_sample_alone():
 
 
 def test_clay_that_has_grown_too_stiff_ends_the_run_with_a_status():
-    growing = hc.Clay(hc.Profile((), (50.0,), growth=(5e7,)), NONE)
+    growing = hc.Clay(hc.Profile((), (50.0,), growth=(5e8,)), NONE)
     r = hc.simulate(replace(GROWING, clay=growing, dt=1e-4, t_max=0.2), engine="python")
     assert r.outcome.code == "unresolved" and "steps in one sample" in r.status
     assert "fast" in r.outcome.advice

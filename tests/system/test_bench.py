@@ -186,7 +186,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
     monkeypatch.setattr(hits, "CLAYS", (1e1, 1e3))
     monkeypatch.setattr(throughput, "SCENES", {"free space": throughput.SCENES["free space"]})
-    monkeypatch.setattr(throughput, "SHORT_QUICK", 400)
+    monkeypatch.setattr(throughput, "SHORT_QUICK", 40)  # too few to be compiled for
     for table in ("ENGINE", "LOOP"):
         monkeypatch.setattr(parts, table, dict(list(getattr(parts, table).items())[:2]))
     some = [c for c in extremes.cases() if c.name in ("none", "held", "folded") and c.quick][:2]
@@ -219,8 +219,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     assert (
         text.startswith("before")
         and text.endswith("after\n")
-        and "old" not in text
-        and "hapticclay | fast" in text
+        and "\nold\n" not in text
+        and "hapticclay |" in text
     )
     page = (tmp_path / "o" / "bench.md").read_text()
     assert page == bench.page(data) and all(c.name in page for c in some)
