@@ -98,14 +98,14 @@ class ImpedanceCommand:
     def _loop(self, file: str | None) -> Subject:
         from ..model.experiments import EXPERIMENTS, SCENARIOS
         from ..model.scenario_file import load_scenario
-        from ..studies.impedance import subject_of
+        from ..studies.boundary import PushedLoop
 
         name = self.source or "constant"
         if file:
             scenario = load_scenario(file)
         else:
             scenario = SCENARIOS[choice("experiment", name, tuple(EXPERIMENTS))]()
-        loop = subject_of(scenario, self.axis or AXES[0], self.b)
+        loop = PushedLoop.of(scenario, self.axis or AXES[0], self.b)
         if self.k is not None:
             loop = replace(loop, k=self.k)
         hand = walls.operator_of(self.wall.hand)

@@ -51,7 +51,7 @@ class PassivityCommand:
 
     def __call__(self) -> int:
         from ..studies import passivity_runs as study
-        from ..studies.impedance import subject_of
+        from ..studies.boundary import PushedLoop
 
         writable(self.out)
         wall = self.wall.wall(self.source, **PASSIVE_WALL)
@@ -60,7 +60,7 @@ class PassivityCommand:
         def bar(items: Any) -> Any:
             return console.progress_bar(items, desc="passivity")
 
-        loops = {axis: subject_of(arm, axis) for axis in AXES}
+        loops = {axis: PushedLoop.of(arm, axis) for axis in AXES}
         found = study.wall_index(wall, bar)
         arms = {axis: study.arm_index(loop) for axis, loop in loops.items()}
         energy = study.energy_over_time(cut)

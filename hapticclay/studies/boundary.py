@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..errors import Bound, choice, number
+from ..errors import Bound, ParameterError, choice, number
 from ..model import arm
 from ..model.arm import Arm
 from ..model.clay import Clay, Profile
@@ -69,6 +69,39 @@ class PushedLoop(Loop):
         super().__post_init__()
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
+    @classmethod
+    def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
+        """The loop of one axis of a scenario as one to be run, its clay all around the handle.
+
+        Args:
+            scenario: whose arm, servo, compensator, hand and control it has.
+            axis: "x" or "y".
+            b: clay [N.s/m]; None for that of the scenario with the least gain limit.
+
+        Raises:
+            ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
+        """
+        loop = Loop.of(scenario, axis, b)
+        given = scenario.hardware
+        if given and replace(given, delay=0.0, seed=0) != type(given)():
+            bound = "must have no hardware but a delay: the impedance is that of a linear loop"
+            raise ParameterError("hardware", given, bound)
+        return cls(
+            loop.axis,
+            b=loop.b,
+            operator=loop.operator,
+            servo=scenario.servo[AXES.index(loop.axis)],
+            compensator=loop.compensator,
+            K=loop.gain,
+            Ts=loop.Ts,
+            delay=loop.delay,
+            render=loop.render,
+            inertia_shaping=scenario.inertia_shaping,
+            torque_limit=scenario.torque_limit,
+            arm=scenario.arm,
+            k=loop.k,
+        )
+
     def scenario(self, t_max: float = GROWTH_SPAN, stop_when_unstable: bool = True) -> Scenario:
         """Build the scenario of a run of it.
 
@@ -111,6 +144,16 @@ class PushedLoop(Loop):
     def _nominal(self) -> tuple[float, float]:
         """Handle at the nominal pose [m]: link 1 along y, link 2 along x."""
         return self.arm.l2, self.arm.l1
+
+
+def of_scenario(subject: Any, axis: str) -> Any:
+    """The loop of an axis of a scenario, as a study runs it; any other subject as it is.
+
+    Args:
+        subject: a scenario, a loop or a wall.
+        axis: of the scenario, "x" or "y".
+    """
+    return PushedLoop.of(subject, axis) if isinstance(subject, Scenario) else subject
 
 
 def growth_rate(

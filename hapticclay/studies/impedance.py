@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, choice, integer, number
+from ..errors import ParameterError, integer, number
 from ..files import versions
 from ..model.constants import AXES
 from ..model.scenario import Scenario
@@ -24,9 +24,8 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limits
 from ..theory.impedance import Impedance, loop_response, wall_response
-from ..theory.linear_loop import Loop
 from ..theory.wall_limits import stable_wall, stiffness_band
-from .boundary import PushedLoop
+from .boundary import PushedLoop, of_scenario
 from .identification import _multisine, estimate_response
 
 IMPEDANCE_SCHEMA = "hapticclay-impedance-1"
@@ -123,42 +122,10 @@ def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
     return loop_response(subject.linear, omega)
 
 
-def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
-    """The loop of one axis of a scenario as one to be run, its clay all around the handle.
-
-    Args:
-        scenario: whose arm, servo, compensator, hand and control it has.
-        axis: "x" or "y".
-        b: clay [N.s/m]; None for that of the scenario with the least gain limit.
-
-    Raises:
-        ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
-    """
-    loop, i = Loop.of(scenario, axis, b), AXES.index(choice("axis", axis, AXES))
-    given = scenario.hardware
-    if given and replace(given, delay=0.0, seed=0) != type(given)():
-        bound = "must have no hardware but a delay: the impedance is that of a linear loop"
-        raise ParameterError("hardware", given, bound)
-    return PushedLoop(
-        loop.axis,
-        b=loop.b,
-        operator=loop.operator,
-        servo=scenario.servo[i],
-        compensator=loop.compensator,
-        K=loop.gain,
-        Ts=loop.Ts,
-        delay=loop.delay,
-        render=loop.render,
-        inertia_shaping=scenario.inertia_shaping,
-        torque_limit=scenario.torque_limit,
-        arm=scenario.arm,
-        k=loop.k,
-    )
-
-
 @checked
 def measure_impedance(
-    subject: Subject,
+    subject: Subject | Scenario,
+    axis: str = "x",
     *,
     band: tuple[float, float] = IMPEDANCE_BAND,
     lines: int = IMPEDANCE_LINES,
@@ -172,8 +139,9 @@ def measure_impedance(
     dt)^2/6, by the amplitude over the length of a link, and by what is left of the transient.
 
     Args:
-        subject: a `PushedLoop`, whose own push and pose do not matter, or a `VirtualWall` that acts
-            everywhere.
+        subject: a `Scenario`; a `PushedLoop`, whose own push and pose do not matter; or a
+            `VirtualWall` that acts everywhere.
+        axis: of a scenario, "x" or "y".
         band: lowest and highest frequency [Hz].
         lines: of the multisine, spread over the logarithm of frequency.
         period: of the multisine [s], rounded up to whole samples that are quick to transform.
@@ -184,6 +152,7 @@ def measure_impedance(
         ParameterError: a value is out of its bounds; the loop is unstable with this hand; or the
             run ends early, meets the limits of the motors, or does not settle.
     """
+    subject = of_scenario(subject, axis)
     _check_subject(subject)
     amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     length = number("period", period, 0.1, 1000.0, unit="s")
@@ -233,7 +202,9 @@ def _check_subject(subject: Subject) -> None:
             raise ParameterError("wall.K", subject.K, bound)
         return
     if not isinstance(subject, PushedLoop):
-        raise ParameterError("subject", subject, "must be a PushedLoop or a VirtualWall")
+        raise ParameterError(
+            "subject", subject, "must be a Scenario, a PushedLoop or a VirtualWall"
+        )
     if not gain_limits.is_stable(subject.linear):
         limit = gain_limits.gain_limit(subject.linear)
         bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"

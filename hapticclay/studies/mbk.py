@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import integer, numbers_of
 from ..files import versions
+from ..model.scenario import Scenario
 from ..model.virtual_wall import VirtualWall
 from ..results import Result
 from ..theory.mbk import (
@@ -24,7 +25,7 @@ from ..theory.mbk import (
     stable_band,
 )
 from ..theory.stability_margins import Box
-from .boundary import PushedLoop, find_crossing, simulated_gain
+from .boundary import PushedLoop, find_crossing, of_scenario, simulated_gain
 from .zwidth import growth_rates
 
 MBK_SCHEMA = "hapticclay-mbk-1"
@@ -244,9 +245,10 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
 
 @checked
 def arm_mbk(
-    loop: PushedLoop,
+    loop: PushedLoop | Scenario,
     box: Box = HANDS,
     *,
+    axis: str = "x",
     columns: int = 5,
     points: int = 15,
     samples: int = 24,
@@ -255,8 +257,10 @@ def arm_mbk(
     """The least masses that the arm renders over their damper, beside runs.
 
     Args:
-        loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
+        loop: arm, servo, hand and sampling, or a scenario; its own compensator and gain do not
+            matter.
         box: hands.
+        axis: of a scenario, "x" or "y".
         columns: number of B/M at which runs look for the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
         samples: random members of the box tried in a sampled or late loop.
@@ -265,6 +269,7 @@ def arm_mbk(
     Raises:
         ParameterError: a value is out of its bounds.
     """
+    loop = of_scenario(loop, axis)
     points, columns = integer("points", points, 2, 1001), integer("columns", columns, 0, 100)
     decays, linear = np.geomspace(*DECAYS, points), loop.linear
     nominal, worst, found = [], [], []

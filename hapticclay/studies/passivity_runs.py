@@ -18,7 +18,7 @@ from ..simulation.simulate import simulate
 from ..theory import wall_limits
 from ..theory.gain_limits import is_stable
 from ..theory.impedance import wall_impedance
-from .boundary import PushedLoop
+from .boundary import PushedLoop, of_scenario
 from .impedance import computed_impedance, measure_impedance
 from .port_energy import passivity_limit, polygon, taken_energy
 from .stability_map import Progress
@@ -181,15 +181,16 @@ def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequen
     )
 
 
-def arm_index(loop: PushedLoop) -> IndexOverFrequency:
+def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequency:
     """The passivity of the arm in clay over frequency: Re Z by theory and by a run of sines.
 
     Args:
         loop: one axis, its hand left out; in continuous time it is passive where Re Z >= 0 at all
             frequencies. Re Z of a sampled loop is that at one frequency; a hand of others may find
-            less.
+            less. Or a scenario.
+        axis: of a scenario, "x" or "y".
     """
-    loop = replace(loop, operator=None)
+    loop = replace(of_scenario(loop, axis), operator=None)
     omega = 2.0 * math.pi * np.geomspace(ARM_BAND[0] / 5.0, 5.0 * ARM_BAND[1], INDEX_POINTS)
     measured_omega = measured = np.zeros(0)
     if is_stable(loop.linear):

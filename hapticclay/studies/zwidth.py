@@ -19,6 +19,7 @@ from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model.constants import AXES, TS
 from ..model.fields import with_fields
 from ..model.operator import Operator
+from ..model.scenario import Scenario
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
 from ..model.virtual_wall import VirtualWall
@@ -79,7 +80,8 @@ REST_RESOLVED = 0.01  # share of K to which the decay of a swing tells stable fr
 FALLEN = 0.01  # share of the largest K below which a boundary has fallen to nothing
 BY_GROWTH, BY_REST = "growth rate", "rest after a push"
 
-Wall = VirtualWall | boundary.PushedLoop  # on a bare device, or clay of k and b on this arm
+# on a bare device, or clay of k and b on this arm
+Wall = VirtualWall | boundary.PushedLoop
 Search = Generator[float, Any, float]
 Share = Callable[[float], None]
 
@@ -293,7 +295,7 @@ class ZWidth(Result):
 
 @checked
 def zwidth(
-    wall: Wall,
+    wall: Wall | Scenario,
     vary: str = "",
     values: Iterable[Any] = (),
     *,
@@ -312,7 +314,8 @@ def zwidth(
 
     Args:
         wall: device, hand and timing; its own K and B do not matter. Or the arm with its servo and
-            compensator: the plane is then that of the clay's b and k, under the gain of the loop.
+            compensator, or a scenario, of which it takes x (y is `PushedLoop.of(scenario, "y")`):
+            the plane is then that of the clay's b and k, under the gain of the loop.
         vary: what differs in a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
             "filter" or "velocity_window", of an arm "Ts", "delay" or "gain"; "" for one region.
         values: of what differs [SI]; None among those of "filter" is no filter.
@@ -327,6 +330,7 @@ def zwidth(
         ParameterError: wall is none, an unknown name, a value out of its bounds, no values, or an
             arm in continuous time.
     """
+    wall = boundary.of_scenario(wall, AXES[0])
     if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
         raise ParameterError("Ts", None, "must be given: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):

@@ -10,7 +10,6 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.studies import passivity_runs as study
-from hapticclay.studies.impedance import subject_of
 from hapticclay.views import passivity_plots as plots
 
 WALL = hc.VirtualWall(K=1000.0, device=hc.Device(0.1, 1.0), Ts=1e-3)
@@ -60,7 +59,7 @@ def test_late_damped_walls_too():
 
 def test_arm_is_passive_on_x_and_active_on_y():
     for axis, K, sign in (("x", 1.0, 1.0), ("y", 0.5, -1.0)):
-        found = study.arm_index(subject_of(hc.constant_cut(), axis))
+        found = study.arm_index(hc.constant_cut(), axis)
         exact = hc.theory.passivity(axis, K, 90.0).margin
         assert found.margin == pytest.approx(exact, rel=2e-3) and np.sign(exact) == sign
         near = np.interp(found.measured_omega, found.omega, found.damping)
