@@ -177,4 +177,4 @@ def test_a_scenario_is_a_subject_of_every_study_of_a_loop():
     with pytest.raises(hc.ParameterError, match="axis = 'z'"):
         measure_impedance(cut, "z")
     with pytest.raises(hc.ParameterError, match="must be given: the walls are rendered at samples"):
-        hc.walls.zwidth(cut, axis="y")
+        hc.walls.zwidth(cut)
