@@ -266,19 +266,22 @@ def test_it_damps_by_the_volume_rate():
 
 VARIANTS = {
     "plain": (BLOCK, {}),
-    "hand": (BLOCK, dict(operator=hc.Operator(), inertia_shaping=True, force=(4.0, 1.0))),
-    "damping": (dataclasses.replace(BLOCK, damping=2e5, gradient=1e6), dict(force=(2.5, 0.8))),
-    "muscle": (BLOCK, dict(muscle=hc.Multisine(rms=(2.0, 2.0), high=4.0), length=None)),
+    "hand": (
+        BLOCK,
+        dict(
+            operator=hc.Operator(),
+            inertia_shaping=True,
+            force=(4.0, 1.0),
+            muscle=hc.Multisine(rms=(2.0, 2.0), high=4.0),
+            length=None,
+        ),
+    ),
     "limit": (BLOCK, dict(torque_limit=(0.3, 0.2), force=(2.5, 1.5))),
-    "layers": (dataclasses.replace(BLOCK, damping=1e5), dict(force=(3.0, 1.0))),
+    "layers": (dataclasses.replace(BLOCK, damping=1e5, gradient=1e6), dict(force=(3.0, 1.0))),
     "long": (BLOCK, dict(dt=1.5e-3, force=(3.0, 1.0))),
     "held": (BLOCK, dict(control="sampled", force=(2.5, 0.5))),
-    "physical": (
-        dataclasses.replace(BLOCK, damping=2e5),
-        dict(control="sampled", render="physical", force=(2.5, 0.5)),
-    ),
     "late": (
-        BLOCK,
+        dataclasses.replace(BLOCK, damping=2e5),
         dict(
             control="sampled",
             render="physical",

@@ -506,7 +506,7 @@ WIRED = dict(
 def test_both_engines_and_a_batch_agree_to_the_last_bit(how):
     wave = Multisine(rms=(1.0, 0.5), low=1.0, high=9.0, period=1.0, seed=3)
     scenes = []
-    for seed in range(SETS):
+    for seed in (3, 4):  # with a signal and held clay, shaped and physical; each compiled for 10 s
         kw = dict(force=(8.0, 6.0), t_max=0.05, inertia_shaping=bool(seed % 3))
         if how == "accurate":
             kw |= dict(integrator="accurate", dt=1e-3)

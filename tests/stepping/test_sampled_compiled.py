@@ -19,30 +19,23 @@ ALL = dict(
 PHYSICAL = {name: x for name, x in ALL.items() if name not in ("passivity", "coupling")}
 HAND = dict(operator=hc.Operator())
 STIFF = dict(render="physical", b=1e5, gain=(1.0, 0.1))
-SCENES = {
+SCENES = {  # of eight kinds, each compiled for some 12 s: every part is in one of them
     "ideal": (None, {}),
-    "physical": (None, dict(render="physical", **HAND)),
-    "substeps": (None, dict(dt=1e-4, Ts=4e-4, inertia_shaping=True)),
+    "substeps": (None, dict(dt=1e-4, Ts=4e-4)),
     "stiff": (None, STIFF | HAND),
     "not stable": (None, dict(b=8e3, start=(0.02, 0.0), gain=(1.0, 0.1), t_max=1.0)),
     "not on the grid": (None, dict(t_max=0.1001)),
     "weak": (None, dict(torque_limit=(0.3, 0.2))),
-    "layers": (ALL, dict(clay=LAYERS)),
+    "layers": (ALL, dict(clay=LAYERS, **HAND)),
     "growing": (None, dict(clay=GROWING, render="physical", muscle=WAVE)),
-    "driven": (ALL, dict(muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))),
-    "driven in substeps": (None, dict(dt=1e-4, Ts=4e-4, muscle=WAVE, command=WAVE)),
+    "driven": (
+        ALL, dict(inertia_shaping=True, muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))
+    ),
     "all": (ALL, HAND),
     "all, stiff": (PHYSICAL, STIFF),
-    "all, slow": (ALL | dict(delay=0.01), dict(dt=1e-4, Ts=0.05)),
+    "all, slow": (ALL | dict(delay=0.01), dict(dt=1e-4, Ts=0.05, **HAND)),
     "first order": (dict(force_filter=500.0, filter_order=1), {}),
-    "a sample late": (dict(delay=TS, passivity=True), {}),
     "jitter and delay": (dict(jitter=8e-5, delay=0.4 * TS, dropout_probability=0.1), {}),
-} | {
-    name: ({name: ALL[name]}, {})
-    for name in (
-        "jitter", "dropout_probability", "encoder", "adc_bits", "force_noise", "dac_bits",
-        "friction",
-    )
 }  # fmt: skip
 
 
