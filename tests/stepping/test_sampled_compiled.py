@@ -29,7 +29,11 @@ SCENES = {  # of eight kinds, each compiled for some 12 s: every part is in one 
     "layers": (ALL, dict(clay=LAYERS, **HAND)),
     "growing": (None, dict(clay=GROWING, render="physical", muscle=WAVE)),
     "driven": (
-        ALL, dict(inertia_shaping=True, muscle=WAVE, command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)))
+        ALL,
+        dict(
+            inertia_shaping=True, muscle=WAVE,
+            command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3)),
+        ),
     ),
     "all": (ALL, HAND),
     "all, stiff": (PHYSICAL, STIFF),
