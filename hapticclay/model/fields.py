@@ -763,7 +763,9 @@ def function_of(
     made: Any = make
     made.__name__ = made.__qualname__ = name
     made.__module__ = answer.__module__
-    made.__signature__ = signature.replace(return_annotation=get_type_hints(answer)["return"])
+    back = get_type_hints(answer)["return"]
+    made.__signature__ = signature.replace(return_annotation=back)
+    made.__annotations__ = {"return": back}
     summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
     about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
     made.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n    ParameterError: {refused}"

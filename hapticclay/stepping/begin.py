@@ -234,6 +234,7 @@ def changed(parts, blocks, s, before):
     laws = kept_blocks(fresh.laws, old.laws)
     if laws is not None:
         laws = laws._replace(flow=fresh.laws.flow, elastic=fresh.laws.elastic)
+        grooves.met_anew(parts.special.groove, p)
     hit = old.hit if fresh.hit and old.hit else fresh.hit
     fresh = fresh._replace(old=old.old, hit=hit, reaction=reaction, laws=laws)
     if fresh.growth is not None and old.growth is not None:

@@ -25,6 +25,12 @@ def cut(groove, at, p):
     law.cut(grid, groove.ground, groove.relief, x, y, whole, groove.rim, groove.removed)
 
 
+def met_anew(groove, p):
+    """Works out what touches the tool at rest, in clay whose numbers have changed."""
+    if groove is not None:
+        cut(groove, (math.nan, math.nan), p)
+
+
 def moved(groove, tool, clay, p, v):
     """Clay and tool after a step, the handle at p with velocity v."""
     if groove is None:
