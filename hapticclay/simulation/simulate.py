@@ -23,6 +23,7 @@ ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
 LOADING = 0.8
+TRIED = 128  # rows made in CPython between two looks at whether machine code repays itself
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
 SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
@@ -161,13 +162,15 @@ def as_it_pays(run: Run, room: int) -> None:
         run: the run.
         room: rows that it may have.
     """
-    kind, s, i = run.kind, run.scenario, run.i
-    if repays(kind, time_ahead(s, i) + saved.get(kind, 0.0)) and (compiled := load_compiled()):
+    kind, s, made = run.kind, run.scenario, run.filled
+    ahead = time_ahead(s, run.i) * max(1.0, run.steps / max(run.i, 1))  # of all steps of a sample
+    if repays(kind, ahead + saved.get(kind, 0.0)) and (compiled := load_compiled()):
         run.kernel = compiled.KERNEL
         run.kernel.advance(run, room)
         return
-    plainly(run, room)
-    saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * (run.i - i)
+    plainly(run, min(room, made + TRIED))
+    steps = run.state.filled.steps
+    saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * steps
 
 
 AUTO = PLAIN._replace(advance=as_it_pays)

@@ -249,7 +249,7 @@ def test_auto_takes_machine_code_in_the_middle_of_a_run_to_the_same_bits(name, m
 
     s = dataclasses.replace(CASES[name], t_max=4.0, length=None)
     kind = machine_code.kind_of(scene.parts_of(s))
-    per_step, chunk = simulate.saved_in_a_step(s), run.CHUNK - 1
+    per_step, chunk = simulate.saved_in_a_step(s), simulate.TRIED
     monkeypatch.setattr(simulate, "saved", {})
     monkeypatch.setattr(compiled, "ready", set())
     monkeypatch.setattr(simulate, "is_kept", lambda kind: False)

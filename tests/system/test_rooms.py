@@ -1,5 +1,6 @@
 """What `import hapticclay` and a run load, how fast, and who imports whom."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -54,18 +55,23 @@ def test_the_rooms_stand_as_drawn():
 
 
 @pytest.mark.perf
-def test_import_is_quick_beside_mujoco():
-    """A ratio: all that a run loads against MuJoCo alone, best of five, in fresh processes."""
+def test_import_is_quick_beside_mujoco(tmp_path):
+    """A ratio: all that a run loads against MuJoCo alone, best of five, in fresh processes.
+
+    All of it comes from compiled files, as after the first import on a user's machine.
+    """
     code = (
         "import time; a = time.perf_counter(); import mujoco; b = time.perf_counter(); "
         "import hapticclay.simulation.simulate; c = time.perf_counter(); print((c - b) / (b - a))"
     )
-    ratios = [
+    env = {**os.environ, "PYTHONPYCACHEPREFIX": str(tmp_path)}
+    env.pop("PYTHONDONTWRITEBYTECODE", None)
+    _, *ratios = [
         float(
             subprocess.run(
-                [sys.executable, "-c", code], capture_output=True, text=True, check=True
+                [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env
             ).stdout
         )
-        for _ in range(5)
+        for _ in range(6)
     ]
     assert min(ratios) < 1.0
