@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Annotated, Any
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -36,6 +36,8 @@ SINGULAR_SHARE = 1e-7  # singular values below this share of the largest are rou
 MODE_SHARE = 1e-4  # so are modes below this share of the strongest
 SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are the hand's spring, no oscillation
 BRACKET = 2e-3  # boundaries are found to this share
+
+Subject = TypeVar("Subject")
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ class PushedLoop(Loop):
         return self.arm.l2, self.arm.l1
 
 
-def of_scenario(subject: Any, axis: str) -> Any:
+def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
     """The loop of an axis of a scenario, as a study runs it; any other subject as it is.
 
     Args:
