@@ -24,8 +24,8 @@ from tqdm import tqdm
 import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
 from hapticclay.model.signals import Multisine
+from hapticclay.scene.scenario import Scenario
 from tests.oracles import I1, I2
 
 from . import common, reference

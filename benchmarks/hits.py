@@ -28,7 +28,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from hapticclay.simulation import simulate
 from tests import oracles
 

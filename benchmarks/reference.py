@@ -27,7 +27,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from hapticclay.model.clay import Profile
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from tests.oracles.arm import G0, G1, I1, I2, L1, L2, S0, S1, SG
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded

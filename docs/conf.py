@@ -26,7 +26,8 @@ from matplotlib.figure import Figure  # noqa: E402
 from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.model import scenario, spring  # noqa: E402
+from hapticclay.model import spring  # noqa: E402
+from hapticclay.scene import scenario  # noqa: E402
 from hapticclay.views.record_plots import RecordPlots  # noqa: E402
 from tests.public import NAMES, told_by, used_in  # noqa: E402
 

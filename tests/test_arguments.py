@@ -17,7 +17,7 @@ import hapticclay as hc
 from hapticclay import errors, units
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError, field_types
-from hapticclay.model.experiments import EXPERIMENTS
+from hapticclay.scene.experiments import EXPERIMENTS
 from tests.public import NAMES
 
 CALLED = ("progress", "announce", "draw", "f", "law")  # functions of the caller's own

@@ -20,8 +20,8 @@ from ..errors import number
 from ..files import atomic
 
 if TYPE_CHECKING:
-    from ..model.experiments import Experiment
-    from ..model.scenario import Scenario
+    from ..scene.experiments import Experiment
+    from ..scene.scenario import Scenario
     from ..views.figure import Figure
 
 
@@ -39,7 +39,7 @@ Changes = Annotated[  # words NAME=VALUE behind each --set
 
 def experiment_words() -> Any:
     """The experiments, and scenario files, as subcommands: the type of a command's `scenario`."""
-    from ..model.experiments import EXPERIMENTS
+    from ..scene.experiments import EXPERIMENTS
 
     file = Annotated[Any, tyro.conf.subcommand("file", constructor=load_scenario_words)]
     return Union[  # noqa: UP007
@@ -60,7 +60,7 @@ def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ())
         path: the file.
         changes: fields that differ from those of the file.
     """
-    from ..model.scenario_file import load_scenario
+    from ..scene.files import load_scenario
 
     return load_scenario(path, named_changes(changes))
 
@@ -74,7 +74,7 @@ def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    from ..model.fields import named_values
+    from ..scene.fields import named_values
 
     return named_values("--set", (word for some in words for word in some))
 
@@ -108,7 +108,7 @@ def load_record(path: tyro.conf.Positional[Path]) -> Any:  # tyro resolves the a
 
 def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
     """A function whose signature tells tyro the parameters of an experiment."""
-    from ..model.experiments import from_words, parameters
+    from ..scene.experiments import from_words, parameters
 
     def scenario(changes: Sequence[Sequence[str]] = (), **words: Any) -> Scenario:
         return from_words(kind, words, named_changes(changes))

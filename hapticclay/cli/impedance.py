@@ -78,7 +78,7 @@ class ImpedanceCommand:
         return 0
 
     def _subject(self) -> Subject:
-        from ..model.scenario_file import is_scenario_file
+        from ..scene.files import is_scenario_file
         from ..studies.comparison import is_wall_file
 
         file = self.source if self.source and is_scenario_file(self.source) else None
@@ -96,8 +96,8 @@ class ImpedanceCommand:
         return self.wall.wall(file)
 
     def _loop(self, file: str | None) -> Subject:
-        from ..model.experiments import EXPERIMENTS, SCENARIOS
-        from ..model.scenario_file import load_scenario
+        from ..scene.experiments import EXPERIMENTS, SCENARIOS
+        from ..scene.files import load_scenario
         from ..studies.boundary import PushedLoop
 
         name = self.source or "constant"

@@ -13,7 +13,7 @@ from ..model.constants import AXES, TS
 from . import console, walls
 
 if TYPE_CHECKING:
-    from ..model.scenario import Scenario
+    from ..scene.scenario import Scenario
     from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
     from ..views.figure import Figure
 
@@ -75,8 +75,8 @@ class PassivityCommand:
 
     def _scenarios(self) -> tuple[Scenario, Scenario]:
         """Of the arm over frequency, and of the rendered clay over time."""
-        from ..model.experiments import constant_cut
-        from ..model.scenario_file import load_scenario
+        from ..scene.experiments import constant_cut
+        from ..scene.files import load_scenario
 
         if self.cut:
             cut = load_scenario(self.cut)

@@ -16,7 +16,7 @@ from ..model.constants import AXES
 from . import console
 
 if TYPE_CHECKING:
-    from ..model.scenario import Scenario
+    from ..scene.scenario import Scenario
     from ..simulation.record import Record
 
 EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]

@@ -105,7 +105,7 @@ class SweepCommand:
                 show(n)
 
     def _plan(self) -> Sweep:
-        from ..model.scenario_file import is_scenario_file, read_settings
+        from ..scene.files import is_scenario_file, read_settings
         from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
 
         if (self.spec is None) == (self.grid is None):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
-    from ..model.virtual_wall import VirtualWall
+    from ..scene.virtual_wall import VirtualWall
     from ..theory.stability_margins import Box
 
 Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
@@ -66,8 +66,8 @@ class DeviceOptions:
             source: the file; None for none.
             **base: fields that differ from the defaults where there is no file.
         """
-        from ..model.fields import with_fields
-        from ..model.virtual_wall import VirtualWall
+        from ..scene.fields import with_fields
+        from ..scene.virtual_wall import VirtualWall
 
         wall = VirtualWall.load(source) if source else with_fields(VirtualWall(), base)
         names = [n for n in self.given if n not in ("hand", "unilateral")]
@@ -116,7 +116,7 @@ def quantities(given: dict[str, str | None]) -> dict[str, Any]:
     Raises:
         ParameterError: a text is none.
     """
-    from ..model.fields import named_values
+    from ..scene.fields import named_values
 
     out: dict[str, Any] = {}
     for name, text in given.items():

@@ -9,10 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from ..arguments import named
+from ..arguments import function_name, named
 from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
-from .fields import function_name
 from .traits import NO, Refusal, Trait
 
 # floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as

@@ -33,9 +33,9 @@ from ..model.constants import (
     G,
     S,
 )
-from ..model.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
 from ..model.operator import Operator
 from ..model.signals import Multisine
+from ..scene.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
 from ..simulation.record import Record, out_of_band_ratio
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at

@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from ..files import versions
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import COMPARED_HANDS, PUSHED, Comparison, differing_fields
 from ..views.compare_plots import compare_figures
 from .report import template_environment

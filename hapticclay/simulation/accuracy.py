@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError, number
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..stepping.pace import STABLE_STEP, check_explicit, fastest_rate
 from ..stepping.run import Crossing
 from .record import ARRAYS, Record

@@ -18,8 +18,8 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
-from ..model.plausible import warn_of
-from ..model.scenario import Scenario
+from ..scene.plausible import warn_of
+from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.engine import warnings_caught
 from ..stepping.machine_code import compile_time, is_kept

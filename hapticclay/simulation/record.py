@@ -18,11 +18,11 @@ from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
 from ..model.constants import AXES
-from ..model.earlier_names import with_present_names
-from ..model.fields import make_part, plain_data
-from ..model.scenario import Scenario
-from ..model.scenario_text import scenario_rows
 from ..model.signals import Multisine
+from ..scene.earlier_names import with_present_names
+from ..scene.fields import make_part, plain_data
+from ..scene.scenario import Scenario
+from ..scene.text import scenario_rows
 from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop

@@ -20,9 +20,9 @@ from ..model.flow import CONSISTENCY_MAX, FY_MAX
 from ..model.groove import Groove
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
-from ..model.plausible import warn_of
 from ..model.sampled_controller import Controller
-from ..model.scenario import Scenario
+from ..scene.plausible import warn_of
+from ..scene.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, EngineStore, Run, Snapshot

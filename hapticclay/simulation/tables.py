@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import needing
 from ..model.constants import AXES
-from ..model.fields import plain_data
 from ..model.hardware import JOINTS
+from ..scene.fields import plain_data
 from .record import ARRAYS, EXTRA, SCALAR, Record
 
 if TYPE_CHECKING:

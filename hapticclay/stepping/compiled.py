@@ -36,7 +36,7 @@ from ..model import (
     regions,
     spring,
 )
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import (
     begin,
     borders,

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..model.arm import PAPER, Arm
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 
 try:
     import mujoco

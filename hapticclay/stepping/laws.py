@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ParameterError
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 
 TABLE: list[ModuleType] = []
 

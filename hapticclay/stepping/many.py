@@ -19,7 +19,7 @@ from ..model import controller, regions
 from ..model.clay import Profile
 from ..model.controller import Servo
 from ..model.operator import NO_HAND, mobility_with
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous
 from .engine_step import put
 from .machine_code import CARRY, kind_of

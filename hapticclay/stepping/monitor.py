@@ -11,8 +11,8 @@ import numpy as np
 from ..arguments import named
 from ..model.clay import Clay
 from ..model.constants import AXES
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
+from ..scene.scenario import Scenario
 from ..theory import gain_limits
 
 LIMITS = "oscillation against the torque limits"

@@ -9,8 +9,8 @@ import numpy as np
 from ..errors import ParameterError
 from ..model.constants import B_MAX
 from ..model.operator import NO_HAND
-from ..model.scenario import Scenario
 from ..model.spring import RESOLVED
+from ..scene.scenario import Scenario
 from ..theory import gain_limits
 from .march import GROWTH_BLOCK
 from .modes import STABLE_STEP, SUBSTEPS, creep_speed

@@ -17,7 +17,7 @@ from ..errors import ParameterError
 from ..model import hardware
 from ..model.constants import AXES
 from ..model.sampled_controller import Controller
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
 from .engine_step import Engine, Probe

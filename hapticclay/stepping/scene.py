@@ -11,7 +11,7 @@ from ..model import compensator, groove, pieces, regions
 from ..model import hardware as devices
 from ..model.constants import B_MAX
 from ..model.sampled_controller import BUFFER, Controller, LawCaller
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import begin, hardware, laws, pace, rows
 from . import parts as p_
 from . import state as s_

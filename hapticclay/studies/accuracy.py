@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..files import versions
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..simulation.accuracy import (
     METHODS,
     ROUNDING_LEFT,

@@ -17,8 +17,8 @@ from ..model.clay import Clay, Profile
 from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
 from ..model.hardware import Hardware
-from ..model.scenario import Position, Scenario, TorqueLimit
 from ..model.spring import Spring
+from ..scene.scenario import Position, Scenario, TorqueLimit
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limits, linear_loop

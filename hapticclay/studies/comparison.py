@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
-from ..model.fields import plain_data
-from ..model.scenario import Scenario
-from ..model.scenario_file import load_scenario, read_settings
-from ..model.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..results import Result
+from ..scene.fields import plain_data
+from ..scene.files import load_scenario, read_settings
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import design, stability_margins, wall_limits

@@ -21,11 +21,11 @@ from ..files import versions
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
-from ..model.fields import function_of
 from ..model.operator import Operator
-from ..model.scenario import Control, Scenario
 from ..model.signals import Multisine
 from ..results import Result
+from ..scene.fields import function_of
+from ..scene.scenario import Control, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 

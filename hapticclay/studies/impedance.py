@@ -16,10 +16,10 @@ from ..arguments import checked, named
 from ..errors import ParameterError, integer, number
 from ..files import versions
 from ..model.constants import AXES
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_limits

@@ -12,9 +12,9 @@ import numpy as np
 from ..arguments import checked
 from ..errors import integer, numbers_of
 from ..files import versions
-from ..model.scenario import Scenario
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..theory.mbk import (
     PLANES,
     DynamicRange,

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import ParameterError, number
 from ..model.hardware import Hardware
-from ..model.scenario import Scenario
-from ..model.virtual_wall import VirtualWall
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record, port_energy
 from ..simulation.simulate import simulate
 from ..theory import wall_limits

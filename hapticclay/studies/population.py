@@ -12,8 +12,8 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
 from ..model.operator import Operator
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.virtual_wall import VirtualWall
 from ..theory import wall_limits
 from ..theory.gain_limits import gain_limit
 from ..theory.linear_loop import Loop

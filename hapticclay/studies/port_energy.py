@@ -19,9 +19,9 @@ import numpy as np
 from ..errors import Bound, ParameterError, check_fields, integer
 from ..model import hardware
 from ..model.samples import Samples
-from ..model.scenario import Scenario
 from ..model.spring import STIFFNESS_MAX
-from ..model.virtual_wall import LEVER, UPRIGHT, VirtualWall, wall_law
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import LEVER, UPRIGHT, VirtualWall, wall_law
 from ..simulation import record
 from ..simulation.simulate import simulate
 from ..theory import wall_limits

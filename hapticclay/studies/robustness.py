@@ -26,10 +26,10 @@ from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, number
 from ..files import versions
 from ..model.constants import AXES
-from ..model.fields import nested, with_fields
-from ..model.scenario import Scenario
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.fields import nested, with_fields
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
 from . import boundary, growth, sweep, zwidth

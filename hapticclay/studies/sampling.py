@@ -17,11 +17,11 @@ import numpy as np
 
 from ..errors import ParameterError, choice, integer
 from ..files import versions
-from ..model.earlier_names import with_present_names
-from ..model.experiments import EXPERIMENTS
-from ..model.fields import join_names, named_values
-from ..model.scenario import Scenario
-from ..model.scenario_file import read_settings, scenario_of
+from ..scene.earlier_names import with_present_names
+from ..scene.experiments import EXPERIMENTS
+from ..scene.fields import join_names, named_values
+from ..scene.files import read_settings, scenario_of
+from ..scene.scenario import Scenario
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
@@ -117,7 +117,7 @@ class Sweep:
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
     A number is a parameter of the experiment, as on the command line, or any field of the scenario
-    by dotted name (`model/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    by dotted name (`scene/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
     without axis gets the value on both. "operator.mass" puts an arm at the handle.
 
     Attributes:

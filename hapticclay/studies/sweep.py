@@ -28,7 +28,7 @@ from ..arguments import checked
 from ..errors import ParameterError
 from ..files import atomic
 from ..model.constants import AXES
-from ..model.experiments import parameter_unit
+from ..scene.experiments import parameter_unit
 from ..simulation.batch import cores
 from ..simulation.record import Record
 from ..simulation.simulate import simulate

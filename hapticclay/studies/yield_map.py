@@ -13,7 +13,7 @@ from ..errors import ParameterError, choice
 from ..model.clay import slab
 from ..model.constants import AXES
 from ..model.flow import Flow
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory.describing import limit_cycles, push_outcomes

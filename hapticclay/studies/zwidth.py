@@ -17,13 +17,13 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model.constants import AXES, TS
-from ..model.fields import with_fields
 from ..model.operator import Operator
-from ..model.scenario import Scenario
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.fields import with_fields
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
 from ..theory import gain_limits, wall_limits

@@ -22,8 +22,8 @@ from numpy.polynomial import Polynomial
 from ..errors import number
 from ..model.compensator import Compensator
 from ..model.constants import AXES
-from ..model.scenario import Scenario
 from ..model.spring import STIFFNESS_MAX
+from ..scene.scenario import Scenario
 from . import linear_loop, roots
 from .linear_loop import Loop, of_loop
 

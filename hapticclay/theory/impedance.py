@@ -19,8 +19,8 @@ from ..arguments import checked, named
 from ..errors import ParameterError, array_of
 from ..model import controller
 from ..model.operator import Operator
-from ..model.virtual_wall import VirtualWall
 from ..results import Result
+from ..scene.virtual_wall import VirtualWall
 from . import linear_loop
 from .linear_loop import Loop, of_loop
 

@@ -24,8 +24,8 @@ from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES, B_MAX
 from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
-from ..model.scenario import Render, Scenario
 from ..model.spring import STIFFNESS_MAX
+from ..scene.scenario import Render, Scenario
 from . import roots
 
 Answer = TypeVar("Answer")

@@ -19,7 +19,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, stability_margins
 from .impedance import frequencies, wall_response
 from .linear_loop import Loop

@@ -18,7 +18,7 @@ from numpy.polynomial import Polynomial
 from ..arguments import checked
 from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
-from ..model.virtual_wall import Device, VirtualWall
+from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_limits, linear_loop, roots
 from .stability_margins import Box
 

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.impedance import MeasuredImpedance, Subject
 from ..studies.mbk import ArmMBK, Border, DeviceMBK
 from ..theory.mbk import PLANES

@@ -20,8 +20,8 @@ from ..model.compensator import PRINTED
 from ..model.constants import AXES
 from ..model.controller import SERVO
 from ..model.flow import Flow
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..theory import linear_loop
 from . import figure as shown

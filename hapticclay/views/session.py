@@ -25,8 +25,8 @@ import numpy as np
 from ..errors import ParameterError, integer, number
 from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import has_numba, load_compiled, saved_in_a_step
 from ..simulation.stepwise import scaled

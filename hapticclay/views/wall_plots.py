@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
 from .style import (
     BLACK,

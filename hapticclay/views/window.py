@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import ParameterError
-from ..model.experiments import SCENARIOS
+from ..scene.experiments import SCENARIOS
 from .session import Player, Replay, Session, flow_text
 from .stage import hardest, held_words
 from .viewer import Rows, Sight, Writing

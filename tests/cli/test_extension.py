@@ -12,7 +12,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import Bound, ParameterError
-from hapticclay.model.experiments import (
+from hapticclay.scene.experiments import (
     EXPERIMENTS,
     Damping,
     Gains,

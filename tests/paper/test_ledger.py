@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from hapticclay.model import constants, operator, scenario
+from hapticclay.model import constants, operator
 from hapticclay.paper import claims, report
+from hapticclay.scene import scenario
 
 SOURCE = Path(scenario.__file__)
 

@@ -12,8 +12,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.fields import make_part
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.fields import make_part
+from hapticclay.scene.scenario import Scenario
 from hapticclay.simulation import export, tables
 
 FORMATS = tuple(export.EXPORTS)

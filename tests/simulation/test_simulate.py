@@ -287,7 +287,7 @@ def test_a_handle_that_slides_along_a_border_goes_on():
 def test_a_border_into_stiff_clay_on_the_other_axis_is_crossed_once():
     from hapticclay.model.clay import Clay, Profile
     from hapticclay.model.operator import Operator
-    from hapticclay.model.scenario import Scenario
+    from hapticclay.scene.scenario import Scenario
 
     e = (0.008008749625277495, 0.11265424819257426)
     s = Scenario(

@@ -12,7 +12,7 @@ from benchmarks import hits, reference
 from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from tests.oracles import bounces, store
 
 REBOUND = Scenario(

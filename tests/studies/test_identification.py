@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from benchmarks import intervals
 from hapticclay.cli import app
-from hapticclay.model.fields import make_part, plain_data
+from hapticclay.scene.fields import make_part, plain_data
 from hapticclay.studies import identification
 from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses

@@ -11,14 +11,14 @@ from typing import Annotated, Literal
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
-from .arm import Arm
-from .constants import B_MAX
-from .hardware import Hardware
-from .operator import NO_HAND, Operator
-from .sampled_controller import Controller
+from ..model.arm import Arm
+from ..model.constants import B_MAX
+from ..model.hardware import Hardware
+from ..model.operator import NO_HAND, Operator
+from ..model.sampled_controller import Controller
+from ..model.signals import Signal
+from ..model.spring import STIFFNESS_MAX
 from .scenario import Scenario
-from .signals import Signal
-from .spring import STIFFNESS_MAX
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
 STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
@@ -105,7 +105,7 @@ class VirtualWall:
             ParameterError: the file cannot be read, or a field was refused.
         """
         from .fields import make_part, nested
-        from .scenario_file import read_settings
+        from .files import read_settings
 
         try:
             data = read_settings(path)
@@ -131,7 +131,7 @@ class VirtualWall:
         """
         from ..files import atomic
         from .fields import plain_data
-        from .scenario_file import is_scenario_file, toml_text
+        from .files import is_scenario_file, toml_text
 
         file, units = Path(path), {}
         if not is_scenario_file(file.name):

@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import experiments
+from hapticclay.scene import experiments
 from tests.oracles import Linear, piecewise_linear
 
 F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis

@@ -18,8 +18,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, field_types
-from .clay import Clay, Profile, slab
-from .constants import (
+from ..model.clay import Clay, Profile, slab
+from ..model.constants import (
     AXES,
     B_CONSTANT,
     B_MAX,
@@ -39,6 +39,9 @@ from .constants import (
     TORQUE_LIMIT,
     TS,
 )
+from ..model.flow import Flow
+from ..model.operator import Operator
+from ..model.signals import Multisine
 from .fields import (
     ENTIRE,
     Field,
@@ -53,8 +56,6 @@ from .fields import (
     no_field,
     values_of,
 )
-from .flow import Flow
-from .operator import Operator
 from .scenario import (
     Control,
     Duration,
@@ -69,7 +70,6 @@ from .scenario import (
     TorqueLimit,
     choose_step,
 )
-from .signals import Multisine
 
 GROWTHS = {  # readings of the growth [N.s/m per s]
     "30/s": GROWTH,
@@ -145,7 +145,7 @@ class Experiment:
         The changes are made before the scenario is checked, so that another arm may go another way.
 
         Args:
-            *changes: plain data of the fields (`model/fields.py`), the later ones on top.
+            *changes: plain data of the fields (`scene/fields.py`), the later ones on top.
 
         Raises:
             ParameterError: as `scenario`; or there is no such field.
@@ -209,7 +209,7 @@ class ConstantCut(PathExperiment):
             return self.b
         if self.b != B_CONSTANT:
             raise ParameterError("material", self.material, "sets b: give one of the two")
-        from .materials import material
+        from ..model.materials import material
 
         return material(self.material)
 

@@ -35,8 +35,8 @@ import numpy as np
 
 from ..arguments import checked, function_name, known_names
 from ..errors import Bound, ParameterError, choice, field_types, quantity
-from .constants import AXES, each_axis
-from .hardware import JOINTS
+from ..model.constants import AXES, each_axis
+from ..model.hardware import JOINTS
 
 P = ParamSpec("P")
 T = TypeVar("T")

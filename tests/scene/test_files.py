@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors, files, units
 from hapticclay.errors import Bound, ParameterError, field_types
-from hapticclay.model import fields, scenario_file
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
-from hapticclay.model.experiments import EXPERIMENTS, from_words, parameter_unit
-from hapticclay.model.fields import make_part, named_values, nested, plain_data, with_fields
+from hapticclay.scene import fields
+from hapticclay.scene import files as scene_files
+from hapticclay.scene.experiments import EXPERIMENTS, from_words, parameter_unit
+from hapticclay.scene.fields import make_part, named_values, nested, plain_data, with_fields
 
 
 def floats(low, high):
@@ -174,7 +175,7 @@ def test_pairs_defaults_and_nothing_come_back(tmp_path, changes):
     ).map(lambda x: {"a": x, "b c": [{"d": x}]})
 )
 def test_the_toml_we_write_is_what_tomllib_reads(data):
-    again = tomllib.loads(scenario_file.toml_text(data))
+    again = tomllib.loads(scene_files.toml_text(data))
     assert _sorted(again) == _sorted(data)  # values stand before tables
 
 
@@ -530,7 +531,7 @@ def test_a_part_of_several_classes_names_its_kind(wave, data):
     drum = Drum(wave)
     assert make_part(Drum, {"wave": data}) == drum
     for full in (True, False):
-        text = scenario_file.toml_text(plain_data(drum, full), {})
+        text = scene_files.toml_text(plain_data(drum, full), {})
         assert make_part(Drum, tomllib.loads(text)) == drum, text
         assert make_part(Drum, json.loads(json.dumps(plain_data(drum, full)))) == drum
 
@@ -746,7 +747,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     for make in (
         lambda: with_fields(hc.constant_cut(), given),
         lambda: from_words(EXPERIMENTS["constant"], {}, given),
-        lambda: scenario_file.load_scenario(file, given),
+        lambda: scene_files.load_scenario(file, given),
     ):
         with pytest.raises(hc.ParameterError, match="adds a hand") as caught:
             make()
@@ -755,7 +756,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     whole = {"operator.mass": 0.3, "operator.damper": 0.0, "operator.spring": 4.0}
     assert with_fields(hc.constant_cut(), whole).operator == hand
     mass = {"operator.mass": whole.pop("operator.mass")}
-    assert scenario_file.load_scenario(file, mass, whole).operator == hand
+    assert scene_files.load_scenario(file, mass, whole).operator == hand
     s = dataclasses.replace(hc.constant_cut(), operator=hc.Operator())
     assert with_fields(s, {"operator.mass": 0.3}).operator == hc.Operator(0.3)
 

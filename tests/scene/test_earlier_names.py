@@ -6,8 +6,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.earlier_names import with_present_names
-from hapticclay.model.scenario_file import scenario_of
+from hapticclay.scene.earlier_names import with_present_names
+from hapticclay.scene.files import scenario_of
 from hapticclay.studies import sampling
 from hapticclay.studies.sweep import Sweep
 

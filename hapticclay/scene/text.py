@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from ..display import one_line
 
 if TYPE_CHECKING:
-    from .clay import Clay
-    from .operator import Operator
+    from ..model.clay import Clay
+    from ..model.operator import Operator
     from .scenario import Scenario
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors
 from hapticclay.errors import Bound, ParameterError, check_fields, field_types
-from hapticclay.model import fields
-from hapticclay.model.experiments import EXPERIMENTS, Experiment, parameters
+from hapticclay.scene import fields
+from hapticclay.scene.experiments import EXPERIMENTS, Experiment, parameters
 
 CLAY = hc.Clay(hc.Profile((0.0,), (0.0, 9.0)), hc.Profile((0.0,), (0.0, 9.0)))
 PARTS = {  # a valid one of each, and what its errors put before the field

@@ -11,18 +11,18 @@ from typing import Annotated, Any, Literal
 from ..arguments import named
 from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, check_fields, number, quantity
-from . import samples, shapes  # noqa: F401  # so that files and options know every Signal
-from .arm import PAPER, Arm
-from .clay import Clay, Smooth
-from .compensator import PRINTED, Compensator
-from .constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
-from .controller import SERVO, Servo
-from .hardware import JOINTS, Hardware
-from .operator import Operator, mobility_with
-from .sampled_controller import Controller
-from .scenario_text import scenario_rows
-from .signals import Signal
-from .support import check_scene
+from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
+from ..model.arm import PAPER, Arm
+from ..model.clay import Clay, Smooth
+from ..model.compensator import PRINTED, Compensator
+from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
+from ..model.controller import SERVO, Servo
+from ..model.hardware import JOINTS, Hardware
+from ..model.operator import Operator, mobility_with
+from ..model.sampled_controller import Controller
+from ..model.signals import Signal
+from ..model.support import check_scene
+from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
 WHOLE = 1e-6  # by which Ts/dt may differ from a whole number
@@ -162,7 +162,7 @@ class Scenario:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .scenario_file import load_scenario
+        from .files import load_scenario
 
         return load_scenario(path)
 
@@ -178,7 +178,7 @@ class Scenario:
         Raises:
             ParameterError: the file cannot be written, or a part is no data, as a function.
         """
-        from .scenario_file import save_scenario
+        from .files import save_scenario
 
         return save_scenario(self, path)
 

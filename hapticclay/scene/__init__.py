@@ -1,0 +1,1 @@
+"""How a scene is written: fields, units, files, text, experiments."""
