@@ -13,11 +13,12 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
 from ..units import is_quantity
+from . import flow, groove, spring
 from .constants import AXES, B_MAX
 from .flow import Consistency, Flow, FlowIndex, YieldForce
 from .groove import Groove
 from .spring import Spring
-from .traits import LEFT_OUT, Refusal, Trait
+from .traits import LEFT_OUT, Refusal, Trait, check_traits, present
 
 
 def halved_damping(b0, b1, L, R):
@@ -803,9 +804,7 @@ class Clay:
             raise ParameterError(
                 "clay.isotropic", True, "must be False where Fy, K or n differ between the axes"
             )
-        from .support import check_clay  # which asks all laws
-
-        check_clay(self)
+        check_traits(present(self, LAWS), self, "clay.")
 
     @classmethod
     def of_groove(cls, groove: Groove) -> Clay:
@@ -898,3 +897,4 @@ TRAITS = (
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
     ),
 )  # fmt: skip
+LAWS = (*TRAITS, *flow.TRAITS, *spring.TRAITS, *groove.TRAITS)

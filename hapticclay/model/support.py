@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import reduce
 from typing import Any
 
-from ..errors import ParameterError
 from . import (
-    clay,
     controller,
-    flow,
-    groove,
     hardware,
     operator,
     sampled_controller,
     signals,
-    spring,
 )
-from .traits import Refusal, Trait
+from .clay import LAWS
+from .traits import Refusal, Trait, check_traits, present
 
 METHODS = (
     Trait("fast", "method", lambda s: s.control == "continuous" and s.integrator == "fast"),
@@ -32,12 +26,11 @@ METHODS = (
     Trait("held", "method", lambda s: s.control == "sampled" and s.render == "held"),
     Trait("physical", "method", lambda s: s.control == "sampled" and s.render == "physical"),
 )  # fmt: skip
-CLAY = (*clay.TRAITS, *flow.TRAITS, *spring.TRAITS, *groove.TRAITS)
 PARTS = (
     *operator.TRAITS, *controller.TRAITS, *signals.TRAITS, *sampled_controller.TRAITS,
     *hardware.TRAITS,
 )  # fmt: skip
-TRAITS = {x.name: x for x in (*METHODS, *CLAY, *PARTS)}
+TRAITS = {x.name: x for x in (*METHODS, *LAWS, *PARTS)}
 
 
 def refusal(a: str, b: str) -> Refusal | None:
@@ -50,28 +43,6 @@ def refusal(a: str, b: str) -> Refusal | None:
     return TRAITS[a].refuses.get(b) or TRAITS[b].refuses.get(a)
 
 
-def present(scene: Any, traits: Iterable[Trait]) -> list[Trait]:
-    """The traits that a scene has.
-
-    Args:
-        scene: a scenario; or clay, for those of clay.
-        traits: to be looked for.
-    """
-    return [x for x in traits if x.has(scene)]
-
-
-def check_clay(made: Any) -> None:
-    """Refuses laws of clay that cannot be combined.
-
-    Args:
-        made: the clay.
-
-    Raises:
-        ParameterError: there are two such.
-    """
-    _check(present(made, CLAY), made, "clay.")
-
-
 def check_scene(s: Any) -> None:
     """Refuses parts and methods that cannot be combined.
 
@@ -81,17 +52,8 @@ def check_scene(s: Any) -> None:
     Raises:
         ParameterError: there are two such.
     """
-    own = [] if s.clay is None else present(s.clay, CLAY)
-    _check([*present(s, METHODS), *own, *present(s, PARTS)], s, "")
-
-
-def _check(found: list[Trait], scene: Any, prefix: str) -> None:
-    names = {x.name for x in found}
-    for trait in found:
-        for other, why in trait.refuses.items():
-            if other in names:
-                path = why.field.removeprefix(prefix).split(".")
-                raise ParameterError(why.field, reduce(getattr, path, scene), why.bound)
+    own = [] if s.clay is None else present(s.clay, LAWS)
+    check_traits([*present(s, METHODS), *own, *present(s, PARTS)], s)
 
 
 # ---- the page ------------------------------------------------------------------------------------
@@ -112,7 +74,7 @@ Bounds that depend on numbers, as that of stiff clay, are on the page of the par
 def page() -> str:
     """The page of the documents, in Markdown."""
     names = [x.name for x in METHODS]
-    rows = [[x.name, *(_cell(x.name, m) for m in names), x.theory] for x in (*CLAY, *PARTS)]
+    rows = [[x.name, *(_cell(x.name, m) for m in names), x.theory] for x in (*LAWS, *PARTS)]
     table = [["", *names, "linear theory"], ["---"] * (len(names) + 2), *rows]
     whys = [
         f"- {a} and {b}: `{why.field}` {why.bound}"

@@ -85,12 +85,12 @@ def scene_of(*names):
         kw["hardware"] = hc.Hardware(**{k: v for x in wires for k, v in x.items()})
     for name in names:
         kw |= PARTS.get(name, {})
-    if any(x.name in names for x in support.CLAY):
+    if any(x.name in names for x in support.LAWS):
         kw["clay"] = clay_of(names)
     return hc.Scenario(force=(1.0, 0.2), start=(0.019, 0.0), t_max=0.01, length=None, dt=1e-4, **kw)
 
 
-NAMES = [x.name for x in (*support.CLAY, *support.PARTS)]
+NAMES = [x.name for x in (*support.LAWS, *support.PARTS)]
 IMPOSSIBLE = {frozenset(x) for x in (
     ("yield by axis", "yield along the motion"),  # one or the other
     ("smooth", "yield along the motion"),  # smooth laws do not yield, and both axes must be alike
@@ -108,7 +108,7 @@ def test_a_cell_that_says_yes_runs_and_another_is_refused(a):
         why = support.refusal(a, b)
         if why is None:
             s = scene_of(a, b)
-            found = {x.name for x in support.present(s.clay, support.CLAY)} if s.clay else set()
+            found = {x.name for x in support.present(s.clay, support.LAWS)} if s.clay else set()
             found |= {x.name for x in support.present(s, (*support.METHODS, *support.PARTS))}
             assert {a, b} <= found, (a, b)
             assert hc.simulate(s, engine="python").outcome.code == "time limit", (a, b)
