@@ -60,9 +60,9 @@ def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ())
         path: the file.
         changes: fields that differ from those of the file.
     """
-    from ..scene.files import load_scenario
+    from ..scene.scenario import Scenario
 
-    return load_scenario(path, named_changes(changes))
+    return Scenario.load(path, named_changes(changes))
 
 
 def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:

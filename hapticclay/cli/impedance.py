@@ -97,12 +97,12 @@ class ImpedanceCommand:
 
     def _loop(self, file: str | None) -> Subject:
         from ..scene.experiments import EXPERIMENTS, SCENARIOS
-        from ..scene.files import load_scenario
+        from ..scene.scenario import Scenario
         from ..studies.boundary import PushedLoop
 
         name = self.source or "constant"
         if file:
-            scenario = load_scenario(file)
+            scenario = Scenario.load(file)
         else:
             scenario = SCENARIOS[choice("experiment", name, tuple(EXPERIMENTS))]()
         loop = PushedLoop.of(scenario, self.axis or AXES[0], self.b)

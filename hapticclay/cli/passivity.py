@@ -76,10 +76,10 @@ class PassivityCommand:
     def _scenarios(self) -> tuple[Scenario, Scenario]:
         """Of the arm over frequency, and of the rendered clay over time."""
         from ..scene.experiments import constant_cut
-        from ..scene.files import load_scenario
+        from ..scene.scenario import Scenario
 
         if self.cut:
-            cut = load_scenario(self.cut)
+            cut = Scenario.load(self.cut)
             return cut, cut
         stiff: Any = dict(b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=33 * TS)
         return constant_cut(), replace(

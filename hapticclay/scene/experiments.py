@@ -57,6 +57,7 @@ from .fields import (
     values_of,
 )
 from .scenario import (
+    MAKERS,
     Control,
     Duration,
     Force,
@@ -487,3 +488,4 @@ variable_cut = scenario_factory(VariableCut)
 stability_test = scenario_factory(StabilityTest)
 free = scenario_factory(Free)
 SCENARIOS = {name: scenario_factory(kind) for name, kind in EXPERIMENTS.items()}
+MAKERS.update({name: functools.partial(from_words, kind) for name, kind in EXPERIMENTS.items()})

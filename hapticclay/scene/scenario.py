@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ..arguments import named
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, check_fields, number, quantity
+from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
 from ..model.clay import Clay, Smooth
@@ -22,6 +23,15 @@ from ..model.operator import Operator, mobility_with
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.support import check_scene
+from .fields import (
+    check_added_hand,
+    dotted_names,
+    merged_values,
+    nested,
+    no_field,
+    values_of,
+)
+from .files import read_settings, write_part
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
@@ -41,6 +51,9 @@ SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
+
+SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
+MAKERS: dict[str, Callable[..., Scenario]] = {}  # scenarios of other words, as experiments, by name
 
 
 @named
@@ -152,19 +165,54 @@ class Scenario:
     def _repr_html_(self) -> str:
         return html_table(f"Scenario {self.name}", scenario_rows(self))
 
-    @staticmethod
-    def load(path: str | os.PathLike[str]) -> Scenario:
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
+        """The scenario of plain data: its fields; or an experiment, its parameters and fields.
+
+        Args:
+            settings: the data, as in a file (docs/scenarios.md).
+            *changes: values by dotted name, the later ones on top.
+
+        Raises:
+            ParameterError: there is no such field, or a value was refused.
+        """
+        data = nested(settings)
+        given = data.pop("schema", SCENARIO_SCHEMA)
+        choice("schema", given, (SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2))
+        if "experiment" in data:
+            name = choice("experiment", data.pop("experiment"), tuple(MAKERS))
+            return MAKERS[name]({}, data, *changes)
+        values = values_of(cls())
+        for name in data:
+            if name not in values:
+                raise no_field(name, data[name], [*dotted_names(cls), "experiment", "schema"])
+        values = merged_values(cls, data, values)
+        later = [nested(x) for x in changes]
+        check_added_hand(values["operator"], *later)
+        for given in later:
+            values = merged_values(cls, given, values)
+        return cls(**values)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
         """Reads a scenario from a file (docs/scenarios.md).
 
         Args:
             path: the file, .toml or .json.
+            *changes: values by dotted name that go before those of the file, the later ones on
+                top.
 
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .files import load_scenario
-
-        return load_scenario(path)
+        try:
+            settings = read_settings(path)
+            cls.of(settings)
+        except ParameterError as error:
+            if error.field != "scenario":
+                error = ParameterError(error.field, error.value, f"{error.bound} (in {Path(path)})")
+            raise error from None
+        return cls.of(settings, *changes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the fields that differ from the defaults, whole or not at all.
@@ -178,9 +226,7 @@ class Scenario:
         Raises:
             ParameterError: the file cannot be written, or a part is no data, as a function.
         """
-        from .files import save_scenario
-
-        return save_scenario(self, path)
+        return write_part(path, {"schema": SCENARIO_SCHEMA, "name": self.name}, self)
 
     @property
     def operators(self) -> tuple[Operator | None, Operator | None]:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..display import one_line
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
     from ..model.operator import Operator
-    from .scenario import Scenario
 
 
-def scenario_rows(scenario: Scenario) -> list[tuple[str, str]]:
+def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     """Name and value, with unit, of what tells a scenario from others.
 
     Args:
@@ -86,7 +85,7 @@ def _hand(th: Operator | None) -> str:
     return f"{th.mass:.4g} kg, {th.damper:.4g} N.s/m, {th.spring:.4g} N/m"
 
 
-def _control(s: Scenario) -> str:
+def _control(s: Any) -> str:
     if s.control == "continuous":
         return f"continuous, {s.integrator}, dt = {s.dt:g} s"
     return f"sampled, {s.render}, Ts = {s.Ts or s.dt:g} s, dt = {s.dt:g} s"

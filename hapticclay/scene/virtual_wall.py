@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from dataclasses import dataclass
@@ -18,6 +17,8 @@ from ..model.operator import NO_HAND, Operator
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
+from .fields import make_part, nested
+from .files import read_settings, write_part
 from .scenario import Scenario
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
@@ -104,9 +105,6 @@ class VirtualWall:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .fields import make_part, nested
-        from .files import read_settings
-
         try:
             data = read_settings(path)
             del data["name"]
@@ -129,20 +127,7 @@ class VirtualWall:
         Raises:
             ParameterError: it cannot be written.
         """
-        from ..files import atomic
-        from .fields import plain_data
-        from .files import is_scenario_file, toml_text
-
-        file, units = Path(path), {}
-        if not is_scenario_file(file.name):
-            raise ParameterError("wall", str(file), "must be a .toml or a .json file")
-        data = {"schema": WALL_SCHEMA, **plain_data(self, False, units)}
-        toml = file.suffix.lower() == ".toml"
-        with atomic(file) as f:
-            f.write(
-                (toml_text(data, units) if toml else json.dumps(data, indent=2) + "\n").encode()
-            )
-        return file
+        return write_part(path, {"schema": WALL_SCHEMA}, self, "wall")
 
     @property
     def hand(self) -> Operator:

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..results import Result
 from ..scene.fields import plain_data
-from ..scene.files import load_scenario, read_settings
+from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
@@ -159,7 +159,7 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
         name: to be shown.
         axis: "x" or "y".
     """
-    scenario = load_scenario(path)
+    scenario = Scenario.load(path)
     loop = Loop.of(scenario, axis)
     plain = replace(loop, **TIMING)
     record, error = run_and_error(scenario)

@@ -20,7 +20,7 @@ from ..files import versions
 from ..scene.earlier_names import with_present_names
 from ..scene.experiments import EXPERIMENTS
 from ..scene.fields import join_names, named_values
-from ..scene.files import read_settings, scenario_of
+from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
@@ -221,7 +221,7 @@ class Sweep:
         """
         settings = self.scenario or {"experiment": self.experiment}
         varied = dict(zip(self.vary, point.tolist(), strict=True))
-        return scenario_of(settings, self.fixed, varied)
+        return Scenario.of(settings, self.fixed, varied)
 
     def described(self) -> dict[str, Any]:
         """The sweep as data."""

@@ -7,7 +7,6 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.scene.earlier_names import with_present_names
-from hapticclay.scene.files import scenario_of
 from hapticclay.studies import sampling
 from hapticclay.studies.sweep import Sweep
 
@@ -66,6 +65,6 @@ def test_a_sweep_and_a_flag_of_0_2(tmp_path):
     found = s.run_scenario(s.points(0, 1)[0])
     assert found.operator == hc.Operator(0.5) and found.inertia_shaping
     data = {"impedance": True, "operator": {"mass": 0.5}, "experiment": "constant"}
-    assert scenario_of(with_present_names(data)).operator == hc.Operator(0.5)
+    assert hc.Scenario.of(with_present_names(data)).operator == hc.Operator(0.5)
     with pytest.raises(ParameterError, match="shaping.* must not stand beside inertia_shaping"):
         with_present_names({"inertia_shaping": True, "shaping": True})

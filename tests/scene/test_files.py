@@ -747,7 +747,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     for make in (
         lambda: with_fields(hc.constant_cut(), given),
         lambda: from_words(EXPERIMENTS["constant"], {}, given),
-        lambda: scene_files.load_scenario(file, given),
+        lambda: hc.Scenario.load(file, given),
     ):
         with pytest.raises(hc.ParameterError, match="adds a hand") as caught:
             make()
@@ -756,7 +756,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     whole = {"operator.mass": 0.3, "operator.damper": 0.0, "operator.spring": 4.0}
     assert with_fields(hc.constant_cut(), whole).operator == hand
     mass = {"operator.mass": whole.pop("operator.mass")}
-    assert scene_files.load_scenario(file, mass, whole).operator == hand
+    assert hc.Scenario.load(file, mass, whole).operator == hand
     s = dataclasses.replace(hc.constant_cut(), operator=hc.Operator())
     assert with_fields(s, {"operator.mass": 0.3}).operator == hc.Operator(0.3)
 
