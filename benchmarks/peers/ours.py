@@ -32,7 +32,7 @@ def methods() -> dict[str, list[float]]:
         **native,
         "accurate": accurate,
         "sampled, held": sampled,
-        "sampled, implicit": sampled,
+        "sampled, physical": sampled,
     }
 
 

@@ -108,10 +108,10 @@ def load_record(path: tyro.conf.Positional[Path]) -> Any:  # tyro resolves the a
 
 def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
     """A function whose signature tells tyro the parameters of an experiment."""
-    from ..scene.experiments import from_words, parameters
+    from ..scene.experiments import parameters
 
     def scenario(changes: Sequence[Sequence[str]] = (), **words: Any) -> Scenario:
-        return from_words(kind, words, named_changes(changes))
+        return kind.of(words, named_changes(changes))
 
     scenario.__doc__ = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
     scenario.__annotations__ = {

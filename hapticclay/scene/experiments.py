@@ -57,7 +57,7 @@ from .fields import (
     values_of,
 )
 from .scenario import (
-    MAKERS,
+    EXPERIMENTS,
     Control,
     Duration,
     Force,
@@ -125,6 +125,29 @@ class Experiment:
             ParameterError: the path leaves the reach of the arm, or parameters contradict.
         """
         raise NotImplementedError
+
+    @classmethod
+    def of(cls, words: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
+        """The scenario of an experiment whose parameters are given as in `parameters`.
+
+        Args:
+            words: parameters by name; those left out keep their defaults.
+            *changes: parameters, and fields of the scenario, by dotted name; the later ones on top.
+
+        Raises:
+            ParameterError: as `scenario`; or there is no such parameter or field.
+        """
+        values, others = dict(words), []
+        if "operator" in values:
+            values["operator"] = _operator(values["operator"])
+        split = [_split_names(cls, nested(given)) for given in changes]
+        before = values.get("operator", parameters(cls)["operator"].default or None)
+        check_added_hand(before, *(own for own, _ in split))
+        for own, other in split:
+            values = merged_values(cls, own, values)
+            others += [other] if other else []
+        experiment = cls(**values)
+        return experiment.changed(*others) if others else experiment.scenario()
 
     def build_scenario(self, name: str, **own: Any) -> Scenario:
         """A scenario that takes its fields from the parameters of the same names.
@@ -318,7 +341,7 @@ class Free(PathExperiment):
         return self.build_scenario("free")
 
 
-EXPERIMENTS: dict[str, type[Experiment]] = {
+EXPERIMENTS |= {
     "constant": ConstantCut,
     "variable": VariableCut,
     "stability": StabilityTest,
@@ -359,32 +382,6 @@ def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
         else:
             out[name] = Parameter(hint, given.default, bound.unit if bound else "", told[name])
     return out
-
-
-def from_words(
-    kind: type[Experiment], words: Mapping[str, Any], *changes: Mapping[str, Any]
-) -> Scenario:
-    """The scenario of an experiment whose parameters are given as in `parameters`.
-
-    Args:
-        kind: the experiment.
-        words: parameters by name; those left out keep their defaults.
-        *changes: parameters, and fields of the scenario, by dotted name; the later ones on top.
-
-    Raises:
-        ParameterError: as `Experiment.scenario`; or there is no such parameter or field.
-    """
-    values, others = dict(words), []
-    if "operator" in values:
-        values["operator"] = _operator(values["operator"])
-    split = [_split_names(kind, nested(given)) for given in changes]
-    before = values.get("operator", parameters(kind)["operator"].default or None)
-    check_added_hand(before, *(own for own, _ in split))
-    for own, other in split:
-        values = merged_values(kind, own, values)
-        others += [other] if other else []
-    experiment = kind(**values)
-    return experiment.changed(*others) if others else experiment.scenario()
 
 
 def _operator(given: Any) -> Any:
@@ -488,4 +485,3 @@ variable_cut = scenario_factory(VariableCut)
 stability_test = scenario_factory(StabilityTest)
 free = scenario_factory(Free)
 SCENARIOS = {name: scenario_factory(kind) for name, kind in EXPERIMENTS.items()}
-MAKERS.update({name: functools.partial(from_words, kind) for name, kind in EXPERIMENTS.items()})

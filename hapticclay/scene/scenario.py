@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -53,7 +53,7 @@ Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
 
 SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
-MAKERS: dict[str, Callable[..., Scenario]] = {}  # scenarios of other words, as experiments, by name
+EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by the name that files give them
 
 
 @named
@@ -180,8 +180,8 @@ class Scenario:
         given = data.pop("schema", SCENARIO_SCHEMA)
         choice("schema", given, (SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2))
         if "experiment" in data:
-            name = choice("experiment", data.pop("experiment"), tuple(MAKERS))
-            return MAKERS[name]({}, data, *changes)
+            name = choice("experiment", data.pop("experiment"), tuple(EXPERIMENTS))
+            return EXPERIMENTS[name].of({}, data, *changes)
         values = values_of(cls())
         for name in data:
             if name not in values:

@@ -178,8 +178,6 @@ def test_the_first_parameters_are_positional():
 def test_a_flag_is_the_nominal_operator(name):
     kind = experiments.EXPERIMENTS[name]
     for on, operator in ((True, hc.Operator()), (False, None)):
-        assert experiments.from_words(kind, {"operator": on}) == hc.SCENARIOS[name](
-            operator=operator
-        )
+        assert kind.of({"operator": on}) == hc.SCENARIOS[name](operator=operator)
     with pytest.raises(ParameterError, match="operator = 1: must be"):
-        experiments.from_words(kind, {"operator": 1})
+        kind.of({"operator": 1})

@@ -20,7 +20,7 @@ from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
 from hapticclay.scene import fields
 from hapticclay.scene import files as scene_files
-from hapticclay.scene.experiments import EXPERIMENTS, from_words, parameter_unit
+from hapticclay.scene.experiments import EXPERIMENTS, parameter_unit
 from hapticclay.scene.fields import make_part, named_values, nested, plain_data, with_fields
 
 
@@ -443,16 +443,16 @@ def test_one_part_for_both_axes_changes_both_of_a_pair():
 def test_an_experiment_takes_parameters_and_fields_at_once():
     kind = EXPERIMENTS["constant"]
     small = {"arm.l1": 0.05, "arm.l2": 0.05, "origin": [0.05, 0.03], "length": "2 cm"}
-    s = from_words(kind, {"b": 50.0}, {**small, "clay.x.values.1": 7.0})  # no reach without
+    s = kind.of({"b": 50.0}, {**small, "clay.x.values.1": 7.0})  # no reach without
     assert s.arm == hc.Arm(0.05, 0.05) and s.length == 0.02
     assert (s.clay.x.values, s.clay.y.values) == ((0.0, 7.0, 0.0), (0.0, 50.0, 0.0))
-    s = from_words(kind, {}, {"clay.begin": 0.06, "operator": True, "operator.mass": 1.0})
+    s = kind.of({}, {"clay.begin": 0.06, "operator": True, "operator.mass": 1.0})
     assert s.clay.x.edges == (0.06, 0.15) and s.operator == hc.Operator(1.0)
-    s = from_words(EXPERIMENTS["stability"], {}, {"gain": 3.0, "gain.y": 0.2, "muscle.seed": 5.0})
+    s = EXPERIMENTS["stability"].of({}, {"gain": 3.0, "gain.y": 0.2, "muscle.seed": 5.0})
     assert s.gain == (3.0, 0.2) and s.muscle.seed == 5
-    s = from_words(kind, {}, {"gain": 3.0, "gain.y": 0.2}, {"gain": 1.0})
+    s = kind.of({}, {"gain": 3.0, "gain.y": 0.2}, {"gain": 1.0})
     assert s.gain == (1.0, 1.0)  # the later goes before
-    s = from_words(EXPERIMENTS["variable"], {}, {"growth": "none", "name": "mine"})
+    s = EXPERIMENTS["variable"].of({}, {"growth": "none", "name": "mine"})
     assert s == dataclasses.replace(hc.variable_cut("none"), name="mine")
 
 
@@ -718,7 +718,7 @@ def test_a_step_that_is_not_given_divides_the_sample(Ts, tmp_path):
     words = {"control": "sampled", "Ts": Ts}
     made = (
         hc.Scenario.load(file), hc.constant_cut(**words), with_fields(hc.Scenario(), words),
-        from_words(EXPERIMENTS["free"], words), dataclasses.replace(hc.Scenario(), **words),
+        EXPERIMENTS["free"].of(words), dataclasses.replace(hc.Scenario(), **words),
     )  # fmt: skip
     assert [x.dt for x in made] == [s.dt] * len(made)
     s.save(tmp_path / "b.toml")
@@ -746,7 +746,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     file.write_text('experiment = "constant"\n')
     for make in (
         lambda: with_fields(hc.constant_cut(), given),
-        lambda: from_words(EXPERIMENTS["constant"], {}, given),
+        lambda: EXPERIMENTS["constant"].of({}, given),
         lambda: hc.Scenario.load(file, given),
     ):
         with pytest.raises(hc.ParameterError, match="adds a hand") as caught:

@@ -213,7 +213,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
         "fast",
         "accurate",
         "sampled, held",
-        "sampled, implicit",
+        "sampled, physical",
     }
     text = readme.read_text()
     assert (
