@@ -74,9 +74,9 @@ def named(made: F) -> F:
             raise
 
     if isinstance(made, type):
-        told = in_words(inspect.signature(inner), vars(sys.modules[made.__module__]))
-        guarded.__signature__ = told  # type: ignore[attr-defined]
-        made.__signature__ = told.replace(parameters=list(told.parameters.values())[1:])
+        guarded.__signature__ = in_words(  # type: ignore[attr-defined]
+            inspect.signature(inner), vars(sys.modules[made.__module__])
+        )
         made.__init__ = guarded
         return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
