@@ -41,7 +41,12 @@ def run(
     velocity = "exact" if counts is None else "difference"
     span = window if counts else 1
     parts = hc.Hardware(
-        encoder=counts, velocity=velocity, window=span, adc_bits=bits, dac_bits=bits, delay=delay
+        encoder=counts,
+        velocity=velocity,
+        velocity_window=span,
+        adc_bits=bits,
+        dac_bits=bits,
+        delay=delay,
     )
     s = dataclasses.replace(
         hc.constant_cut(force=(FORCE, 0.0), inertia_shaping=True, control="sampled", length=END),

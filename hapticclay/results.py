@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 RESULT_SCHEMA = "hapticclay-result-1"
-ROOMS = ("model", "stepping", "theory", "simulation", "studies")  # of classes that a file may name
+ROOMS = (
+    "model",
+    "scene",
+    "stepping",
+    "theory",
+    "simulation",
+    "studies",
+)  # of classes that a file may name
+VIEWS = "hapticclay.views.result_plots"  # draws; looked up when a figure is asked for
 SHOWN_ROWS = 10  # of a table in a notebook
 Tables = Mapping[str, Mapping[str, Sequence[Any]]]
 
@@ -66,9 +74,7 @@ class Result:
 
     def plot(self) -> Figure:
         """Draws it, as the command does."""
-        from .views.result_plots import plot_of
-
-        return plot_of(self)
+        return importlib.import_module(VIEWS).plot_of(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes all of it, to the last bit, whole or not at all.

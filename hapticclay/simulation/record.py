@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
 import math
 import os
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from ..views.record_plots import RecordPlots
     from .accuracy import Accuracy
 
+VIEWS = "hapticclay.views.record_plots"  # draws; looked up when a figure is asked for
 RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
 ARRAYS = {
     "t": "s",
@@ -174,14 +175,12 @@ class Record:
         return ARRAYS | extra | ({"ground": "m"} if self.ground is not None else {})
 
     @property
-    def plot(self) -> RecordPlots:
+    def plot(self) -> Any:
         """Draws the run: `plot()`, or `plot.velocity()`, `plot.force()`, `plot.path()`, ...
 
-        The plots live in `views`, a room above; this is the one place that looks up.
+        It is a `views.record_plots.RecordPlots`.
         """
-        from ..views.record_plots import RecordPlots
-
-        return RecordPlots(self)
+        return importlib.import_module(VIEWS).RecordPlots(self)
 
     def to_frame(self) -> DataFrame:
         """The arrays as a pandas DataFrame, a row a sample.

@@ -10,6 +10,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import Bound, ParameterError, choice, number
 from ..model import arm
 from ..model.arm import Arm
@@ -40,6 +41,7 @@ BRACKET = 2e-3  # boundaries are found to this share
 Subject = TypeVar("Subject")
 
 
+@named
 @dataclass(frozen=True)
 class PushedLoop(Loop):
     """A loop to be run: the handle pushed along its axis, in clay all around it.

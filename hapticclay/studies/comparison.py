@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError
 from ..results import Result
 from ..scene.fields import plain_data
@@ -39,6 +40,7 @@ WALL_WORDS = frozenset(
 )
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Compared:
     """One file: what it says, what theory says of it, and its run.
@@ -73,6 +75,7 @@ class Compared:
         return loop_response(replace(self.loop, operator=None, **TIMING), omega)
 
 
+@named
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Result):
     """Files side by side, in the order in which they were given.
@@ -103,6 +106,7 @@ class Comparison(Result):
         return {"numbers": {"file": [x.name for x in self.files], **columns}}
 
 
+@checked
 def compare_files(
     paths: Sequence[str | os.PathLike[str]],
     axis: str = "x",

@@ -75,6 +75,7 @@ class Noise:
         object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
 
 
+@named
 @dataclass(frozen=True)
 class Coefficient:
     """One coefficient of a fit.

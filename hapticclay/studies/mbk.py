@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..errors import integer, numbers_of
+from ..arguments import checked, named
+from ..errors import choice, integer, numbers_of
 from ..files import versions
 from ..results import Result
 from ..scene.scenario import Scenario
@@ -52,6 +52,7 @@ class Border(NamedTuple):
     end: str
 
 
+@named
 @dataclass(frozen=True, eq=False, repr=False)
 class DeviceMBK(Result):
     """What a bare device renders: a region over each plane, and its dynamic range.
@@ -118,6 +119,7 @@ class DeviceMBK(Result):
         }
 
 
+@named
 @dataclass(frozen=True, eq=False, repr=False)
 class ArmMBK(Result):
     """The least masses that the arm renders as an admittance 1/(M s^2 + B s).
@@ -216,6 +218,7 @@ def device_mbk(
     return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)
 
 
+@checked
 def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
     """The borders of one column of a plane found by runs, the search begun at the exact ones.
 
@@ -226,7 +229,7 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
         plane: one of PLANES.
         x: the part along the plane.
     """
-    across, up = PLANES[plane]
+    across, up = PLANES[choice("plane", plane, tuple(PLANES))]
     wall = replace(wall, **{across: x})
     low, high = stable_band(wall, up)
     out = []

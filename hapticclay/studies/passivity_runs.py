@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, number
 from ..model.hardware import Hardware
 from ..scene.scenario import Scenario
@@ -33,6 +34,7 @@ REGION_POINTS = 61
 WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class IndexOverFrequency:
     """Damping that a wall, or an arm in clay, shows the hand at each frequency, with runs beside.
@@ -76,6 +78,7 @@ class IndexOverFrequency:
         return out
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class EnergyOverTime:
     """One run without and with the observer and controller of Hannaford and Ryu.
@@ -115,6 +118,7 @@ class EnergyOverTime:
         return out
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class PassiveRegion:
     """Largest passive stiffness of a wall over the control sample, for several delays.
@@ -147,6 +151,7 @@ class PassiveRegion:
         return out
 
 
+@checked
 def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequency:
     """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
 
@@ -181,6 +186,7 @@ def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequen
     )
 
 
+@checked
 def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequency:
     """The passivity of the arm in clay over frequency: Re Z by theory and by a run of sines.
 
@@ -208,6 +214,7 @@ def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequenc
     )
 
 
+@checked
 def energy_over_time(scenario: Scenario) -> EnergyOverTime:
     """Runs a scenario without and with the passivity controller.
 
@@ -227,6 +234,7 @@ def energy_over_time(scenario: Scenario) -> EnergyOverTime:
     return EnergyOverTime(without, controlled)
 
 
+@checked
 def passive_region(
     wall: VirtualWall,
     delays: Sequence[float] = (0.0, 0.5, 1.0, 2.0),

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer
 from ..files import versions
 from ..scene.earlier_names import with_present_names
@@ -29,6 +30,7 @@ RANGE_PATTERN = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST_RUNS = 10_000_000  # runs in one sweep
 
 
+@named
 @dataclass(frozen=True)
 class Range:
     """Values of one parameter: from low to high, evenly spaced or by constant factors; or a list.
@@ -112,6 +114,7 @@ class Range:
         return self.low + (self.high - self.low) * u
 
 
+@named
 @dataclass(frozen=True)
 class Sweep:
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
@@ -246,6 +249,7 @@ def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndar
     return engine.random(runs)
 
 
+@checked
 def parse_grid(text: str) -> dict[str, Range]:
     """Reads "b=1:1000:50log gain=0.2:2:20 force=1:2 log".
 
@@ -259,6 +263,8 @@ def parse_grid(text: str) -> dict[str, Range]:
         "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, "
         "each name once"
     )
+    if not isinstance(text, str):
+        raise ParameterError("grid", text, how)
     together = re.sub(r"\s+log(?!\S)", "log", text)
     return {
         name: Range.parse(name, values)

@@ -420,9 +420,10 @@ def _hold(lock: int, out: Path) -> None:
         os.write(lock, f"process {os.getpid()} on {platform.node()}".encode())
 
 
+@checked
 def run_sweep(
     sweep: Sweep,
-    out: Path,
+    out: str | os.PathLike[str],
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -440,7 +441,7 @@ def run_sweep(
     Raises:
         ParameterError: as `claimed` and `run_chunks`.
     """
-    done = 0
+    done, out = 0, Path(out)
     with (
         claimed(sweep, out) as (plan, todo),
         contextlib.closing(run_chunks(plan, out, todo, workers, scheduler)) as results,

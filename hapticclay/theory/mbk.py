@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
@@ -40,6 +40,7 @@ WIDEST = 16.0
 SLIGHT = 1e-8  # of that: the least spring that is tried
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Region:
     """Where a virtual wall is stable, over a plane of two of its parts; between low and high.
@@ -211,6 +212,7 @@ def least_mass(
 # ---- dynamic range -----------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class DynamicRange:
     """What a device spans, from its free motion to its stiffest stable wall.

@@ -331,7 +331,7 @@ def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
 
 def test_lost_samples_hold_the_torque_as_often_as_they_should():
     p = 0.2
-    r = hc.simulate(cut(hc.Hardware(lost=p), t_max=0.9))
+    r = hc.simulate(cut(hc.Hardware(dropout_probability=p), t_max=0.9))
     same = np.all(np.diff(r.tau[:-1], axis=0) == 0.0, axis=1)
     n = len(same)
     assert abs(same.mean() - p) < 5.0 * math.sqrt(p * (1.0 - p) / n)
