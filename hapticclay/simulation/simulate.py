@@ -162,15 +162,20 @@ def as_it_pays(run: Run, room: int) -> None:
         run: the run.
         room: rows that it may have.
     """
-    kind, s, made = run.kind, run.scenario, run.filled
-    ahead = time_ahead(s, run.i) * max(1.0, run.steps / max(run.i, 1))  # of all steps of a sample
-    if repays(kind, ahead + saved.get(kind, 0.0)) and (compiled := load_compiled()):
-        run.kernel = compiled.KERNEL
-        run.kernel.advance(run, room)
-        return
-    plainly(run, min(room, made + TRIED))
-    steps = run.state.filled.steps
-    saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * steps
+    kind, s = run.kind, run.scenario
+    while True:
+        made = run.state.filled
+        substeps = max(1.0, (run.steps + made.steps) / max(run.i, 1))
+        if repays(kind, time_ahead(s, run.i) * substeps + saved.get(kind, 0.0)):
+            if compiled := load_compiled():
+                run.kernel = compiled.KERNEL
+                run.kernel.advance(run, room)
+                return
+        plainly(run, min(room, made.rows + TRIED))
+        steps = run.state.filled.steps - made.steps
+        saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * steps
+        if run.state.filled.rows < made.rows + TRIED:  # it is over, or has no room
+            return
 
 
 AUTO = PLAIN._replace(advance=as_it_pays)
