@@ -213,7 +213,7 @@ def clay_predictions(loop: PushedLoop, flow: Flow) -> dict[str, Any]:
         (None in another).
     """
     from ..theory import describing, relay_cycle
-    from ..theory.linear_loop import TIMING
+    from ..theory.loops import TIMING
 
     linear = replace(loop.linear, **TIMING)
     small, large = describing.push_outcomes(linear, flow=flow)
@@ -314,7 +314,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     import numpy as np
 
     from ..theory import loop_passivity, stability_margins
-    from ..theory.linear_loop import TIMING
+    from ..theory.loops import TIMING
 
     K, Ts = loop.K, loop.Ts or TS
     linear = replace(loop.linear, **TIMING)

@@ -40,8 +40,8 @@ from ..simulation.record import Record, out_of_band_ratio
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at
 from ..studies.identification import Identified, identify
-from ..theory import gain_limits, linear_loop, stability_margins
-from ..theory.linear_loop import Loop
+from ..theory import gain_limits, linear_loop, loops, stability_margins
+from ..theory.loops import Loop
 
 STATUSES = {
     "given": "printed, and reproduced",
@@ -202,7 +202,7 @@ def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
         b: clay [N.s/m].
         th: Th; None for Th = 0.
     """
-    poles = linear_loop.closed_loop_poles(axis, K, b, th)
+    poles = loops.closed_loop_poles(axis, K, b, th)
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
 
 

@@ -22,8 +22,8 @@ from ..model.spring import Spring
 from ..scene.scenario import Position, Scenario, TorqueLimit
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limits, linear_loop
-from ..theory.linear_loop import TIMING, Loop
+from ..theory import gain_crossings, gain_limits, linear_loop
+from ..theory.loops import TIMING, Loop
 from ..theory.roots import first_failure
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
@@ -414,7 +414,7 @@ def continuous_stable(loop: PushedLoop) -> bool:
     Args:
         loop: the loop.
     """
-    return gain_limits.is_stable(replace(loop.linear, **TIMING))
+    return gain_crossings.is_stable(replace(loop.linear, **TIMING))
 
 
 def explain_disagreement(loop: PushedLoop, stable: bool) -> str:

@@ -23,7 +23,7 @@ from ..simulation.simulate import simulate
 from ..theory import design, stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
-from ..theory.linear_loop import TIMING, Loop
+from ..theory.loops import TIMING, Loop
 from ..theory.mbk import dynamic_range, least_mass
 from .zwidth import ZRegion, zwidth
 

@@ -22,7 +22,7 @@ from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limits
+from ..theory import gain_crossings, gain_limits
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.wall_limits import stable_wall, stiffness_band
 from .boundary import PushedLoop, of_scenario
@@ -205,7 +205,7 @@ def _check_subject(subject: Subject) -> None:
         raise ParameterError(
             "subject", subject, "must be a Scenario, a PushedLoop or a VirtualWall"
         )
-    if not gain_limits.is_stable(subject.linear):
+    if not gain_crossings.is_stable(subject.linear):
         limit = gain_limits.gain_limit(subject.linear)
         bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
         raise ParameterError("K", subject.K, bound)

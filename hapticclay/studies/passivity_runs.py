@@ -17,7 +17,7 @@ from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record, port_energy
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
-from ..theory.gain_limits import is_stable
+from ..theory.gain_crossings import is_stable
 from ..theory.impedance import wall_impedance
 from .boundary import PushedLoop, of_scenario
 from .impedance import computed_impedance, measure_impedance

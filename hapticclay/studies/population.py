@@ -16,7 +16,7 @@ from ..results import Result
 from ..scene.virtual_wall import VirtualWall
 from ..theory import wall_limits
 from ..theory.gain_limits import gain_limit
-from ..theory.linear_loop import Loop
+from ..theory.loops import Loop
 from ..theory.stability_margins import Box
 from .distribution import LAWS, Distribution, normal_score
 from .stability_map import Progress

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import choice
 from ..model.constants import TS
-from ..theory import gain_limits, loop_passivity, stability_margins
-from ..theory.linear_loop import TIMING
+from ..theory import gain_crossings, loop_passivity, stability_margins
+from ..theory.loops import TIMING
 from ..theory.roots import bisect, first_failure
 from . import boundary
 from .boundary import PushedLoop, nominal_limit
@@ -280,7 +280,7 @@ def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float
     linear = replace(loop.linear, Ts=Ts, delay=delay)
 
     def stable(b: float) -> bool:
-        return gain_limits.is_stable(replace(linear, b=b))
+        return gain_crossings.is_stable(replace(linear, b=b))
 
     low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
     return high if low else 0.0

@@ -18,7 +18,7 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory.describing import limit_cycles, push_outcomes
 from ..theory.gain_limits import gain_limit
-from ..theory.linear_loop import TIMING, Loop
+from ..theory.loops import TIMING, Loop
 from ..theory.relay_cycle import critical_push, exact_cycles
 from ..theory.roots import first_failure
 from .boundary import LARGE_PUSH, PushedLoop

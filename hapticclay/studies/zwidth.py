@@ -26,7 +26,7 @@ from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
-from ..theory import gain_limits, wall_limits
+from ..theory import gain_crossings, gain_limits, wall_limits
 from ..theory.roots import bisect
 from ..theory.stability_margins import Box
 from . import boundary
@@ -445,7 +445,7 @@ def theoretical_damping(wall: Wall) -> float:
         tried = _at(wall, 0.0, B)
         if isinstance(tried, VirtualWall):
             return wall_limits.stable_wall(tried)
-        return gain_limits.is_stable(tried.linear)
+        return gain_crossings.is_stable(tried.linear)
 
     grid = np.geomspace(1e-5 * unit, 1e3 * unit, 120).tolist()
     low = next((i for i, B in enumerate(grid) if stable(B)), None)

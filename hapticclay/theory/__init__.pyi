@@ -14,10 +14,10 @@ from .gain_limits import stiffness_limit as stiffness_limit
 from .impedance import Impedance as Impedance
 from .impedance import loop_impedance as loop_impedance
 from .impedance import loop_response as loop_response
-from .linear_loop import Loop as Loop
-from .linear_loop import closed_loop_poles as closed_loop_poles
 from .loop_passivity import clay_passivity as clay_passivity
 from .loop_passivity import passivity as passivity
+from .loops import Loop as Loop
+from .loops import closed_loop_poles as closed_loop_poles
 from .relay_cycle import ExactCycle as ExactCycle
 from .relay_cycle import exact_cycles as exact_cycles
 from .stability_margins import Box as Box

@@ -14,7 +14,7 @@ from ..errors import ParameterError, number, pair
 from ..model.compensator import Compensator
 from ..results import Result
 from . import gain_limits, stability_margins
-from .linear_loop import TIMING, Loop, of_loop
+from .loops import TIMING, Loop, of_loop
 from .roots import first_failure
 
 K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain

@@ -22,7 +22,7 @@ from ..model.operator import Operator
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
 from . import linear_loop
-from .linear_loop import Loop, of_loop
+from .loops import Loop, of_loop
 
 UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 

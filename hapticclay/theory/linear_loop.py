@@ -1,23 +1,21 @@
 """The linear loop (Fig. 2): its parts, closed-loop polynomials, state space and sampled map.
 
-Everything that `theory` and `studies` say of a loop starts from a `Loop`: one axis at the nominal
-pose. Polynomials treat one such axis; state spaces one, or both where a pose couples them.
+Everything that `theory` and `studies` say of a loop starts from one axis at the nominal pose.
+Polynomials treat one such axis; state spaces one, or both where a pose couples them.
 """
 
 from __future__ import annotations
 
 import cmath
-import functools
-import inspect
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, Literal, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..arguments import checked, known_names, named
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model import controller
 from ..model.compensator import PRINTED, Compensator
@@ -25,24 +23,16 @@ from ..model.constants import AXES, B_MAX
 from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
 from ..model.spring import STIFFNESS_MAX
-from ..scene.scenario import Render, Scenario
+from ..scene.scenario import Render
 from . import roots
 
-Answer = TypeVar("Answer")
-NO_TIMING = "must be {} here: the analysis is one of continuous time without delay"
-MOST_DAMPINGS = 64  # of the clay of a scenario, of which the worst is sought
-TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
 FASTEST = 1e9  # [m/s] of a steady velocity
 
 
 @named
 @dataclass(frozen=True)
-class Loop:
-    """The linear loop of one axis at the nominal pose: the parts of a run, for the analysis.
-
-    What is said of it holds for the machine at the nominal pose, where the axes are decoupled, in
-    small motions and with the motors within their torque limits. Elsewhere it holds with inertia
-    shaping in continuous time.
+class LinearLoop:
+    """One axis of the loop at the nominal pose, by its parts.
 
     Attributes:
         axis: "x" or "y".
@@ -85,58 +75,6 @@ class Loop:
         if self.Ts is not None:
             number("delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
 
-    @classmethod
-    def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
-        """The loop of one axis of a scenario, at the nominal pose of its arm.
-
-        Muscle force, pose, friction and what else the hardware has besides its delay are not part
-        of it. Of clay that yields or springs back it has b alone: Fy, K and springs are left out,
-        so that in clay of b = 0 a gain limit may be inf however large Fy is. For clay that yields
-        see `push_outcomes` and `limit_cycles`.
-
-        Args:
-            scenario: the run.
-            axis: "x" or "y".
-            b: clay [N.s/m]; None for that of the scenario's clay, before it grows, with the least
-                gain limit, 0 without clay. Of more than MOST_DAMPINGS values so many are tried;
-                clay with rotated axes resists by those of both of its own axes.
-
-        Raises:
-            ParameterError: no scenario, one with a controller of the user's own, unknown axis, or b
-                out of its bounds.
-        """
-        if not isinstance(scenario, Scenario):
-            raise ParameterError("scenario", scenario, "must be a Scenario")
-        if scenario.controller is not None:
-            bound = "must be None: the analysis is of compensator and servo, not of a law"
-            raise ParameterError("controller", scenario.controller, bound)
-        i, clay = AXES.index(choice("axis", axis, AXES)), scenario.clay
-        servo, bare = scenario.servo[i], scenario.arm.nominal_mobility[i]
-        shaped = scenario.inertia_shaping and bare != servo.S.gain
-        sampled = scenario.control == "sampled"
-        loop = Loop(
-            axis=AXES[i],
-            operator=scenario.operators[i],
-            servo=servo
-            if scenario.inertia_shaping
-            else replace(servo, S=replace(servo.S, gain=bare)),
-            compensator=scenario.compensators[i],
-            K=scenario.gain[i],
-            Ts=(scenario.Ts or scenario.dt) if sampled else None,
-            delay=scenario.hardware.delay if scenario.hardware else 0.0,
-            render=scenario.render if sampled else "held",
-            mobility=bare if shaped else None,
-        )
-        if b is not None:
-            return replace(loop, b=b)
-        from .gain_limits import gain_limit
-
-        laws = () if clay is None else clay.laws_on(i)
-        dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
-        if len(dampings) > MOST_DAMPINGS:
-            dampings = dampings[np.linspace(0, len(dampings) - 1, MOST_DAMPINGS).astype(int)]
-        return min((replace(loop, b=x) for x in dampings.tolist()), key=gain_limit, default=loop)
-
     @property
     def gain(self) -> float:
         """K.
@@ -158,119 +96,6 @@ class Loop:
         """Te + Th, clay and the operator's arm (Eqs. 4, 19), as a polynomial in s."""
         th = self.hand
         return Polynomial([th.spring + self.k, th.damper + self.b, th.mass])
-
-
-PARTS = tuple(f.name for f in fields(Loop))
-
-
-def of_loop(
-    *order: str, timing: bool = False
-) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
-    """Lets an analysis of a `Loop` be asked of the parts of one, too.
-
-    `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
-    asks of `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
-    names by position or by name, and every other part of a Loop by name.
-
-    Args:
-        order: parts of the loop and arguments of the analysis that may follow the axis by position;
-            all but the operator must be given. Only the latter may follow a Loop by position.
-        timing: whether the analysis is one of sampled and late loops too.
-
-    Returns:
-        A decorator.
-    """
-
-    def decorate(analysis: Callable[..., Answer]) -> Callable[..., Answer]:
-        name = analysis.__name__
-        own = [p for n, p in inspect.signature(analysis).parameters.items() if n != "loop"]
-        free = tuple(n for n in order if n not in PARTS)
-        guarded, signature = checked(analysis), _signature(order, own)
-        known = {"loop", *PARTS, *signature.parameters}
-        known = known if all(p.kind is not p.VAR_KEYWORD for p in own) else None
-
-        @functools.wraps(analysis)
-        def ask(*args: Any, **given: Any) -> Answer:
-            if known:
-                known_names(name, given, known)
-            whole, *rest = _loop_first(name, args, given)
-            _by_name(name, free if isinstance(whole, Loop) else order, rest, given)
-            parts = {word: given.pop(word) for word in PARTS if word in given}
-            if isinstance(whole, Loop):
-                loop = _with_gain(whole, parts)
-            else:
-                missing = [n for n in order if n in PARTS and n not in ("operator", *parts)]
-                if missing:
-                    raise TypeError(f"{name}() lacks {', '.join(missing)}")
-                loop = Loop(whole, **parts)
-            if not timing:
-                _refuse_timing(loop)
-            return guarded(loop, **given)
-
-        ask.__signature__ = signature  # type: ignore[attr-defined]
-        return ask
-
-    return decorate
-
-
-def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequence[Any]:
-    """What an analysis was asked by position, after a Loop, that of a Scenario, or an axis.
-
-    What makes the first is taken from `given`, the arguments by name.
-    """
-    if args and isinstance(args[0], Scenario):
-        scenario, *rest = args
-        if not rest and "axis" not in given:
-            raise TypeError(f"{name}() of a Scenario needs an axis")
-        axis = rest.pop(0) if rest else given.pop("axis")
-        args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
-    for word in ("loop", "axis"):
-        if word in given:
-            args = (given.pop(word), *args)
-    if not args:
-        raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
-    return args
-
-
-def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[str, Any]) -> None:
-    """Puts arguments that follow by position among those by name."""
-    if len(rest) > len(names):
-        raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
-    for word, value in zip(names, rest, strict=False):
-        if word in given:
-            raise TypeError(f"{name}() got multiple values for argument {word!r}")
-        given[word] = value
-
-
-def _refuse_timing(loop: Loop) -> None:
-    """Refuses a loop that is sampled or late."""
-    for word, value in TIMING.items():
-        if getattr(loop, word) != value:
-            raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
-
-
-def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
-    """The loop, with K where it is given."""
-    for word, value in parts.items():
-        if word != "K":
-            raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
-    return replace(loop, **parts) if parts else loop
-
-
-def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
-    """What an analysis takes: an axis or a Loop, what may follow by position, and the rest."""
-    P, more = inspect.Parameter, {p.name: p for p in own}
-    blank = {"operator": None}
-    out = [P("axis", P.POSITIONAL_OR_KEYWORD, annotation="str | Loop | Scenario")]
-    out += [P(n, P.POSITIONAL_OR_KEYWORD, default=blank.get(n, P.empty)) for n in order]
-    out += [
-        P(f.name, P.KEYWORD_ONLY, default=f.default)
-        for f in fields(Loop)
-        if f.name != "axis" and f.name not in order
-    ]
-    rest = [p for n, p in more.items() if n not in order]
-    out += [p.replace(kind=P.KEYWORD_ONLY) for p in rest if p.kind is not P.VAR_KEYWORD]
-    return inspect.Signature(out + [p for p in rest if p.kind is P.VAR_KEYWORD])
 
 
 def steady_speed(
@@ -371,7 +196,7 @@ def reduced(compensator: Compensator) -> Compensator:
 # ---- polynomials ---------------------------------------------------------------------------------
 
 
-def loop_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial: denominator + passive + K driven.
 
     The first is the common denominator of G, C and Sh, so the loop's transfer function
@@ -389,7 +214,7 @@ def loop_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
     return cg * servo, s.gain * (cg * t), forward
 
 
-def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial with late motors: physical + late (motors + K driven).
 
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
@@ -416,13 +241,13 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
     return physical, motors, loop_polynomials(loop)[2]
 
 
-def _forward_denominator(loop: Loop) -> Polynomial:
+def _forward_denominator(loop: LinearLoop) -> Polynomial:
     """Denominator of G C."""
     g = loop.servo.G
     return loop.compensator.fraction[1] * Polynomial([g.stiffness, g.damping, 1.0])
 
 
-def characteristic(loop: Loop) -> Polynomial:
+def characteristic(loop: LinearLoop) -> Polynomial:
     """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
 
     Args:
@@ -435,7 +260,7 @@ def characteristic(loop: Loop) -> Polynomial:
     return denominator + passive + loop.gain * driven
 
 
-def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
+def device_admittance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """G C + Sh, handle position over net force, as (numerator, denominator).
 
     Args:
@@ -446,7 +271,7 @@ def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     return passive + loop.gain * driven, denominator
 
 
-def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
+def device_impedance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
 
     Args:
@@ -456,19 +281,7 @@ def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     return (d, roots.VARIABLE * e) if d.coef[0] else (d // roots.VARIABLE, e)
 
 
-@of_loop("K", "b", "operator")
-def closed_loop_poles(loop: Loop) -> np.ndarray:
-    """Poles of the loop at the nominal pose [rad/s], shape (4 + order of C,).
-
-    With an integrator in C and no spring in Th one of them is that which moves the handle (s = 0).
-
-    Args:
-        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
-    """
-    return roots.roots(characteristic(loop))
-
-
-def stable(loop: Loop) -> bool:
+def stable(loop: LinearLoop) -> bool:
     """Return True if no closed-loop pole lies right of the imaginary axis.
 
     Args:
@@ -480,7 +293,9 @@ def stable(loop: Loop) -> bool:
 # ---- state spaces --------------------------------------------------------------------------------
 
 
-def state_space(*loops: Loop, mobility: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def state_space(
+    *loops: LinearLoop, mobility: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """The loop in continuous time: z' = A z + B uh, with y = G delta.
 
     The servo's law is that of docs/equations.md, section 3.
@@ -514,7 +329,7 @@ def state_space(*loops: Loop, mobility: np.ndarray | None = None) -> tuple[np.nd
 
 
 def sampled_differences(
-    *loops: Loop, pose: tuple[np.ndarray, bool] | None = None
+    *loops: LinearLoop, pose: tuple[np.ndarray, bool] | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The sampled loop x(k+1) = (M + beta K gamma) x(k), x at the sample before it acts.
 
@@ -600,7 +415,7 @@ def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
     return whole, part if part > 1e-9 else 0.0
 
 
-def _places(loops: Sequence[Loop]) -> list[int]:
+def _places(loops: Sequence[LinearLoop]) -> list[int]:
     """Where the states of each axis begin, and where those of the last end."""
     at = [0]
     for loop in loops:
@@ -608,24 +423,24 @@ def _places(loops: Sequence[Loop]) -> list[int]:
     return at
 
 
-def _shaped_mobility(loops: Sequence[Loop]) -> np.ndarray:
+def _shaped_mobility(loops: Sequence[LinearLoop]) -> np.ndarray:
     return np.diag([x.servo.S.gain for x in loops])
 
 
-def _nominal_pose(loops: Sequence[Loop]) -> tuple[np.ndarray, bool]:
+def _nominal_pose(loops: Sequence[LinearLoop]) -> tuple[np.ndarray, bool]:
     """Mobility of the bare handle at the nominal pose, and whether the servo shapes it."""
     bare = [x.servo.S.gain if x.mobility is None else x.mobility for x in loops]
     return np.diag(bare), any(x.mobility is not None for x in loops)
 
 
-def _resistance(loops: Sequence[Loop]) -> tuple[np.ndarray, np.ndarray]:
+def _resistance(loops: Sequence[LinearLoop]) -> tuple[np.ndarray, np.ndarray]:
     """Hand and clay without the hand's mass: force per place and per velocity of each axis."""
     hands = [x.hand for x in loops]
     dampers = np.array([-h.damper - x.b for h, x in zip(hands, loops, strict=True)])
     return np.array([-h.spring - x.k for h, x in zip(hands, loops, strict=True)]), dampers
 
 
-def _feedback(loops: Sequence[Loop]) -> np.ndarray:
+def _feedback(loops: Sequence[LinearLoop]) -> np.ndarray:
     """The servo's law over the states of all axes, without what passes straight through C."""
     at = _places(loops)
     out = np.zeros((len(loops), at[-1]))
@@ -636,7 +451,9 @@ def _feedback(loops: Sequence[Loop]) -> np.ndarray:
 
 
 def _over_states(
-    loops: Sequence[Loop], place: Sequence[float] | np.ndarray, rate: Sequence[float] | np.ndarray
+    loops: Sequence[LinearLoop],
+    place: Sequence[float] | np.ndarray,
+    rate: Sequence[float] | np.ndarray,
 ) -> np.ndarray:
     """Rows over the states of all axes that hold a factor on p and one on p' of each."""
     at = _places(loops)
@@ -713,7 +530,7 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
 
 
 def crossing_times(
-    loop: Loop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
+    loop: LinearLoop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
 ) -> list[float]:
     """Times at which a handle that starts at rest under a constant force passes each border.
 

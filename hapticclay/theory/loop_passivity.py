@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from ..arguments import checked
 from ..errors import number
 from . import linear_loop, roots
-from .linear_loop import Loop, of_loop
+from .loops import Loop, of_loop
 from .stability_margins import LINEAR, Verdict
 
 

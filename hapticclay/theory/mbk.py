@@ -22,7 +22,7 @@ from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, stability_margins
 from .impedance import frequencies, wall_response
-from .linear_loop import Loop
+from .loops import Loop
 from .roots import bisect
 from .stability_margins import Box
 from .wall_limits import wall_differences

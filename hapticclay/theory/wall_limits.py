@@ -19,7 +19,7 @@ from ..arguments import checked
 from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
 from ..scene.virtual_wall import Device, VirtualWall
-from . import gain_limits, linear_loop, roots
+from . import gain_crossings, linear_loop, roots
 from .stability_margins import Box
 
 MOST_STATES = 600  # of a map whose eigenvalues are asked for
@@ -71,7 +71,7 @@ def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
         ParameterError: window and delay are of more than 600 samples together.
     """
     family, typical = _every_stiffness(wall), (wall.device.mass + wall.hand.mass) / wall.Ts**2
-    edges = [0.0, *sorted(K for K, _ in gain_limits.gain_crossings(family)), math.inf]
+    edges = [0.0, *sorted(K for K, _ in gain_crossings.gain_crossings(family)), math.inf]
     low = None
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         if b <= (1.0 + 1e-9) * a:
@@ -178,7 +178,7 @@ def _within(less: np.ndarray) -> bool:
     """Whether every eigenvalue of 1 + less lies within the unit circle."""
     if not np.all(np.any(less, axis=0)):  # a state that nothing depends on: one lies at z = 1
         return False
-    z1 = gain_limits.eigenvalues(less)
+    z1 = gain_crossings.eigenvalues(less)
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
 
 
@@ -205,7 +205,7 @@ def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return law * smooth * rate, 0.0 * back
 
 
-def _every_stiffness(wall: VirtualWall) -> gain_limits.LoopFamily:
+def _every_stiffness(wall: VirtualWall) -> gain_crossings.LoopFamily:
     """The wall for every K."""
     wall = replace(wall, K=0.0)
     free = wall_differences(wall)
@@ -221,9 +221,9 @@ def _every_stiffness(wall: VirtualWall) -> gain_limits.LoopFamily:
     poles = np.log1p(z1[(np.abs(1.0 + z1) > 1e-6) & (z1 != 0.0)]) / Ts
     size = np.abs(poles[poles != 0.0])
     low = max(1e-3 * min(size.min(initial=math.inf), 1e-3 * top), 1e-12 * top)
-    near = gain_limits.frequency_grid(low, top * (1.0 - 1e-9), poles.imag[poles.imag > 0.0])
+    near = gain_crossings.frequency_grid(low, top * (1.0 - 1e-9), poles.imag[poles.imag > 0.0])
     grid = np.union1d(np.linspace(low, top, 40 * n)[:-1], near)
-    return gain_limits.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
+    return gain_crossings.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
 
 
 @checked

@@ -16,7 +16,7 @@ from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
-from ..theory.linear_loop import TIMING
+from ..theory.loops import TIMING
 from . import figure as shown
 from .style import (
     BLACK,

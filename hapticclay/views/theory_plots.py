@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from ..model.compensator import Compensator
 from ..theory import linear_loop, stability_margins
 from ..theory.design import DESIGN_BAND
-from ..theory.linear_loop import Loop, of_loop
+from ..theory.loops import Loop, of_loop
 from .style import (
     BLACK,
     BLUE,

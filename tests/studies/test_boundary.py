@@ -20,7 +20,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, stability_map
-from hapticclay.theory import gain_limits
+from hapticclay.theory import gain_crossings
 from hapticclay.views import study_plots
 from tests.oracles import Linear
 
@@ -268,8 +268,8 @@ def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
     b = stability_map._unstable_damping(Loop(), Ts, delay)
     loop = hc.theory.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
-    assert gain_limits.is_stable(replace(loop, b=0.999 * b))
-    assert not gain_limits.is_stable(replace(loop, b=1.001 * b))
+    assert gain_crossings.is_stable(replace(loop, b=0.999 * b))
+    assert not gain_crossings.is_stable(replace(loop, b=1.001 * b))
     assert (
         stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it

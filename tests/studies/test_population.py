@@ -13,7 +13,7 @@ import hapticclay as hc
 from hapticclay.studies import distribution, population
 from hapticclay.studies.distribution import Distribution
 from hapticclay.theory import wall_limits
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 
 HAND = hc.Operator(0.4, 5.0, 80.0)
 

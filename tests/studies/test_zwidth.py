@@ -21,7 +21,7 @@ from hapticclay.studies.zwidth import (
     worst_hand,
     zwidth,
 )
-from hapticclay.theory import gain_limits
+from hapticclay.theory import gain_crossings
 from hapticclay.views.style import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
 from tests.oracles.sampled_wall import sample_map
@@ -216,7 +216,7 @@ def test_clay_on_the_arm():
     for B, K, exact in zip(r.B, r.K, r.exact, strict=True):
         for share in (0.99, 1.01):
             tried = replace(loop, b=B, k=share * K).linear
-            assert gain_limits.is_stable(tried) == (share < 1.0)
+            assert gain_crossings.is_stable(tried) == (share < 1.0)
         assert K == pytest.approx(exact, rel=3e-3)
 
 

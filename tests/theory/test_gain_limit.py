@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import gain_limits, linear_loop
+from hapticclay.theory import gain_crossings, linear_loop
 from tests.oracles import G0, G1, S0, S1, SG
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}
@@ -76,7 +76,7 @@ def test_continuous_limits(axis, on, j):
         lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13
     )
     assert found == pytest.approx(root, rel=1e-9)  # eps times the condition of the roots, 1e4
-    K, omega = gain_limits.critical_gain(hc.theory.Loop(axis, b, operator(hand)))
+    K, omega = gain_crossings.critical_gain(hc.theory.Loop(axis, b, operator(hand)))
     assert abs(np.polyval(polynomial(axis, K, b, hand), 1j * omega)) < 1e-8 * np.polyval(
         np.abs(polynomial(axis, K, b, hand)), omega
     )
@@ -270,7 +270,7 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
         stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "physical")
         assert stable == (share < 1.0)
         assert (
-            gain_limits.is_stable(
+            gain_crossings.is_stable(
                 hc.theory.Loop(
                     axis,
                     b,
@@ -295,7 +295,7 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
     """
     for K in (1e-6, 1e-12, 1e-30, 5e-324):
         assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
-        assert gain_limits.is_stable(
+        assert gain_crossings.is_stable(
             hc.theory.Loop(
                 axis, 90.0, operator(HANDS[hand]), K=K, Ts=Ts, delay=delay, render=render
             )
@@ -309,7 +309,7 @@ def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n)
     The loop broken at the sampled net force, from python-control's own discretisations.
     """
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
-    K, omega = gain_limits.critical_gain(hc.theory.Loop(axis, b, Ts=Ts, delay=n * Ts))
+    K, omega = gain_crossings.critical_gain(hc.theory.Loop(axis, b, Ts=Ts, delay=n * Ts))
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
     G = G0[i] / (s**2 + G1[i] * s + G0[i])
     C = K / (s**2 + 10 * s)
@@ -389,15 +389,15 @@ def test_a_narrow_unstable_window_is_not_missed():
         return (1.0 - 0.1 * x) * (1.0 + 1j * (x**2 - 1e-8))
 
     edges = 1.0 / (1.0 + 1e-5), 1.0 / (1.0 - 1e-5)
-    loop = gain_limits.LoopFamily(
+    loop = gain_crossings.LoopFamily(
         h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1]
     )
-    found = sorted(gain_limits.gain_crossings(loop))
+    found = sorted(gain_crossings.gain_crossings(loop))
     np.testing.assert_allclose(
         [K for K, _ in found], edges, rtol=1e-9
     )  # a root beside its extreme: sqrt(eps) of 1e-4
     np.testing.assert_allclose(np.log([w for _, w in found]), [1.2344, 1.2346], atol=1e-9)
-    assert gain_limits.first_instability(loop)[0] == pytest.approx(edges[0], rel=1e-9)
+    assert gain_crossings.first_instability(loop)[0] == pytest.approx(edges[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("axis,hand", [("x", "none"), ("y", "hand")])

@@ -13,7 +13,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model import controller
 from hapticclay.model.controller import SERVO
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop
+from hapticclay.theory import linear_loop, loops
 from tests.oracles import Linear, laws, piecewise_linear
 
 TH = Operator()
@@ -48,7 +48,7 @@ def test_poles_are_those_of_the_state_space_model(axis):
         m = Linear("xy".index(axis), b, K, 1.0, (0.25, 2, 6) if th else (0, 0, 0))
         # the state space has p, v beside the servo's states: same loop, order 6 in both
         np.testing.assert_allclose(
-            np.sort_complex(linear_loop.closed_loop_poles(axis, K, b, th)),
+            np.sort_complex(loops.closed_loop_poles(axis, K, b, th)),
             np.sort_complex(m.poles()),
             atol=1e-6,
         )
@@ -81,12 +81,8 @@ def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, print
 
 
 def test_y_axis_is_unstable_at_unit_gain():
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(
-        2.36, abs=0.005
-    )
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(
-        1.56, abs=0.005
-    )
+    assert loops.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(2.36, abs=0.005)
+    assert loops.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(1.56, abs=0.005)
 
     def stable(b):
         return linear_loop.stable(hc.theory.Loop("y", b, K=1.0))
@@ -139,7 +135,7 @@ def test_bad_input_is_refused(call, field):
 @pytest.mark.parametrize("th", [None, Operator(), Operator(5.0, 0.0, 100.0)])
 def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
     A, B = linear_loop.state_space(hc.theory.Loop(axis, 90.0, th, K=0.7))
-    poles = np.sort_complex(linear_loop.closed_loop_poles(axis, 0.7, 90.0, th))
+    poles = np.sort_complex(loops.closed_loop_poles(axis, 0.7, 90.0, th))
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5
     )  # a double pole near 0

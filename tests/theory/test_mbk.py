@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.theory import gain_limits, mbk
+from hapticclay.theory import gain_crossings, gain_limits, mbk
 
 WALL = hc.VirtualWall(device=hc.Device(0.1, 0.5))
 
@@ -82,8 +82,8 @@ def test_least_mass_of_the_arm_is_the_border(Ts):
     for decay in (2.0, 10.0, 60.0):
         M, B = mbk.least_mass(loop, decay)
         assert B == pytest.approx(decay * M)
-        assert gain_limits.is_stable(mbk.rendering(loop, 1.001 * M, 1.001 * B))
-        assert not gain_limits.is_stable(mbk.rendering(loop, 0.999 * M, 0.999 * B))
+        assert gain_crossings.is_stable(mbk.rendering(loop, 1.001 * M, 1.001 * B))
+        assert not gain_crossings.is_stable(mbk.rendering(loop, 0.999 * M, 0.999 * B))
     printed = mbk.least_mass(loop, 10.0)[0]
     assert printed == pytest.approx(1.0 / gain_limits.gain_limit(loop), rel=1e-12)
 

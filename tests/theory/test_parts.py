@@ -19,7 +19,7 @@ from scipy.signal import tf2ss
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
-from hapticclay.theory import gain_limits, linear_loop, roots, stability_margins
+from hapticclay.theory import gain_crossings, linear_loop, roots, stability_margins
 from tests.oracles import parts
 
 SIZE = st.floats(1.0, 80.0)  # of a pole or zero [rad/s]
@@ -225,7 +225,7 @@ def test_a_compensator_that_is_unstable_alone_has_no_limit_from_zero():
         assert hc.theory.gain_limit(loop) == 0.0
         # above a gain that moves the pole to the left there is a window of stable ones
         K = np.geomspace(1e-4, 1.0, 401)
-        stable = [gain_limits.is_stable(dataclasses.replace(loop, K=x)) for x in K]
+        stable = [gain_crossings.is_stable(dataclasses.replace(loop, K=x)) for x in K]
         window = [rightmost(matrix(loop, x), loop) < 0.0 for x in K]
         assert not window[0] and any(window)
         assert abs(np.argmax(stable) - np.argmax(window)) <= 1  # a slow pole: sampling is far
@@ -240,7 +240,7 @@ def test_a_pole_that_leaves_along_the_real_axis_is_seen():
     for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-3, delay=2.5e-3)):
         loop = hc.theory.Loop("x", 20.0, th, compensator=c, **kw)
         assert hc.theory.gain_limit(loop) == pytest.approx(K, rel=1e-9)
-        assert gain_limits.critical_gain(loop)[1] == 0.0
+        assert gain_crossings.critical_gain(loop)[1] == 0.0
 
 
 def test_integrating_the_wrong_way_is_unstable_at_any_gain():
@@ -289,9 +289,9 @@ def late_crossing(loop):
 def test_late_limits_are_those_of_a_direct_search(loop, delay, render, bare):
     mobility = bare and bare * loop.servo.S.gain
     loop = dataclasses.replace(loop, delay=delay, render=render, mobility=mobility)
-    found, omega = gain_limits.critical_gain(loop)
+    found, omega = gain_crossings.critical_gain(loop)
     if found == 0.0:  # servo and clay alone do not bear the delay, or two integrators
-        assert not gain_limits.is_stable(dataclasses.replace(loop, K=1e-6))
+        assert not gain_crossings.is_stable(dataclasses.replace(loop, K=1e-6))
     elif found < math.inf and 0.05 < omega < 4000.0:
         assert min(abs(K / found - 1.0) for K in late_crossing(loop)) < 1e-8
 
@@ -302,10 +302,10 @@ def test_a_force_that_goes_straight_round_has_a_limit_at_infinite_frequency():
     for delay in (1e-5, 1e-3):
         loop = hc.theory.Loop("x", 20.0, th, compensator=c, delay=delay)
         bound = (1.0 + 0.7919 * 2.0) / (910.19 * 2.0)
-        found, omega = gain_limits.critical_gain(loop)
+        found, omega = gain_crossings.critical_gain(loop)
         assert found <= bound * (1.0 + 1e-12)
-        assert not gain_limits.is_stable(dataclasses.replace(loop, K=1.001 * bound))
-        assert gain_limits.is_stable(dataclasses.replace(loop, K=0.9 * found))
+        assert not gain_crossings.is_stable(dataclasses.replace(loop, K=1.001 * bound))
+        assert gain_crossings.is_stable(dataclasses.replace(loop, K=0.9 * found))
 
 
 # ---- sampled -------------------------------------------------------------------------------------
@@ -400,7 +400,7 @@ def test_sampled_margins_put_a_pole_on_the_circle(loop, Ts, share, part):
     m = hc.theory.margins(loop, K=K)
     assert m.stable and m.gain[1] == pytest.approx(1.0 / part, rel=1e-9)
     first, second = period(loop, 1.0), period(loop, 2.0)
-    family = gain_limits.loop_family(loop)
+    family = gain_crossings.loop_family(loop)
 
     def nearest(factor, omega):
         """Distance of the pole nearest to exp(j omega Ts) from there."""
@@ -455,7 +455,7 @@ def test_nyquist_of_late_loops_counts_as_fast_sampling_does(c, th):
     """Samples of 20 us stand for none, unless an acceleration goes straight round."""
     T = 2e-3
     loop = hc.theory.Loop("x", 60.0, th, compensator=c, delay=T)
-    most = gain_limits.loop_family(loop).most
+    most = gain_crossings.loop_family(loop).most
     if most < math.inf:
         assert hc.theory.nyquist(loop, K=0.5 * most, at="compensator").P == 0
         with pytest.raises(ParameterError):

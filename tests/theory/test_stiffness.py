@@ -12,7 +12,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.simulation.simulate import simulate
 from hapticclay.studies.boundary import PushedLoop, growth_rate, pose_matrix
 from hapticclay.theory import gain_limits, linear_loop
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 
 TIMINGS = [
     dict(),

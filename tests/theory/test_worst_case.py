@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop, stability_margins
+from hapticclay.theory import linear_loop, loops, stability_margins
 
 
 def spans(high):
@@ -103,7 +103,7 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
         zeros = np.sort_complex(linear_loop.device_admittance(hc.theory.Loop(axis, K=K))[0].roots())
-        poles = linear_loop.closed_loop_poles(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
+        poles = loops.closed_loop_poles(axis, K, 90.0, Operator(1e3, 1e8, 1e9))
         near = [np.min(np.abs(poles - z)) / abs(z) for z in zeros]
         assert max(near) < 1e-3 and zeros.real.max() < 0.0
         assert linear_loop.stable(hc.theory.Loop(axis, 90.0, Operator(1e3, 1e8, 1e9), K=K))

@@ -25,7 +25,7 @@ from hapticclay.studies.stability_map import MapCell, StabilityMap
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
 from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, Limit, ZRegion, ZWidth
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 from hapticclay.theory.stability_margins import Box
 from hapticclay.views import (
     compare_plots,

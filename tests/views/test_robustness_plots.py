@@ -9,7 +9,7 @@ import hapticclay as hc
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.robustness import Instability
 from hapticclay.studies.sampling import Range
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 from hapticclay.views.figure import Figure
 from hapticclay.views.robustness_plots import band_plot, instability_plot
 
