@@ -62,7 +62,7 @@ suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
-    ("py:class", r"hapticclay\.model\.fields\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.scene\.fields\.T|mujoco\._structs\.MjModel"),
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
 ]
 linkcheck_timeout = 20
@@ -171,7 +171,12 @@ def plain_types(app, call, bound_method: bool) -> None:
     call = getattr(call, "__func__", call)
     spelled = getattr(call, "__annotations__", {})
     if signature := getattr(call, "__signature__", None):
-        spelled = {name: p.annotation for name, p in signature.parameters.items()}
+        spelled = {
+            name: re.sub(r" \[[^\]]*\]$", "", p.annotation)
+            if isinstance(p.annotation, str)
+            else p.annotation
+            for name, p in signature.parameters.items()
+        }
     module = vars(sys.modules.get(call.__module__, hc))
     found = {name: resolved(text, module) for name, text in spelled.items()}
     if signature:
@@ -182,7 +187,7 @@ def plain_types(app, call, bound_method: bool) -> None:
 
 
 def plain_defaults(app, what, name, thing, options, signature, returned):
-    """Writes ... for a default that is made anew, which is no Python as dataclasses print it.
+    """Writes a signature as Python: ... for a default that is made anew, and types without units.
 
     Args:
         app: the application.
@@ -193,7 +198,8 @@ def plain_defaults(app, what, name, thing, options, signature, returned):
         signature: the text of its arguments.
         returned: the text of what it returns.
     """
-    return (signature or "").replace("<factory>", "...") or None, returned
+    spelled = (signature or "").replace("<factory>", "...").replace("np.ndarray", "numpy.ndarray")
+    return re.sub(r"(?<!=) \[[^\]]*\]", "", spelled) or None, returned
 
 
 def resolved(annotation, module: dict):

@@ -11,9 +11,10 @@ import pkgutil
 import re
 import sys
 import types
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from .errors import ParameterError
 
@@ -74,12 +75,20 @@ def named(made: F) -> F:
             raise
 
     if isinstance(made, type):
-        guarded.__signature__ = in_words(  # type: ignore[attr-defined]
-            inspect.signature(inner), vars(sys.modules[made.__module__])
-        )
         made.__init__ = guarded
+        made.__signature__ = SignatureInWords()  # type: ignore[attr-defined]
         return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
+
+
+class SignatureInWords:
+    """The signature of a class, and of each of its subclasses, with units in words."""
+
+    def __get__(self, instance: Any, owner: type) -> inspect.Signature:
+        init: Any = owner.__init__
+        scopes = [vars(sys.modules[kind.__module__]) for kind in owner.__mro__]
+        told = in_words(inspect.signature(init), ChainMap(*scopes))
+        return told.replace(parameters=list(told.parameters.values())[1:])
 
 
 class Words(str):
@@ -104,7 +113,7 @@ def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.
 
 
 def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
-    """An annotation with a unit in place of a bound; any other as it is.
+    """An annotation with a unit in place of a bound, and for its aliases what they stand for.
 
     Args:
         hint: the annotation, as it was written.
@@ -112,14 +121,33 @@ def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
     """
     if not isinstance(hint, str):
         return hint
-    if (named_ := scope.get(hint)) is not None and get_origin(named_) is Annotated:
-        kind, bound = get_args(named_)
-        told = kind.__name__ if isinstance(kind, type) and not get_args(kind) else str(kind)
-        return Words(f"{told}{_of_unit(bound.unit)}")
-    if found := re.fullmatch(r"Annotated\[(.*), Bound\((.*)\)\]", hint, re.S):
-        unit = re.search(r"(?:, |unit=)'([^']+)'", found[2])
-        return Words(f"{found[1]}{_of_unit(unit[1] if unit else '')}")
-    return Words(hint)
+    unit = ""
+    if found := re.fullmatch(r"Annotated\[(.*), (?:Bound\((.*)\)|(\w+))\]", hint, re.S):
+        hint, inner, name = found.groups()
+        unit = (
+            scope[name].unit if name else "".join(re.findall(r"(?:, |unit=)'([^']+)'", inner)[:1])
+        )
+    units = [unit] if unit else []
+
+    def spelled(match: re.Match[str]) -> str:
+        named_ = scope.get(match[0])
+        if get_origin(named_) is Annotated:
+            units.append(get_args(named_)[1].unit)
+        return _alias_text(named_) or match[0]
+
+    text = re.sub(r"\b(?<!')[A-Z]\w*\b(?!')", spelled, hint)
+    return Words(text + _of_unit(", ".join(dict.fromkeys(filter(None, units)))))
+
+
+def _alias_text(kind: Any) -> str:
+    """What an alias of a type stands for; "" for what is none."""
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    elif get_origin(kind) not in (Literal, Union, types.UnionType):
+        return ""
+    if isinstance(kind, type) and not get_args(kind):
+        return kind.__name__
+    return str(kind).replace("typing.", "")
 
 
 def _of_unit(unit: str) -> str:

@@ -67,6 +67,7 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 TRIAL_INDICES = (0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2)  # flow indices from which fits start
 
 
+@named
 @dataclass(frozen=True)
 class FlowParameter:
     """One parameter of a law.
@@ -86,6 +87,7 @@ class FlowParameter:
     high: float = math.nan
 
 
+@named
 @dataclass(frozen=True)
 class FittedLaw:
     """One candidate.

@@ -376,6 +376,7 @@ def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.nd
     return low, high
 
 
+@named
 @dataclass(frozen=True)
 class Probability:
     """A probability that was counted.
@@ -401,6 +402,7 @@ class Probability:
         return f"{share} {100.0 * self.high:.3g} %, {100.0 * self.level:g} % interval)"
 
 
+@named
 @dataclass(frozen=True)
 class RiskMap:
     """The probability of instability over two parameters, or over one.
@@ -587,6 +589,7 @@ def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
 # ---- making the runs -----------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True)
 class Cost:
     """What the runs that are left will take, measured on a few of them.

@@ -115,6 +115,7 @@ class Press:
         check_fields(self, "press.")
 
 
+@named
 @dataclass(frozen=True)
 class Limit:
     """A published or exact line in the plane of B and K.
@@ -143,6 +144,7 @@ class Limit:
         return float(np.interp(B, self.B, self.K, math.nan, math.nan))
 
 
+@named
 @dataclass(frozen=True)
 class ZRegion:
     """Walls that one device renders stably: those below K(B), found by runs.
