@@ -51,9 +51,8 @@ class Case:
 
 def cut(velocity=(0.0, 0.0), **kw) -> Scenario:
     """The constant cut; fields that constant_cut() does not take are replaced."""
-    own = {
-        k: kw.pop(k) for k in ("operator", "clay", "length", "stop", "muscle", "gain") if k in kw
-    }
+    apart = {"operator", "clay", "length", "stop_when_unstable", "muscle", "gain"} & kw.keys()
+    own = {k: kw.pop(k) for k in apart}
     return replace(hc.constant_cut(**kw), velocity=velocity, **own)
 
 

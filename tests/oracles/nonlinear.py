@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .arm import G0, G1, ORIGIN, S0, S1, SG, Arm
+from .arm import ORIGIN, Arm
+from .arm_loop import arm_loop
 
 
 class Pieces:
@@ -77,26 +78,10 @@ def nonlinear_pieces(  # noqa: PLR0913  # a case, spelt out
     method="DOP853",
 ):
     """As `nonlinear`, the solution as Pieces."""
-    K, uh = np.array(K), np.array(uh)
-    m, d, k = th or (0.0, 0.0, 0.0)
-    p0 = np.array(p0, float)
+    rates, p0 = arm_loop(K, uh, th, inertia_shaping), np.array(p0, float)
 
     def rhs(t, z, b):
-        q, w, delta, rate, y, yr = z.reshape(6, 2)
-        J, Jd = Arm.jacobian(q), Arm.jacobian_rate(q, w)
-        p, v, c = Arm.forward(q) - ORIGIN, J @ w, Jd @ w
-        W = J @ np.linalg.solve(Arm.M, J.T)
-        Lam = np.linalg.inv(W)
-        y2 = G0 * (delta - y) - G1 * yr
-        want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if inertia_shaping else W
-        # p'' = want + S f,  f = uh - m p'' - d v - k p - b v
-        rest = uh - d * v - k * p - b * v
-        acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)
-        f = rest - m * acc
-        tau = J.T @ (Lam @ (want - c + (S - W) @ f))
-        wd = np.linalg.solve(Arm.M, tau + J.T @ f)
-        return np.concatenate((w, wd, rate, K * f - 10 * rate, yr, y2))
+        return rates(z, lambda p, v: b * v)
 
     z = np.concatenate((Arm.start(p0), [0, 0], p0, [0, 0], p0, [0, 0]))
     t, out = 0.0, Pieces()

@@ -220,11 +220,11 @@ def test_no_force_no_motion():
 
 @pytest.mark.parametrize("b", [9000.0, 1e5, 1e6, 1e9])
 @pytest.mark.parametrize("inertia_shaping", [False, True])
-def test_stiff_clay_stops_the_handle_where_it_should(b, shaping):
-    s = hc.constant_cut(b=b, inertia_shaping=shaping, t_max=3.0)
+def test_stiff_clay_stops_the_handle_where_it_should(b, inertia_shaping):
+    s = hc.constant_cut(b=b, inertia_shaping=inertia_shaping, t_max=3.0)
     r = hc.simulate(s)
     assert r.outcome.code in ("time limit", "stalled")
-    if shaping:
+    if inertia_shaping:
         _, position = piecewise_linear(EDGES, (0, b, 0), 1.0, 1.0, t_max=3.0)
         expected = position(np.array([3.0]))[0]
     else:  # quasi-static beyond the border

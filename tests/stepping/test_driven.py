@@ -14,7 +14,7 @@ import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine
-from tests.oracles import G0, G1, Linear, piecewise_linear
+from tests.oracles import G0, G1, axis_rates, piecewise_linear
 
 TH = (0.25, 2.0, 6.0)
 
@@ -28,15 +28,7 @@ def axis_solution(  # noqa: PLR0913  # a case, spelt out
     i, b, K, uh, th, t_end, command=lambda t: 0.0, z0=None, edge=None
 ):
     """One axis under b(t), uh(t), command(t); z = (p, v, delta, delta', y, y')."""
-    free, one = Linear(i, 0.0, K, 0.0, th).A, Linear(i, 1.0, K, 0.0, th).A
-    forced = Linear(i, 0.0, K, 1.0, th).A[:, 6]
-
-    def rhs(t, z):
-        A = free + b(t) * (one - free)
-        shown = np.append(z, 0.0)
-        shown[2] += command(t)
-        return (A @ shown + forced * uh(t))[:6]
-
+    rates = axis_rates(i, K, th)
     events = None
     if edge is not None:
 
@@ -45,7 +37,7 @@ def axis_solution(  # noqa: PLR0913  # a case, spelt out
 
         events.terminal = True
     return solve_ivp(
-        rhs,
+        lambda t, z: rates(z, b(t), uh(t), command(t)),
         (0.0, t_end),
         np.zeros(6) if z0 is None else z0,
         "DOP853",

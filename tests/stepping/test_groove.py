@@ -1,7 +1,6 @@
 """Clay that stays cut, against the geometry of a disc on its path."""
 
 import dataclasses
-import importlib.util
 import math
 
 import numpy as np
@@ -14,7 +13,6 @@ from hapticclay.errors import ParameterError
 from hapticclay.model import groove
 from tests.oracles.raster import raster
 
-NUMBA = importlib.util.find_spec("numba") is not None
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta", "ground")
 TOOL = hc.Tool(0.01, 0.005)
 WIDTH, DEPTH, RADIUS = TOOL.width, TOOL.depth, 0.5 * TOOL.width
@@ -299,17 +297,6 @@ def variant(name):
         law = hc.Profile((0.005, 0.02), (0.0, 40.0, 10.0))
         s = dataclasses.replace(s, clay=hc.Clay(law, law, angle=0.3, groove=block))
     return s
-
-
-@pytest.mark.skipif(not NUMBA, reason="needs hapticclay[fast]")
-@pytest.mark.parametrize("name", VARIANTS)
-def test_all_engines_make_the_same_run(name):
-    s = variant(name)
-    first = hc.simulate(s, engine="python")
-    assert first.extra["removed"][-1] > first.extra["removed"][0] > 0.0
-    same(hc.simulate(s, engine="native"), first)
-    for r in hc.simulate_batch([s, s], threads=2):
-        same(r, first)
 
 
 @pytest.mark.parametrize("name", VARIANTS)

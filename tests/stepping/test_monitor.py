@@ -35,11 +35,11 @@ def check_finite(r):
 
 @pytest.mark.parametrize("inertia_shaping", [False, True])
 @pytest.mark.parametrize("impedance", [False, True])
-def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
+def test_unit_gain_on_y_is_unstable_and_says_so(inertia_shaping, impedance):
     r = hc.simulate(
         hc.constant_cut(
             gain=(1.0, 1.0),
-            inertia_shaping=shaping,
+            inertia_shaping=inertia_shaping,
             operator=hc.Operator() if impedance else None,
             force=(2.0, 0.1),
         )

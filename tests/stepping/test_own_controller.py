@@ -30,12 +30,14 @@ def same(a, b, names=ARRAYS):
     "kw",
     [
         {},
-        dict(operator=hc.Operator()),
         dict(Ts=1.44e-3, force=(1.0, 0.3)),
         dict(torque_limit=(0.05, 0.05)),
-        dict(hardware=hc.Hardware(delay=5e-4, jitter=1e-5, dropout_probability=0.1, dac_bits=12)),
+        dict(
+            hardware=hc.Hardware(delay=5e-4, jitter=1e-5, dropout_probability=0.1, dac_bits=12),
+            operator=hc.Operator(),
+        ),
     ],
-    ids=["ideal", "hand", "slow", "limits", "hardware"],
+    ids=["ideal", "slow", "limits", "hardware, hand"],
 )
 def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine):
     if kw.get("hardware"):  # a lost sample holds the torque, but the compensator goes on

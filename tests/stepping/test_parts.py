@@ -21,7 +21,7 @@ from hapticclay.studies import boundary
 from tests.oracles import parts
 from tests.stepping.test_compiled import fast, same
 
-SETS = 30
+SETS = 16
 TS = 3.6e-4
 FREE = dict(length=None, torque_limit=(1e5, 1e5))
 
@@ -133,7 +133,7 @@ def at(r, times):
 
 
 @fast
-@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 5), ids=lambda x: f"{x[0]}-{x[-1]}")
+@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 4), ids=lambda x: f"{x[0]}-{x[-1]}")
 def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seeds):
     """The error is (h/tau)^2/12 of some 0.05 s, tau the times of servo and C, 10 ms and more.
 
@@ -158,7 +158,7 @@ def both_ways(seed, **kw):
 
 
 @fast
-@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 5), ids=lambda x: f"{x[0]}-{x[-1]}")
+@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 4), ids=lambda x: f"{x[0]}-{x[-1]}")
 def test_unshaped_runs_are_those_of_scipy(seeds):
     """Within 5e-7 m at 0.36 ms, 1e-7 m at 1.44 ms by the accurate method; both fall with the step.
 
@@ -419,7 +419,7 @@ def test_stiff_clay_is_borne_whatever_the_compensator(b, limit):
         gain = tuple(half_of_limit(s, axis, (0.0, 100.0, 1e3, 1e4)) for axis in "xy")
         s = dataclasses.replace(s, gain=gain)
         r = hc.simulate(s, engine="native")
-        if limit[0] > 1.0 or name == "order 2, biproper":  # hits at the limits take many steps
+        if name == "order 2, biproper":
             same(r, hc.simulate(s, engine="python"))
         assert np.all(np.isfinite(r.p)) and np.abs(r.p).max() < 0.05
         assert abs(r.energy["residual"]) < 1e-10 * r.energy["throughput"]
@@ -488,40 +488,6 @@ def test_friction_with_another_arm(seed):
     P, V, _ = parts.sampled(s, 0.15, friction=rubs, way=way)
     np.testing.assert_allclose(r.p[: len(P)], P, atol=1e-7)
     np.testing.assert_allclose(r.v[: len(P)], V, atol=2e-5)
-
-
-# ---- engines
-
-
-WIRED = dict(
-    encoder=65536, velocity="difference", velocity_window=4, adc_bits=14, dac_bits=14,
-    delay=1.3 * TS,
-    force_filter=400.0, friction=(0.01, 0.005), jitter=3e-5, dropout_probability=0.02,
-    force_noise=0.02,
-)  # fmt: skip
-
-
-@fast
-@pytest.mark.parametrize("how", ["fast", "accurate", "sampled", "wired"])
-def test_both_engines_and_a_batch_agree_to_the_last_bit(how):
-    wave = Multisine(rms=(1.0, 0.5), low=1.0, high=9.0, period=1.0, seed=3)
-    scenes = []
-    for seed in (3, 4):  # with a signal and held clay, shaped and physical; each compiled for 10 s
-        kw = dict(force=(8.0, 6.0), t_max=0.05, inertia_shaping=bool(seed % 3))
-        if how == "accurate":
-            kw |= dict(integrator="accurate", dt=1e-3)
-        elif how != "fast":
-            kw |= dict(control="sampled", render=("held", "physical")[seed // 4 % 2])
-        s, b = some_scene(seed, **kw)
-        x, y = Profile((1e-3, 4e-3), b[:3]), Profile((1e-3,), b[1:3], along="y")
-        s = dataclasses.replace(s, clay=Clay(x, y), muscle=wave if seed % 2 else None)
-        parts_of = hc.Hardware(**WIRED, seed=seed) if how == "wired" else None
-        scenes.append(dataclasses.replace(s, hardware=parts_of))
-    for s, batched in zip(scenes, hc.simulate_batch(scenes), strict=True):
-        native = hc.simulate(s, engine="native")
-        assert np.abs(native.p).max() > 1e-5
-        same(native, hc.simulate(s, engine="python"))
-        same(native, batched)
 
 
 # ---- stability and transparency

@@ -1,7 +1,6 @@
 """The accurate integrator: fourth order, by the laws of the loop, one source for both engines."""
 
 import dataclasses
-import importlib.util
 
 import mujoco
 import numpy as np
@@ -12,10 +11,9 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import arm, controller
-from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping.instant import instant
-from hapticclay.stepping.run import PLAIN, Run
+from hapticclay.stepping.run import Run
 from hapticclay.stepping.state import Axis, Moment, Point
 from tests.oracles import laws, nonlinear, piecewise_linear, store
 from tests.oracles.links import Links
@@ -207,51 +205,6 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     expected = (*p, *v, *fh, *out[6:8], *delta)
     sample = *now.p, *now.v, *now.fh, *now.tau, *now.delta
     np.testing.assert_allclose(sample, expected, rtol=1e-11, atol=1e-11)
-
-
-LAYERS = Clay(
-    Profile((0.01, 0.03), (0.0, 90.0, 30.0), "x"), Profile((0.01,), (40.0, 120.0), "y", (0.0, 9.0))
-)
-
-
-def cut(**parts):
-    return dataclasses.replace(hc.constant_cut(), **parts)
-
-
-SHAKEN = dict(operator=hc.Operator(), muscle=hc.Multisine(rms=(2.0, 0.5), high=3.0))
-ONE_SOURCE = {  # four kinds, each compiled for some 10 s
-    "stiff": hc.constant_cut(b=1e4, force=(20.0, 0.5)),
-    "layers": dataclasses.replace(hc.free(force=(1.5, 0.7)), clay=LAYERS),
-    "growing": hc.variable_cut(force=(3.0, 0.0)),
-    "weak": dataclasses.replace(hc.constant_cut(torque_limit=(0.1, 0.15)), **SHAKEN),
-    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
-    "all": cut(
-        compensator=ZEROS,
-        operator=HANDS,
-        force=(2.0, 0.3),
-        command=hc.Multisine(rms=(0.01, 0.01), high=3.0),
-        **OTHER,
-    ),
-}
-
-
-@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs hapticclay[fast]")
-@pytest.mark.parametrize("whole", [False, True], ids=["whole steps", "all steps"])
-@pytest.mark.parametrize("name", ONE_SOURCE)
-def test_all_engines_step_bit_for_bit_alike(name, whole, monkeypatch):
-    from hapticclay.stepping import compiled
-
-    if whole and name not in ("stiff", "layers", "all"):
-        return  # what surrounds whole steps is the same source for all
-    monkeypatch.setattr(compiled, "CAREFUL", -1 if whole else 10**9)
-    s = dataclasses.replace(ONE_SOURCE[name], integrator="accurate", dt=1e-3, t_max=4.0)
-    plain, other = Run(s, 3, PLAIN), Run(s, 3, compiled.KERNEL)
-    for run in (plain, other):
-        run.go(None)
-    assert other.outcome == plain.outcome and other.crossings == plain.crossings
-    assert other.steps == plain.steps and other.balance() == plain.balance()
-    for key, values in plain.arrays().items():
-        np.testing.assert_array_equal(other.arrays()[key], values, err_msg=key)
 
 
 def test_the_choice_is_checked():

@@ -108,18 +108,17 @@ def test_a_zener_wall_relaxes_to_its_lasting_spring():
 
 
 @pytest.mark.plain
-def test_python_compiled_batch_steps_and_files_agree(tmp_path):
+def test_steps_and_files_agree_with_the_run(tmp_path):
     spring = hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, unilateral=True)
     s = dataclasses.replace(
         hc.free(), clay=wall(spring, b=20.0, edges=(0.01, 0.012), Fy=(0.0, 0.5, 0.2)),
         force=(4.0, 1.0), t_max=0.25, length=None, stop_when_unstable=False, operator=hc.Operator(),
     )  # fmt: skip
-    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
-    (c,) = hc.simulate_batch([s])
+    a = hc.simulate(s, engine="python")
     with hc.Simulation(s) as sim:
         while sim.outcome is None:
             sim.step()
-    for r in (b, c, sim.record(), hc.Record.load(a.save(tmp_path))):
+    for r in (sim.record(), hc.Record.load(a.save(tmp_path))):
         for name in ("t", "p", "v", "fh", "fe", "q", "qd", "tau", "delta"):
             assert np.array_equal(getattr(a, name), getattr(r, name)), name
         assert r.energy == a.energy
@@ -147,10 +146,6 @@ def test_sampled_control_meets_the_same_springs(render):
         )
     # what a hold of half a sample does falls with the sample
     assert gaps[1] < 0.7 * gaps[0] < 1e-4
-    short = dataclasses.replace(late, t_max=0.05, start=(0.009, 0.0))
-    a, b = (hc.simulate(short, engine=e) for e in ("python", "native"))
-    for name in ("t", "p", "v", "fh", "fe", "tau"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
 
 
 def test_springs_are_refused_where_no_law_of_them_is_known():
@@ -171,9 +166,7 @@ def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
         stop_when_unstable=False, dt=1e-4,
         Ts=5e-4, control="sampled", render="held", hardware=hc.Hardware(encoder=counts),
     )  # fmt: skip
-    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
-    for name in ("t", "p", "v", "fh", "fe", "tau"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+    a = hc.simulate(s, engine="python")
     step = 2.0 * math.pi / counts
     q = step * np.round(a.q[:-1:5] / step)
     l1, l2 = s.arm.l1, s.arm.l2

@@ -219,19 +219,6 @@ def test_clay_takes_energy_whatever_moves_in_it(scene):
         assert abs(r.energy["residual"]) <= 1e-10 * through + 1e-12
 
 
-@pytest.mark.plain
-@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(scene=scenes())
-def test_python_compiled_and_batch_give_the_same_bits(scene):
-    runs = [hc.simulate(scene, engine=e) for e in ("python", "native")]
-    runs += hc.simulate_batch([scene])
-    for name in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
-        a, *others = (getattr(r, name) for r in runs)
-        assert all(np.array_equal(a, x) for x in others), name
-    assert runs[0].energy == runs[1].energy == runs[2].energy
-    assert runs[0].stops == runs[1].stops == runs[2].stops
-
-
 def test_step_by_step_it_is_the_same_run_and_a_file_keeps_it(tmp_path):
     s = dataclasses.replace(
         hc.constant_cut(), clay=hc.slab(hc.Flow(Fy=5.0, b=30.0), 0.05, 0.15), force=(4.0, 0.0),

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import importlib.util
 import math
 
 import numpy as np
@@ -15,7 +14,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.stepping import modes, pace
-from hapticclay.stepping.run import PLAIN, Run
+from hapticclay.stepping.run import Run
 from tests.oracles import store
 from tests.oracles.yielding import yielding_case
 
@@ -334,19 +333,3 @@ def test_an_asked_error_is_kept_in_clay_that_yields():
     )
     r = hc.simulate(s, error="1e-8 m")
     assert r.error is not None and r.error.reached and r.error.integrator == "accurate"
-
-
-@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs hapticclay[fast]")
-@pytest.mark.parametrize("name", CASES)
-def test_all_engines_step_alike_in_clay_that_yields(name):
-    from hapticclay.stepping import compiled
-
-    runs = [Run(scene(CASES[name], 2e-3), 3, k) for k in (PLAIN, compiled.KERNEL)]
-    for run in runs:
-        run.go(None)
-    plain, other = runs
-    assert other.outcome == plain.outcome and other.crossings == plain.crossings
-    assert other.stops == plain.stops and other.steps == plain.steps
-    assert other.balance() == plain.balance()
-    for key, values in plain.arrays().items():
-        np.testing.assert_array_equal(other.arrays()[key], values, err_msg=key)
