@@ -11,7 +11,7 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, ParameterError, number
 from ..model import arm
 from ..model.arm import Arm
 from ..model.clay import Clay, Profile
@@ -20,22 +20,17 @@ from ..model.controller import SERVO
 from ..model.hardware import Hardware
 from ..model.spring import Spring
 from ..scene.scenario import Position, Scenario, TorqueLimit
-from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory import gain_crossings, gain_limits, linear_loop
 from ..theory.loops import TIMING, Loop
 from ..theory.roots import first_failure
+from . import growth
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
 LARGE_PUSH = 0.05  # [m/s] initial velocity that a hand gives
 PUSH_TIME = 0.01  # [s] in which a force takes the place of such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
 CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer while the motors are in their limits
-FITTED_SHARE = 0.7  # of a run, its end, from which growth is read
-GROWTH_SAMPLE = 4e-3  # [s] between the samples from which growth is read
-SINGULAR_SHARE = 1e-7  # singular values below this share of the largest are rounding
-MODE_SHARE = 1e-4  # so are modes below this share of the strongest
-SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are the hand's spring, no oscillation
 BRACKET = 2e-3  # boundaries are found to this share
 
 Subject = TypeVar("Subject")
@@ -160,52 +155,6 @@ def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
     return PushedLoop.of(subject, axis) if isinstance(subject, Scenario) else subject
 
 
-def growth_rate(
-    record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
-) -> float:
-    """Rate at which the oscillation of a free motion grows: that of its least damped mode.
-
-    The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
-    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
-
-    Args:
-        record: of the motion.
-        axis: "x" or "y".
-        sample: about the time between the samples that are read [s].
-        slowest: modes slower than this do not count [rad/s, 1/s].
-
-    Returns:
-        [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
-    """
-    i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
-    if len(record.t) > 2:  # kept each so many steps
-        dt *= max(1, round((record.t[1] - record.t[0]) / dt))
-    v = record.v[:-1, i]  # the last step may be short
-    v = v[int((1.0 - FITTED_SHARE) * len(v)) :]
-    # Odd, and two of them: half the sampling frequency must fold onto zero in neither.
-    skip = 2 * round(0.5 * sample / dt) + 1
-    found = [_least_damped(v[::n], n * dt, slowest) for n in (skip, skip + 2) if len(v) >= 32 * n]
-    if not found:
-        return math.inf if record.outcome.code != "time limit" else -math.inf
-    return max(found)
-
-
-def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
-    rows = min(len(v) // 2, 700)  # of a long run: all its modes, at a fraction of the cost
-    hankel = np.lib.stride_tricks.sliding_window_view(v, rows).T
-    u, s, _ = np.linalg.svd(hankel, full_matrices=False)
-    r = max(1, min(int(np.sum(s > SINGULAR_SHARE * s[0])), rows // 3))
-    z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
-    z = z[np.abs(z) > 1e-6]
-    powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
-    amplitude = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0])
-    weight = amplitude * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
-    rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
-    strong = weight > MODE_SHARE * weight.max(initial=0.0)
-    counts = strong & ((omega > slowest) | (rate > slowest))
-    return float(rate[counts].max()) if counts.any() else -math.inf
-
-
 def classify_run(loop: PushedLoop) -> str:
     """Class of a run of the loop: "stable", "limit cycle" (bounded by the motors) or "diverges".
 
@@ -223,9 +172,9 @@ def classify_run(loop: PushedLoop) -> str:
             return "diverges"
         if code in ("limit cycle", "saturated"):
             break
-        end = record.tau[int((1.0 - FITTED_SHARE) * len(record.tau)) :]
+        end = record.tau[int((1.0 - growth.FITTED_SHARE) * len(record.tau)) :]
         if not np.any(np.abs(end) >= limit):
-            return "diverges" if growth_rate(record, loop.axis) > 0.0 else "stable"
+            return "diverges" if growth.growth_rate(record, loop.axis) > 0.0 else "stable"
     return "limit cycle"
 
 
@@ -332,7 +281,7 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
     def rate(value: float) -> float:
-        return growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
+        return growth.growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
 
     return find_crossing(rate, guess, most)
 

@@ -256,7 +256,7 @@ def judge(
     """Makes runs and tells which are unstable.
 
     A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
-    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `boundary.growth_rate`. That
+    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. That
     of a wall is as long, and is read, as `zwidth.growth_rates` does, at the wall's own samples;
     where it hardly changes in size it is repeated, four times as long. A run that ends early, or
     drives the motors into their limits from so small a push, is unstable.
@@ -280,7 +280,7 @@ def judge(
         with contextlib.suppress(ParameterError):
             made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
             # Odd, so that half the sampling frequency does not fold onto zero.
-            steps[i] = 2 * round(0.5 * boundary.GROWTH_SAMPLE / made.dt) + 1
+            steps[i] = 2 * round(0.5 * growth.GROWTH_SAMPLE / made.dt) + 1
             short[i] = replace(
                 made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
             )
@@ -307,7 +307,7 @@ def judge(
     runs = [replace(short[i], t_max=t) for i, t in zip(again, spans, strict=True)]
     for i, record in zip(again, simulate_batch(runs, threads=threads), strict=True):
         ended = record.outcome.code in ENDED
-        unstable[i] = ended or boundary.growth_rate(record, trials.axis) > 0.0
+        unstable[i] = ended or growth.growth_rate(record, trials.axis) > 0.0
     return unstable, longer
 
 
@@ -339,7 +339,7 @@ def _judge_walls(
                     if record.outcome.code in (*ENDED, *LOST):
                         unstable[i] = True
                         continue
-                    rate = zwidth.growth_of_run(record, *read[i][1:])
+                    rate = growth.growth_of_run(record, *read[i][1:])
                     unstable[i] = rate > 0.0
                     if abs(rate) * job.t_max < WALL_TOLD:
                         undecided.append(i)

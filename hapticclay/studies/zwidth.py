@@ -29,7 +29,7 @@ from ..simulation.record import Record
 from ..theory import gain_crossings, gain_limits, wall_limits
 from ..theory.roots import bisect
 from ..theory.stability_margins import Box
-from . import boundary
+from . import boundary, growth
 
 VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit that a label shows
     "Ts": ("Ts", "ms", 1e3),
@@ -60,7 +60,6 @@ FEWEST_SAMPLES, MOST_SAMPLES = 300, 6000  # samples of a run whose growth is rea
 READ_SWINGS = 4.0  # periods of device and wall in such a run, at least
 READ = 400  # samples of it that are read, about
 SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) are no oscillation
-FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
 GROWTH_STEPS, REST_STEPS = 16, 4  # engine steps a sample, at least
 STEP_DECAY = 0.1  # largest share of its speed that the damper takes in a step
 DEEPEST = 5e-3  # [m] into the wall that the force presses, so that the arm moves straight
@@ -646,8 +645,8 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
     arms = [w for w in walls if isinstance(w, boundary.PushedLoop)]
     if arms:
         records = simulate_batch(w.scenario() for w in arms)
-        how = boundary.GROWTH_SAMPLE, boundary.SLOWEST_MODE
-        return [growth_of_run(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
+        how = growth.GROWTH_SAMPLE, growth.SLOWEST_MODE
+        return [growth.growth_of_run(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
     bare = [w for w in walls if isinstance(w, VirtualWall)]
     steps = growth_steps(bare[0]) if bare else 1
     read = [growth_reading(w) for w in bare]
@@ -659,7 +658,7 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
         every=steps,
     )
     return [
-        growth_of_run(r, sample, slowest)
+        growth.growth_of_run(r, sample, slowest)
         for r, (_, sample, slowest) in zip(records, read, strict=True)
     ]
 
@@ -693,24 +692,6 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
     n = math.ceil(span * min(n, MOST_SAMPLES + 12.0 * order))
     kept = max(READ, 6.0 * order)
     return n, wall.Ts * max(1.0, n / kept), SLOWEST * omega
-
-
-def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
-    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean.
-
-    Args:
-        record: of a free motion.
-        sample: as in `boundary.growth_rate` [s].
-        slowest: as there [rad/s, 1/s].
-        axis: "x" or "y".
-    """
-    speed = np.abs(record.v[:, AXES.index(axis)])
-    n = len(speed)
-    share = math.ceil(0.1 * n)
-    change = (speed[-share:].max() + 1e-300) / (speed[:share].max() + 1e-300)
-    if n > 2 * share and not FADED < change < 1.0 / FADED:
-        return math.log(change) / record.t[-1]
-    return boundary.growth_rate(record, axis, sample, slowest)
 
 
 def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[bool]:

@@ -17,7 +17,7 @@ from scipy.linalg import expm
 import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.signals import Multisine
-from hapticclay.studies import boundary
+from hapticclay.studies import boundary, growth
 from tests.oracles import parts
 from tests.stepping.test_compiled import fast, same
 
@@ -544,7 +544,7 @@ def test_boundary_by_runs_within_0_2_percent_of_python_control():
 
         def rate(K, run=run, axis=axis):
             r = hc.simulate(dataclasses.replace(run, gain=along(axis, K)))
-            return boundary.growth_rate(r, axis)
+            return growth.growth_rate(r, axis)
 
         found = boundary.find_crossing(rate, 0.97 * K, 10.0 * K)
         assert found == pytest.approx(K, rel=2e-3), (i, s.compensators[i], omega)

@@ -19,7 +19,7 @@ from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
-from hapticclay.studies import boundary, stability_map
+from hapticclay.studies import boundary, growth, stability_map
 from hapticclay.theory import gain_crossings
 from hapticclay.views import study_plots
 from tests.oracles import Linear
@@ -43,7 +43,7 @@ def test_growth_is_that_of_the_least_damped_mode(sigma, omega, fast, phase):
     rec = SimpleNamespace(
         t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
     )
-    assert boundary.growth_rate(rec, "x") == pytest.approx(
+    assert growth.growth_rate(rec, "x") == pytest.approx(
         sigma, abs=1e-3
     )  # the mode above it starts 30 times as large
 
@@ -54,7 +54,7 @@ def test_growth_sees_half_the_sampling_frequency():
     rec = SimpleNamespace(
         t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
     )
-    assert boundary.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
+    assert growth.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
 
 
 @pytest.mark.parametrize("K", [2.0, 4.5])
@@ -62,7 +62,7 @@ def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
     r = hc.simulate(Loop(K=K).scenario())
     poles = Linear(0, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles()
     pole = poles[np.abs(poles.imag) > 1.0].real.max()
-    assert boundary.growth_rate(r, "x") == pytest.approx(
+    assert growth.growth_rate(r, "x") == pytest.approx(
         pole, abs=2e-3
     )  # second order: (omega dt)^2/12 of omega
 

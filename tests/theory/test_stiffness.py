@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.simulation.simulate import simulate
-from hapticclay.studies.boundary import PushedLoop, growth_rate, pose_matrix
+from hapticclay.studies.boundary import PushedLoop, pose_matrix
+from hapticclay.studies.growth import growth_rate
 from hapticclay.theory import gain_limits, linear_loop
 from hapticclay.theory.loops import Loop
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.studies.boundary import growth_rate
+from hapticclay.studies.growth import growth_rate
 from hapticclay.theory import wall_limits
 from hapticclay.theory.loop_passivity import colgate_schenkel
 
