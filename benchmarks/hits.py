@@ -29,7 +29,7 @@ from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
 from hapticclay.scene.scenario import Scenario
-from hapticclay.simulation import simulate
+from hapticclay.simulation import engines
 from tests import oracles
 
 from . import common, reference
@@ -138,7 +138,7 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
 def methods() -> dict[str, tuple[float, ...]]:
     """Way to step -> dt [s], coarse to fine."""
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
-    if not simulate.has_numba():
+    if not engines.has_numba():
         return {"fast": fast, "accurate": accurate}
     common.warm()
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}

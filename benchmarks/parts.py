@@ -24,7 +24,7 @@ import hapticclay as hc
 from hapticclay.model.arm import PAPER
 from hapticclay.model.hardware import Coupling, Hardware
 from hapticclay.model.signals import Multisine
-from hapticclay.simulation import simulate
+from hapticclay.simulation import engines
 from hapticclay.stepping import engine
 from hapticclay.views import stage
 
@@ -189,7 +189,7 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
-    if simulate.has_numba():
+    if engines.has_numba():
         common.warm()
         native = compare(list(LOOP), lambda name: run(name, 10 * steps, "native"), rounds)
         found["native"] = native

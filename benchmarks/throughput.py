@@ -27,7 +27,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.constants import CLAY_X as CLAY
-from hapticclay.simulation import batch, simulate
+from hapticclay.simulation import batch, engines
 
 from . import common
 
@@ -127,12 +127,12 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     rows: list[dict[str, float | str]] = []
     for name, scenario in SCENES.items():
         times = []
-        if simulate.has_numba():
+        if engines.has_numba():
             warm([lasting(scenario, steps)])
         for _ in range(rounds):
             times.append((floor(scenario, steps), loop(scenario, steps)))
         compiled = (
-            [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
+            [native(scenario, steps) for _ in range(OFTEN * rounds)] if engines.has_numba() else []
         )
         rows.append(
             {
@@ -380,7 +380,7 @@ def main(
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
     data: dict[str, Any] = {"rounds": rounds, "steps": steps}
-    native = simulate.has_numba()
+    native = engines.has_numba()
     if native and not quick:
         data["first_call"] = [first_calls()]
     data["rows"] = measure(rounds, steps)

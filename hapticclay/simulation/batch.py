@@ -27,7 +27,8 @@ from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, kind_key
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
-from .simulate import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step, simulate
+from .engines import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step
+from .simulate import simulate
 
 KEEP = ("records", "summaries")
 MANY = 32  # runs of a batch from which on those of one kind are made together

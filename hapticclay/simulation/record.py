@@ -28,39 +28,17 @@ from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
+from .columns import ARRAYS, EXTRA, SCALAR
+from .error_estimate import Accuracy
 from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from .accuracy import Accuracy
 
 VIEWS = "hapticclay.views.record_plots"  # draws; looked up when a figure is asked for
 RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
-ARRAYS = {
-    "t": "s",
-    "p": "m",
-    "v": "m/s",
-    "fh": "N",
-    "fe": "N",
-    "b": "N.s/m",
-    "q": "rad",
-    "qd": "rad/s",
-    "tau": "N.m",
-    "delta": "m",
-}
-EXTRA = {  # arrays that some records have
-    "removed": "m^3",
-    "removal_rate": "m^3/s",
-    "target": "m",
-    "gain": "1/kg",
-}
-SCALAR = (
-    "t",
-    "removed",
-    "removal_rate",
-)  # arrays of one figure a sample; the others have one an axis
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -537,11 +515,7 @@ def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
 
 
 def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
-    if d is None:
-        return None
-    from .accuracy import Accuracy  # most records have none
-
-    return Accuracy(**d)
+    return None if d is None else Accuracy(**d)
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:

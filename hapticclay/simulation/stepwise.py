@@ -27,7 +27,7 @@ from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, EngineStore, Run, Snapshot
 from . import record
-from .simulate import ENGINES, kernel_for, pays
+from .engines import ENGINES, kernel_for, pays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges

@@ -27,8 +27,8 @@ from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
 from ..model.signals import Multisine
 from ..scene.scenario import Scenario
+from ..simulation.engines import has_numba, load_compiled, saved_in_a_step
 from ..simulation.record import Record
-from ..simulation.simulate import has_numba, load_compiled, saved_in_a_step
 from ..simulation.stepwise import scaled
 from ..stepping import monitor, path
 from ..stepping.monitor import Outcome

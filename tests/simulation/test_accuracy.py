@@ -245,15 +245,15 @@ def test_it_is_saved_with_the_record_and_old_records_have_none(tmp_path):
 
 def test_a_refused_finer_step_keeps_what_is_there(monkeypatch):
     """Memory that a finer run would not fit into."""
-    real, made = accuracy.simulate, []
+    real, made = accuracy.run_once, []
 
-    def limited(s, **how):
+    def limited(s, *how):
         made.append(s.dt)
         if len(made) > 3:
             raise ParameterError("every", 1, "keep fewer")
-        return real(s, **how)
+        return real(s, *how)
 
-    monkeypatch.setattr(accuracy, "simulate", limited)
+    monkeypatch.setattr(accuracy, "run_once", limited)
     r = hc.simulate(hits.jobs(1e5)["hit"], error=1e-9)  # whose errors are large for their step
     assert not r.error.reached and "keep fewer" in r.error.note and r.error.estimate > 1e-9
     assert r.error.dt == made[2]

@@ -11,7 +11,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model.controller import SERVO, Servo
-from hapticclay.simulation import batch, record, simulate
+from hapticclay.simulation import batch, engines, record
 from hapticclay.stepping import many, run, scene
 from hapticclay.stepping.machine_code import kind_of
 
@@ -216,7 +216,7 @@ class NoLane:
 def test_steps_are_compiled_for_the_kinds_of_runs_made_alone_that_repay_them(monkeypatch):
     asked = []
     monkeypatch.setattr(batch, "pays", lambda s, steps: asked.append(round(steps)) or steps > 1000)
-    monkeypatch.setattr(simulate, "saved", {})
+    monkeypatch.setattr(engines, "saved", {})
     grown = hc.variable_cut(t_max=0.05)
     runs = [dataclasses.replace(grown, start=(1e-3 * i, 0.0)) for i in range(9)]
     other = dataclasses.replace(CUT, integrator="accurate", t_max=0.01)

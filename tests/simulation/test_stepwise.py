@@ -10,7 +10,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.simulation.simulate import has_numba
+from hapticclay.simulation.engines import has_numba
 
 pytestmark = pytest.mark.plain
 fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")

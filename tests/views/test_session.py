@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation.simulate import has_numba
+from hapticclay.simulation.engines import has_numba
 from hapticclay.stepping.run import PLAIN
 from hapticclay.views.session import (
     FRAME_TIME,
