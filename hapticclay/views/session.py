@@ -18,7 +18,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,9 +35,6 @@ from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Kernel, Run
 from ..studies.removal import TOOL, Tool, removed
 from ..theory import gain_limits
-
-if TYPE_CHECKING:
-    from .stream import UdpStream
 
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
@@ -245,6 +242,12 @@ class Clock:
         return simulated / real
 
 
+class Listener(Protocol):
+    """Takes each slice of a session or a replay, as a `UdpStream` does."""
+
+    def send(self, play: Any) -> None: ...
+
+
 class Frame(NamedTuple):
     """State at the end of a slice, for plots that run along.
 
@@ -283,7 +286,7 @@ class Session:
         stream: that a player tells of each slice; None for none.
     """
 
-    stream: UdpStream | None = None
+    stream: Listener | None = None
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
@@ -602,7 +605,7 @@ class Replay:
         stream: as of a session.
     """
 
-    stream: UdpStream | None = None
+    stream: Listener | None = None
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample.
