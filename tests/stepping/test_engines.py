@@ -12,7 +12,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model import support
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.clay import LAWS, Clay, Profile
 from hapticclay.model.constants import TS
 from hapticclay.simulation import record
 from hapticclay.stepping.machine_code import kind_of
@@ -286,9 +286,9 @@ def test_the_kinds_have_every_part_with_every_method_that_takes_it():
     for scenes in KINDS.values():
         for s in scenes.values():
             (method,) = support.present(s, support.METHODS)
-            found = (*support.present(s.clay, support.CLAY), *support.present(s, support.PARTS))
+            found = (*support.present(s.clay, LAWS), *support.present(s, support.PARTS))
             has |= {(method.name, x.name) for x in found}
-    parts = [x.name for x in (*support.CLAY, *support.PARTS)]
+    parts = [x.name for x in (*LAWS, *support.PARTS)]
     for method in support.METHODS:
         takes = {x for x in parts if not support.refusal(method.name, x)}
         assert takes == {x for name, x in has if name == method.name}
