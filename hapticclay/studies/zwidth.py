@@ -52,6 +52,7 @@ LETTERS = {
     "friction": "fc",
     "mass": "m",
     "quantum": "Delta",
+    "velocity_window": "window",
 }  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
 LIMIT_POINTS = 61  # of a line of theory

@@ -245,7 +245,12 @@ class Clock:
 class Listener(Protocol):
     """Takes each slice of a session or a replay, as a `UdpStream` does."""
 
-    def send(self, play: Any) -> None: ...
+    def send(self, play: Any) -> None:
+        """Takes a slice.
+
+        Args:
+            play: the session or replay that has played it.
+        """
 
 
 class Frame(NamedTuple):

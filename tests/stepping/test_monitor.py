@@ -302,9 +302,9 @@ def test_a_command_may_beat_as_it_likes():
 def test_gain_limits_are_worked_out_once_a_clay(monkeypatch):
     """However far and however long an axis swings: each costs a root finding."""
     asked = []
-    exact = monitor.gain_limit.continuous_limit
+    exact = monitor.gain_limits.continuous_limit
     monkeypatch.setattr(
-        monitor.gain_limit, "continuous_limit", lambda *a: asked.append(a[1:]) or exact(*a)
+        monitor.gain_limits, "continuous_limit", lambda *a: asked.append(a[1:]) or exact(*a)
     )
     edges = tuple(np.linspace(-0.08, 0.08, 200).tolist())
     b = tuple(np.linspace(20.0, 3000.0, 201).tolist())

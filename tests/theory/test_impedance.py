@@ -144,9 +144,11 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     velocity_window=st.integers(1, 5),
 )
 @settings(max_examples=25)
-def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, window):
+def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, velocity_window):
     """Two derivations of one number; the hand's sidebands are none without its arm."""
-    wall = hc.VirtualWall(K, B, M, hc.Device(0.2, 0.7), delay=delay, velocity_window=window)
+    wall = hc.VirtualWall(
+        K, B, M, hc.Device(0.2, 0.7), delay=delay, velocity_window=velocity_window
+    )
     found = wall_response(wall, OMEGA)
     np.testing.assert_allclose(found.Z, hc.walls.wall_impedance(wall, OMEGA), rtol=1e-8)
     # the device itself is left: fh = (m s + b) v + fe
