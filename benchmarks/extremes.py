@@ -24,8 +24,8 @@ from tqdm import tqdm
 import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
 from hapticclay.model.signals import Multisine
+from hapticclay.scene.scenario import Scenario
 from tests.oracles import I1, I2
 
 from . import common, reference
@@ -51,9 +51,8 @@ class Case:
 
 def cut(velocity=(0.0, 0.0), **kw) -> Scenario:
     """The constant cut; fields that constant_cut() does not take are replaced."""
-    own = {
-        k: kw.pop(k) for k in ("operator", "clay", "length", "stop", "muscle", "gain") if k in kw
-    }
+    apart = {"operator", "clay", "length", "stop_when_unstable", "muscle", "gain"} & kw.keys()
+    own = {k: kw.pop(k) for k in apart}
     return replace(hc.constant_cut(**kw), velocity=velocity, **own)
 
 
@@ -99,7 +98,7 @@ def cases() -> list[Case]:
     add(
         g, "b = 1e9 hit at 2 m/s, hand of 100 kg", cut((2.0, 0.0), b=1e9, t_max=1.0, operator=HEAVY)
     )
-    add(g, "b = 1e9 hit at 2 m/s, shaped", cut((2.0, 0.0), b=1e9, t_max=1.0, shaping=True))
+    add(g, "b = 1e9 hit at 2 m/s, shaped", cut((2.0, 0.0), b=1e9, t_max=1.0, inertia_shaping=True))
 
     g = "hand"
     add(
@@ -139,7 +138,7 @@ def cases() -> list[Case]:
         "K = 1 on y, goes on",
         cut(
             gain=(1.0, 1.0),
-            stop=False,
+            stop_when_unstable=False,
             t_max=8.0,
             force=(0.1, 0.02),
             start=(0.06, 0.0),
@@ -149,7 +148,7 @@ def cases() -> list[Case]:
     add(
         g,
         "K = 3 on x, hand, shaped",
-        cut(gain=(3.0, 0.3), b=100.0, operator=hc.Operator(), shaping=True, t_max=5.0),
+        cut(gain=(3.0, 0.3), b=100.0, operator=hc.Operator(), inertia_shaping=True, t_max=5.0),
         True,
     )
     add(
@@ -159,7 +158,7 @@ def cases() -> list[Case]:
             gain=(25.0, 0.3),
             b=100.0,
             operator=hc.Operator(),
-            stop=False,
+            stop_when_unstable=False,
             t_max=4.0,
             length=None,
             start=(0.1, 0.0),
@@ -286,14 +285,21 @@ def cases() -> list[Case]:
     add(
         g,
         "held, b = 8e3, goes on",
-        cut(control="sampled", b=8e3, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1), stop=False),
+        cut(
+            control="sampled",
+            b=8e3,
+            start=(0.06, 0.0),
+            t_max=2.0,
+            gain=(1.0, 0.1),
+            stop_when_unstable=False,
+        ),
     )
     add(
         g,
         "implicit, b = 8e3",
         cut(
             control="sampled",
-            render="implicit",
+            render="physical",
             b=8e3,
             start=(0.06, 0.0),
             t_max=0.5,
@@ -306,7 +312,7 @@ def cases() -> list[Case]:
         cut(
             (2.0, 0.0),
             control="sampled",
-            render="implicit",
+            render="physical",
             b=1e9,
             t_max=0.3,
             torque_limit=(1e4, 1e4),

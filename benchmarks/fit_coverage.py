@@ -73,7 +73,7 @@ def motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return t, scale * p, np.where(rate > 1e-6, scale * v, 0.0)
 
 
-def measured(law: str, seed: int, sensors: Sensors) -> hc.Measurement:
+def measured(law: str, seed: int, sensors: Sensors) -> hc.studies.Measurement:
     """What the sensors tell of a motion through clay of a law."""
     rng = np.random.default_rng((seed, 16))
     t, p, v = motion(rng)
@@ -82,7 +82,7 @@ def measured(law: str, seed: int, sensors: Sensors) -> hc.Measurement:
     f = np.where(v == 0.0, a["Fy"] * np.sin(7.0 * t), f)  # at rest, any force up to Fy
     f = _rounded(f + sensors.force_noise * rng.standard_normal(len(t)), sensors.force_count)
     p = _rounded(p + sensors.position_noise * rng.standard_normal(len(t)), sensors.position_count)
-    return hc.Measurement(t, f, p, name=f"{law}, seed {seed}")
+    return hc.studies.Measurement(t, f, p, name=f"{law}, seed {seed}")
 
 
 def _rounded(x: np.ndarray, count: float) -> np.ndarray:
@@ -92,8 +92,8 @@ def _rounded(x: np.ndarray, count: float) -> np.ndarray:
 def one(seed: int, law: str, sensors: str) -> dict[str, Any]:
     """One trial: which law is picked, and each parameter of the true one with its interval."""
     data = measured(law, seed, SENSORS[sensors])
-    fitted = hc.fit_flow(data)
-    right = fitted if fitted.law == law else hc.fit_flow(data, laws=(law,))
+    fitted = hc.studies.fit_flow(data)
+    right = fitted if fitted.law == law else hc.studies.fit_flow(data, laws=(law,))
     return {
         "law": law,
         "sensors": sensors,

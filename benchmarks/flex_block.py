@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hapticclay.model.arm import PAPER, inverse_kinematics
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from hapticclay.stepping.engine import build, mujoco, warnings_caught
 from hapticclay.views import film
 from hapticclay.views.stage import THICKNESS, picture_spec

@@ -28,8 +28,8 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
-from hapticclay.simulation import simulate
+from hapticclay.scene.scenario import Scenario
+from hapticclay.simulation import engines
 from tests import oracles
 
 from . import common, reference
@@ -51,7 +51,7 @@ def jobs(b: float) -> dict[str, Scenario]:
     s = Scenario(
         clay=slab(b, *EDGES[:2]),
         length=None,
-        shaping=True,
+        inertia_shaping=True,
         torque_limit=STRONG,
         origin=NOMINAL_BORDER,
     )
@@ -138,7 +138,7 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
 def methods() -> dict[str, tuple[float, ...]]:
     """Way to step -> dt [s], coarse to fine."""
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
-    if not simulate.has_numba():
+    if not engines.has_numba():
         return {"fast": fast, "accurate": accurate}
     common.warm()
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}
@@ -164,7 +164,7 @@ def scene(seed: int) -> Scenario:
         gain=(1.0, 0.3),
         force=(along[0] * push + along[1] * across, along[1] * push + along[0] * across),
         operator=hand if rng.random() < 0.5 else None,
-        shaping=bool(rng.random() < 0.5),
+        inertia_shaping=bool(rng.random() < 0.5),
         start=(along[0] * ahead, along[1] * ahead),
         velocity=(along[0] * v, along[1] * v),
         origin=ORIGIN if axis == 0 else (0.33, 0.16),
@@ -194,7 +194,7 @@ def against_reference(
     n = min(len(x.p), int(np.searchsorted(index, len(r.p))))
     return {
         "seed": seed,
-        "shaping": s.shaping,
+        "inertia_shaping": s.inertia_shaping,
         "hand": s.operator is not None,
         "crossings": len(x.crossings),
         "crossing": max((error for speed, error in late if speed > SLOW), default=0.0),

@@ -31,9 +31,9 @@ from hapticclay.studies import identification
 from . import common
 
 SENSORS = {
-    "20000 counts, no force noise": hc.Noise(20_000, 0.0),
-    "10000 counts, 0.1 N": hc.Noise(10_000, 0.1),
-    "2^30 counts, no force noise": hc.Noise(2**30, 0.0),
+    "20000 counts, no force noise": hc.studies.Noise(20_000, 0.0),
+    "10000 counts, 0.1 N": hc.studies.Noise(10_000, 0.1),
+    "2^30 counts, no force noise": hc.studies.Noise(2**30, 0.0),
 }
 BLOCKS: tuple[tuple[str, bool], ...] = (
     ("G", False),
@@ -60,7 +60,7 @@ def one(
         return [
             {
                 "what": what,
-                "shaping": shaping,
+                "inertia_shaping": shaping,
                 "axis": axis,
                 "sensors": name,
                 "coefficient": c.name,
@@ -70,8 +70,8 @@ def one(
             for what, shaping in blocks
             for axis in axes
             for name, noise in SENSORS.items()
-            for c in hc.identify(
-                axis, what, shaping=shaping, noise=noise, seed=seed, **kw
+            for c in hc.studies.identify(
+                axis, what, inertia_shaping=shaping, noise=noise, seed=seed, **kw
             ).coefficients
         ]
     finally:
@@ -83,10 +83,10 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     groups: dict[tuple, list[dict[str, Any]]] = {}
     for r in rows:
         groups.setdefault(
-            tuple(r[k] for k in ("what", "shaping", "axis", "coefficient", "sensors")), []
+            tuple(r[k] for k in ("what", "inertia_shaping", "axis", "coefficient", "sensors")), []
         ).append(r)
     return [
-        dict(zip(("what", "shaping", "axis", "coefficient", "sensors"), key, strict=True))
+        dict(zip(("what", "inertia_shaping", "axis", "coefficient", "sensors"), key, strict=True))
         | {
             "seeds": len(g),
             "covered": sum(abs(r["error"]) <= r["half"] for r in g) / len(g),
@@ -100,7 +100,7 @@ def page(found: list[dict[str, Any]]) -> str:
     """The Markdown page."""
     cells: dict[tuple, list[str]] = {}
     for x in found:
-        block = x["what"] + (", shaped" if x["shaping"] else "")
+        block = x["what"] + (", shaped" if x["inertia_shaping"] else "")
         cells.setdefault((block, x["axis"], x["coefficient"]), []).append(
             f"{x['covered']:.3f}, {x['half']:.1e}"
         )

@@ -39,11 +39,13 @@ def cases() -> list[tuple[float, hc.Flow]]:
 
 def measure(K: float, flow: hc.Flow, steps: tuple[float, ...] = STEPS) -> dict[str, Any]:
     """One row: the predicted cycle, the exact one, and that of a run at each step."""
-    loop = PushedLoop("y", b=flow.b, K=K, shaping=True)
-    predicted = next(x for x in hc.limit_cycles(loop.linear, flow) if x.kind == "limit cycle")
+    loop = PushedLoop("y", b=flow.b, K=K, inertia_shaping=True)
+    predicted = next(
+        x for x in hc.theory.limit_cycles(loop.linear, flow) if x.kind == "limit cycle"
+    )
     exact = None
     if flow.Fy and not flow.K:
-        exact = next((x for x in hc.exact_cycles(loop.linear, flow) if x.stable), None)
+        exact = next((x for x in hc.theory.exact_cycles(loop.linear, flow) if x.stable), None)
     speed = exact.speed if exact else predicted.speed
     found: list[MeasuredCycle | None] = []
     for dt in steps:

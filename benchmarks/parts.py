@@ -22,9 +22,9 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.arm import PAPER
-from hapticclay.model.hardware import Coupling, Interface
+from hapticclay.model.hardware import Coupling, Hardware
 from hapticclay.model.signals import Multisine
-from hapticclay.simulation import simulate
+from hapticclay.simulation import engines
 from hapticclay.stepping import engine
 from hapticclay.views import stage
 
@@ -79,16 +79,16 @@ CUT = dataclasses.replace(hc.constant_cut(start=(0.06, 0.0)), length=None)
 WAVE = Multisine(rms=(0.1, 0.1), low=0.2, high=3.0, period=5.0, seed=1)
 
 
-def _sampled(**interface: Any) -> hc.Scenario:
-    given = Interface(**interface) if interface else None
-    return dataclasses.replace(CUT, control="sampled", interface=given)
+def _sampled(**hardware: Any) -> hc.Scenario:
+    given = Hardware(**hardware) if hardware else None
+    return dataclasses.replace(CUT, control="sampled", hardware=given)
 
 
 LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     "cut": (CUT, {}),
     "one sample in 100 recorded": (CUT, {"every": 100}),
     "no clay": (dataclasses.replace(CUT, clay=None, gain=(0.01, 0.01)), {}),
-    "shaping": (dataclasses.replace(CUT, shaping=True), {}),
+    "inertia_shaping": (dataclasses.replace(CUT, inertia_shaping=True), {}),
     "Th": (dataclasses.replace(CUT, operator=hc.Operator(), force=(2.0, 0.0)), {}),
     "clay that grows": (hc.variable_cut(start=(0.06, 0.06)), {}),
     "muscle force": (dataclasses.replace(CUT, muscle=WAVE), {}),
@@ -100,7 +100,7 @@ LOOP: dict[str, tuple[hc.Scenario, dict[str, Any]]] = {
     ),
     "sampled, D/A": (_sampled(dac_bits=16), {}),
     "sampled, delay": (_sampled(delay=1e-4), {}),
-    "sampled, jitter, lost samples": (_sampled(jitter=1e-5, lost=0.01), {}),
+    "sampled, jitter, lost samples": (_sampled(jitter=1e-5, dropout_probability=0.01), {}),
     "sampled, friction": (_sampled(friction=(0.01, 0.01)), {}),
     "sampled, passivity observer": (_sampled(passivity=True), {}),
     "sampled, virtual coupling": (_sampled(coupling=Coupling(2000.0, 20.0)), {}),
@@ -126,7 +126,9 @@ def step(model: mujoco.MjModel, steps: int) -> float:
 def run(name: str, steps: int, engine: str = "python") -> float:
     """Seconds a step of the whole loop."""
     scenario, how = LOOP[name]
-    scenario = dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, stop=False)
+    scenario = dataclasses.replace(
+        scenario, t_max=(steps + 0.5) * scenario.dt, stop_when_unstable=False
+    )
     r = hc.simulate(scenario, engine=engine, **how)
     return r.wall_time / r.steps
 
@@ -187,7 +189,7 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
-    if simulate.has_numba():
+    if engines.has_numba():
         common.warm()
         native = compare(list(LOOP), lambda name: run(name, 10 * steps, "native"), rounds)
         found["native"] = native

@@ -55,5 +55,5 @@ def reference(name: str) -> Pieces:
     assert s.clay is not None
     th = dataclasses.astuple(s.operator) if s.operator else None
     return nonlinear_pieces(
-        s.clay.x.values, EDGES, s.gain, s.force, th, s.shaping, s.t_max, 1e-12, 1e-14
+        s.clay.x.values, EDGES, s.gain, s.force, th, s.inertia_shaping, s.t_max, 1e-12, 1e-14
     )

@@ -27,7 +27,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from hapticclay.model.clay import Profile
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from tests.oracles.arm import G0, G1, I1, I2, L1, L2, S0, S1, SG
 
 FOLD = math.sin(math.radians(1.0))  # the elbow within 1 degree of stretched or folded
@@ -142,7 +142,7 @@ class Loop:
             ux - (self.d + b[0]) * v[0] - self.k * p[0],
             uy - (self.d + b[1]) * v[1] - self.k * p[1],
         )
-        S = (float(SG[0]), 0.0, float(SG[1])) if self.s.shaping else W
+        S = (float(SG[0]), 0.0, float(SG[1])) if self.s.inertia_shaping else W
         a = _solve(
             self.m,
             S,
@@ -452,7 +452,7 @@ class Run:
         self.sum = max(0.0, self.sum + self.sigma * (t - self.judged))
         self.worst = max(self.worst, self.sum)
         self.judged = t
-        return self.s.stop and self.worst > GROWTH
+        return self.s.stop_when_unstable and self.worst > GROWTH
 
     def finish(self, code: str, t: float) -> Solution:
         out = self.out
@@ -505,7 +505,7 @@ class SampledRun:
             A[1, 1], A[1, 4] = -10.0, s.gain[i]
             A[3] = [G0[i], 0.0, -G0[i], -G1[i], 0.0]
             self.blocks.append(expm(A * self.Ts))
-        self.physical = s.render == "implicit"
+        self.physical = s.render == "physical"
         self.out = Solution()
 
     def b(self, p) -> tuple[float, float]:
@@ -539,7 +539,7 @@ class SampledRun:
         flat = (0, 0, 0, 0, x[0][0], x[1][0], x[0][1], x[1][1], x[0][2], x[1][2], x[0][3], x[1][3])
         want, _ = self.loop.want(flat, p, v)
         Wm = np.array([[W[0], W[1]], [W[1], W[2]]])
-        S = np.diag(SG) if self.s.shaping else Wm
+        S = np.diag(SG) if self.s.inertia_shaping else Wm
         Jm = np.reshape(J, (2, 2))
         new = Jm.T @ np.linalg.solve(Wm, np.array(want) - c + (S - Wm) @ f)
         if not self.physical:
@@ -653,7 +653,7 @@ class SampledRun:
             if abs(math.sin(z[1])) < FOLD:
                 code = "out of reach" if math.cos(z[1]) > 0.0 else "singular"
                 break
-            if s.stop and worst > GROWTH:
+            if s.stop_when_unstable and worst > GROWTH:
                 break
             end = min((n + 1) * self.Ts, s.t_max)
             for at in self.times[np.searchsorted(self.times, t) : np.searchsorted(self.times, end)]:

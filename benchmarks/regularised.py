@@ -74,9 +74,9 @@ def exact(dt: float) -> tuple[float, float, int, float]:
     free = hc.free()
     servo = tuple(hc.Servo(x.G, hc.SecondOrder(1.0 / M, 1e-9, 1e-9)) for x in free.servo)
     scene = hc.Scenario(
-        clay=hc.slab(hc.Flow(Fy=FY, b=B)), gain=(0.0, 0.0), shaping=True, force=(PUSH, 0.0),
+        clay=hc.slab(hc.Flow(Fy=FY, b=B)), gain=(0.0, 0.0), inertia_shaping=True, force=(PUSH, 0.0),
         servo=(servo[0], servo[1]), velocity=(V0, 0.0), start=(0.02, 0.0), dt=dt, t_max=HOLD,
-        compensator=hc.Compensator((1.0,), (1.0, 0.0, 0.0)), length=None, stop=False,
+        compensator=hc.Compensator((1.0,), (1.0, 0.0, 0.0)), length=None, stop_when_unstable=False,
     )  # fmt: skip
     begin = time.perf_counter()
     r = hc.simulate(scene)

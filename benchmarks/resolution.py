@@ -40,12 +40,17 @@ def run(
     """One cut: what its clay felt like. Errors are relative to b."""
     velocity = "exact" if counts is None else "difference"
     span = window if counts else 1
-    parts = hc.Interface(
-        encoder=counts, velocity=velocity, window=span, adc_bits=bits, dac_bits=bits, delay=delay
+    parts = hc.Hardware(
+        encoder=counts,
+        velocity=velocity,
+        velocity_window=span,
+        adc_bits=bits,
+        dac_bits=bits,
+        delay=delay,
     )
     s = dataclasses.replace(
-        hc.constant_cut(force=(FORCE, 0.0), shaping=True, control="sampled", length=END),
-        interface=parts,
+        hc.constant_cut(force=(FORCE, 0.0), inertia_shaping=True, control="sampled", length=END),
+        hardware=parts,
     )
     r = hc.simulate(s)
     mine = (r.p[:, 0] > WITHIN[0]) & (r.p[:, 0] < WITHIN[1])
@@ -73,7 +78,7 @@ def run(
 def measure(
     counts: tuple[int, ...] = COUNTS, windows: tuple[int, ...] = WINDOWS
 ) -> list[dict[str, Any]]:
-    """All rows: the ideal interface, converters alone, then encoders."""
+    """All rows: ideal hardware, converters alone, then encoders."""
     rows = [run(None, 1, None, 0.0), run(None, 1, None), run(None, 1)]
     return rows + [run(c, w) for c in counts for w in windows]
 

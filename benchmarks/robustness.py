@@ -27,32 +27,33 @@ from . import common
 
 SEEDS, RUNS = 20, 2000
 HAND = hc.Operator(0.4, 5.0, 80.0)
-GAIN = hc.Distribution("log-normal", 4.0, 1.0)
-DAMPER = hc.Distribution("log-normal", 5.0, 2.5)
-DELAY = hc.Distribution("uniform", 0.0, 1e-3)
-POSE = hc.Distribution("normal", 0.0, 0.03)
+GAIN = hc.studies.Distribution("log-normal", 4.0, 1.0)
+DAMPER = hc.studies.Distribution("log-normal", 5.0, 2.5)
+DELAY = hc.studies.Distribution("uniform", 0.0, 1e-3)
+POSE = hc.studies.Distribution("normal", 0.0, 0.03)
 
 
-def cases() -> dict[str, tuple[hc.Trials, list[str], int]]:
+def cases() -> dict[str, tuple[hc.studies.Trials, list[str], int]]:
     """Trials of each case; the parameters that quadrature nodes are laid over; how many of each."""
     continuous = PushedLoop("x", b=90.0, operator=HAND)
     sampled = PushedLoop("x", b=90.0, operator=HAND, Ts=0.5e-3)
-    turned = PushedLoop("x", b=90.0, operator=HAND, shaping=False)
+    turned = PushedLoop("x", b=90.0, operator=HAND, inertia_shaping=False)
     hand = ["operator.mass", "operator.damper", "operator.spring"]
     return {
         "hand and gain, continuous": (
-            hc.Trials(continuous, {"K": GAIN}, hands=hc.Hands.around(HAND, 0.5)), hand, 10),
+            hc.studies.Trials(continuous, {"K": GAIN}, hands=hc.studies.Hands.around(HAND, 0.5)),
+            hand, 10),
         "damper, delay and gain, sampled": (
-            hc.Trials(sampled, {"operator.damper": DAMPER, "delay": DELAY, "K": GAIN}),
+            hc.studies.Trials(sampled, {"operator.damper": DAMPER, "delay": DELAY, "K": GAIN}),
             ["operator.damper", "delay"], 10),
         "damper, pose and gain, without shaping": (
-            hc.Trials(turned, {"operator.damper": DAMPER, "pose.x": POSE, "K": GAIN}),
+            hc.studies.Trials(turned, {"operator.damper": DAMPER, "pose.x": POSE, "K": GAIN}),
             ["operator.damper", "pose.x"], 16),
     }  # fmt: skip
 
 
 def quadrature(
-    trials: hc.Trials, names: list[str], nodes: int, limit: Callable[[Any], float]
+    trials: hc.studies.Trials, names: list[str], nodes: int, limit: Callable[[Any], float]
 ) -> float:
     """Probability that K lies above the exact limit: the mean over the other numbers.
 
@@ -94,7 +95,9 @@ def measure(seeds: int, runs: int) -> list[dict[str, Any]]:
     for name, (trials, names, nodes) in cases().items():
         exact = quadrature(trials, names, nodes, exact_limit)
         coarse = quadrature(trials, names, nodes - 3, exact_limit)
-        found = [hc.monte_carlo(replace(trials, runs=runs, seed=seed)) for seed in range(seeds)]
+        found = [
+            hc.studies.monte_carlo(replace(trials, runs=runs, seed=seed)) for seed in range(seeds)
+        ]
         totals = [x.total for x in found]
         events, every = sum(t.events for t in totals), sum(t.runs for t in totals)
         rows.append({
@@ -116,9 +119,9 @@ def measure(seeds: int, runs: int) -> list[dict[str, Any]]:
 def timed(runs: int) -> dict[str, Any]:
     """Time of many runs of the first case."""
     trials = replace(next(iter(cases().values()))[0], runs=runs)
-    hc.monte_carlo(replace(trials, runs=20))  # loads and compiles
+    hc.studies.monte_carlo(replace(trials, runs=20))  # loads and compiles
     wall, spent = time.perf_counter(), time.process_time()
-    found = hc.monte_carlo(trials)
+    found = hc.studies.monte_carlo(trials)
     wall, spent = time.perf_counter() - wall, time.process_time() - spent
     return {"runs": runs, "wall [s]": wall, "processor [s]": spent, "total": str(found.total)}
 

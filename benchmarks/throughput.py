@@ -27,7 +27,7 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.constants import CLAY_X as CLAY
-from hapticclay.simulation import batch, simulate
+from hapticclay.simulation import batch, engines
 
 from . import common
 
@@ -36,7 +36,7 @@ SHORT, SHORT_QUICK, SHORT_STEPS = 1_000_000, 10_000, 100  # runs, steps of each
 OFTEN = 5  # compiled runs to one in Python, which takes as long
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
-    "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), shaping=True),
+    "constant cut, shaping": hc.constant_cut(start=(0.06, 0.0), inertia_shaping=True),
     "constant cut, Th": hc.constant_cut(
         start=(0.06, 0.0), operator=hc.Operator(), force=(2.0, 0.0)
     ),
@@ -127,12 +127,12 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     rows: list[dict[str, float | str]] = []
     for name, scenario in SCENES.items():
         times = []
-        if simulate.has_numba():
+        if engines.has_numba():
             warm([lasting(scenario, steps)])
         for _ in range(rounds):
             times.append((floor(scenario, steps), loop(scenario, steps)))
         compiled = (
-            [native(scenario, steps) for _ in range(OFTEN * rounds)] if simulate.has_numba() else []
+            [native(scenario, steps) for _ in range(OFTEN * rounds)] if engines.has_numba() else []
         )
         rows.append(
             {
@@ -280,7 +280,7 @@ def monte_carlo(n: int, control: str) -> Iterator[hc.Scenario]:
     same, rng = lasting(same, SHORT_STEPS), np.random.default_rng(n)
     for _ in range(n):
         mass, damper, spring, b, gain, start, delay = rng.random(7).tolist()
-        own: Any = dict(interface=hc.Interface(delay=1e-3 * delay)) if control == "sampled" else {}
+        own: Any = dict(hardware=hc.Hardware(delay=1e-3 * delay)) if control == "sampled" else {}
         yield dataclasses.replace(
             same,
             operator=hc.Operator(0.1 + mass, 1.0 + damper, 2.0 + 8.0 * spring),
@@ -380,7 +380,7 @@ def main(
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
     data: dict[str, Any] = {"rounds": rounds, "steps": steps}
-    native = simulate.has_numba()
+    native = engines.has_numba()
     if native and not quick:
         data["first_call"] = [first_calls()]
     data["rows"] = measure(rounds, steps)

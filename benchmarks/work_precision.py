@@ -382,7 +382,7 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
     """Position errors of sampled runs against the hybrid and the continuous system."""
     out = []
     exact = reference("default cut")
-    for render in ("held", "implicit"):
+    for render in ("held", "physical"):
         for Ts in (4e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 3.6e-4):
             s = dataclasses.replace(
                 PROBLEMS["default cut"],

@@ -32,7 +32,7 @@ CASES: tuple[Case, ...] = (
     ("falls with the delay", "delay", SMOOTH, (0.0, 1e-3, 3e-3, 1e-2)),
     ("falls with a coarse encoder", "quantum", DRY, (0.0, 5e-6, 2e-5, 8e-5)),
     ("a filter helps until its lag costs more", "filter", ROUGH, (None, 100.0, 30.0, 10.0, 3.0)),
-    ("so does a longer window", "window", ROUGH, (1, 4, 16, 64)),
+    ("so does a longer window", "velocity_window", ROUGH, (1, 4, 16, 64)),
 )
 
 
@@ -46,7 +46,7 @@ def measure(case: Case, quick: bool) -> list[dict[str, Any]]:
     about, vary, wall, values = case
     if quick:
         values = values[:: len(values) - 1] if vary != "filter" else (None, 30.0, 3.0)
-    found = hc.zwidth(wall, vary, values, quick=quick)
+    found = hc.walls.zwidth(wall, vary, values, quick=quick)
     return [
         {
             "about": about,

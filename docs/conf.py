@@ -26,8 +26,10 @@ from matplotlib.figure import Figure  # noqa: E402
 from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 import hapticclay as hc  # noqa: E402
-from hapticclay.model import scenario, spring  # noqa: E402
+from hapticclay.model import spring  # noqa: E402
+from hapticclay.scene import scenario  # noqa: E402
 from hapticclay.views.record_plots import RecordPlots  # noqa: E402
+from tests.public import NAMES, told_by, used_in  # noqa: E402
 
 CHECKED = {  # imported for type checks alone, or by the module of a base class
     "np": np,
@@ -60,7 +62,7 @@ suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
-    ("py:class", r"hapticclay\.model\.fields\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.scene\.fields\.T|mujoco\._structs\.MjModel"),
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
 ]
 linkcheck_timeout = 20
@@ -169,7 +171,12 @@ def plain_types(app, call, bound_method: bool) -> None:
     call = getattr(call, "__func__", call)
     spelled = getattr(call, "__annotations__", {})
     if signature := getattr(call, "__signature__", None):
-        spelled = {name: p.annotation for name, p in signature.parameters.items()}
+        spelled = {
+            name: re.sub(r" \[[^\]]*\]$", "", p.annotation)
+            if isinstance(p.annotation, str)
+            else p.annotation
+            for name, p in signature.parameters.items()
+        }
     module = vars(sys.modules.get(call.__module__, hc))
     found = {name: resolved(text, module) for name, text in spelled.items()}
     if signature:
@@ -180,7 +187,7 @@ def plain_types(app, call, bound_method: bool) -> None:
 
 
 def plain_defaults(app, what, name, thing, options, signature, returned):
-    """Writes ... for a default that is made anew, which is no Python as dataclasses print it.
+    """Writes a signature as Python: ... for a default that is made anew, and types without units.
 
     Args:
         app: the application.
@@ -191,7 +198,8 @@ def plain_defaults(app, what, name, thing, options, signature, returned):
         signature: the text of its arguments.
         returned: the text of what it returns.
     """
-    return (signature or "").replace("<factory>", "...") or None, returned
+    spelled = (signature or "").replace("<factory>", "...").replace("np.ndarray", "numpy.ndarray")
+    return re.sub(r"(?<!=) \[[^\]]*\]", "", spelled) or None, returned
 
 
 def resolved(annotation, module: dict):
@@ -274,11 +282,10 @@ def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
     """Examples by the public name that they use, and how many names each uses."""
     uses: dict[str, set[str]] = collections.defaultdict(set)
     for path in SOURCES:
-        for name in set(re.findall(r"\bhc\.(\w+)", path.read_text())):
+        for name in used_in(path.read_text()):
             uses[f"hapticclay.{name}"].add(os.path.relpath(path, DOCS))
-    for name in hc.__all__:  # what a function returns, as a Verdict
-        returned = str(getattr(getattr(hc, name), "__annotations__", {}).get("return", ""))
-        for result in set(re.findall(r"\w+", returned)) & set(hc.__all__):
+    for name in NAMES:  # what a function returns, as a Verdict, and what that consists of
+        for result in told_by(name):
             uses[f"hapticclay.{result}"] |= uses[f"hapticclay.{name}"]
     return uses, collections.Counter(path for paths in uses.values() for path in paths)
 

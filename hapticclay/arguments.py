@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import functools
 import inspect
 import os
+import pkgutil
+import re
+import sys
 import types
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from .errors import ParameterError
 
@@ -71,8 +76,82 @@ def named(made: F) -> F:
 
     if isinstance(made, type):
         made.__init__ = guarded
+        made.__signature__ = SignatureInWords()  # type: ignore[attr-defined]
         return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
+
+
+class SignatureInWords:
+    """The signature of a class, and of each of its subclasses, with units in words."""
+
+    def __get__(self, instance: Any, owner: type) -> inspect.Signature:
+        init: Any = owner.__init__
+        scopes = [vars(sys.modules[kind.__module__]) for kind in owner.__mro__]
+        told = in_words(inspect.signature(init), ChainMap(*scopes))
+        return told.replace(parameters=list(told.parameters.values())[1:])
+
+
+class Words(str):
+    """An annotation that a signature shows as it is."""
+
+    __repr__ = str.__str__
+
+
+def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.Signature:
+    """A signature with units in place of bounds: `float [N/m]`.
+
+    Args:
+        signature: of the constructor of a dataclass.
+        scope: names of its module.
+    """
+    return signature.replace(
+        parameters=[
+            p.replace(annotation=unit_in_words(p.annotation, scope))
+            for p in signature.parameters.values()
+        ]
+    )
+
+
+def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
+    """An annotation with a unit in place of a bound, and for its aliases what they stand for.
+
+    Args:
+        hint: the annotation, as it was written.
+        scope: names that stand for annotations.
+    """
+    if not isinstance(hint, str):
+        return hint
+    unit = ""
+    if found := re.fullmatch(r"Annotated\[(.*), (?:Bound\((.*)\)|(\w+))\]", hint, re.S):
+        hint, inner, name = found.groups()
+        unit = (
+            scope[name].unit if name else "".join(re.findall(r"(?:, |unit=)'([^']+)'", inner)[:1])
+        )
+    units = [unit] if unit else []
+
+    def spelled(match: re.Match[str]) -> str:
+        named_ = scope.get(match[0])
+        if get_origin(named_) is Annotated:
+            units.append(get_args(named_)[1].unit)
+        return _alias_text(named_) or match[0]
+
+    text = re.sub(r"\b(?<!')[A-Z]\w*\b(?!')", spelled, hint)
+    return Words(text + _of_unit(", ".join(dict.fromkeys(filter(None, units)))))
+
+
+def _alias_text(kind: Any) -> str:
+    """What an alias of a type stands for; "" for what is none."""
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    elif get_origin(kind) not in (Literal, Union, types.UnionType):
+        return ""
+    if isinstance(kind, type) and not get_args(kind):
+        return kind.__name__
+    return str(kind).replace("typing.", "")
+
+
+def _of_unit(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
 
 
 def checked(made: F) -> F:
@@ -143,3 +222,16 @@ def _in_words(kind: Any) -> str:
     if kind is str:
         return IN_WORDS[os.PathLike]
     return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
+
+
+def function_name(function: Any) -> str:
+    """The name "package.module:name" by which others find a function; "" if they do not.
+
+    Args:
+        function: the function.
+    """
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    with contextlib.suppress(ImportError, AttributeError, ValueError):
+        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
+            return name
+    return ""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import functools
 import math
 import numbers
 import types
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import (
     TYPE_CHECKING,
@@ -543,3 +544,22 @@ def _check_text(field: str, value: Any, part: Any) -> Any:
     if not isinstance(value, str) or not value:
         raise ParameterError(field, value, "must be a non-empty string")
     return value
+
+
+@contextlib.contextmanager
+def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
+    """Says how to install a package where importing it fails.
+
+    Args:
+        what: what needs it, for the error.
+        package: its name.
+        extra: of hapticclay, that brings it.
+
+    Raises:
+        ParameterError: the package is not installed.
+    """
+    try:
+        yield
+    except ImportError:
+        bound = f"is not installed: pip install 'hapticclay[{extra}]'"
+        raise ParameterError(what, package, bound) from None

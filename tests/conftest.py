@@ -15,7 +15,7 @@ from hypothesis import settings
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
-from hapticclay.simulation import simulate  # noqa: E402
+from hapticclay.simulation import engines  # noqa: E402
 from hapticclay.stepping.notice import Notice  # noqa: E402
 
 try:
@@ -95,7 +95,7 @@ def pytest_runtest_protocol(item):
 def auto_engine(request, monkeypatch):
     """Steps in Python where they are what is tested."""
     if request.node.get_closest_marker("plain"):
-        monkeypatch.setattr(simulate, "repays", lambda kind, time: False)
+        monkeypatch.setattr(engines, "repays", lambda kind, time: False)
 
 
 @pytest.fixture(scope="session")

@@ -53,7 +53,7 @@ class Job:
             and s.clay.x.edges == EDGES[:2]
             and s.length == EDGES[2]
         )
-        assert not s.shaping and s.start == (0.0, 0.0)
+        assert not s.inertia_shaping and s.start == (0.0, 0.0)
         o = s.operator
         th = (o.mass, o.damper, o.spring) if o else (0.0, 0.0, 0.0)
         return cls(

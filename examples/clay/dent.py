@@ -13,7 +13,7 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 k, limit = 2e3, 4.0  # N/m, N
-spring = hc.Spring(k=k, limit=limit, surface=True)
+spring = hc.Spring(k=k, limit=limit, unilateral=True)
 wall = hc.Profile((0.02,), (0.0, 60.0), springs=(hc.Spring(), spring))
 push = hc.Ramp((6.0, 0.0), start=0.0, end=1.0) - hc.Ramp((8.0, 0.0), start=1.0, end=2.0)
 scenario = hc.Scenario(
@@ -24,7 +24,7 @@ scenario = hc.Scenario(
     t_max=2.0,
 )
 record = hc.simulate(scenario)
-lost = record.energy["springs_lost"]
+lost = record.energy["springs_dissipated"]
 print(f"{1e3 * lost:.2f} mJ lost, {1e3 * lost / limit:.2f} mm of dent")
 
 fig, ax = plt.subplots()

@@ -14,7 +14,7 @@ plt.style.use("hapticclay.views.figure")
 
 pressure, tool = 20e3, hc.Tool(width=0.010, depth=0.005)  # Pa, m
 block = hc.Groove(x=(0.02, 0.08), y=(-0.02, 0.02), pressure=pressure, tool=tool, cells=(72, 48))
-cut = dict(gain=(1.0, 0.0), force=(2.0, 0.0), length=0.1, shaping=True, dt=1e-3)
+cut = dict(gain=(1.0, 0.0), force=(2.0, 0.0), length=0.1, inertia_shaping=True, dt=1e-3)
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 5.4), height_ratios=(2, 3))
 record = None
 for y, name in ((0.0, "first"), (0.0, "again"), (0.005, "half a width beside")):

@@ -2,7 +2,7 @@
 Materials by name
 =================
 
-``hc.material`` turns the published strength of a clay into the force of a tool in it, and
+``hc.materials.material`` turns the published strength of a clay into the force of a tool in it, and
 ``Material.range`` tells how far that number may be off.
 """
 
@@ -13,9 +13,9 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 tool = hc.Tool(width=0.010, depth=0.005)  # m
-names = [name for name in hc.MATERIALS if hc.material(name, tool).Fy > 0.0]
-forces = [hc.material(name, tool).Fy for name in names]
-ranges = [hc.MATERIALS[name].range(tool) for name in names]
+names = [name for name in hc.materials.MATERIALS if hc.materials.material(name, tool).Fy > 0.0]
+forces = [hc.materials.material(name, tool).Fy for name in names]
+ranges = [hc.materials.MATERIALS[name].range(tool) for name in names]
 below = [f - low.Fy for f, (low, _) in zip(forces, ranges, strict=True)]
 above = [high.Fy - f for f, (_, high) in zip(forces, ranges, strict=True)]
 

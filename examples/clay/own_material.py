@@ -13,7 +13,7 @@ import hapticclay as hc
 
 plt.style.use("hapticclay.views.figure")
 
-mine = hc.Material(source="vane test, 12 samples", strength=(18e3, 22e3))  # Pa
+mine = hc.materials.Material(source="vane test, 12 samples", strength=(18e3, 22e3))  # Pa
 depths = np.linspace(1e-3, 20e-3, 40)  # m
 fig, ax = plt.subplots()
 for width in (0.005, 0.010, 0.020):

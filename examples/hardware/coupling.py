@@ -20,18 +20,18 @@ base = hc.Scenario(
     Ts=Ts,
     force=(0.2, 0.0),
     gain=(0.3, 0.3),
-    shaping=True,
+    inertia_shaping=True,
     start=(0.049, 0.0),
     torque_limit=(1e6, 1e6),  # N.m, so that nothing but the hold matters
     length=None,
     t_max=0.3,
-    stop=False,
+    stop_when_unstable=False,
 )
 couplings = {"held by the motors": None, "coupled": hc.Coupling(spring=5e4, damper=500.0)}
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.8))
 for name, coupling in couplings.items():
-    interface = hc.Interface(coupling=coupling)
-    record = hc.simulate(hc.with_fields(base, {"interface": interface}))
+    hardware = hc.Hardware(coupling=coupling)
+    record = hc.simulate(hc.with_fields(base, {"hardware": hardware}))
     print(f"{name}: {record.status}")
     t = 1e3 * (record.t - record.crossings[0].time)
     above.plot(t, 100 * record.v[:, 0], ".-", ms=3, lw=0.8, label=name)

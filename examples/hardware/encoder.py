@@ -18,14 +18,14 @@ plt.style.use("hapticclay.views.figure")
 counts, Ts = 65536, 0.36e-3
 parts = {
     "window of 1 sample": dict(),
-    "window of 16 samples": dict(window=16),
+    "window of 16 samples": dict(velocity_window=16),
     "1 sample and a filter of 30 Hz": dict(velocity_filter=30.0),
 }
 fig, axes = plt.subplots(3, 1, sharex=True, sharey=True, figsize=(6.4, 5.4))
 for ax, (name, part) in zip(axes, parts.items(), strict=True):
-    interface = hc.Interface(encoder=counts, velocity="difference", **part)
-    cut = hc.constant_cut(control="sampled", force=(5.0, 0.0), shaping=True, length=0.12)
-    record = hc.simulate(hc.with_fields(cut, {"interface": interface}))
+    hardware = hc.Hardware(encoder=counts, velocity="difference", **part)
+    cut = hc.constant_cut(control="sampled", force=(5.0, 0.0), inertia_shaping=True, length=0.12)
+    record = hc.simulate(hc.with_fields(cut, {"hardware": hardware}))
     felt = record.ratio(record.fe)[:, 0]
     inside = (record.p[:, 0] > 0.08) & (record.p[:, 0] < 0.11)
     ax.plot(100 * record.p[:, 0], felt, lw=0.8)

@@ -3,8 +3,8 @@ How much clay can motors hold?
 ==============================
 
 Clay that a computer renders is passive up to the physical damping of the handle, whatever the
-sample (``hc.clay_passivity``). That is of all hands and motions; a single run is passive if the
-hand has at no time got back more energy than it put in.
+sample (``hc.theory.clay_passivity``). That is of all hands and motions; a single run is passive if
+the hand has at no time got back more energy than it put in.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,7 @@ plt.style.use("hapticclay.views.figure")
 
 damping = 5.0  # N.s/m, physical
 for b in (4.0, 6.0):
-    verdict = hc.clay_passivity(b, Ts=1e-3, damping=damping)
+    verdict = hc.theory.clay_passivity(b, Ts=1e-3, damping=damping)
     print(f"b = {b:g}: passive {verdict.verdict}, {verdict.margin:.1f} {verdict.measures}")
 
 cut = hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.0), control="sampled")

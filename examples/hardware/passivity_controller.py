@@ -20,16 +20,16 @@ base = hc.Scenario(
     control="sampled",
     Ts=Ts,
     force=(0.2, 0.0),
-    shaping=True,
+    inertia_shaping=True,
     start=(0.049, 0.0),
     torque_limit=(1e6, 1e6),  # N.m, so that nothing but the hold matters
     length=None,
     t_max=0.15,
-    stop=False,
+    stop_when_unstable=False,
 )
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.8))
 for name, on in (("without", False), ("with the controller", True)):
-    record = hc.simulate(hc.with_fields(base, {"interface": hc.Interface(passivity=on)}))
+    record = hc.simulate(hc.with_fields(base, {"hardware": hc.Hardware(passivity=on)}))
     taken = np.cumsum(record.fe[:-1, 0] * np.diff(record.p[:, 0]))  # J, each force held for Ts
     print(f"{name}: {record.status}; least energy {1e3 * taken.min():.3g} mJ")
     t = 1e3 * (record.t - record.crossings[0].time)

@@ -3,7 +3,7 @@ Sampled control, delay and jitter
 =================================
 
 Hardware measures, computes and holds. With ``control="sampled"`` a run does the same, every Ts, as
-late and as unevenly as ``hc.Interface`` says. A cut close to its gain limit shows what this costs.
+late and as unevenly as ``hc.Hardware`` says. A cut close to its gain limit shows what this costs.
 """
 
 import matplotlib.pyplot as plt
@@ -19,16 +19,16 @@ loops = {
     "sampled, 0.36 ms": hc.constant_cut(control="sampled", **common),
     "sampled, 1.44 ms": hc.constant_cut(control="sampled", Ts=1.44e-3, **common),
 }
-jitter = hc.Interface(delay=0.36e-3, jitter=0.1e-3)  # s
+jitter = hc.Hardware(delay=0.36e-3, jitter=0.1e-3)  # s
 loops["a sample late, with jitter"] = hc.with_fields(
-    hc.constant_cut(control="sampled", **common), {"interface": jitter}
+    hc.constant_cut(control="sampled", **common), {"hardware": jitter}
 )
 fig, axes = plt.subplots(len(loops), 1, sharex=True, sharey=True, figsize=(6.4, 6.0))
 for ax, (name, scenario) in zip(axes, loops.items(), strict=True):
     record = hc.simulate(scenario)
-    limit = hc.gain_limit(scenario, "x") if not scenario.interface else float("nan")
-    if scenario.interface:
-        limit = hc.gain_limit("x", b, Ts=0.36e-3, delay=0.36e-3)
+    limit = hc.theory.gain_limit(scenario, "x") if not scenario.hardware else float("nan")
+    if scenario.hardware:
+        limit = hc.theory.gain_limit("x", b, Ts=0.36e-3, delay=0.36e-3)
     t = record.t - record.crossings[0].time
     ax.plot(t, 100 * record.v[:, 0])
     ax.set_title(f"{name}: K = {K:g} of {limit:.2f} 1/kg at most", fontsize=9, loc="left")

@@ -22,7 +22,9 @@ for name, arm in arms.items():
     scenario = hc.with_fields(hc.constant_cut(b=40.0), {"arm": arm})
     record = hc.simulate(scenario)
     W = arm.nominal_mobility[0]
-    print(f"{name}: {record.status}, limit of K on x {hc.gain_limit(scenario, 'x'):.2f} 1/kg")
+    print(
+        f"{name}: {record.status}, limit of K on x {hc.theory.gain_limit(scenario, 'x'):.2f} 1/kg"
+    )
     t = record.t - record.crossings[0].time
     ax.plot(t, 100 * record.v[:, 0], label=f"{name}, W = {W:.2f} 1/kg")
 ax.axhline(100.0 / 50.0, color="0.3", ls="--", lw=1, label="expected, K f/(10 + K b)")

@@ -21,7 +21,7 @@ scenario = hc.Scenario(
     gain=(K, 0.5),
     force=(0.0, 0.0),
     muscle=chirp,
-    shaping=True,
+    inertia_shaping=True,
     length=None,
     t_max=30.0,
 )

@@ -3,7 +3,8 @@ A compensator of your own
 =========================
 
 Any proper transfer function up to order 4 takes the place of K/(s² + 10 s). At equal stability
-margin a lead shows the hand more of the clay: ``hc.compare`` finds the gain of each and sorts them.
+margin a lead shows the hand more of the clay: ``hc.theory.compare`` finds the gain of each and
+sorts them.
 """
 
 import matplotlib.pyplot as plt
@@ -22,8 +23,8 @@ shapes = {
 omega = np.geomspace(0.1, 300.0, 400)  # rad/s
 fig, ax = plt.subplots()
 for name, shape in shapes.items():
-    (best,) = hc.compare("x", b, [shape], hand, disk_margin=0.5, delay_margin=0.005)
-    share = hc.transparency("x", best.K, b, omega=omega, compensator=shape)
+    (best,) = hc.theory.compare("x", b, [shape], hand, disk_margin=0.5, delay_margin=0.005)
+    share = hc.theory.transparency("x", best.K, b, omega=omega, compensator=shape)
     ax.semilogx(omega, np.abs(share), label=f"{name}, K = {best.K:.3g}")
     print(f"{name}: K = {best.K:.4f}, error {best.error:.4f}")
 ax.axvspan(0.3, 30.0, color="0.94", lw=0)

@@ -22,7 +22,7 @@ hands = {
 dampings = np.geomspace(1.0, 1e4, 60)  # N.s/m
 fig, ax = plt.subplots()
 for name, hand in hands.items():
-    limits = [hc.gain_limit("y", float(b), hand) for b in dampings]
+    limits = [hc.theory.gain_limit("y", float(b), hand) for b in dampings]
     ax.loglog(dampings, limits, label=name)
 ax.axhline(0.5, color="0.3", ls="--", lw=1, label="K = 0.5, of the cut")
 ax.set(xlabel="damping of the clay b [N·s/m]", ylabel="largest stable K on y [1/kg]")

@@ -10,13 +10,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hapticclay as hc
-from hapticclay.theory.linear_loop import Loop
 
 plt.style.use("hapticclay.views.figure")
 
-hands = hc.Hands.around(hc.Operator(), variation=0.5)
+hands = hc.studies.Hands.around(hc.Operator(), variation=0.5)
 b = np.geomspace(10.0, 500.0, 13)  # N.s/m
-band = hc.gain_band(Loop("x"), hands, b.tolist(), hc.Draw(hands=60))
+band = hc.studies.gain_band(hc.theory.Loop("x"), hands, b.tolist(), hc.studies.Draw(hands=60))
 fig, ax = plt.subplots()
 low, high = band.quantile(0.05), np.minimum(band.quantile(0.95), 1e6)  # inf is no limit
 ax.fill_between(b, low, high, alpha=0.3, label="5 to 95 % of hands")

@@ -11,21 +11,19 @@ import tempfile
 import matplotlib.pyplot as plt
 
 import hapticclay as hc
-from hapticclay.studies.boundary import PushedLoop
-from hapticclay.studies.sampling import Range
 
 plt.style.use("hapticclay.views.figure")
 
-trials = hc.Trials(
-    PushedLoop("x", b=90.0, Ts=1e-3),  # N.s/m, s
-    vary={"delay": hc.Distribution("uniform", 0.0, 2e-3)},  # s
-    hands=hc.Hands.around(hc.Operator(), variation=0.5),
-    grid={"K": Range(1.0, 5.0, 4)},
+trials = hc.studies.Trials(
+    hc.studies.PushedLoop("x", b=90.0, Ts=1e-3),  # N.s/m, s
+    vary={"delay": hc.studies.Distribution("uniform", 0.0, 2e-3)},  # s
+    hands=hc.studies.Hands.around(hc.Operator(), variation=0.5),
+    grid={"K": hc.studies.Range(1.0, 5.0, 4)},
     runs=30,  # of each K
 )
 with tempfile.TemporaryDirectory() as folder:
-    hc.monte_carlo(trials, out=folder)
-    result = hc.stored_runs(trials, folder)
+    hc.studies.monte_carlo(trials, out=folder)
+    result = hc.studies.stored_runs(trials, folder)
 print(f"over all K: {result.total}")
 
 chart = result.map()

@@ -17,7 +17,7 @@ scenario = hc.Scenario(  # a hit, and the way back out
     force=(-2.0, 0.0),
     start=(0.03, 0.0),
     velocity=(0.3, 0.0),
-    shaping=True,
+    inertia_shaping=True,
     length=None,
     t_max=1.0,
 )

@@ -23,7 +23,7 @@ for b, marker in ((300.0, "o"), (1000.0, "s"), (10000.0, "^")):
         force=(0.0, 0.0),
         start=(0.03, 0.0),
         velocity=(0.3, 0.0),  # m/s
-        shaping=True,
+        inertia_shaping=True,
         length=None,
         t_max=0.1,
     )

@@ -16,14 +16,14 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 k, v0 = 1e6, 0.2  # N/m, m/s
-wall = hc.Profile((0.05,), (0.0, 0.0), springs=(hc.Spring(), hc.Spring(k=k, surface=True)))
+wall = hc.Profile((0.05,), (0.0, 0.0), springs=(hc.Spring(), hc.Spring(k=k, unilateral=True)))
 scenario = hc.Scenario(
     clay=hc.Clay(wall, hc.Profile((), (0.0,))),
     gain=(0.0, 0.0),
     force=(0.0, 0.0),
     start=(0.048, 0.0),
     velocity=(v0, 0.0),
-    shaping=True,
+    inertia_shaping=True,
     length=None,
     t_max=0.03,
 )

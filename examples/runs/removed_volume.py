@@ -2,9 +2,9 @@
 The volume of a cut
 ===================
 
-``hc.removed`` is what a tool at the handle has taken away, to 0.5 %. A straight cut through the
-slab removes width × depth × length. The tool is round: its front is ahead of the handle by half a
-width.
+``hc.studies.removed`` is what a tool at the handle has taken away, to 0.5 %. A straight cut through
+the slab removes width × depth × length. The tool is round: its front is ahead of the handle by half
+a width.
 """
 
 import matplotlib.pyplot as plt
@@ -15,8 +15,8 @@ plt.style.use("hapticclay.views.figure")
 
 width, depth = 0.02, 0.01  # m
 record = hc.simulate(hc.constant_cut())
-volume, rate = hc.removed(record, width=width, depth=depth)
-through_air, _ = hc.removed(hc.simulate(hc.free()), width=width, depth=depth)
+volume, rate = hc.studies.removed(record, width=width, depth=depth)
+through_air, _ = hc.studies.removed(hc.simulate(hc.free()), width=width, depth=depth)
 print(f"{1e6 * volume[-1]:.3f} cm3, expected {1e6 * width * depth * 0.1:.3f}")
 print(f"in free space {through_air[-1]:g}")
 

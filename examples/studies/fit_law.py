@@ -2,8 +2,8 @@
 The law of a clay from a record
 ===============================
 
-``hc.fit_flow`` chooses among five laws, and finds the parameters, from time, position and force
-that are noisy and rounded. Nothing is differentiated, so that noise does not bias the law.
+``hc.studies.fit_flow`` chooses among five laws, and finds the parameters, from time, position and
+force that are noisy and rounded. Nothing is differentiated, so that noise does not bias the law.
 """
 
 import math
@@ -25,7 +25,7 @@ record = hc.simulate(scenario, every=4)
 rng = np.random.default_rng(1)
 p = np.round((record.p[:, 0] + 1e-5 * rng.standard_normal(len(record.t))) / 3e-5) * 3e-5
 f = np.round((record.fe[:, 0] + 0.05 * rng.standard_normal(len(record.t))) / 0.02) * 0.02
-fitted = hc.fit_flow(hc.Measurement(record.t, input=f, output=p))
+fitted = hc.studies.fit_flow(hc.studies.Measurement(record.t, input=f, output=p))
 print("law:", fitted.law)
 for name, x in zip(("Fy", "K", "n"), fitted.parameters, strict=True):
     print(f"{name}: {x.low:.3f} to {x.high:.3f}, true {getattr(true, name):g}")

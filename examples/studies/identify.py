@@ -13,7 +13,7 @@ import hapticclay as hc
 
 plt.style.use("hapticclay.views.figure")
 
-found = hc.identify("x", "G", noise=hc.Noise())
+found = hc.studies.identify("x", "G", noise=hc.studies.Noise())
 for c in found.coefficients:
     print(f"{c.name}: {c.low:.2f} to {c.high:.2f} {c.unit}, printed {c.printed:g}")
 

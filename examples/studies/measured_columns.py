@@ -2,8 +2,8 @@
 Identify from columns of your own
 =================================
 
-``hc.identify_data`` takes time, input and output as they were measured. Here they come from a run:
-a chirp as the command, the position rounded to counts.
+``hc.studies.identify_data`` takes time, input and output as they were measured. Here they come from
+a run: a chirp as the command, the position rounded to counts.
 """
 
 import matplotlib.pyplot as plt
@@ -15,12 +15,17 @@ plt.style.use("hapticclay.views.figure")
 
 chirp = hc.Chirp((0.01, 0.0), low=0.2, high=12.0, duration=30.0)  # m, Hz, s
 scenario = hc.Scenario(
-    gain=(0.0, 0.0), force=(0.0, 0.0), command=chirp, shaping=True, length=None, t_max=30.996
+    gain=(0.0, 0.0),
+    force=(0.0, 0.0),
+    command=chirp,
+    inertia_shaping=True,
+    length=None,
+    t_max=30.996,
 )
 record = hc.simulate(scenario, every=3)
 position = np.round(record.p[:, 0] / 1e-5) * 1e-5
-data = hc.Measurement(record.t, input=record.delta[:, 0], output=position)
-found = hc.identify_data(data, "G", "x", band=(0.3, 10.0))
+data = hc.studies.Measurement(record.t, input=record.delta[:, 0], output=position)
+found = hc.studies.identify_data(data, "G", "x", band=(0.3, 10.0))
 for c in found.coefficients:
     print(f"{c.name}: {c.low:.2f} to {c.high:.2f} {c.unit}, true {c.printed:g}")
 

@@ -13,8 +13,8 @@ import hapticclay as hc
 
 plt.style.use("hapticclay.views.figure")
 
-loop = hc.Loop("y", K=1.0)
-((low, high),) = hc.unstable_dampings(loop)
+loop = hc.theory.Loop("y", K=1.0)
+((low, high),) = hc.theory.unstable_dampings(loop)
 V = np.geomspace(1e-4, 1.0, 200)  # m/s
 flows = {
     "Bingham": hc.Flow(Fy=5.0, b=30.0),
@@ -25,11 +25,11 @@ flows = {
 fig, ax = plt.subplots()
 ax.axhspan(low, high, color="0.92", label="the loop is unstable")
 for name, flow in flows.items():
-    ax.loglog(V, hc.describing_function(flow, V), label=name)
-    for cycle in hc.limit_cycles(loop, flow):
+    ax.loglog(V, hc.theory.describing_function(flow, V), label=name)
+    for cycle in hc.theory.limit_cycles(loop, flow):
         print(f"{name}: {cycle.kind} at {cycle.speed:.4f} m/s, {cycle.frequency:.2f} Hz")
         style = "o" if cycle.kind == "limit cycle" else "x"
-        ax.plot(cycle.speed, hc.describing_function(flow, cycle.speed), style, color="0.2")
+        ax.plot(cycle.speed, hc.theory.describing_function(flow, cycle.speed), style, color="0.2")
 ax.plot([], [], "o", color="0.2", label="limit cycle")
 ax.plot([], [], "x", color="0.2", label="threshold")
 ax.set(xlabel="amplitude of the velocity [m/s]", ylabel="N [N·s/m]", xlim=(1e-4, 1.0))

@@ -3,7 +3,8 @@ A limit cycle in clay that yields
 =================================
 
 The loop of y at K = 1 sticks after a small push and oscillates after a large one. The describing
-function predicts speed and frequency, ``hc.exact_cycles`` has them exactly, and a run shows them.
+function predicts speed and frequency, ``hc.theory.exact_cycles`` has them exactly, and a run shows
+them.
 """
 
 import matplotlib.pyplot as plt
@@ -13,11 +14,11 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 flow = hc.Flow(Fy=0.5, b=30.0)  # N, N.s/m
-loop = hc.Loop("y", K=1.0)
-print("a small push:", hc.push_outcomes(loop, flow)[0], "- a large one:", end=" ")
-print(hc.push_outcomes(loop, flow)[1])
-predicted = hc.limit_cycles(loop, flow)[-1]
-exact = hc.exact_cycles(loop, flow)[-1]
+loop = hc.theory.Loop("y", K=1.0)
+print("a small push:", hc.theory.push_outcomes(loop, flow)[0], "- a large one:", end=" ")
+print(hc.theory.push_outcomes(loop, flow)[1])
+predicted = hc.theory.limit_cycles(loop, flow)[-1]
+exact = hc.theory.exact_cycles(loop, flow)[-1]
 print(f"predicted {predicted.speed:.4f} m/s, {predicted.frequency:.3f} Hz")
 print(f"exact     {exact.speed:.4f} m/s, {exact.frequency:.3f} Hz")
 
@@ -28,11 +29,11 @@ for push, name in ((0.05, "pushed at 5 cm/s"), (1e-4, "pushed at 0.1 mm/s")):
         gain=(0.0, 1.0),
         force=(0.0, 0.0),
         velocity=(0.0, push),
-        shaping=True,
+        inertia_shaping=True,
         torque_limit=(1e6, 1e6),
         length=None,
         t_max=3.0,
-        stop=False,
+        stop_when_unstable=False,
     )
     record = hc.simulate(scenario)
     ax.plot(record.t, 100 * record.v[:, 1], lw=1, label=name)

@@ -13,12 +13,12 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 axis, b, hand = "y", 90.0, hc.Operator()
-limit = hc.gain_limit(axis, b, hand)
+limit = hc.theory.gain_limit(axis, b, hand)
 fig, ax = plt.subplots(figsize=(5.2, 4.4))
 for share in (0.5, 1.0, 1.5):
     K = share * limit
-    curve = hc.nyquist(axis, K, b, hand, at="compensator")
-    low = hc.margins(axis, K, b, hand).gain[1]
+    curve = hc.theory.nyquist(axis, K, b, hand, at="compensator")
+    low = hc.theory.margins(axis, K, b, hand).gain[1]
     print(f"K = {K:.3f}: Z = N + P = {curve.N} + {curve.P} = {curve.Z}, gain margin {low:.2f}")
     ax.plot(curve.L.real, curve.L.imag, label=f"K = {share:g} of the limit, Z = {curve.Z}")
 ax.plot(-1, 0, "k+", ms=12, mew=2)

@@ -3,7 +3,7 @@ Poles over the gain
 ===================
 
 The poles of the closed loop of y as K grows. They leave the left half-plane where
-``hc.gain_limit`` says so.
+``hc.theory.gain_limit`` says so.
 """
 
 import matplotlib.pyplot as plt
@@ -14,14 +14,14 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 b, hand = 90.0, hc.Operator()
-limit = hc.gain_limit("y", b, hand)
+limit = hc.theory.gain_limit("y", b, hand)
 gains = np.geomspace(0.01, 3.0 * limit, 300)
-poles = np.array([hc.closed_loop_poles("y", float(K), b, hand) for K in gains])
+poles = np.array([hc.theory.closed_loop_poles("y", float(K), b, hand) for K in gains])
 fig, ax = plt.subplots()
 colors = np.repeat(gains, poles.shape[1])
 dots = ax.scatter(poles.real, poles.imag, c=colors, s=3, cmap="viridis", norm="log")
 fig.colorbar(dots, ax=ax, label="K [1/kg]")
-at = hc.closed_loop_poles("y", limit, b, hand)
+at = hc.theory.closed_loop_poles("y", limit, b, hand)
 at = at[np.abs(at.real) < 1e-6]
 print(f"at K = {limit:.4f}: {at}")
 ax.plot(at.real, at.imag, "o", color="#D55E00", mfc="none", ms=9, label=f"K = {limit:.3f}")

@@ -18,14 +18,14 @@ b = 90.0  # N.s/m
 gains = np.geomspace(0.02, 5.0, 60)
 fig, ax = plt.subplots()
 for equation in (9, 11, 13):
-    margins = [hc.small_gain("x", float(K), b, equation=equation).margin for K in gains]
+    margins = [hc.theory.small_gain("x", float(K), b, equation=equation).margin for K in gains]
     ax.loglog(gains, margins, label=f"Eq. {equation}, no hand")
-margins = [hc.small_gain("x", float(K), b, hc.Operator(), equation=13).margin for K in gains]
+margins = [hc.theory.small_gain("x", float(K), b, hc.Operator(), equation=13).margin for K in gains]
 print(f"with the paper's hand, Eq. 13: at most {max(margins):.1g}")
-limit = hc.gain_limit("x", b)
+limit = hc.theory.gain_limit("x", b)
 ax.axvline(limit, color="0.3", lw=1, label=f"exact limit, {limit:.2f}")
 ax.axhline(1.0, color="0.3", ls="--", lw=1)
-error = hc.transparency_error("x", 1.0, b)
+error = hc.theory.transparency_error("x", 1.0, b)
 print(f"at K = 1 the clay's share of the force is off by {error:.3f} rms")
 ax.set(xlabel="K [1/kg]", ylabel="margin: holds above 1 (Eq. 9: above 0)", ylim=(1e-2, 1e2))
 ax.legend()

@@ -2,8 +2,9 @@
 The worst hand of a box
 =======================
 
-A loop that is stable with one hand may be unstable with another. ``hc.worst_case`` finds the lowest
-gain limit over a whole box of hands, and the hand that has it; random members never do worse.
+A loop that is stable with one hand may be unstable with another. ``hc.theory.worst_case`` finds the
+lowest gain limit over a whole box of hands, and the hand that has it; random members never do
+worse.
 """
 
 import matplotlib.pyplot as plt
@@ -14,13 +15,13 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 b = 90.0  # N.s/m
-box = hc.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))
-worst = hc.worst_case("y", 0.5, b, box)
+box = hc.theory.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))
+worst = hc.theory.worst_case("y", 0.5, b, box)
 print(worst)
 
 hands = box.sample(200, seed=1)
-limits = np.array([hc.gain_limit("y", b, hand) for hand in hands])
-nominal = hc.gain_limit("y", b, hc.Operator())
+limits = np.array([hc.theory.gain_limit("y", b, hand) for hand in hands])
+nominal = hc.theory.gain_limit("y", b, hc.Operator())
 fig, ax = plt.subplots()
 ax.scatter([h.spring for h in hands], limits, c=[h.mass for h in hands], s=14, cmap="viridis")
 fig.colorbar(ax.collections[0], ax=ax, label="mass [kg]")

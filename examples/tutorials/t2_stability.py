@@ -25,13 +25,13 @@ for K in (0.5, 1.0):
 # %%
 # The limit, computed
 # -------------------
-# ``hc.gain_limit`` is the K below which every gain is stable. It is exact for the linear loop of
-# one axis. It depends on the clay, and stiffer clay is not always worse:
+# ``hc.theory.gain_limit`` is the K below which every gain is stable. It is exact for the linear
+# loop of one axis. It depends on the clay, and stiffer clay is not always worse:
 
 dampings = np.geomspace(3.0, 3e4, 60)
 fig, ax = plt.subplots()
 for axis in "xy":
-    limits = [hc.gain_limit(axis, float(b)) for b in dampings]
+    limits = [hc.theory.gain_limit(axis, float(b)) for b in dampings]
     ax.loglog(dampings, limits, label=f"{axis} axis")
 ax.axhline(1.0, color="0.3", ls="--", lw=1)
 ax.axvline(90.0, color="0.3", ls="--", lw=1)
@@ -44,7 +44,7 @@ plt.show()
 # The run and the limit agree: just below the limit an oscillation of y dies out, just above it
 # grows.
 
-limit = hc.gain_limit("y", 90.0)
+limit = hc.theory.gain_limit("y", 90.0)
 fig, ax = plt.subplots()
 for share in (0.95, 1.0, 1.05):
     scenario = hc.Scenario(
@@ -52,10 +52,10 @@ for share in (0.95, 1.0, 1.05):
         gain=(0.0, share * limit),
         force=(0.0, 0.0),
         velocity=(0.0, 0.01),
-        shaping=True,
+        inertia_shaping=True,
         length=None,
         t_max=3.0,
-        stop=False,
+        stop_when_unstable=False,
     )
     run = hc.simulate(scenario)
     ax.plot(run.t, 100 * run.v[:, 1], lw=1, label=f"K = {share:g} of {limit:.4f}")
@@ -66,12 +66,12 @@ plt.show()
 # %%
 # How far from it?
 # ----------------
-# A verdict carries its margin and what it assumes; ``hc.margins`` has gain, phase, delay and disk
-# margins.
+# A verdict carries its margin and what it assumes; ``hc.theory.margins`` has gain, phase, delay and
+# disk margins.
 
-verdict = hc.coupled_stability("x", 1.0, 90.0)
+verdict = hc.theory.coupled_stability("x", 1.0, 90.0)
 print(verdict.verdict, f"{verdict.margin:.2f}", verdict.measures)
-margins = hc.margins("x", 1.0, 90.0)
+margins = hc.theory.margins("x", 1.0, 90.0)
 print(f"phase {np.degrees(margins.phase):.0f}°, delay {1e3 * margins.delay:.0f} ms")
 
 # %%
@@ -80,29 +80,32 @@ print(f"phase {np.degrees(margins.phase):.0f}°, delay {1e3 * margins.delay:.0f}
 # Ts is the control sample, delay the time from a measurement to its torque.
 
 for timing in ({}, dict(Ts=0.36e-3), dict(Ts=0.36e-3, delay=0.36e-3), dict(Ts=2e-3, delay=2e-3)):
-    print(f"{hc.gain_limit('x', 90.0, **timing):.3f} 1/kg with {timing or 'continuous control'}")
+    print(
+        f"{hc.theory.gain_limit('x', 90.0, **timing):.3f} 1/kg with "
+        f"{timing or 'continuous control'}"
+    )
 
 # %%
 # Any hand
 # --------
-# These limits hold without a hand. ``hc.Operator()`` is the paper's hand; ``hc.worst_case`` finds
-# the worst hand of a box, and ``hc.passivity`` asks for all passive hands at once.
+# These limits hold without a hand. ``hc.Operator()`` is the paper's hand; ``hc.theory.worst_case``
+# finds the worst hand of a box, and ``hc.theory.passivity`` asks for all passive hands at once.
 
-box = hc.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))
-worst = hc.worst_case("y", 0.5, 90.0, box)
+box = hc.theory.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))
+worst = hc.theory.worst_case("y", 0.5, 90.0, box)
 print(f"no hand       {limit:.4f} 1/kg")
-print(f"the paper's   {hc.gain_limit('y', 90.0, hc.Operator()):.4f} 1/kg")
+print(f"the paper's   {hc.theory.gain_limit('y', 90.0, hc.Operator()):.4f} 1/kg")
 print(f"worst of box  {worst.limit:.4f} 1/kg, {worst.hand}")
 for axis, K in (("x", 1.0), ("y", 0.5)):
-    passive = hc.passivity(axis, K, 90.0)
+    passive = hc.theory.passivity(axis, K, 90.0)
     print(f"{axis}, K = {K:g}: passive {passive.verdict}, {passive.margin:.0f} N.s/m to spare")
 
 # %%
 # So y at K = 0.5 is stable with every hand of the box, and some other passive hand makes it
-# unstable. ``hc.design_gain`` turns the question round: the largest K with the margins that you
-# ask for.
+# unstable. ``hc.theory.design_gain`` turns the question round: the largest K with the margins that
+# you ask for.
 
-K = hc.design_gain("y", 90.0, hc.Operator(), disk_margin=0.5)
+K = hc.theory.design_gain("y", 90.0, hc.Operator(), disk_margin=0.5)
 print(f"K = {K:.3f} keeps a disk margin of 0.5")
 
 # %%

@@ -10,8 +10,8 @@ own, on hardware with encoders and a delay.
 # An arm
 # ------
 # Lengths and inertias make an arm; link 2 is balanced about the elbow. The engine's model is
-# generated from them. With ``shaping`` the servo hides the arm's inertia, so that the loop is the
-# same on every arm.
+# generated from them. With ``inertia_shaping`` the servo hides the arm's inertia, so that
+# the loop is the same on every arm.
 
 import math
 
@@ -23,7 +23,7 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 arm = hc.Arm(l1=0.3, l2=0.3, I1=0.08, I2=0.5)  # m, kg.m^2
-cut = hc.with_fields(hc.constant_cut(b=40.0, shaping=True), {"arm": arm})
+cut = hc.with_fields(hc.constant_cut(b=40.0, inertia_shaping=True), {"arm": arm})
 print(hc.simulate(cut).status)
 
 # %%
@@ -33,7 +33,7 @@ print(hc.simulate(cut).status)
 # and rates ``qd``, the force ``fh`` of the hand, a state that you keep, and parameters. It
 # returns the torques of shoulder and elbow, and the next state. This one is an admittance
 # controller. The hand's force moves a virtual mass with a damper; the joints follow it with PD
-# control. With ``render="implicit"`` the clay is physical. With "held" the law would have to
+# control. With ``render="physical"`` the clay is physical. With "held" the law would have to
 # render it.
 
 
@@ -70,7 +70,7 @@ scenario = hc.Scenario(
     clay=hc.slab(40.0, 0.05, 0.15),
     control="sampled",
     dt=Ts,
-    render="implicit",
+    render="physical",
     controller=controller,
     force=(1.0, 0.0),
     length=None,
@@ -99,13 +99,18 @@ plt.show()
 # %%
 # On hardware
 # -----------
-# :obj:`~hapticclay.Interface` puts encoders, converters, a delay and friction around the same
+# :obj:`~hapticclay.Hardware` puts encoders, converters, a delay and friction around the same
 # law. Angles come in counts, rates from their differences.
 
-interface = hc.Interface(
-    encoder=65_536, velocity="difference", window=4, delay=Ts, dac_bits=12, friction=(0.05, 0.02)
+hardware = hc.Hardware(
+    encoder=65_536,
+    velocity="difference",
+    velocity_window=4,
+    delay=Ts,
+    dac_bits=12,
+    friction=(0.05, 0.02),
 )
-rough = hc.simulate(hc.with_fields(scenario, {"interface": interface}))
+rough = hc.simulate(hc.with_fields(scenario, {"hardware": hardware}))
 print(rough.status)
 
 fig, ax = plt.subplots()

@@ -24,20 +24,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hapticclay as hc
-from hapticclay.studies.sampling import Sweep, parse_grid
-from hapticclay.studies.sweep import read_sweep, run_sweep
 
 plt.style.use("hapticclay.views.figure")
 
-grid = parse_grid("b=5:2000:7log gain.y=0.1,0.3,0.5,0.7,0.9,1.2")  # N.s/m, 1/kg
-sweep = Sweep("constant", grid, fixed={"t_max": 8.0, "length": 0.1})
+grid = hc.studies.parse_grid("b=5:2000:7log gain.y=0.1,0.3,0.5,0.7,0.9,1.2")  # N.s/m, 1/kg
+sweep = hc.studies.Sweep("constant", grid, fixed={"t_max": 8.0, "length": 0.1})
 folder = Path(tempfile.mkdtemp())
-print(run_sweep(sweep, folder, workers=1), "runs made")
+print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 
 # %%
 # Interrupt it whenever you like: the same call makes what is missing, and no more.
 
-print(run_sweep(sweep, folder, workers=1), "runs made")
+print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 
 # %%
 # Read it
@@ -45,7 +43,7 @@ print(run_sweep(sweep, folder, workers=1), "runs made")
 # ``read_sweep`` returns an Arrow table, one row a run; any reader of Parquet opens the folder as
 # well.
 
-table = read_sweep(folder).to_pandas()
+table = hc.studies.read_sweep(folder).to_pandas()
 print(table[["b", "gain.y", "status", "axis", "end_time", "speed_x", "gain_margin_y"]].head(8))
 print(table.status.value_counts())
 
@@ -61,7 +59,9 @@ fig, ax = plt.subplots()
 for some, marker, label in ((~unstable, "o", "goes on"), (unstable, "x", "unstable")):
     ax.loglog(table.b[some], table["gain.y"][some], marker, label=f"run {label}")
 b = np.geomspace(5.0, 2000.0, 100)
-ax.plot(b, [hc.gain_limit("y", float(i)) for i in b], "--", color="0.3", lw=1, label="gain limit")
+ax.plot(
+    b, [hc.theory.gain_limit("y", float(i)) for i in b], "--", color="0.3", lw=1, label="gain limit"
+)
 ax.set(xlabel="damping of the clay b [N·s/m]", ylabel="K of y [1/kg]", ylim=(0.08, 4))
 ax.legend(ncols=3, loc="upper center")
 plt.show()

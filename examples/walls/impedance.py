@@ -15,11 +15,11 @@ plt.style.use("hapticclay.views.figure")
 
 device = hc.Device(mass=0.1, damper=0.5)  # kg, N.s/m
 wall = hc.VirtualWall(K=300.0, B=2.0, device=device, Ts=1e-3)
-found = hc.measure_impedance(wall)
+found = hc.studies.measure_impedance(wall)
 print(f"measured and computed Z differ by {found.gap:.1e}, fe/fh by {found.felt_gap:.1e}")
 
 omega = 2.0 * np.pi * np.geomspace(0.5, 30.0, 300)  # rad/s
-computed, measured = hc.wall_response(wall, omega), found.measured
+computed, measured = hc.walls.wall_response(wall, omega), found.measured
 fig, axes = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4))
 for ax, part, unit in zip(
     axes, ("stiffness", "damping", "mass"), ("N/m", "N·s/m", "kg"), strict=True
@@ -27,7 +27,7 @@ for ax, part, unit in zip(
     ax.semilogx(measured.frequency, getattr(measured, part), "o", ms=4, label="measured")
     ax.plot(computed.frequency, getattr(computed, part), "-", label="computed")
     ax.set(ylabel=f"effective {part} [{unit}]", ylim=(0.0, {"mass": 0.12}.get(part)))
-free = hc.wall_impedance(hc.VirtualWall(device=device, Ts=1e-3), omega)  # motor off
+free = hc.walls.wall_impedance(hc.VirtualWall(device=device, Ts=1e-3), omega)  # motor off
 axes[2].plot(omega / (2.0 * np.pi), free.imag / omega, "k:", label="device alone")
 axes[0].legend()
 axes[2].legend()

@@ -9,14 +9,13 @@ printed hand and for all hands of a box?
 import matplotlib.pyplot as plt
 
 import hapticclay as hc
-from hapticclay.studies.boundary import PushedLoop
 
 plt.style.use("hapticclay.views.figure")
 
-loop = PushedLoop("x", Ts=0.36e-3, b=0.0, operator=hc.Operator())  # s, without clay
-box = hc.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))  # kg, N.s/m, N/m
-found = hc.arm_mbk(loop, box, columns=1, points=7, samples=2)
-M, B = hc.least_mass(loop, decay=1.0)
+loop = hc.studies.PushedLoop("x", Ts=0.36e-3, b=0.0, operator=hc.Operator())  # s, without clay
+box = hc.theory.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))  # kg, N.s/m, N/m
+found = hc.walls.arm_mbk(loop, box, columns=1, points=7, samples=2)
+M, B = hc.walls.least_mass(loop, decay=1.0)
 print(f"B/M = 1/s: {1e3 * M:.3g} g and {1e3 * B:.3g} mN.s/m; runs differ by {found.gap:.1e}")
 
 fig, ax = plt.subplots()

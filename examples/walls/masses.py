@@ -9,15 +9,14 @@ device light. Theory has the exact borders at each mass; runs find the one at M 
 import matplotlib.pyplot as plt
 
 import hapticclay as hc
-from hapticclay.studies.mbk import wall_borders
 
 plt.style.use("hapticclay.views.figure")
 
 wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5), Ts=1e-3)  # kg, N.s/m, s
-low, high = hc.stable_band(wall, "M")
+low, high = hc.walls.stable_band(wall, "M")
 print(f"M-width without damper: {low:.4g} to {high:.4g} kg")
-region = hc.renderable(wall, "mass-damper")
-borders = wall_borders(wall, "mass-damper", 0.05)
+region = hc.walls.renderable(wall, "mass-damper")
+borders = hc.walls.wall_borders(wall, "mass-damper", 0.05)
 for found in borders:
     print(f"M = {found.x:g} kg: B to {found.y:.5g} by runs, {found.exact:.5g} N.s/m by theory")
 

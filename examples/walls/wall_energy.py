@@ -12,18 +12,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hapticclay as hc
-from hapticclay.studies.port_energy import taken_energy, zigzag
 
 plt.style.use("hapticclay.views.figure")
 
 b, Ts, amplitude = 1.0, 1e-3, 1e-4  # N.s/m, s, m
 wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=b), Ts=Ts)
-limit = hc.colgate_schenkel_limit(wall)
+limit = hc.walls.colgate_schenkel_limit(wall)
 K = limit * np.array([0.0, 0.4, 0.8, 1.0, 1.2, 1.6])
-taken = [taken_energy(replace(wall, K=float(x)), zigzag(amplitude)) for x in K]
+taken = [hc.walls.taken_energy(replace(wall, K=float(x)), hc.walls.zigzag(amplitude)) for x in K]
 
 omega = np.array([np.pi / Ts])  # rad/s
-spare = [hc.passivity_index(replace(wall, K=float(x)), omega)[0] for x in K]  # N.s/m
+spare = [hc.walls.passivity_index(replace(wall, K=float(x)), omega)[0] for x in K]  # N.s/m
 path = 8.0 * amplitude**2 / Ts  # integral of v^2 over a period, m^2/s
 
 fig, ax = plt.subplots()

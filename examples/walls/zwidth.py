@@ -13,7 +13,7 @@ import hapticclay as hc
 plt.style.use("hapticclay.views.figure")
 
 wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5), Ts=1e-3)  # kg, N.s/m, s
-found = hc.zwidth(wall, B=(0.0, 10.0, 120.0))  # N.s/m
+found = hc.walls.zwidth(wall, B=(0.0, 10.0, 120.0))  # N.s/m
 (region,) = found.regions
 print(f"largest K: {region.largest_K:.4g} N/m; runs and exact line differ by {found.gap():.1%}")
 print("unstable below a line that is sufficient:", found.violations() or "none")

@@ -205,8 +205,8 @@ def with_units(words: Sequence[str]) -> list[str]:
 
 def _option_units(words: Sequence[str]) -> dict[str, str]:
     """Units of options, by name: those of an experiment, and those in brackets in their help."""
-    from ..model.experiments import EXPERIMENTS, parameters
-    from ..model.fields import field_descriptions
+    from ..scene.experiments import EXPERIMENTS, parameters
+    from ..scene.fields import field_descriptions
 
     kind = load_command(words[0])
     nested: Any = filter(dataclasses.is_dataclass, _hints(kind).values())
@@ -287,8 +287,8 @@ def ordered(words: Sequence[str]) -> list[str]:
     own = options([command])
     if "scenario" not in own:
         return list(words)
-    from ..model.experiments import EXPERIMENTS
-    from ..model.scenario_file import is_scenario_file
+    from ..scene.experiments import EXPERIMENTS
+    from ..scene.files import is_scenario_file
 
     recorded = scenario_words in (m.constructor_factory for m in own["scenario"].__metadata__)
     at = _positional(rest, own, lambda w: w in EXPERIMENTS or is_scenario_file(w) and "=" not in w)
@@ -345,7 +345,7 @@ def options(words: Sequence[str]) -> dict[str, Any]:
             name = "set" if f.name == "changes" else f.name
             out |= _hints(hints[f.name]) if nested else {name: hints[f.name]}
     if "scenario" in out:
-        from ..model.experiments import EXPERIMENTS, parameters
+        from ..scene.experiments import EXPERIMENTS, parameters
 
         if len(words) > 1 and words[1] in EXPERIMENTS:
             out |= {name: p.kind for name, p in parameters(EXPERIMENTS[words[1]]).items()}

@@ -20,15 +20,15 @@ from ..errors import number
 from ..files import atomic
 
 if TYPE_CHECKING:
-    from ..model.experiments import Experiment
-    from ..model.scenario import Scenario
+    from ..scene.experiments import Experiment
+    from ..scene.scenario import Scenario
     from ..views.figure import Figure
 
 
 ENDS = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 SET_HELP = (
     "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
-    "compensator.den=1,40,0 impedance=true operator.mass=500g; hapticclay fields lists the names."
+    "compensator.den=1,40,0 operator=true operator.mass=500g; hapticclay fields lists the names."
 )
 Changes = Annotated[  # words NAME=VALUE behind each --set
     tuple[tuple[str, ...], ...],
@@ -39,7 +39,7 @@ Changes = Annotated[  # words NAME=VALUE behind each --set
 
 def experiment_words() -> Any:
     """The experiments, and scenario files, as subcommands: the type of a command's `scenario`."""
-    from ..model.experiments import EXPERIMENTS
+    from ..scene.experiments import EXPERIMENTS
 
     file = Annotated[Any, tyro.conf.subcommand("file", constructor=load_scenario_words)]
     return Union[  # noqa: UP007
@@ -60,9 +60,9 @@ def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ())
         path: the file.
         changes: fields that differ from those of the file.
     """
-    from ..model.scenario_file import load_scenario
+    from ..scene.scenario import Scenario
 
-    return load_scenario(path, named_changes(changes))
+    return Scenario.load(path, named_changes(changes))
 
 
 def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    from ..model.fields import named_values
+    from ..scene.fields import named_values
 
     return named_values("--set", (word for some in words for word in some))
 
@@ -108,10 +108,10 @@ def load_record(path: tyro.conf.Positional[Path]) -> Any:  # tyro resolves the a
 
 def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
     """A function whose signature tells tyro the parameters of an experiment."""
-    from ..model.experiments import from_words, parameters
+    from ..scene.experiments import parameters
 
     def scenario(changes: Sequence[Sequence[str]] = (), **words: Any) -> Scenario:
-        return from_words(kind, words, named_changes(changes))
+        return kind.of(words, named_changes(changes))
 
     scenario.__doc__ = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
     scenario.__annotations__ = {

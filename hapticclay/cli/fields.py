@@ -13,7 +13,7 @@ import tyro
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
-    from ..model.fields import Field
+    from ..scene.fields import Field
 
 WIDTH = 96  # of the text
 
@@ -34,9 +34,9 @@ class FieldsCommand:
     names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
 
     def __call__(self) -> int:
-        from ..model.experiments import EXPERIMENTS, parameter_fields
-        from ..model.fields import dotted_names, fields_of, no_field
-        from ..model.scenario import Scenario
+        from ..scene.experiments import EXPERIMENTS, parameter_fields
+        from ..scene.fields import dotted_names, fields_of, no_field
+        from ..scene.scenario import Scenario
 
         known, shown = fields_of(Scenario, part=Scenario()), []
         for name in self.names:
@@ -65,7 +65,7 @@ def field_list(fields: Iterable[Field]) -> str:
 
 
 def _value_in_words(value: Any) -> str:
-    from ..model.fields import UNSET
+    from ..scene.fields import UNSET
 
     if value is UNSET:
         return "(to be given)"
@@ -76,7 +76,7 @@ def _value_in_words(value: Any) -> str:
 
 def _takes(field: Field) -> str:
     """Bounds of a number, or the words that a field takes."""
-    from ..model.fields import union_members
+    from ..scene.fields import union_members
 
     words, numbers = [], False
     for kind in union_members(field.hint):

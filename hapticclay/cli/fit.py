@@ -73,7 +73,9 @@ class FitCommand:
         )
         try:
             console.save_json(fitted.summary(), self.out / "fit.json")
-            figure = Figure(lambda: fit_plot(fitted), fitted.tables)
+            tables = fitted.tables()
+            shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
+            figure = Figure(lambda: fit_plot(fitted), shown)
             console.save_figures({"fit": figure}, self.out, self.figures)
         finally:  # a full disk must not hide the result
             print(law_table(fitted))

@@ -78,7 +78,7 @@ class ImpedanceCommand:
         return 0
 
     def _subject(self) -> Subject:
-        from ..model.scenario_file import is_scenario_file
+        from ..scene.files import is_scenario_file
         from ..studies.comparison import is_wall_file
 
         file = self.source if self.source and is_scenario_file(self.source) else None
@@ -96,16 +96,16 @@ class ImpedanceCommand:
         return self.wall.wall(file)
 
     def _loop(self, file: str | None) -> Subject:
-        from ..model.experiments import EXPERIMENTS, SCENARIOS
-        from ..model.scenario_file import load_scenario
-        from ..studies.impedance import subject_of
+        from ..scene.experiments import EXPERIMENTS, SCENARIOS
+        from ..scene.scenario import Scenario
+        from ..studies.boundary import PushedLoop
 
         name = self.source or "constant"
         if file:
-            scenario = load_scenario(file)
+            scenario = Scenario.load(file)
         else:
             scenario = SCENARIOS[choice("experiment", name, tuple(EXPERIMENTS))]()
-        loop = subject_of(scenario, self.axis or AXES[0], self.b)
+        loop = PushedLoop.of(scenario, self.axis or AXES[0], self.b)
         if self.k is not None:
             loop = replace(loop, k=self.k)
         hand = walls.operator_of(self.wall.hand)
@@ -120,15 +120,17 @@ def impedance_table(found: MeasuredImpedance) -> str:
     """
     m, c = found.measured, found.computed
     off = abs(m.Z / c.Z - 1.0)
-    columns = zip(m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.felt), strict=True)
+    columns = zip(
+        m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.transparency), strict=True
+    )
     rows = [
         [
             f"{f:.4g}",
             *(console.significant(float(x)) for x in (stiffness, damping, mass)),
             f"{100.0 * gap:.4f} %",
-            console.significant(float(felt)),
+            console.significant(float(transparency)),
         ]
-        for f, stiffness, damping, mass, gap, felt in columns
+        for f, stiffness, damping, mass, gap, transparency in columns
     ]
     head = ["Hz", "stiffness [N/m]", "damping [N.s/m]", "mass [kg]", "off theory", "|fe/fh|"]
     lines = [

@@ -42,7 +42,7 @@ def record_text(record: Record, size: int) -> str:
     """
     import numpy as np
 
-    from ..model.scenario_text import scenario_rows
+    from ..scene.text import scenario_rows
     from ..simulation.record import RECORD_SCHEMA
 
     r, n = record, len(record.t)

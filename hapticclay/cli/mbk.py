@@ -77,8 +77,8 @@ class MBKCommand:
         return 0
 
     def _arm(self, columns: int) -> int:
-        from ..model.fields import with_fields
         from ..model.operator import Operator
+        from ..scene.fields import with_fields
         from ..studies.boundary import PushedLoop
         from ..studies.mbk import HANDS, arm_mbk
         from ..views import impedance_plots

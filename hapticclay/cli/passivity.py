@@ -13,7 +13,7 @@ from ..model.constants import AXES, TS
 from . import console, walls
 
 if TYPE_CHECKING:
-    from ..model.scenario import Scenario
+    from ..scene.scenario import Scenario
     from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
     from ..views.figure import Figure
 
@@ -51,7 +51,7 @@ class PassivityCommand:
 
     def __call__(self) -> int:
         from ..studies import passivity_runs as study
-        from ..studies.impedance import subject_of
+        from ..studies.boundary import PushedLoop
 
         writable(self.out)
         wall = self.wall.wall(self.source, **PASSIVE_WALL)
@@ -60,7 +60,7 @@ class PassivityCommand:
         def bar(items: Any) -> Any:
             return console.progress_bar(items, desc="passivity")
 
-        loops = {axis: subject_of(arm, axis) for axis in AXES}
+        loops = {axis: PushedLoop.of(arm, axis) for axis in AXES}
         found = study.wall_index(wall, bar)
         arms = {axis: study.arm_index(loop) for axis, loop in loops.items()}
         energy = study.energy_over_time(cut)
@@ -75,14 +75,16 @@ class PassivityCommand:
 
     def _scenarios(self) -> tuple[Scenario, Scenario]:
         """Of the arm over frequency, and of the rendered clay over time."""
-        from ..model.experiments import constant_cut
-        from ..model.scenario_file import load_scenario
+        from ..scene.experiments import constant_cut
+        from ..scene.scenario import Scenario
 
         if self.cut:
-            cut = load_scenario(self.cut)
+            cut = Scenario.load(self.cut)
             return cut, cut
         stiff: Any = dict(b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=33 * TS)
-        return constant_cut(), replace(constant_cut(control="sampled", **stiff), stop=False)
+        return constant_cut(), replace(
+            constant_cut(control="sampled", **stiff), stop_when_unstable=False
+        )
 
     def _save(
         self,

@@ -13,8 +13,8 @@ from . import console
 
 if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
-    from ..studies.monte_carlo import Cost, Instability, Trials
     from ..studies.population import Band
+    from ..studies.robustness import Cost, Instability, Trials
 
 ROBUSTNESS_SCHEMA = "hapticclay-robustness-1"
 GRIDS = {"x": "K=1:8:15 b=10:1000:11log", "y": "K=0.2:2:15 b=10:1000:11log"}
@@ -35,7 +35,7 @@ class RobustnessCommand:
         gain: K of the compensator, where nothing varies it.
         Ts: Control sample [s]; None for continuous time.
         delay: From a measurement to the torque computed from it [s], with --Ts.
-        shaping: Let the servo shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: Let the servo shape the inertia, so that Sh holds at every pose.
         hands: Name of a population; hapticclay robustness --list prints them.
         variation: Take log-normal hands around the population's hand of medians, with this
             standard deviation over the mean: an assumption.
@@ -58,7 +58,7 @@ class RobustnessCommand:
     gain: float | None = None
     Ts: float | None = None
     delay: float = 0.0
-    shaping: bool = True
+    inertia_shaping: bool = True
     hands: str = "published range"
     variation: float | None = None
     vary: str = ""
@@ -74,8 +74,8 @@ class RobustnessCommand:
 
     def __call__(self) -> int:
         from ..simulation.batch import cores
-        from ..studies import monte_carlo
         from ..studies.population import POPULATIONS, Draw, gain_band, hands_of
+        from ..studies.robustness import monte_carlo
 
         if self.list:
             rows = [hands.row(name) for name, hands in POPULATIONS.items()]
@@ -92,7 +92,7 @@ class RobustnessCommand:
         print(console.text_table([hands.row(self.hands)[:-1]], HANDS_HEAD, "lrrrrl"))
         try:
             with console.progress_bar(total=len(trials), unit="run", desc="runs") as bar:
-                result = monte_carlo.monte_carlo(
+                result = monte_carlo(
                     trials,
                     out=self.out,
                     workers=workers,
@@ -122,8 +122,8 @@ class RobustnessCommand:
         from ..model.constants import AXES, GAIN
         from ..studies.boundary import PushedLoop
         from ..studies.distribution import parse_laws
-        from ..studies.monte_carlo import Trials
         from ..studies.population import Hands, hands_of
+        from ..studies.robustness import Trials
         from ..studies.sampling import parse_grid
 
         base: PushedLoop = PushedLoop(
@@ -133,7 +133,7 @@ class RobustnessCommand:
             operator=None,
             Ts=self.Ts,
             delay=self.delay,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
         )
         hands = hands_of(self.hands)
         if self.variation is not None:

@@ -16,7 +16,7 @@ from ..model.constants import AXES
 from . import console
 
 if TYPE_CHECKING:
-    from ..model.scenario import Scenario
+    from ..scene.scenario import Scenario
     from ..simulation.record import Record
 
 EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]
@@ -70,17 +70,17 @@ def unstable_axes(scenario: Scenario) -> list[str]:
     Args:
         scenario: the run.
     """
-    from ..theory import gain_limit
+    from ..theory import gain_limits
 
     clay = scenario.clay
     if clay is None or clay.yields or clay.springs:
         return []
     told = []
     for i, axis in enumerate(AXES):
-        laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+        laws = clay.laws_on(i)
         values = sorted({b for law in laws for b in law.within(*EVERYWHERE)})
         step = max(1, -(-len(values) // MOST_CLAYS))
-        limits = [(gain_limit.continuous_limit(scenario, axis, b), b) for b in values[::step]]
+        limits = [(gain_limits.continuous_limit(scenario, axis, b), b) for b in values[::step]]
         limit, b = min(limits, default=(math.inf, 0.0))
         if scenario.gain[i] > limit:
             told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit:.4g} at b = {b:g} N.s/m")
@@ -90,7 +90,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
 def simulate_with_progress(
     scenario: Scenario,
     every: int,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[], bool] | None = None,
     error: str | None = None,
 ) -> Record:
     """Runs simulate() under a progress bar.
@@ -109,7 +109,7 @@ def simulate_with_progress(
         def progress(t: float, x: float) -> bool:
             way = (x - start) / (length - start) if length is not None else 0.0
             show(max(t / scenario.t_max, way))
-            return stop()
+            return stop is not None and stop()
 
         return simulate(scenario, every=every, progress=progress, error=error)
 
@@ -166,13 +166,15 @@ def run_table(record: Record) -> str:
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     lines += _crossing_lines(record) + _stop_lines(record)
-    if isinstance(s.muscle, Multisine) and len(record.t) >= 32:  # the fewest for irregularity()
+    if (
+        isinstance(s.muscle, Multisine) and len(record.t) >= 32
+    ):  # the fewest for out_of_band_ratio()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
     elif _chatters(s, [r for _, r in pieces]):
-        lines.append("advice: --render implicit; clay that motors render cannot hold the handle")
+        lines.append("advice: --render physical; clay that motors render cannot hold the handle")
     if record.error is not None:
         lines.append(f"error: {record.error}")
         if record.error.note:
@@ -206,7 +208,7 @@ def _stop_lines(record: Record) -> list[str]:
 def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:
     """Whether clay that should hold the handle is rendered by the motors from the velocity."""
     rendered = s.control == "sampled" and s.render == "held"
-    if not rendered or (s.interface and (s.interface.coupling or s.interface.passivity)):
+    if not rendered or (s.hardware and (s.hardware.coupling or s.hardware.passivity)):
         return False
     return any(r.get("Fy") and r["expected_speed"] == 0.0 for r in stretches)
 
@@ -241,8 +243,8 @@ def _table_row(way: str, r: dict[str, Any]) -> list[str]:
 
 
 def _maneuver_line(record: Record, axis: str) -> str:
-    from ..simulation.record import irregularity
+    from ..simulation.record import out_of_band_ratio
 
     rms = float((record.fh[:, AXES.index(axis)] ** 2).mean() ** 0.5)
-    measured = f"rms {rms:.4g} N, irregularity {irregularity(record, axis):.4f}"
+    measured = f"rms {rms:.4g} N, out of band {out_of_band_ratio(record, axis):.4f}"
     return f"operator's force along {axis}: {measured}"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
     from ..studies.stability_map import StabilityMap
     from ..studies.yield_map import YieldMap
-    from ..theory.margins import Verdict
+    from ..theory.stability_margins import Verdict
 
 VERDICTS_SCHEMA = "hapticclay-stability-1"
 VERDICTS_UNITS = {
@@ -49,10 +49,11 @@ class StabilityCommand:
         num: Numerator of the compensator, descending powers of s.
         den: Denominator of the compensator, descending powers of s.
         G: Gain, damping and stiffness of the position loop G; by default as printed.
-        S: Gain, damping and stiffness of Sh, by default as printed; the gain with --shaping, else
-            it is that of the arm.
-        impedance: Put the operator's arm Th (Eq. 19) in the loop.
-        shaping: Let the servo of the runs shape the inertia, so that Sh holds at every pose.
+        S: Gain, damping and stiffness of Sh, by default as printed; the gain with
+            --inertia-shaping, else it is that of the arm.
+        operator: Put the operator's arm Th (Eq. 19) in the loop.
+        inertia_shaping: Let the servo of the runs shape the inertia, so that Sh holds at every
+            pose.
         clay: Clay that yields, Fy=5 K=2 n=0.5 beside b, or a material, "stiff clay": predict what
             sticks, and limit cycles.
         map: Plane of the map: a boundary in K or b over clay, delay or pose; or what a push ends
@@ -71,8 +72,8 @@ class StabilityCommand:
     den: tuple[float, ...] = C_DEN
     G: tuple[float, float, float] | None = None
     S: tuple[float, float, float] | None = None
-    impedance: bool = True
-    shaping: bool = False
+    operator: bool = True
+    inertia_shaping: bool = False
     clay: tuple[str, ...] | None = None
     map: Literal["none", "gain-damping", "delay-damping", "gain-pose", "gain-yield"] = "none"
     out: Path = Path("out/stability")
@@ -91,12 +92,12 @@ class StabilityCommand:
             self.axis,
             b=flow.b if flow else b,
             K=GAIN[i] if self.gain is None else self.gain,
-            operator=Operator() if self.impedance else None,
+            operator=Operator() if self.operator else None,
             servo=self._servo(i),
             compensator=Compensator(self.num, self.den),
             Ts=self.Ts,
             delay=self.delay if self.Ts else 0.0,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
         )
         rows = verdicts(loop, self.delay)
         if flow:
@@ -108,7 +109,7 @@ class StabilityCommand:
         operator = loop.operator and asdict(loop.operator)
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": operator, "Ts": self.Ts,
                  "compensator": asdict(loop.compensator), "servo": asdict(loop.servo),
-                 "delay": self.delay, "shaping": self.shaping, "map": self.map,
+                 "delay": self.delay, "inertia_shaping": self.inertia_shaping, "map": self.map,
                  "quick": self.quick}  # fmt: skip
         chart = self._map(loop)
         found = {"schema": VERDICTS_SCHEMA, "asked": asked, "units": VERDICTS_UNITS,
@@ -212,7 +213,7 @@ def clay_predictions(loop: PushedLoop, flow: Flow) -> dict[str, Any]:
         (None in another).
     """
     from ..theory import describing, relay_cycle
-    from ..theory.linear_loop import TIMING
+    from ..theory.loops import TIMING
 
     linear = replace(loop.linear, **TIMING)
     small, large = describing.push_outcomes(linear, flow=flow)
@@ -312,8 +313,8 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     """
     import numpy as np
 
-    from ..theory import margins, passivity
-    from ..theory.linear_loop import TIMING
+    from ..theory import loop_passivity, stability_margins
+    from ..theory.loops import TIMING
 
     K, Ts = loop.K, loop.Ts or TS
     linear = replace(loop.linear, **TIMING)
@@ -328,7 +329,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
         add(question, v.verdict, v.margin, what, v.omega)
 
     def stable(question: str, **late: Any) -> None:
-        v = margins.coupled_stability(replace(linear, **late))
+        v = stability_margins.coupled_stability(replace(linear, **late))
         add(question, v.verdict, v.margin * K, "largest stable K", v.omega)
 
     stable("stable with this hand")
@@ -336,7 +337,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     if delay:
         stable(f"... {1e3 * delay:g} ms late", delay=delay)
         stable(f"... {1e3 * delay:g} ms late, sampled", Ts=Ts, delay=delay)
-    m = margins.margins(linear)
+    m = stability_margins.margins(linear)
 
     def response(question: str, value: float, what: str, omega: float) -> None:
         # an unstable loop has no steady state
@@ -347,16 +348,16 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     response("delay margin of the compensator", 1e3 * m.delay, "ms", m.delay_omega)
     response("disk margin", m.disk, "alpha", m.disk_omega)
     for equation in (11, 13):
-        small = margins.small_gain(linear, equation=equation)
+        small = stability_margins.small_gain(linear, equation=equation)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
-    judge("passive: stable with every hand", passivity.passivity(linear), "least Re Z [N.s/m]")
+    judge("passive: stable with every hand", loop_passivity.passivity(linear), "least Re Z [N.s/m]")
     judge(
         "held clay passive with this hand",
-        passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
+        loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
         "N.s/m to spare",
     )
-    felt = margins.transparency(linear, np.array([ONE_HZ]))[0]
-    response("transparency |fe/fh| at 1 Hz", float(abs(felt)), "1 at best", ONE_HZ)
+    transparency = stability_margins.transparency(linear, np.array([ONE_HZ]))[0]
+    response("transparency |fe/fh| at 1 Hz", float(abs(transparency)), "1 at best", ONE_HZ)
     return rows
 
 

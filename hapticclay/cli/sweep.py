@@ -41,7 +41,7 @@ class SweepCommand:
         grid: Parameters to vary, as in "b=1:1000:50log gain=0.2:2:20", or, to sample,
             "b=1:1000log gain=0.2:2"; gain.x is one axis, arm.l1 and servo.x.G.damping numbers of
             parts: hapticclay fields lists them all.
-        fixed: Fixed parameters, as in "t_max=2 shaping=true arm.l2=0.4".
+        fixed: Fixed parameters, as in "t_max=2 inertia_shaping=true arm.l2=0.4".
         experiment: Name of an experiment, as in hapticclay run, or a scenario file.
         design: All combinations, a Latin hypercube or a Sobol sequence.
         runs: Number of runs of a Latin hypercube or Sobol sequence.
@@ -105,7 +105,7 @@ class SweepCommand:
                 show(n)
 
     def _plan(self) -> Sweep:
-        from ..model.scenario_file import is_scenario_file, read_settings
+        from ..scene.files import is_scenario_file, read_settings
         from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
 
         if (self.spec is None) == (self.grid is None):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
-    from ..model.virtual_wall import VirtualWall
-    from ..theory.margins import Box
+    from ..scene.virtual_wall import VirtualWall
+    from ..theory.stability_margins import Box
 
 Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
 Hand = tuple[float, float, float]
@@ -36,10 +36,10 @@ class DeviceOptions:
         Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
         delay: From a sample to the force computed from it [s].
         velocity: How it is measured, by default the difference of positions.
-        window: Samples that the difference spans, by default 1.
+        velocity_window: Samples that the difference spans, by default 1.
         filter: Low-pass behind the difference [Hz], or none.
         hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
-        surface: The wall has a surface and never pulls.
+        unilateral: The wall has a surface and never pulls.
     """
 
     mass: Quantity = None
@@ -49,10 +49,10 @@ class DeviceOptions:
     Ts: Quantity = None
     delay: Quantity = None
     velocity: Literal["difference", "exact"] | None = None
-    window: Quantity = None
+    velocity_window: Quantity = None
     filter: Quantity = None
     hand: Hand | None = None
-    surface: bool = False
+    unilateral: bool = False
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -66,16 +66,16 @@ class DeviceOptions:
             source: the file; None for none.
             **base: fields that differ from the defaults where there is no file.
         """
-        from ..model.fields import with_fields
-        from ..model.virtual_wall import VirtualWall
+        from ..scene.fields import with_fields
+        from ..scene.virtual_wall import VirtualWall
 
         wall = VirtualWall.load(source) if source else with_fields(VirtualWall(), base)
-        names = [n for n in self.given if n not in ("hand", "surface")]
+        names = [n for n in self.given if n not in ("hand", "unilateral")]
         changes = quantities({n: getattr(self, n) for n in names})
         wall = with_fields(wall, {WALL_FIELDS.get(n, n): x for n, x in changes.items()})
         if self.hand:
             wall = replace(wall, operator=operator_of(self.hand))
-        return replace(wall, surface=True) if self.surface else wall
+        return replace(wall, unilateral=True) if self.unilateral else wall
 
     def refuse(self, bound: str, but: tuple[str, ...] = ()) -> None:
         """Refuses what was given.
@@ -116,7 +116,7 @@ def quantities(given: dict[str, str | None]) -> dict[str, Any]:
     Raises:
         ParameterError: a text is none.
     """
-    from ..model.fields import named_values
+    from ..scene.fields import named_values
 
     out: dict[str, Any] = {}
     for name, text in given.items():
@@ -142,7 +142,7 @@ def box_of(hands: HandEnds | None) -> Box | None:
     Args:
         hands: least and largest mass, damper and spring [kg, N.s/m, N/m].
     """
-    from ..theory.margins import Box
+    from ..theory.stability_margins import Box
 
     if hands is None:
         return None

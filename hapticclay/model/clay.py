@@ -13,10 +13,12 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
 from ..units import is_quantity
+from . import flow, groove, spring
 from .constants import AXES, B_MAX
 from .flow import Consistency, Flow, FlowIndex, YieldForce
 from .groove import Groove
 from .spring import Spring
+from .traits import LEFT_OUT, Refusal, Trait, check_traits, present
 
 
 def halved_damping(b0, b1, L, R):
@@ -99,11 +101,11 @@ def slow_force(g, W, share, f):
     return x, y
 
 
-def turned_force(c, s, bx, by, vx, vy):
-    """As `viscous_force` in clay that is turned, fe = R diag(bx, by) R' v.
+def rotated_force(c, s, bx, by, vx, vy):
+    """Force of clay with rotated axes, fe = R diag(bx, by) R' v.
 
     Args:
-        c: cosine of the angle by which it is turned.
+        c: cosine of the angle by which its axes are rotated.
         s: sine of that angle.
         bx: damping along its first axis [N.s/m].
         by: damping along its second axis [N.s/m].
@@ -117,11 +119,11 @@ def turned_force(c, s, bx, by, vx, vy):
     return c * first - s * second, s * first + c * second
 
 
-def turned_damping(c, s, bx, by):
-    """The damping tensor of clay that is turned, R diag(bx, by) R'.
+def rotated_damping(c, s, bx, by):
+    """The damping tensor of clay with rotated axes, R diag(bx, by) R'.
 
     Args:
-        c: cosine of the angle by which it is turned.
+        c: cosine of the angle by which its axes are rotated.
         s: sine of that angle.
         bx: damping along its first axis [N.s/m].
         by: damping along its second axis [N.s/m].
@@ -150,7 +152,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
     if (start is None) != (end is None):
         raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
     if isinstance(resists, str) and not is_quantity(resists):
-        bound = f"must be a damping, or a flow as hc.material({resists!r}) returns"
+        bound = f"must be a damping, or a flow as hc.materials.material({resists!r}) returns"
         raise ParameterError("resists", resists, bound)
     flow = (
         resists
@@ -780,9 +782,9 @@ class Clay:
     also yields, with Fy_i sign v_i + K_i |v_i|^n_i sign v_i beside it along each axis.
 
     Attributes:
-        x: law of motion along x, or along the clay's own first axis where it is turned.
+        x: law of motion along x, or along the clay's own first axis where they are rotated.
         y: law of motion along y, or along the clay's own second axis.
-        angle: by which those axes are turned from x and y, counterclockwise [rad], -pi to pi.
+        angle: by which those axes are rotated from x and y, counterclockwise [rad], -pi to pi.
         isotropic: whether Fy and K, alike on both axes, resist along the motion whatever its
             direction, (Fy + K |v|^n) v/|v|; else each axis yields by itself.
         groove: a block of clay that stays cut, beside x and y, which then neither yield, grow nor
@@ -802,9 +804,7 @@ class Clay:
             raise ParameterError(
                 "clay.isotropic", True, "must be False where Fy, K or n differ between the axes"
             )
-        if self.groove and (x.yields or y.yields or self.grows or self.smooth or self.springs):
-            bound = "must be None beside laws that yield, grow, spring back or are smooth"
-            raise ParameterError("clay.groove", self.groove, bound)
+        check_traits(present(self, LAWS), self, "clay.")
 
     @classmethod
     def of_groove(cls, groove: Groove) -> Clay:
@@ -819,6 +819,14 @@ class Clay:
     def laws(self) -> tuple[Profile | Grid | Smooth, Profile | Grid | Smooth]:
         """Of x and of y."""
         return self.x, self.y
+
+    def laws_on(self, i: int) -> tuple[Profile | Grid | Smooth, ...]:
+        """Laws that resist along an axis: both where the axes of the clay are rotated.
+
+        Args:
+            i: axis, 0 for x, 1 for y.
+        """
+        return self.laws if self.angle else self.laws[i : i + 1]
 
     @property
     def smooth(self) -> int:
@@ -874,3 +882,19 @@ class Clay:
         """
         b = self.x.at(x, y)
         return np.stack([b, b if self.y is self.x else self.y.at(x, y)])
+
+
+_ACROSS = Refusal(
+    "clay.angle", "must be 0 for a passivity controller or a coupling, which act along x and y"
+)
+TRAITS = (
+    Trait("viscous", "clay", lambda c: any(x.damping.any() for x in c.laws)),
+    Trait("growth", "clay", lambda c: c.grows, LEFT_OUT),
+    Trait("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
+    Trait("smooth", "clay", lambda c: bool(c.smooth)),
+    Trait(
+        "rotated axes", "clay", lambda c: c.angle != 0.0,
+        refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
+    ),
+)  # fmt: skip
+LAWS = (*TRAITS, *flow.TRAITS, *spring.TRAITS, *groove.TRAITS)

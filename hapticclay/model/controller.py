@@ -19,6 +19,7 @@ from ..arguments import named
 from ..errors import check_fields
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
+from .traits import Trait
 
 
 @named
@@ -90,10 +91,10 @@ def velocity_per_force(n, W, d):
 
 
 def along_axes(c, s, x, y):
-    """Components of a vector along axes that are turned.
+    """Components of a vector along rotated axes.
 
     Args:
-        c: cosine of the angle by which they are turned.
+        c: cosine of the angle by which they are rotated.
         s: sine of that angle.
         x: component along x.
         y: component along y.
@@ -179,3 +180,6 @@ def matrix_exponential(a: np.ndarray) -> np.ndarray:
     from scipy.linalg import expm
 
     return expm(a)
+
+
+TRAITS = (Trait("inertia shaping", "part", lambda s: s.inertia_shaping),)

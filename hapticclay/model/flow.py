@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
+from .traits import LEFT_OUT, Trait
 
 KICK_PARTS = 6  # of a kick, at most; two stops and what lies between and around, and one to spare
 AXIS_ROUNDS = 60  # from axis to axis until both forces agree
@@ -431,3 +432,12 @@ def slowed(B, qx, qy, k, Fy, K, n):
     det = a * e - b * c
     x, y = (e * qx - b * qy) / det, (a * qy - c * qx) / det
     return s * x, s * y
+
+
+TRAITS = tuple(
+    Trait(
+        name, "clay",
+        lambda c, along=along: any(x.yields for x in c.laws) and c.isotropic == along, LEFT_OUT,
+    )
+    for name, along in (("yield by axis", False), ("yield along the motion", True))
+)  # fmt: skip

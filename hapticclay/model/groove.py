@@ -15,6 +15,7 @@ from .constants import AXES, B_MAX
 from .flow import FY_MAX
 from .materials import SMALL_TOOL, material
 from .tool import Tool
+from .traits import LEFT_OUT, Refusal, Trait
 
 CELLS = 20  # in the width of the tool, where none are asked for
 COARSEST = 8  # cells in it, at least
@@ -339,3 +340,24 @@ class Groove:
             raise ParameterError("ground", ground, bound)
         shares = np.divide(ground, relief, out=np.ones(self.shape), where=relief > 0.0)
         return replace(self, left=shares)  # pyright: ignore[reportArgumentType]
+
+
+_UNCUT = Refusal(
+    "hardware", "must be without passivity controller and coupling in clay that stays cut"
+)
+_BESIDE = Refusal(
+    "clay.groove", "must be None beside laws that yield, grow, spring back or are smooth"
+)
+TRAITS = (
+    Trait(
+        "groove", "clay", lambda c: c.groove is not None, LEFT_OUT,
+        {
+            **dict.fromkeys(
+                ("yield by axis", "yield along the motion", "growth", "smooth", "springs"), _BESIDE
+            ),
+            "accurate": Refusal("integrator", "must be 'fast' in clay that stays cut"),
+            "passivity controller": _UNCUT,
+            "virtual coupling": _UNCUT,
+        },
+    ),
+)  # fmt: skip

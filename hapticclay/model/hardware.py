@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from . import flow
+from .traits import LEFT_OUT, YES, Refusal, Trait
 
 STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
@@ -37,16 +38,17 @@ class Coupling:
 
 @named
 @dataclass(frozen=True)
-class Interface:
+class Hardware:
     """The hardware between computer and arm, part by part; ideal by default.
 
     Attributes:
         jitter: how far a sampling instant is off its time, uniform, rms [s], at most 0.28 Ts, so
             that samples keep their order.
-        lost: probability that a sample is lost, 0 to 0.99; the torque is then held for one more.
+        dropout_probability: probability that a sample is lost, 0 to 0.99; the torque is then held
+            for one more.
         encoder: counts per turn of each joint, 4 to 2^40; None measures angles exactly.
         velocity: of the joints: "exact" (a tachometer) or "difference" of measured angles.
-        window: samples that the difference spans, 1 to 10000.
+        velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
         adc_bits: bits of the converter of the hand's force, 2 to 32; None for none.
         adc_range: that converter spans -range to range on each axis [N].
@@ -66,10 +68,10 @@ class Interface:
     """
 
     jitter: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
-    lost: Annotated[float, Bound(0.0, 0.99)] = 0.0
+    dropout_probability: Annotated[float, Bound(0.0, 0.99)] = 0.0
     encoder: Annotated[int | None, Bound(4, 2**40)] = None
     velocity: Literal["exact", "difference"] = "exact"
-    window: Annotated[int, Bound(1, 10_000)] = 1
+    velocity_window: Annotated[int, Bound(1, 10_000)] = 1
     velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     adc_bits: Annotated[int | None, Bound(2, 32)] = None
     adc_range: Annotated[float, Bound(0.0, 1e6, "N", above=True)] = 50.0
@@ -87,10 +89,12 @@ class Interface:
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
 
     def __post_init__(self):
-        check_fields(self, "interface.")
-        if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
+        check_fields(self, "hardware.")
+        if self.velocity == "exact" and (
+            self.velocity_filter is not None or self.velocity_window != 1
+        ):
             raise ParameterError(
-                "interface.velocity", self.velocity, "must be 'difference' for a window or a filter"
+                "hardware.velocity", self.velocity, "must be 'difference' for a window or a filter"
             )
 
 
@@ -360,7 +364,7 @@ class SampleNoise:
         parts: the hardware, with its seed.
     """
 
-    def __init__(self, parts: Interface):
+    def __init__(self, parts: Hardware):
         self.parts = parts
         self._streams = [np.random.default_rng([parts.seed, i]) for i in range(3)]
         self._first, self._rows = 0, np.zeros((0, 4))
@@ -403,6 +407,31 @@ class SampleNoise:
         s, (time, loss, noise) = self.parts, self._streams
         width = s.jitter * sqrt(3.0)
         late = time.uniform(-width, width, NOISE_BLOCK)
-        lost = loss.random(NOISE_BLOCK) < s.lost
+        lost = loss.random(NOISE_BLOCK) < s.dropout_probability
         hiss = s.force_noise * noise.standard_normal((NOISE_BLOCK, 2))
         return np.column_stack((late, lost, hiss))
+
+
+_UNSAMPLED = Refusal("hardware", "must be None unless control is 'sampled'")
+_SAMPLED = {"fast": _UNSAMPLED, "accurate": _UNSAMPLED}
+_HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
+TRAITS = (
+    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _SAMPLED),
+    *(
+        Trait(name, "part", lambda s, of=of: s.hardware is not None and of(s.hardware), theory,
+              _SAMPLED | own)
+        for name, of, theory, own in (
+            ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {}),
+            ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {}),
+            ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {}),
+            ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {}),
+            ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}),
+            ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {}),
+            ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {}),
+            ("delay", lambda x: x.delay > 0.0, YES, {}),
+            ("joint friction", lambda x: any(x.friction), LEFT_OUT, {}),
+            ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD),
+            ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD),
+        )
+    ),
+)  # fmt: skip

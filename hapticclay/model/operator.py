@@ -8,6 +8,7 @@ from typing import Annotated
 from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
+from .traits import Trait
 
 
 def mobility_with(trace, mass):
@@ -43,3 +44,6 @@ class Operator:
 
 
 NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0
+
+
+TRAITS = (Trait("operator", "part", lambda s: any(s.operators)),)

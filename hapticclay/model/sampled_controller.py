@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from ..arguments import named
+from ..arguments import function_name, named
 from ..display import one_line
 from ..errors import Bound, ParameterError, check_fields
-from .fields import function_name
+from .traits import NO, Refusal, Trait
 
-# floats of the desk that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
+# floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
 # measured, hand force [N], torques [N.m]; then the law's state now and after, and its parameters
-DESK = 9
+BUFFER = 9
 TORQUE = 7  # place of the torques
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*(:[^\W\d]\w*(\.[^\W\d]\w*)*)?")
 
@@ -34,8 +34,8 @@ class Controller:
     (torques, state): t [s]; q [rad] and qd [rad/s] of shoulder and elbow as they are measured; fh
     [N] (x, y), force of the hand on the handle as it is measured; state and params tuples of
     floats. The torques (shoulder, elbow) [N.m] are held for a sample, within the torque limits and
-    behind converter and delay of the interface. The state is handed to the next call. Rendering
-    the clay is up to the law, unless the scenario's `render` is "implicit", where it is physical.
+    behind converter and delay of the hardware. The state is handed to the next call. Rendering
+    the clay is up to the law, unless the scenario's `render` is "physical", where it is physical.
 
     Runs compile the function with numba where they are compiled themselves and it can be; Python
     runs it otherwise, to the same numbers, and a line says so. Variables outside of the function
@@ -98,11 +98,11 @@ class LawFailed(RuntimeError):
 
 
 class LawCaller:
-    """Calls a law between the loop's reading of the desk and its taking the torques.
+    """Calls a law between the loop's reading of the buffer and its taking the torques.
 
     Args:
         controller: whose law.
-        desk: the shared floats, shape (n,).
+        buffer: the shared floats, shape (n,).
 
     Attributes:
         law: the function.
@@ -111,14 +111,14 @@ class LawCaller:
         called: what machine code calls, once it does.
     """
 
-    def __init__(self, controller: Controller, desk: Any):
+    def __init__(self, controller: Controller, buffer: Any):
         self.controller, self.law = controller, controller.function()
-        self.desk: Any = memoryview(desk)
+        self.buffer: Any = memoryview(buffer)
         self.error: BaseException | None = None
         self.pointer: Any = None
         self.called: Any = None
         self._returned = 0.0, 0.0
-        self._ends = DESK + len(controller.state), DESK + 2 * len(controller.state)
+        self._ends = BUFFER + len(controller.state), BUFFER + 2 * len(controller.state)
 
     def __call__(self, _desk: object = None) -> None:
         try:  # machine code drops what is raised here: it ends the run, and `check` raises it
@@ -126,12 +126,12 @@ class LawCaller:
                 self._answer()
         except BaseException as error:
             self.error = error
-            self.desk[TORQUE] = self.desk[TORQUE + 1] = math.nan
+            self.buffer[TORQUE] = self.buffer[TORQUE + 1] = math.nan
 
     def _answer(self) -> None:
-        t, q1, q2, w1, w2, fx, fy = self.desk[:TORQUE].tolist()
+        t, q1, q2, w1, w2, fx, fy = self.buffer[:TORQUE].tolist()
         middle, end = self._ends
-        state = tuple(self.desk[DESK:middle].tolist())
+        state = tuple(self.buffer[BUFFER:middle].tolist())
         answer: Any = self.law(t, (q1, q2), (w1, w2), (fx, fy), state, self.controller.params)
         try:
             (t1, t2), after = answer
@@ -142,13 +142,13 @@ class LawCaller:
         if len(after) != len(state):
             raise TypeError(f"state must have {len(state)} numbers, not {len(after)}")
         for j, x in enumerate(after):
-            self.desk[middle + j] = x
+            self.buffer[middle + j] = x
         self._returned = t1, t2
-        self.desk[TORQUE], self.desk[TORQUE + 1] = t1, t2
+        self.buffer[TORQUE], self.buffer[TORQUE + 1] = t1, t2
 
     def finite(self) -> bool:
         """Whether the torques are."""
-        return all(map(math.isfinite, self.desk[TORQUE : TORQUE + 2].tolist()))
+        return all(map(math.isfinite, self.buffer[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
         """Raises LawFailed if a call has failed; machine code of it leaves torques not finite.
@@ -161,11 +161,31 @@ class LawCaller:
                 self()  # in Python, which says why
             elif all(map(math.isfinite, self._returned)):
                 self.error = KeyboardInterrupt()  # it came before the call could keep it
-            torques = tuple(self.desk[TORQUE : TORQUE + 2].tolist())
-            if self.error is None and self.desk[0] <= 0.0:
+            torques = tuple(self.buffer[TORQUE : TORQUE + 2].tolist())
+            if self.error is None and self.buffer[0] <= 0.0:
                 self.error = ValueError(f"torques must be finite, not {torques}")
         if isinstance(self.error, Exception):
             what = f"{type(self.error).__name__}: {self.error}"
-            raise LawFailed(f"controller.law at t = {self.desk[0]:g} s: {what}") from self.error
+            raise LawFailed(f"controller.law at t = {self.buffer[0]:g} s: {what}") from self.error
         if self.error is not None:
             raise self.error
+
+
+_ALONE = Refusal(
+    "hardware", "must be without passivity controller and coupling where the law is one's own"
+)
+_SAMPLED = Refusal("control", "must be 'sampled' with a controller of one's own")
+TRAITS = (
+    Trait(
+        "own controller", "part", lambda s: s.controller is not None, NO,
+        {
+            "fast": _SAMPLED,
+            "accurate": _SAMPLED,
+            "inertia shaping": Refusal(
+                "inertia_shaping", "must be False with a controller, which replaces the servo"
+            ),
+            "passivity controller": _ALONE,
+            "virtual coupling": _ALONE,
+        },
+    ),
+)  # fmt: skip

@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, integer, numbers_of
 from . import pieces
+from .traits import LEFT_OUT, Trait
 
 MOST_LINES = 100_000
 
@@ -320,3 +321,6 @@ class Multisine(Signal):
             h: as there.
         """
         return self.mean(t, h)
+
+
+TRAITS = (Trait("signals", "part", lambda s: s.driven, LEFT_OUT),)

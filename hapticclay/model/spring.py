@@ -8,6 +8,7 @@ from typing import Annotated
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
+from .traits import LEFT_OUT, Refusal, Trait
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
@@ -27,7 +28,7 @@ class Spring:
         limit: force beyond which it gives way for good [N], > 0, at most 1e6; None for never.
         k1: stiffness of a second spring beside it, which relaxes [N/m], 0 to 1e9.
         tau: relaxation time of the second spring [s], > 0, at most 1e5; 1 without k1.
-        surface: whether the clay is a wall behind the border, which pushes and never pulls; what
+        unilateral: whether the clay is a wall behind the border, which pushes and never pulls; what
             gave way, and where the tool was at the start, is a dent that stays. Else the tool
             sticks in it and is pulled back as well.
     """
@@ -36,7 +37,7 @@ class Spring:
     limit: Annotated[float | None, Bound(0.0, 1e6, "N", above=True)] = None
     k1: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
     tau: Annotated[float, Bound(0.0, 1e5, "s", above=True)] = 1.0
-    surface: bool = False
+    unilateral: bool = False
 
     def __post_init__(self):
         check_fields(self, "spring.")
@@ -44,14 +45,14 @@ class Spring:
             raise ParameterError("spring.limit", self.limit, "must be None without stiffness k")
         if self.tau != type(self).tau and not self.k1:
             raise ParameterError("spring.tau", self.tau, f"must be {type(self).tau} without k1")
-        if self.surface and not (self.k or self.k1):
-            raise ParameterError("spring.surface", True, "must be False without k and k1")
+        if self.unilateral and not (self.k or self.k1):
+            raise ParameterError("spring.unilateral", True, "must be False without k and k1")
 
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:
         """k [N/m], limit [N] (inf for none), k1 [N/m], tau [s], 1.0 for a surface."""
         limit = math.inf if self.limit is None else self.limit
-        return self.k, limit, self.k1, self.tau, float(self.surface)
+        return self.k, limit, self.k1, self.tau, float(self.unilateral)
 
 
 def spring_step(k, limit, way, rest, p):
@@ -106,3 +107,19 @@ def relaxing_step(k, tau, way, z, dp, h):
         if way * new < 0.0:  # the handle has left it
             lost, new = 0.5 * k * abs(z) * max(0.0, abs(z) - abs(dp)), 0.0
     return new, k * new, 0.5 * k * new * new, max(lost, 0.0)
+
+
+_UNGUARDED = Refusal(
+    "hardware", "must be without passivity controller and coupling in clay that springs back"
+)
+TRAITS = (
+    Trait(
+        "springs", "clay", lambda c: bool(c.springs), LEFT_OUT,
+        {
+            "passivity controller": _UNGUARDED,
+            "virtual coupling": _UNGUARDED,
+            "accurate": Refusal("integrator", "must be 'fast' in clay that springs back"),
+            "rotated axes": Refusal("clay.angle", "must be 0 for springs"),
+        },
+    ),
+)  # fmt: skip

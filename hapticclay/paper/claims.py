@@ -33,15 +33,15 @@ from ..model.constants import (
     G,
     S,
 )
-from ..model.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from ..simulation.record import Record, irregularity
+from ..scene.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
+from ..simulation.record import Record, out_of_band_ratio
 from ..simulation.simulate import simulate
 from ..stepping.engine import arm_at
 from ..studies.identification import Identified, identify
-from ..theory import gain_limit, linear_loop, margins
-from ..theory.linear_loop import Loop
+from ..theory import gain_limits, linear_loop, loops, stability_margins
+from ..theory.loops import Loop
 
 STATUSES = {
     "given": "printed, and reproduced",
@@ -202,7 +202,7 @@ def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
         b: clay [N.s/m].
         th: Th; None for Th = 0.
     """
-    poles = linear_loop.closed_loop_poles(axis, K, b, th)
+    poles = loops.closed_loop_poles(axis, K, b, th)
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
 
 
@@ -216,7 +216,7 @@ def ledger_rows(runs: Runs | None = None) -> list[Row]:
         runs: the runs behind them; None for new ones.
     """
     runs = runs or Runs()
-    parts = (machine, blocks, constant, variable, gain_limits, maneuver)
+    parts = (machine, blocks, constant, variable, largest_gains, maneuver)
     return [each for part in parts for each in part(runs)]
 
 
@@ -290,7 +290,7 @@ def machine(runs: Runs) -> Iterator[Row]:
         (None, float(max(ends)), None),
         "not recoverable",
         f"the printed Sh holds at one pose: Λx is {Lambda[0, 0]:.4g} kg there and "
-        f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; shaping=True keeps it",
+        f"{min(ends):.4g} to {max(ends):.4g} kg at the ends; inertia_shaping=True keeps it",
     )
     yield row(
         "sampling period | Sec. 4 | 0.36 ms | s",
@@ -377,25 +377,25 @@ def _corner(th: Operator) -> float:
     return float(omega[np.argmax((size > math.sqrt(2.0) * th.spring) & (omega > 1.0))])
 
 
-def gain_limits(runs: Runs) -> Iterator[Row]:
+def largest_gains(runs: Runs) -> Iterator[Row]:
     """The gain limit and the conditions for stability (Secs. 3, 4.3).
 
     Args:
         runs: the runs behind the rows.
     """
     text = "; ".join(
-        f"{axis}, b = {b:g}: {gain_limit.gain_limit(axis, b, TH):.4g} with Th, "
-        f"{gain_limit.gain_limit(axis, b):.4g} without"
+        f"{axis}, b = {b:g}: {gain_limits.gain_limit(axis, b, TH):.4g} with Th, "
+        f"{gain_limits.gain_limit(axis, b):.4g} without"
         for axis in AXES
         for b in (B_VARIABLE[0], B_CONSTANT, B_STABILITY)
     )
     yield row(
         "limit of K | Sec. 4.3 | should not exceed 5C | 1",
-        (GAIN_LIMIT_PRINTED, gain_limit.gain_limit("x", B_STABILITY, TH), None),
+        (GAIN_LIMIT_PRINTED, gain_limits.gain_limit("x", B_STABILITY, TH), None),
         "contradicted",
         f"exact limits of the printed loop: {text}. The printed 5 is nearest x at b = 50",
     )
-    y = gain_limit.gain_limit("y", B_STABILITY, TH)
+    y = gain_limits.gain_limit("y", B_STABILITY, TH)
     yield row(
         "limit of K on y, from which the 5C is derived | Sec. 4.3, Eqs. 16, 19 | should not exceed "
         "5C | 1",
@@ -404,8 +404,8 @@ def gain_limits(runs: Runs) -> Iterator[Row]:
         "Eq. 16 is the y axis, whose exact limit is below 1",
     )
     for axis in AXES:
-        verdict = margins.small_gain(axis, 1.0, B_STABILITY, TH, equation=11)
-        tiny = margins.small_gain(axis, 1e-3, B_STABILITY, TH, equation=11)
+        verdict = stability_margins.small_gain(axis, 1.0, B_STABILITY, TH, equation=11)
+        tiny = stability_margins.small_gain(axis, 1e-3, B_STABILITY, TH, equation=11)
         bands = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in verdict.fails)
         yield row(
             f"inequality (11) on {axis}, K = 1 | Eq. 11 | satisfied below 5C | 1",
@@ -417,7 +417,7 @@ def gain_limits(runs: Runs) -> Iterator[Row]:
             "no bound at low frequency, whatever K. The condition is sufficient, not necessary",
         )
     stiff = [
-        gain_limit.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
+        gain_limits.gain_limit("x", B_STABILITY, Operator(0.25 * n, 2.0 * n, 6.0 * n))
         for n in (1.0, 10.0, 100.0)
     ]
     yield row(
@@ -491,7 +491,7 @@ def constant(runs: Runs) -> Iterator[Row]:
         f"K f/(10 + K b) with 1 N; it varies by {100 * np.ptp(v) / v.mean():.1g} % over the steady "
         "part",
     )
-    first = runs.constant(shaping=True)
+    first = runs.constant(inertia_shaping=True)
     dampings = (0.0, B_CONSTANT, 0.0)
     exact = linear_loop.crossing_times(Loop(K=1.0), r.scenario.force[0], edges, dampings)
     for c, when, name in zip(first.crossings, exact, ("enters", "leaves", "ends"), strict=True):
@@ -505,7 +505,7 @@ def constant(runs: Runs) -> Iterator[Row]:
     yield row(
         "fe/fh in the clay | Eq. 7 | a transfer function | 1",
         (
-            abs(complex(margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
+            abs(complex(stability_margins.transparency("x", 1.0, B_CONSTANT, np.array([1e-6]))[0])),
             steady(r, "x", 1, "steady_fe_over_v") / steady(r, "x", 1, "steady_fh_over_v"),
             1e-3,
         ),
@@ -543,7 +543,7 @@ def variable(runs: Runs) -> Iterator[Row]:
     Args:
         runs: the runs behind the rows.
     """
-    r, shaped = runs.variable("none"), runs.variable("none", shaping=True)
+    r, shaped = runs.variable("none"), runs.variable("none", inertia_shaping=True)
     yield row(
         "input force | Sec. 4.2 | 1 N at 45 degrees | N",
         (1.0, math.hypot(*r.scenario.force), 1e-12),
@@ -653,12 +653,12 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         GAINS_FIG11[2]: "25",
     }
     for K in GAINS_FIG11:
-        r, stable = runs.stability(K), K < gain_limit.gain_limit("x", B_STABILITY, TH)
+        r, stable = runs.stability(K), K < gain_limits.gain_limit("x", B_STABILITY, TH)
         pole = rightmost("x", K, B_STABILITY, TH)
         rms = float(np.sqrt(np.mean(r.fh[:, 0] ** 2)))
         yield row(
-            f"irregularity of the force, K = {K:g} | Sec. 4.3, Fig. 11 | {where[K]} | 1",
-            (0.0 if stable else 1.0, irregularity(r), 0.05),
+            f"force out of the band, K = {K:g} | Sec. 4.3, Fig. 11 | {where[K]} | 1",
+            (0.0 if stable else 1.0, out_of_band_ratio(r), 0.05),
             "given",
             f"0 is a force in the band of the maneuver, 1 one wholly outside; "
             f"rms {rms:.3g} N; rightmost pole {pole.real:+.3g} ± {abs(pole.imag):.3g}j 1/s; "
@@ -672,10 +672,10 @@ def maneuver(runs: Runs) -> Iterator[Row]:
         "given",
         "bounded by the torque limits alone, which are not printed",
     )
-    other = runs.stability(GAINS_FIG11[1], axis="y", shaping=True)
+    other = runs.stability(GAINS_FIG11[1], axis="y", inertia_shaping=True)
     yield row(
         "axis of Fig. 11 | Fig. 11 | force in x, position y | 1",
-        (None, irregularity(other, "y"), None),
+        (None, out_of_band_ratio(other, "y"), None),
         "contradicted",
         f"run in x; in y K = 3 is unstable as well ({other.status}), so the figure's two cases "
         "tell apart in x only",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from typing import Any
 
 from ..files import versions
-from ..model.virtual_wall import VirtualWall
-from ..studies.comparison import COMPARED_HANDS, PUSHED, Compared, differing_fields
+from ..scene.virtual_wall import VirtualWall
+from ..studies.comparison import COMPARED_HANDS, PUSHED, Comparison, differing_fields
 from ..views.compare_plots import compare_figures
 from .report import template_environment
 
@@ -40,7 +39,7 @@ NOTES = {
 }
 
 
-def comparison_page(found: Sequence[Compared]) -> str:
+def comparison_page(found: Comparison) -> str:
     """Renders a comparison as one HTML page that needs no other file.
 
     Args:
@@ -66,7 +65,7 @@ def comparison_page(found: Sequence[Compared]) -> str:
     return template_environment().get_template("compare.html").render(context)
 
 
-def number_rows(found: Sequence[Compared]) -> dict[str, list[str]]:
+def number_rows(found: Comparison) -> dict[str, list[str]]:
     """Key numbers as text, a row a number, a cell a file; without those that no file has.
 
     Args:

@@ -10,18 +10,19 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import named
 from ..errors import ParameterError, number
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..stepping.pace import STABLE_STEP, check_explicit, fastest_rate
 from ..stepping.run import Crossing
-from .record import ARRAYS, Record
-from .simulate import has_numba, simulate
+from .columns import ARRAYS
+from .engines import has_numba
+from .error_estimate import Accuracy
+from .one_run import run_once
+from .record import Record
 
 UNITS = ("s", "m")
 ROUNDING = 1e-11  # [s], [m] the finest error that can be asked for; runs keep some 1e-12 at best
@@ -61,43 +62,6 @@ METHODS = {
     "fast": IntegratorFacts(2, {"s": 0.35, "m": 0.5}, 1.0),
     "accurate": IntegratorFacts(4, {"s": 50.0, "m": 100.0}, 5.0),
 }
-
-
-@named
-@dataclass(frozen=True)
-class Accuracy:
-    """How far a run is from the exact solution, and how far it was allowed to be.
-
-    Attributes:
-        asked: the error asked for [unit].
-        unit: "s", the largest error of the times at which borders are crossed; or "m", of the
-            position at the samples.
-        estimate: the error of the record [unit]; None where nothing bounds it.
-        reached: whether the estimate is as small as asked.
-        integrator: that was chosen.
-        dt: step of the record [s].
-        order: observed over the last three steps; None where it cannot be told.
-        runs: made to choose and to verify.
-        wall_time: of all of them [s].
-        note: why there is no estimate, or why it is not as small as asked; else "".
-    """
-
-    asked: float
-    unit: str
-    estimate: float | None
-    reached: bool
-    integrator: str
-    dt: float
-    order: float | None = None
-    runs: int = 0
-    wall_time: float = 0.0
-    note: str = ""
-
-    def __str__(self) -> str:
-        found = "unknown" if self.estimate is None else f"{self.estimate:.1e} {self.unit}"
-        kept = "reached" if self.reached else "not reached"
-        how = f"{self.integrator}, dt = {self.dt:.3g} s, {self.runs} runs"
-        return f"{found}, {self.asked:g} {self.unit} asked: {kept} ({how})"
 
 
 class Trace(NamedTuple):
@@ -384,7 +348,7 @@ class Trial:
         else:
             every = self.every if dt == kept else 1_000_000  # crossings alone are compared
         scenario = dataclasses.replace(self.scenario, dt=dt)
-        r = simulate(scenario, every=every, progress=self.progress, engine=self.engine)
+        r = run_once(scenario, every, self.engine, self.progress)
         self.runs, self.wall = self.runs + 1, self.wall + r.wall_time
         return r
 

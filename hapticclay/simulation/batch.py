@@ -18,8 +18,8 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..model.constants import AXES
-from ..model.plausible import warn_of
-from ..model.scenario import Scenario
+from ..scene.plausible import warn_of
+from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.engine import warnings_caught
 from ..stepping.machine_code import compile_time, is_kept
@@ -27,7 +27,8 @@ from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, kind_key
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
-from .simulate import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step, simulate
+from .engines import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step
+from .simulate import simulate
 
 KEEP = ("records", "summaries")
 MANY = 32  # runs of a batch from which on those of one kind are made together

@@ -12,10 +12,10 @@ from typing import IO, Any
 import numpy as np
 
 from ..display import one_line
-from ..errors import ParameterError, choice
+from ..errors import ParameterError, choice, needing
 from ..files import atomic
 from . import tables
-from .record import Record
+from .columns import Recorded
 from .stored import check_times
 
 TOPIC = "/hapticclay"  # of MCAP
@@ -23,7 +23,7 @@ RECORDING = "hapticclay"  # application of a Rerun recording
 ROWS = 4096  # of a text that are written at once
 
 
-def export_record(record: Record, path: str | os.PathLike[str], kind: str | None = None) -> Path:
+def export_record(record: Recorded, path: str | os.PathLike[str], kind: str | None = None) -> Path:
     """Writes a record in a format of EXPORTS, whole or not at all; an older file is replaced.
 
     Args:
@@ -51,16 +51,16 @@ def export_record(record: Record, path: str | os.PathLike[str], kind: str | None
     return file
 
 
-def _netcdf(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("nc", "h5netcdf"):
+def _netcdf(record: Recorded, file: IO[bytes]) -> None:
+    with needing("nc", "h5netcdf"):
         import h5netcdf  # noqa: F401  # xarray finds it by name
         import h5py  # noqa: F401
-    file.write(record.to_xarray().to_netcdf(engine="h5netcdf"))
+    file.write(tables.to_xarray(record).to_netcdf(engine="h5netcdf"))
 
 
-def _parquet(record: Record, file: IO[bytes]) -> None:
-    frame = record.to_frame().reset_index()
-    with tables.needing("parquet", "pyarrow"):
+def _parquet(record: Recorded, file: IO[bytes]) -> None:
+    frame = tables.to_frame(record).reset_index()
+    with needing("parquet", "pyarrow"):
         import pyarrow as pa
         import pyarrow.parquet as pq
     units = frame.attrs["units"]
@@ -69,7 +69,7 @@ def _parquet(record: Record, file: IO[bytes]) -> None:
     pq.write_table(table.cast(pa.schema(fields, table.schema.metadata)), file)
 
 
-def _csv(record: Record, file: IO[bytes]) -> None:
+def _csv(record: Recorded, file: IO[bytes]) -> None:
     columns, units = tables.record_columns(record), tables.column_units(record)
     told = [f"{one_line(record.scenario.name)}: {one_line(record.status, 200)}"]
     told.append(", ".join(f"{name} [{unit}]" for name, unit in units.items()))
@@ -81,8 +81,8 @@ def _csv(record: Record, file: IO[bytes]) -> None:
         file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
 
 
-def _mcap(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("mcap", "mcap"):
+def _mcap(record: Recorded, file: IO[bytes]) -> None:
+    with needing("mcap", "mcap"):
         from mcap.writer import Writer
     told = tables.told_of(record)
     writer = Writer(file)
@@ -111,7 +111,7 @@ def _finite(x: float) -> float | None:
     return x if math.isfinite(x) else None
 
 
-def _sample_schema(record: Record) -> dict[str, Any]:
+def _sample_schema(record: Recorded) -> dict[str, Any]:
     """The JSON schema of a sample."""
 
     def entry(name: str) -> dict[str, Any]:
@@ -125,8 +125,8 @@ def _sample_schema(record: Record) -> dict[str, Any]:
     return {"type": "object", "properties": {name: entry(name) for name in names}}
 
 
-def _rerun(record: Record, file: IO[bytes]) -> None:
-    with tables.needing("rrd", "rerun-sdk", "rerun"):
+def _rerun(record: Recorded, file: IO[bytes]) -> None:
+    with needing("rrd", "rerun-sdk", "rerun"):
         import rerun as rr
     told = tables.told_of(record)
     recording = rr.RecordingStream(RECORDING)
@@ -149,7 +149,7 @@ def _rerun(record: Record, file: IO[bytes]) -> None:
     file.write(content)
 
 
-def _matlab(record: Record, file: IO[bytes]) -> None:
+def _matlab(record: Recorded, file: IO[bytes]) -> None:
     from scipy.io import savemat
     from scipy.io.matlab import MatWriteError
 
@@ -166,7 +166,7 @@ def _matlab(record: Record, file: IO[bytes]) -> None:
         raise ParameterError("format", "mat", bound) from None
 
 
-EXPORTS: dict[str, Callable[[Record, IO[bytes]], None]] = {
+EXPORTS: dict[str, Callable[[Recorded, IO[bytes]], None]] = {
     "nc": _netcdf,
     "parquet": _parquet,
     "csv": _csv,

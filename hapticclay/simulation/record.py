@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
 import math
 import os
@@ -18,47 +19,26 @@ from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
 from ..model.constants import AXES
-from ..model.fields import make_part, plain_data
-from ..model.scenario import Scenario
-from ..model.scenario_text import scenario_rows
 from ..model.signals import Multisine
+from ..scene.earlier_names import with_present_names
+from ..scene.fields import make_part, plain_data
+from ..scene.scenario import Scenario
+from ..scene.text import scenario_rows
 from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
-from ..theory.margins import Verdict
+from ..theory.stability_margins import Verdict
+from .columns import ARRAYS, EXTRA, SCALAR
+from .error_estimate import Accuracy
 from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from ..views.record_plots import RecordPlots
-    from .accuracy import Accuracy
 
-RECORD_SCHEMA = "hapticclay-record-1"
-ARRAYS = {
-    "t": "s",
-    "p": "m",
-    "v": "m/s",
-    "fh": "N",
-    "fe": "N",
-    "b": "N.s/m",
-    "q": "rad",
-    "qd": "rad/s",
-    "tau": "N.m",
-    "delta": "m",
-}
-EXTRA = {  # arrays that some records have
-    "removed": "m^3",
-    "removal_rate": "m^3/s",
-    "target": "m",
-    "gain": "1/kg",
-}
-SCALAR = (
-    "t",
-    "removed",
-    "removal_rate",
-)  # arrays of one figure a sample; the others have one an axis
+VIEWS = "hapticclay.views.record_plots"  # draws; looked up when a figure is asked for
+RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -86,7 +66,7 @@ class Record:
             damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
             what is left over (residual) and what went through (throughput) [J]; of clay that
             springs back, what its springs hold of the clay's share and have lost (springs_stored,
-            springs_lost).
+            springs_dissipated).
         steps: engine steps made.
         wall_time: run time [s].
         versions: of the packages used.
@@ -173,14 +153,12 @@ class Record:
         return ARRAYS | extra | ({"ground": "m"} if self.ground is not None else {})
 
     @property
-    def plot(self) -> RecordPlots:
+    def plot(self) -> Any:
         """Draws the run: `plot()`, or `plot.velocity()`, `plot.force()`, `plot.path()`, ...
 
-        The plots live in `views`, a room above; this is the one place that looks up.
+        It is a `views.record_plots.RecordPlots`.
         """
-        from ..views.record_plots import RecordPlots
-
-        return RecordPlots(self)
+        return importlib.import_module(VIEWS).RecordPlots(self)
 
     def to_frame(self) -> DataFrame:
         """The arrays as a pandas DataFrame, a row a sample.
@@ -332,7 +310,7 @@ class Record:
 
         Returns:
             None where the force is not constant, a hand is at the handle, the clay changes over the
-            stretch, stays cut, springs back or is turned, or the controller is the user's own.
+            stretch, stays cut, springs back or has rotated axes, or the controller is your own.
         """
         i, s = AXES.index(axis), self.scenario
         if s.clay and (s.clay.groove or s.clay.springs):
@@ -344,7 +322,7 @@ class Record:
         if (
             not alone
             or s.controller is not None
-            or s.turned
+            or s.rotated
             or np.any(self.b[piece][:, axes] != b[axes])
         ):
             return None
@@ -470,9 +448,9 @@ class Record:
                 ground = z["ground"] if "ground" in z else None
             _check(arrays | extra)
             schema = head["schema"]
-            if schema == RECORD_SCHEMA:
+            if schema in (RECORD_SCHEMA, RECORD_SCHEMA_0_2):
                 check_head(head)
-                scenario, lost = _scenario(head["scenario"])
+                scenario, lost = _scenario(with_present_names(head["scenario"]))
                 _check_ground(ground, scenario)
                 check_times(arrays["t"])
                 return cls(
@@ -480,7 +458,7 @@ class Record:
                     scenario=scenario,
                     outcome=Outcome(**head["outcome"]),
                     crossings=tuple(Crossing(**c) for c in head["crossings"]),
-                    energy=head["energy"],
+                    energy=with_present_names(head["energy"]),
                     steps=head["steps"],
                     wall_time=head["wall_time_s"],
                     versions=head["versions"],
@@ -537,11 +515,7 @@ def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
 
 
 def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
-    if d is None:
-        return None
-    from .accuracy import Accuracy  # most records have none
-
-    return Accuracy(**d)
+    return None if d is None else Accuracy(**d)
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
@@ -620,7 +594,7 @@ def observed_passivity(record: Record) -> Verdict:
 
 
 @checked
-def irregularity(record: Record, axis: str = "x") -> float:
+def out_of_band_ratio(record: Record, axis: str = "x") -> float:
     """Share of the rms of the operator's force above the band of the maneuver.
 
     A stable linear loop answers a maneuver within its band and gives 0; white noise gives nearly 1.

@@ -20,14 +20,14 @@ from ..model.flow import CONSISTENCY_MAX, FY_MAX
 from ..model.groove import Groove
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
-from ..model.plausible import warn_of
 from ..model.sampled_controller import Controller
-from ..model.scenario import Scenario
+from ..scene.plausible import warn_of
+from ..scene.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, EngineStore, Run, Snapshot
 from . import record
-from .simulate import ENGINES, kernel_for, pays
+from .engines import ENGINES, kernel_for, pays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges

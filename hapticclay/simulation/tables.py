@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import needing
 from ..model.constants import AXES
-from ..model.fields import plain_data
 from ..model.hardware import JOINTS
-from .record import ARRAYS, EXTRA, SCALAR, Record
+from ..scene.fields import plain_data
+from .columns import ARRAYS, EXTRA, SCALAR, Recorded
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,26 +38,7 @@ LONG_NAMES = {
 }
 
 
-@contextlib.contextmanager
-def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
-    """Says how to install a package where importing it fails.
-
-    Args:
-        what: what needs it, for the error.
-        package: its name.
-        extra: of hapticclay, that brings it.
-
-    Raises:
-        ParameterError: the package is not installed.
-    """
-    try:
-        yield
-    except ImportError:
-        bound = f"is not installed: pip install 'hapticclay[{extra}]'"
-        raise ParameterError(what, package, bound) from None
-
-
-def recorded_arrays(record: Record) -> dict[str, np.ndarray]:
+def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
     """The arrays over time of a record by name, t among them, then those in `extra`.
 
     Args:
@@ -77,7 +56,7 @@ def parts_of(name: str) -> tuple[str, ...]:
     return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
 
 
-def record_columns(record: Record) -> dict[str, np.ndarray]:
+def record_columns(record: Recorded) -> dict[str, np.ndarray]:
     """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ...
 
     Args:
@@ -90,7 +69,7 @@ def record_columns(record: Record) -> dict[str, np.ndarray]:
     return out
 
 
-def column_units(record: Record) -> dict[str, str]:
+def column_units(record: Recorded) -> dict[str, str]:
     """Unit of each of the `record_columns`.
 
     Args:
@@ -103,7 +82,7 @@ def column_units(record: Record) -> dict[str, str]:
     }
 
 
-def told_of(record: Record) -> dict[str, Any]:
+def told_of(record: Recorded) -> dict[str, Any]:
     """Texts and numbers that go with the arrays into any file.
 
     Args:
@@ -125,7 +104,7 @@ def told_of(record: Record) -> dict[str, Any]:
     }
 
 
-def to_frame(record: Record) -> DataFrame:
+def to_frame(record: Recorded) -> DataFrame:
     """A record as a pandas DataFrame: see `Record.to_frame`.
 
     Args:
@@ -143,7 +122,7 @@ def to_frame(record: Record) -> DataFrame:
     return out
 
 
-def to_xarray(record: Record) -> Dataset:
+def to_xarray(record: Recorded) -> Dataset:
     """A record as an xarray Dataset: see `Record.to_xarray`.
 
     Args:

@@ -145,7 +145,7 @@ def machine_at(part, parts, s, p):
     loop, nothing = s.loop, hardware.nothing(part.passivity)
     x, y = reference_of(part.own, loop)
     return Machine(
-        x, y, first_form(part.formed, loop), first_own(part.own),
+        x, y, first_form(part.state_space, loop), first_own(part.own),
         Hold(NONE, NONE, nothing, hardware.no_pull(part.coupling)),
         sampled.samples_from(part, parts.time.dt, 0), NONE,
         first_rates(part.difference, part, s.body), unfiltered(part.filter),
@@ -161,9 +161,9 @@ def reference_of(own, loop):
     return rest, rest
 
 
-def first_form(formed, loop):
-    if formed is None:
-        return formed
+def first_form(state_space, loop):
+    if state_space is None:
+        return state_space
     x, y = loop.form
     return Formed(x, y, (loop.x.delta, loop.y.delta))
 
@@ -177,7 +177,7 @@ def first_own(own):
 def first_rates(part, sampler, body):
     if part is None:
         return part
-    ring, n, q, w = part.ring, part.window, body.q, body.w
+    ring, n, q, w = part.ring, part.velocity_window, body.q, body.w
     for i in range(n):  # before the start the joints have turned so for long
         j = i - n
         q1, q2 = q[0] + j * sampler.Ts * w[0], q[1] + j * sampler.Ts * w[1]

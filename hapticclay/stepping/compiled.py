@@ -36,7 +36,7 @@ from ..model import (
     regions,
     spring,
 )
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import (
     begin,
     borders,
@@ -209,7 +209,7 @@ OUTLINED = {
     path.crossed,
     borders.clay_in,
     borders.first_border,
-    path.careful,
+    path.step_to_event,
     borders.passed_alike,
 }
 ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, engine_step.numbers_at, many.filled}
@@ -275,9 +275,9 @@ def register_atoms() -> None:
 # ---- entries: all that is called between them is compiled with the same flags --------------------
 
 
-def glide(parts, s, e, room):
-    """path.glide."""
-    return path.glide(parts, s, e, room)
+def run_whole_steps(parts, s, e, room):
+    """path.run_whole_steps."""
+    return path.run_whole_steps(parts, s, e, room)
 
 
 def advance(parts, s, e, room):
@@ -304,7 +304,7 @@ def entry(f: Any) -> Any:
 
 register(SOURCES)
 register_atoms()
-GLIDE, ADVANCE, CARRY = entry(glide), entry(advance), entry(carry)
+WHOLE_STEPS, ADVANCE, CARRY = entry(run_whole_steps), entry(advance), entry(carry)
 
 
 def library() -> ctypes.CDLL:
@@ -348,9 +348,9 @@ def natively(r: run.Run, room: int) -> None:
                 r.state = ADVANCE(parts, r.state, r.native, room)
             continue
         with first_call(ready, kind, "runs of this kind"):
-            r.state = GLIDE(parts, r.state, r.native, room)
+            r.state = WHOLE_STEPS(parts, r.state, r.native, room)
         if path.has_room(r.parts.time, r.state, r.e, room):
-            run.one_plainly(r, path.careful)
+            run.one_plainly(r, path.step_to_event)
             met[kind] = met.get(kind, 0) + 1
 
 
@@ -375,7 +375,7 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
         what: is compiled, in words.
     """
     with Notice(what, compile_time(kind)) as notice, signals_held():
-        if not isinstance(GLIDE._cache, cache.FileCache):  # without a home none can miss it
+        if not isinstance(WHOLE_STEPS._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
         before = cache.on_miss.set(notice.begin)
         try:

@@ -26,7 +26,7 @@ def moving(modal, part, body, v):
     return Body(body.q, w, body.g)
 
 
-def feel(parts, s, body, modes):
+def evaluate_contact(parts, s, body, modes):
     """What clay that yields does now, in these modes."""
     when = moment(parts.accurate.ahead, s.clock.t, 0.0, -1)
     return instant(parts, when, point_of(body, s.loop), s.clay, modes).grip
@@ -90,7 +90,7 @@ def chosen_axes(parts, s, m):
     v = m_.velocity(modal, parts.arm, body.q, body.w)
     (x, restx), (y, resty) = first_mode(m, 0, v[0]), first_mode(m, 1, v[1])
     m = m_.with_mode(m, x, y)
-    grip = feel(parts, s, body, m)
+    grip = evaluate_contact(parts, s, body, m)
     restx, resty = rests_now(modal, m.law, grip, 0, restx), rests_now(modal, m.law, grip, 1, resty)
     if not (restx or resty):
         return body, m, grip
@@ -121,22 +121,22 @@ def fitting(parts, s, body, m, restx, resty):
     modal, (x, y), (endx, endy) = parts.modal, m.mode, m.ended
     openx, openy = restx and abs(endx) != FREE, resty and abs(endy) != FREE
     least, tried, last = INF, 0, 9
-    best, felt = m_.with_mode(m, 0.0, 0.0), Grip(NONE, (0.0, 0.0, 0.0, 0.0), NONE, NONE)
+    best, chosen = m_.with_mode(m, 0.0, 0.0), Grip(NONE, (0.0, 0.0, 0.0, 0.0), NONE, NONE)
     while tried < last:
         j, k = tried // 3, tried % 3
         tried += 1
         if (j > 0 and not restx) or (k > 0 and not resty):
             continue
         m = m_.with_mode(m, tried_mode(j, restx, endx, x), tried_mode(k, resty, endy, y))
-        grip = feel(parts, s, body, m)
+        grip = evaluate_contact(parts, s, body, m)
         wrongx = m_.misfit(modal, m, grip, 0) if openx else 0.0
         wrongy = m_.misfit(modal, m, grip, 1) if openy else 0.0
         wrong = max(wrongx, wrongy)
         if wrong < least:
-            least, best, felt = wrong, m, grip
+            least, best, chosen = wrong, m, grip
         if least <= 0.0:
             break
-    return best, felt
+    return best, chosen
 
 
 def chosen_way(parts, s, m):
@@ -145,18 +145,18 @@ def chosen_way(parts, s, m):
     v, active = m_.velocity(modal, parts.arm, body.q, body.w), m_.is_active(m.law, 0)
     rests = active and (m.mode[0] == 0.0 or ended != 0.0 or (v[0] == 0.0 and v[1] == 0.0))
     m = m_.with_way(m, 0.0 if rests else SLIDING, m.way)
-    grip = feel(parts, s, body, m)
+    grip = evaluate_contact(parts, s, body, m)
     if not active:
         return body, m, grip
     if not rests and m_.is_nearly_at_rest(modal.along, modal, m.law, grip, 0):
         rests, m = True, m_.with_way(m, 0.0, m.way)
     if rests:
         v, body = NONE, moving(modal, parts.arm, body, NONE)
-        grip = feel(parts, s, body, m)
+        grip = evaluate_contact(parts, s, body, m)
         if ended != FREE and m_.gap(modal.along, modal, m, grip, 0) >= 0.0:
             return body, m, grip
         m = m_.with_way(m, SLIDING, m_.set_out(m, grip))
-        grip = feel(parts, s, body, m)
+        grip = evaluate_contact(parts, s, body, m)
     speed, way = m_.way_of(m, v)
     m = m_.with_way(m, SLIDING, way)
     if not m_.is_turned_in(modal.dt, m.law, grip, way):
@@ -165,13 +165,13 @@ def chosen_way(parts, s, m):
     m = m_.with_way(m, TURNED_IN, way)
     if speed > 0.0:
         body = moving(modal, parts.arm, body, (speed * way[0], speed * way[1]))
-    return body, m, feel(parts, s, body, m)
+    return body, m, evaluate_contact(parts, s, body, m)
 
 
 # ---- where they end ------------------------------------------------------------------------------
 
 
-def strays(modal, part, m, k):
+def leaves_mode(modal, part, m, k):
     """Whether a step along the motion turns back, or leaves the speeds of its mode."""
     v, mode = m_.velocity(modal, part, k.end.q, k.end.w), m.mode[0]
     along = v[0] * m.way[0] + v[1] * m.way[1]
@@ -243,7 +243,7 @@ def strays_along(along, modal, part, m, k):
     """The same of any clay; elsewhere the handle has no way to keep to."""
     if along is None:
         return False
-    return m_.is_active(m.law, 0) and strays(modal, part, m, k)
+    return m_.is_active(m.law, 0) and leaves_mode(modal, part, m, k)
 
 
 def may_end(along, m, v, i):

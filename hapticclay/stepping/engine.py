@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..model.arm import PAPER, Arm
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 
 try:
     import mujoco
@@ -73,11 +73,11 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     model.opt.timestep = scenario.dt
     for i, limit in enumerate(scenario.torque_limit):
         model.actuator_ctrlrange[i] = -limit, limit
-    turn_dampers(model, scenario)
+    rotate_dampers(model, scenario)
     return model
 
 
-def turn_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
+def rotate_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
     """Turns the engine's dampers, which act along the axes of a site, with the clay.
 
     Args:

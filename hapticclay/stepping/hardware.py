@@ -75,9 +75,9 @@ def differenced(part, x, k, Ts, q, w):
     ring, row, k = part.ring, 3 * x.oldest, float(k)
     then = ring[row], ring[row + 1], ring[row + 2]
     w = law.velocity_difference(then[0], (then[1], then[2]), k, q, Ts)
-    newest = ring[3 * ((x.oldest - 1) % part.window)]
+    newest = ring[3 * ((x.oldest - 1) % part.velocity_window)]
     w = smoothed(part.cutoff, x.w, w, (k - newest) * Ts)
-    return w, Rates(w, (x.oldest + 1) % part.window)
+    return w, Rates(w, (x.oldest + 1) % part.velocity_window)
 
 
 def smoothed(cutoff, old, w, span):

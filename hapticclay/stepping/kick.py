@@ -161,12 +161,12 @@ def moved(special, parts, clay, a, law):
     g = yielding.creeping(special.flow, special.stiff, special.groove, states.flow, a, g)
     load, back, owes, soft = stiff.with_owed(special.stiff, hand_, a, all_, before.owed, g)
     u = servo.solve(law, load)
-    u, felt = yielding.resist(special.flow, special.groove, parts.grain, clay, a, law, load, u)
-    r = yielding.mean(special.flow, felt)
+    u, contact = yielding.resist(special.flow, special.groove, parts.grain, clay, a, law, load, u)
+    r = yielding.mean(special.flow, contact)
     rest, owed = stiff.still_owed(special.stiff, a, back, owes, soft, u)
     x, y = servo.taken(bare, all_, u)
     beside = rest[0] + r[0] + pulled[0] + x, rest[1] + r[1] + pulled[1] + y
-    return Motion(u, servo.net(load, u, r), rest, beside, Reaction(owed, a.split, felt))
+    return Motion(u, servo.net(load, u, r), rest, beside, Reaction(owed, a.split, contact))
 
 
 def stopped_handle(special, split, step, at, w):
@@ -180,7 +180,7 @@ def rests(special, motion):
     """Whether clay holds the handle behind a kick."""
     if special is None:
         return False
-    return yielding.is_still(special.flow, motion.reaction.felt)
+    return yielding.is_still(special.flow, motion.reaction.contact)
 
 
 def link_torques(links, u, g, f):

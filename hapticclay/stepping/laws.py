@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ParameterError
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 
 TABLE: list[ModuleType] = []
 
@@ -53,7 +53,7 @@ def parts_of(scenario: Scenario) -> Any:
         if part is None:
             continue
         told = module.refuses(scenario)
-        if scenario.interface is not None and scenario.interface.coupling is not None:
+        if scenario.hardware is not None and scenario.hardware.coupling is not None:
             told = told or "must be without a coupling, which renders viscous clay and its yielding"
         if told:
             raise ParameterError("clay", scenario.clay, told)

@@ -19,7 +19,7 @@ from ..model import controller, regions
 from ..model.clay import Profile
 from ..model.controller import Servo
 from ..model.operator import NO_HAND, mobility_with
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous
 from .engine_step import put
 from .machine_code import CARRY, kind_of
@@ -34,12 +34,13 @@ LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so
 FEWEST = 4  # runs of a kind that repay its pattern
 PATTERNS = 64  # kinds that are kept
 SHARED = (
-    "jitter", "lost", "encoder", "velocity", "window", "velocity_filter", "adc_bits", "adc_range",
+    "jitter", "dropout_probability", "encoder", "velocity", "velocity_window", "velocity_filter",
+    "adc_bits", "adc_range",
     "force_noise", "force_filter", "filter_order", "dac_bits", "dac_range", "friction", "passivity",
     "coupling",
-)  # fmt: skip  # of an interface, all but its delay; without noise its seed has no effect
+)  # fmt: skip  # of the hardware, all but its delay; without noise its seed has no effect
 _scene = operator.attrgetter(
-    "control", "shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
+    "control", "inertia_shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
 )
 _shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
 
@@ -203,13 +204,13 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
     Args:
         s: the scenario.
     """
-    clay, wires, hand = s.clay, s.interface, s.operator
+    clay, wires, hand = s.clay, s.hardware, s.operator
     if (
         s.muscle is not None
         or s.command is not None
         or s.controller is not None
         or s.integrator != "fast"
-        or not s.stop
+        or not s.stop_when_unstable
         or s.t_max > LONGEST * s.dt
         or (laws.TABLE and laws.parts_of(s) is not None)
     ):
@@ -224,7 +225,7 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
         law = x.edges, x.along, y.edges, y.along, y is x or y == x, hard
     parts: Any = None
     if wires is not None:
-        if wires.jitter or wires.lost or wires.force_noise:
+        if wires.jitter or wires.dropout_probability or wires.force_noise:
             return None
         parts = _shared(wires), wires.delay > 0.0
     held = hand is not None and (not isinstance(hand, tuple) or any(hand))
@@ -295,7 +296,7 @@ class Pattern:
         Args:
             jobs: their scenarios.
         """
-        longest = max((s.interface.delay for s in jobs if s.interface), default=0.0)
+        longest = max((s.hardware.delay for s in jobs if s.hardware), default=0.0)
         held = self.parts.sampler
         if held and held.delay and longest > held.delay.delay:
             self.parts = scene.for_delays(self.parts, longest)
@@ -319,7 +320,7 @@ class Pattern:
         if at.hand is not None:
             self._put_hands(out, jobs)
         if at.sampler is not None and at.sampler.delay is not None:
-            self._put_delays(out, [s.interface.delay for s in jobs if s.interface])
+            self._put_delays(out, [s.hardware.delay for s in jobs if s.hardware])
         return out
 
     def _put_hands(self, out: np.ndarray, jobs: Sequence[Scenario]) -> None:
@@ -481,7 +482,7 @@ def summary_columns(like: Scenario, made: Runs) -> dict[str, Any]:
     ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
     work = made.work.T
     balance = energy.balance(work[:5], work[5:7], work[7:9])
-    if like.interface is not None and any(like.interface.friction):
+    if like.hardware is not None and any(like.hardware.friction):
         balance["residual"] = balance["residual"] - work[9]
     last, crossed = made.last, made.crossed
     v, b, fe = last[:, 4:6], last[:, 12:14], made.force

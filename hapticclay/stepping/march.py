@@ -309,10 +309,10 @@ def write_shown(parts, e, i, body, x):
             b[0], b[1], w1, w2,
         ),
     )  # fmt: skip
-    write_felt(parts.modal, parts.special, e, i, x.fe)
+    write_force(parts.modal, parts.special, e, i, x.fe)
 
 
-def write_felt(modal, special, e, i, fe):
+def write_force(modal, special, e, i, fe):
     """Writes the force of the clay where b v does not tell it."""
     if modal is None:
         return write_more(special, e, i, fe)

@@ -18,7 +18,7 @@ from .kick import place
 from .parts import INF
 from .servo import net, solve
 from .state import Grip, Handle, Modes, Point, Response
-from .yielding import turned_matrix
+from .yielding import rotated_matrix
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most of them for one sample
@@ -63,16 +63,16 @@ def is_rough(law, i):
     return law[3 * i + 1] > 0.0 and n != math.floor(n)
 
 
-def creep_speed(lightness, dt, K, n):
+def creep_speed(mobility, dt, K, n):
     """Speed below which clay of n < 1 is too stiff for SUBSTEPS a sample [m/s]; else 0."""
     if K <= 0.0 or n >= 1.0:
         return 0.0
-    return (dt * lightness * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
+    return (dt * mobility * K * n / (SUBSTEPS * STABLE_STEP)) ** (1.0 / (1.0 - n))
 
 
 def slowest(modal, law, i):
     """As `creep_speed`, of an axis."""
-    return creep_speed(modal.lightness, modal.dt, law[3 * i + 1], law[3 * i + 2])
+    return creep_speed(modal.mobility, modal.dt, law[3 * i + 1], law[3 * i + 2])
 
 
 def holding_force(modal, law, i):
@@ -126,7 +126,7 @@ def answer(modal, modes, law, load, at):
     if modal is None:
         return plain_answer(law, load)
     grain, c, g = modal.grain, at.c, solve(law, load)
-    B = turned_matrix(grain, controller.velocity_per_force(law.n, law.W, load.d))
+    B = rotated_matrix(grain, controller.velocity_per_force(law.n, law.W, load.d))
     v = viscous.along(grain, at.v[0], at.v[1])
     a = viscous.along(grain, g[0] - c[0], g[1] - c[1])
     if modes.mode[0] == 0.0 and modes.mode[1] == 0.0:
@@ -199,7 +199,7 @@ def across(B, e):
 
 
 def acceleration(x):
-    """Acceleration of the handle as felt, along the axes of the clay [m/s^2]."""
+    """Acceleration of the handle that the clay sees, along the axes of the clay [m/s^2]."""
     return left_of(x.a, x.B, x.f)
 
 

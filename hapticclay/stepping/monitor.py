@@ -11,9 +11,9 @@ import numpy as np
 from ..arguments import named
 from ..model.clay import Clay
 from ..model.constants import AXES
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..theory import gain_limit
+from ..scene.scenario import Scenario
+from ..theory import gain_limits
 
 LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
@@ -96,7 +96,7 @@ class StabilityMonitor:
             step = first + n - 1
             code = "limit cycle" if cause == LIMITS else "diverged"
             verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
-            if self.scenario.stop:
+            if self.scenario.stop_when_unstable:
                 return n, verdict
             self.onset = self.onset or verdict
         if good == rows.shape[1]:
@@ -195,7 +195,7 @@ class StabilityMonitor:
             self.unbound = self.seen + last - int((~bound)[::-1].argmax())
         self.often += int(bound.sum())
         self.seen += last + 1
-        if not self.scenario.stop:
+        if not self.scenario.stop_when_unstable:
             last = max(1, round(WHILE / self.scenario.dt))
             self.bound = np.concatenate((self.bound, bound))[-last:]
 
@@ -234,7 +234,7 @@ class StabilityMonitor:
                 cause = "" if self.onset or i in verdicts else self._verdict(i)
                 if cause:
                     verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
-                    if self.scenario.stop:
+                    if self.scenario.stop_when_unstable:
                         break
             if before != len(turns) - 1 and i not in verdicts:
                 self.swings[i] = []
@@ -279,7 +279,7 @@ class StabilityMonitor:
         """The clay with the least gain limit of the linear loop of axis i, and this limit."""
         for b in values:
             if (i, b) not in self._limits:
-                self._limits[i, b] = gain_limit.continuous_limit(self.scenario, AXES[i], b)
+                self._limits[i, b] = gain_limits.continuous_limit(self.scenario, AXES[i], b)
         return min(((b, self._limits[i, b]) for b in values), key=lambda x: x[1])
 
     def _dampings(self, i: int, visited: bool) -> list[float]:
@@ -319,7 +319,7 @@ class StabilityMonitor:
             return f"{self._raise_limit()}: the motors saturate"
         if s.controller is not None:
             return "change the controller, or lower dt or Ts"
-        if not s.shaping:
+        if not s.inertia_shaping:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
@@ -327,7 +327,7 @@ class StabilityMonitor:
 
 def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
     """Dampings that may resist axis i in a box [N.s/m], ascending."""
-    laws = clay.laws if clay.angle else clay.laws[i : i + 1]  # turned clay resists by both
+    laws = clay.laws_on(i)
     corners = (low[0], low[1]), (high[0], high[1])
     return np.unique([b for law in laws for b in law.within(*corners)])
 

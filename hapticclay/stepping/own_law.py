@@ -17,7 +17,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload, register_jitable
 
-from ..model.sampled_controller import DESK, TORQUE, LawCaller
+from ..model.sampled_controller import BUFFER, TORQUE, LawCaller
 from .parts import Parts
 
 CALL = ctypes.CFUNCTYPE(None, ctypes.c_size_t)
@@ -34,7 +34,7 @@ def called(parts: Parts) -> Parts:
         return parts
     own = parts.sampler.own
     law = c_function(own.law)
-    own = own._replace(law=law, desk=own.desk.ctypes.data)
+    own = own._replace(law=law, buffer=own.buffer.ctypes.data)
     return parts._replace(sampler=parts.sampler._replace(own=own))
 
 
@@ -57,20 +57,24 @@ def c_function(caller: LawCaller) -> Any:
 
 @functools.lru_cache(maxsize=64)
 def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
-    """A C function that reads the desk, calls the law and writes what it returns; None if numba
+    """A C function that reads the buffer, calls the law and writes what it returns; None if numba
     cannot compile it, and a line says so. What is `outside` the law is a constant in it.
     """
-    names = [f"desk[{j}]" for j in range(DESK + 2 * n + m)]
-    state, after, params = names[DESK : DESK + n], names[DESK + n :][:n], names[DESK + 2 * n :]
+    names = [f"buffer[{j}]" for j in range(BUFFER + 2 * n + m)]
+    state, after, params = (
+        names[BUFFER : BUFFER + n],
+        names[BUFFER + n :][:n],
+        names[BUFFER + 2 * n :],
+    )
     returned = [f"{x} = state[{j}]" for j, x in enumerate(after)]
     lines = [
-        f"desk = carray(pointer, {len(names)})",
-        f"desk[{TORQUE}] = desk[{TORQUE + 1}] = nan",  # what a law that raises leaves behind
+        f"buffer = carray(pointer, {len(names)})",
+        f"buffer[{TORQUE}] = buffer[{TORQUE + 1}] = nan",  # what a law that raises leaves behind
         "try:",
-        " torque, state = law(desk[0], (desk[1], desk[2]), (desk[3], desk[4]), (desk[5], desk[6]), "
-        f"{_tuple_of(state)}, {_tuple_of(params)})",
+        " torque, state = law(buffer[0], (buffer[1], buffer[2]), (buffer[3], buffer[4]), "
+        f"(buffer[5], buffer[6]), {_tuple_of(state)}, {_tuple_of(params)})",
         f" assert_length(state, {n})",
-        f" desk[{TORQUE}], desk[{TORQUE + 1}] = torque",
+        f" buffer[{TORQUE}], buffer[{TORQUE + 1}] = torque",
         *(f" {x}" for x in returned),
         "except Exception:",
         " pass",

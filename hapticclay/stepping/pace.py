@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import ParameterError
 from ..model.constants import B_MAX
 from ..model.operator import NO_HAND
-from ..model.scenario import Scenario
 from ..model.spring import RESOLVED
-from ..theory import gain_limit
+from ..scene.scenario import Scenario
+from ..theory import gain_limits
 from .march import GROWTH_BLOCK
 from .modes import STABLE_STEP, SUBSTEPS, creep_speed
 
@@ -40,7 +40,7 @@ def spring_step(scenario: Scenario) -> float:
     if scenario.control == "sampled":
         omega = math.sqrt(max(most) * scenario.mobility)
     else:
-        omega = max(gain_limit.spring_crossover(scenario, i, k) for i, k in enumerate(most))
+        omega = max(gain_limits.spring_crossover(scenario, i, k) for i, k in enumerate(most))
     longest = RESOLVED / omega if omega else math.inf
     if longest * SPRING_STEPS < scenario.dt:
         bound = (
@@ -92,7 +92,7 @@ def largest_lightness(scenario: Scenario) -> float:
     """
     W, through = scenario.arm.links[4], 0.0
     for servo, shape, K in zip(scenario.servo, scenario.compensators, scenario.gain, strict=True):
-        if scenario.shaping:
+        if scenario.inertia_shaping:
             W = max(W, servo.S.gain)
         if len(shape.num) == len(shape.den):  # C passes a force on at once
             through = max(through, K * servo.G.gain * abs(shape.num[0]))

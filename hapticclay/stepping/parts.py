@@ -239,7 +239,7 @@ class Sampler(NamedTuple):
         special: its laws beside plain viscous damping.
         rendered: 1 where the force that the motors hold is recorded.
         memory: rows (A, B) of controller.held_compensator of x, then of y.
-        formed: compensators of another shape.
+        state_space: compensators of another shape.
         own: the user's own controller.
         command: the command's Signal.
         chance: random effects.
@@ -261,7 +261,7 @@ class Sampler(NamedTuple):
     special: Any
     rendered: Any
     memory: Any
-    formed: Any
+    state_space: Any
     own: Any
     command: Any
     chance: Any
@@ -281,14 +281,14 @@ class Own(NamedTuple):
     """The user's own controller.
 
     Attributes:
-        law: called with the desk.
-        desk: the floats that it reads and writes, see sampled_controller.DESK; compiled, their
+        law: called with the buffer.
+        buffer: the floats that it reads and writes, see sampled_controller.BUFFER; compiled, their
             address.
         start: its state at the first sample.
     """
 
     law: Any
-    desk: Any
+    buffer: Any
     start: Any
 
 
@@ -308,12 +308,12 @@ class Difference(NamedTuple):
     """Joint rates by the difference of measured angles.
 
     Attributes:
-        window: samples that it spans.
+        velocity_window: samples that it spans.
         cutoff: of the low-pass behind it [Hz].
         ring: index and angles of past samples, three numbers each.
     """
 
-    window: int
+    velocity_window: int
     cutoff: Any
     ring: Any
 
@@ -376,13 +376,13 @@ class Modal(NamedTuple):
     Attributes:
         along: None where each axis yields by itself, 1 along the motion.
         grain: as Parts.grain; None along the motion.
-        lightness: largest acceleration per unit of force, by way of C too [1/kg].
+        mobility: largest acceleration per unit of force, by way of C too [1/kg].
         dt: length of a sample [s].
     """
 
     along: Any
     grain: Any
-    lightness: float
+    mobility: float
     dt: float
 
 

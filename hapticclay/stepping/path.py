@@ -101,14 +101,14 @@ def noted(special, e, before, after, t, n):
     """Notes stops of the handle in a kick; how many are then noted."""
     if special is None:
         return n
-    return yielding.noted(special.flow, e, after.felt, before.felt, t, n)
+    return yielding.noted(special.flow, e, after.contact, before.contact, t, n)
 
 
 def held_arm(special, e, reaction, w):
     """Joint rates; none of an arm that clay holds, which the engine's rounding would let creep."""
     if special is None:
         return w
-    if yielding.is_still(special.flow, reaction.felt):
+    if yielding.is_still(special.flow, reaction.contact):
         put(e.w, 0, (0.0, 0.0))
         return 0.0, 0.0
     return w
@@ -342,7 +342,7 @@ def towards(probe, parts, s, after, over, first):
             s, after, axis, up = ends.ending(parts.modal, s, (0.0, 0.0)), length, i, side
 
 
-def careful(parts, s, e):
+def step_to_event(parts, s, e):
     """The state after one step with a look at its end, on a border if one is in the way."""
     target, most, on_grid = next_stop(parts, s)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
@@ -390,7 +390,7 @@ def is_calm(special, laws_):
     return springs.is_calm(special.springs, laws_.elastic)
 
 
-def may_glide(parts, s):
+def may_follow(parts, s):
     """Whether a step may follow without a look at more than its end."""
     x = s.status
     calm = hits.is_over(parts.hits, s.clay.hit) and is_calm(parts.special, s.clay.laws)
@@ -405,7 +405,7 @@ def has_room(time, s, e, room):
     return fits and x.crossings < e.most_crossings and x.stops < e.most_stops
 
 
-def glided(parts, s, e):
+def whole_step(parts, s, e):
     """A step within one region: whether it could be made, and the state after it."""
     target, after, on_grid = next_stop(parts, s)
     if after < parts.time.dt:
@@ -424,14 +424,14 @@ def glided(parts, s, e):
     return True, stepped(parts, s, e, k, after, target, work, n)
 
 
-def glide(parts, s, e, room):
-    """Whole steps within one region, up to one that `careful` has to look at."""
-    return glide_by(parts.accurate, parts, s, e, room)
+def run_whole_steps(parts, s, e, room):
+    """Whole steps within one region, up to one that `step_to_event` has to look at."""
+    return whole_steps_of(parts.accurate, parts, s, e, room)
 
 
-def glide_by(accurate, parts, s, e, room):
+def whole_steps_of(accurate, parts, s, e, room):
     if accurate is None:
-        return glide_kicks(parts, s, e, room)
+        return whole_kicks(parts, s, e, room)
     c = s.clock
     if c.t != c.i * parts.time.dt or c.i >= parts.time.last or s.status.closing != OPEN:
         return s
@@ -456,11 +456,11 @@ def glide_by(accurate, parts, s, e, room):
     return s
 
 
-def glide_kicks(parts, s, e, room):
+def whole_kicks(parts, s, e, room):
     """The same of the fast method."""
     made = True
-    while made and has_room(parts.time, s, e, room) and may_glide(parts, s):
-        made, s = glided(parts, s, e)
+    while made and has_room(parts.time, s, e, room) and may_follow(parts, s):
+        made, s = whole_step(parts, s, e)
     return s
 
 
@@ -468,14 +468,14 @@ def step(parts, s, e):
     """The state after one step, or after those to the next sample."""
     c, made, rows_ = s.clock, s.filled.steps, s.filled.rows
     room = rows_ + 1 if c.t == c.i * parts.time.dt else rows_  # and what lies between the samples
-    s = glide(parts, s, e, room)
-    return careful(parts, s, e) if s.filled.steps == made else s
+    s = run_whole_steps(parts, s, e, room)
+    return step_to_event(parts, s, e) if s.filled.steps == made else s
 
 
 def advance(parts, s, e, room):
     """Steps until rows, crossings or stops are full, or the run is over."""
     while s.status.code == OPEN and has_room(parts.time, s, e, room):
-        s = glide(parts, s, e, room)
+        s = run_whole_steps(parts, s, e, room)
         if has_room(parts.time, s, e, room):
-            s = careful(parts, s, e)
+            s = step_to_event(parts, s, e)
     return s

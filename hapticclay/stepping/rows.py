@@ -69,7 +69,7 @@ def yield_force(special, k):
 def felt_force(flow, state):
     if flow is None:
         return 0.0, 0.0
-    return state.felt.f
+    return state.contact.f
 
 
 def sprung_force(part, states, L):

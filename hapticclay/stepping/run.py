@@ -17,7 +17,7 @@ from ..errors import ParameterError
 from ..model import hardware
 from ..model.constants import AXES
 from ..model.sampled_controller import Controller
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
 from .engine_step import Engine, Probe
@@ -90,7 +90,7 @@ def one_plainly(run: Run, step: Callable[..., State]) -> None:
 
     Args:
         run: the run.
-        step: path.step or path.careful.
+        step: path.step or path.step_to_event.
     """
     try:
         run.state = step(run.views, run.state, run.e)
@@ -147,7 +147,7 @@ class EngineStore:
         model.opt.timestep = s.dt
         for i, limit in enumerate(s.torque_limit):
             model.actuator_ctrlrange[i] = -limit, limit
-        engine.turn_dampers(model, s)
+        engine.rotate_dampers(model, s)
         mujoco.mj_resetData(model, data)
         return model, data
 
@@ -176,11 +176,11 @@ class EngineStore:
         self.room_for(parts)
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
-        felt: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
+        probed: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
         step, forward, *engine_ = kernel.calls(model, data)
         probe = None
         if parts.accurate is not None:
-            probe = Probe(forward, *engine_, *map(kernel.place, felt))
+            probe = Probe(forward, *engine_, *map(kernel.place, probed))
         places = map(kernel.place, [*own, *(x.reshape(-1) for x in kept)])
         rest: Any = *places, CROSSINGS - 3, max(len(self.stops) - 8, 1), probe
         return Engine(step, *engine_, *rest)
@@ -289,7 +289,7 @@ class Run:
         self.end_time: float | None = None
         self.without_samples = brief
         # nothing to report so far; later the monitor may want all rows once more
-        self.calm = kernel.quiet is not None and scenario.stop and not watched
+        self.calm = kernel.quiet is not None and scenario.stop_when_unstable and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self.first = energy.stored(self.parts, self.state)
         self._saved = self.saved()
@@ -329,7 +329,9 @@ class Run:
             self.give_up()
         elif code == NOT_FINITE:
             self._end(
-                monitor.Outcome("out of reach", self.t, self.i, cause=scene.beyond(self.parts))
+                monitor.Outcome(
+                    "out of reach", self.t, self.i, cause=scene.cause_of_end(self.parts)
+                )
             )
         elif code != OPEN:
             self.finish("finished" if code == FINISHED else "time limit")
@@ -353,7 +355,7 @@ class Run:
     def _draw(self, n: int) -> None:
         """Draws the random effects on the control samples of the next n whole steps."""
         x, k = self.parts.sampler.chance, self.state.loop.machine.samples.k
-        io: Any = self.scenario.interface
+        io: Any = self.scenario.hardware
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
         if x.first <= k and k + most <= x.first + len(x.numbers) // 4:
             return
@@ -718,12 +720,12 @@ class Run:
         laws = self.state.clay.laws
         if laws is not None and laws.elastic is not None:
             x = laws.elastic
-            out |= {"springs_stored": float(x.stored), "springs_lost": float(x.lost)}
+            out |= {"springs_stored": float(x.stored), "springs_dissipated": float(x.lost)}
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
         """What the hardware takes; of it friction is no part of the motors."""
-        x, io = self.state.work.hardware, self.scenario.interface
+        x, io = self.state.work.hardware, self.scenario.hardware
         if x is None or io is None:
             return {}
         used = any(io.friction), io.passivity, io.coupling is not None
@@ -767,7 +769,7 @@ def completed(
     Returns:
         The run, and the seconds it took.
     """
-    brief = brief and scenario.stop
+    brief = brief and scenario.stop_when_unstable
     watched = every > 1 and progress is not None  # which must not begin anew
     while True:
         run = Run(scenario, every, kernel, store, brief, watched)

@@ -90,7 +90,7 @@ def elastic_before(springs, state):
     return state.elastic.before
 
 
-def reaction(special, sampler, parts, s, felt, at, tau, uh):
+def reaction(special, sampler, parts, s, before, at, tau, uh):
     """Force of physical clay that yields at an instant, (x, y) [N].
 
     Where clay holds the handle it is what keeps it from accelerating.
@@ -100,17 +100,17 @@ def reaction(special, sampler, parts, s, felt, at, tau, uh):
         sampler: the machine.
         parts: the scene.
         s: the state.
-        felt: laws of the clay behind the kick that leads to the instant.
+        before: reaction of the clay behind the kick that leads to the instant.
         at: the handle.
         tau: torques on the joints [N.m].
         uh: muscle force [N].
     """
     if special is None:
         return NONE
-    return reaction_of(special.flow, sampler, parts, s, felt, at, tau, uh)
+    return reaction_of(special.flow, sampler, parts, s, before, at, tau, uh)
 
 
-def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):
+def reaction_of(flow, sampler, parts, s, before, at, tau, uh):
     if flow is None:
         return NONE
     f = resisted(parts.hand, uh, at)
@@ -118,15 +118,15 @@ def reaction_of(flow, sampler, parts, s, felt, at, tau, uh):
     ax, ay = instant_acceleration(parts, at, tau, f)
     x, y = masses(parts.hand)
     xx, xy, yx, yy = controller.velocity_per_force((1.0, 1.0), at.W, (x, y, 0.0))
-    h, grain, clay = REACTION, parts.grain, behind(sampler.special, s.clay, felt)
-    stuck = felt.felt.stuck
+    h, grain, clay = REACTION, parts.grain, behind(sampler.special, s.clay, before)
+    stuck = before.contact.stuck
     B, a = (h * xx, h * xy, h * yx, h * yy), (ax - at.c[0], ay - at.c[1])
     vx, vy = viscous.along(grain, at.v[0], at.v[1])
     v = 0.0 if stuck[0] > 0.0 else vx, 0.0 if stuck[1] > 0.0 else vy
     law = yielding.law_in_kick(sampler.special.groove, flow, clay, 1.0, B, v, a)
     ax, ay = viscous.along(grain, a[0], a[1])
     end = v[0] + h * ax, v[1] + h * ay
-    B = yielding.turned_matrix(grain, B)
+    B = yielding.rotated_matrix(grain, B)
     _, _, _, fs, _ = yielding.split_resist(yielding.resist_by(flow.along, B, v, end, law, 0.0))
     return viscous.across(grain, fs[0], fs[1])
 
@@ -212,23 +212,23 @@ def flowing_force(flow, clay, special, parts, state, v, pull):
     return force_in_motion(clay, flow, special.groove, parts.grain, state.flow, v, pull)
 
 
-def force_in_motion(clay, flow, groove, grain, felt, v, pull):
+def force_in_motion(clay, flow, groove, grain, state, v, pull):
     """Force of clay that yields, beside b v, on a handle in motion; none at rest.
 
     Where the clay acts itself, it is what holds it.
     """
     if clay is None:
-        law = law_now(groove, felt, v)
+        law = law_now(groove, state, v)
         x, y = viscous.along(grain, v[0], v[1])
         x, y = yielding_law.motion_force(law, flow.along is not None, x, y)
         return viscous.across(grain, x, y)
     return pull
 
 
-def law_now(groove, felt, v):
+def law_now(groove, state, v):
     """Fy, K, n of x and y of clay that yields, in a direction."""
     if groove is None:
-        return felt.law
+        return state.law
     return grooves.law_along(groove, v[0], v[1])
 
 
@@ -265,9 +265,9 @@ def axis_pull(n, rest, stretch, at, p):
     return f + f1
 
 
-def outputs(formed, form, m, f):
+def outputs(state_space, form, m, f):
     """Output of the compensators at a sample under a net force, (x, y) [m]."""
-    if formed is None:
+    if state_space is None:
         return m.x.delta, m.y.delta
     z = m.form
     return (
@@ -364,7 +364,7 @@ def computed(sampler, parts, s, at, f, pull, rates):
     )
     fe, added, guard = hardware.guarded(sampler.passivity, m.guard, at, fe, Ts)
     f = f[0] - fe[0], f[1] - fe[1]
-    delta = outputs(sampler.formed, parts.form, m, f)
+    delta = outputs(sampler.state_space, parts.form, m, f)
     tau = held_torques(sampler.clay, at, servo_torques(parts, m, at, delta, f), fe)
     hold = Hold(driven_torques(sampler.dac, parts.limits, tau), fe, added, pulled)
     return Answer(1.0, hold, f, delta, m.own, rates, guard, tool)
@@ -382,7 +382,7 @@ def advanced(own, sampler, parts, m, f, shift):
 
 def advanced_by(memory, sampler, parts, m, f, shift):
     if memory is None:
-        return advanced_form(sampler.formed, parts.form, m, f, shift)
+        return advanced_form(sampler.state_space, parts.form, m, f, shift)
     x = over_sample(memory, 0, m.x, f[0], shift[0])
     return x, over_sample(memory, 20, m.y, f[1], shift[1]), m.form
 
@@ -640,7 +640,7 @@ def felt_at(special, sampler, parts, s, k, share, v):
 def flow_at(flow, clay, parts, s, k, share, v):
     if flow is None:
         return NONE
-    x, old = k.motion.reaction.felt.f, s.loop.event.reaction.felt.f
+    x, old = k.motion.reaction.contact.f, s.loop.event.reaction.contact.f
     x = x[0] + share * (old[0] - x[0]), x[1] + share * (old[1] - x[1])
     return force_in_motion(clay, flow, parts.special.groove, parts.grain, s.clay.laws.flow, v, x)
 
@@ -685,7 +685,7 @@ def noted_event(flow, e, s, n):
     if flow is None:
         return n
     if is_early(s, 1.0):
-        now, was = s.loop.event.reaction.felt, s.clay.reaction.felt
+        now, was = s.loop.event.reaction.contact, s.clay.reaction.contact
         return yielding.noted(flow, e, now, was, s.clock.t, n)
     return n
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..model import compensator, groove, pieces, regions
-from ..model import hardware as interface
+from ..model import hardware as devices
 from ..model.constants import B_MAX
-from ..model.sampled_controller import DESK, Controller, LawCaller
-from ..model.scenario import Scenario
+from ..model.sampled_controller import BUFFER, Controller, LawCaller
+from ..scene.scenario import Scenario
 from . import begin, hardware, laws, pace, rows
 from . import parts as p_
 from . import state as s_
@@ -143,7 +143,7 @@ def parts_of(s: Scenario, controller: Controller | None = None):
         p_.Time(float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)),
         p_.Arm(tuple(map(float, s.arm.links)), *map(float, s.origin)),
         tuple(p_.Servo(*map(float, each.numbers)) for each in s.servo),
-        1 if s.shaping else None, lag, form, hand_parts(s),
+        1 if s.inertia_shaping else None, lag, form, hand_parts(s),
         p_.Push((0.0, *steady_force(s), 0.0, 0.0), None), None,
         tuple(map(float, s.torque_limit)), regions.region_table(s.clay, s.length), *clay,
         sampler(s, controller or s.controller, *clay[::3]), *accurate_parts(s),
@@ -177,22 +177,22 @@ def sampler(s: Scenario, controller, clay, special):
     """
     if s.control != "sampled":
         return None
-    ratio, io = round((s.Ts or s.dt) / s.dt), s.interface
+    ratio, io = round((s.Ts or s.dt) / s.dt), s.hardware
     Ts = ratio * float(s.dt)
     axes = list(zip(s.servo, s.compensators, s.gain, strict=True))
     lags = [c.lag for c in s.compensators]
-    memory = formed = own = None
+    memory = state_space = own = None
     if all(x and x[0] == 1.0 for x in lags):
         memory = np.ravel([held_memory(*axis, Ts) for axis in axes])
     else:
-        formed = np.ravel([formed_memory(*axis, Ts) for axis in axes])
+        state_space = np.ravel([formed_memory(*axis, Ts) for axis in axes])
     if controller is not None:
         state = controller.state
-        desk = np.array([0.0] * DESK + [*state, *state, *controller.params])
-        own = p_.Own(LawCaller(controller, desk), desk, tuple(map(float, state)))
+        buffer = np.array([0.0] * BUFFER + [*state, *state, *controller.params])
+        own = p_.Own(LawCaller(controller, buffer), buffer, tuple(map(float, state)))
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
-    first: Any = ratio, Ts, *physical, 1 if told else None, memory, formed, own, None
+    first: Any = ratio, Ts, *physical, 1 if told else None, memory, state_space, own, None
     return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
 
 
@@ -200,17 +200,17 @@ def hardware_parts(s: Scenario, io, Ts):
     """The parts of a Sampler from `chance` on.
 
     Args:
-        io: the Interface.
+        io: the Hardware.
     """
     chance = difference = lag = adc = dac = delay = friction = passivity = coupling = None
-    if io.jitter > 0.0 or io.lost > 0.0 or io.force_noise > 0.0:
+    if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / Ts), NOISE_AHEAD) + 8
-        chance = p_.Chance(interface.SampleNoise(io).table(0, n).ravel(), 0)
+        chance = p_.Chance(devices.SampleNoise(io).table(0, n).ravel(), 0)
     if io.velocity == "difference":
         cutoff = float(io.velocity_filter) if io.velocity_filter else None
-        difference = p_.Difference(io.window, cutoff, np.zeros(3 * io.window))
+        difference = p_.Difference(io.velocity_window, cutoff, np.zeros(3 * io.velocity_window))
     if io.force_filter is not None:
-        lag = interface.butterworth(io.force_filter, io.filter_order, Ts)
+        lag = devices.butterworth(io.force_filter, io.filter_order, Ts)
     if io.adc_bits:
         adc = p_.Converter(io.adc_bits, (float(io.adc_range), float(io.adc_range)))
     if io.dac_bits:
@@ -259,9 +259,9 @@ def first_reaction(special):
     """What clay left to the first kick."""
     if special is None:
         return None
-    felt = s_.Felt(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
+    contact = s_.Contact(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
     split = s_.Split(0.0, NONE, NONE) if special.stiff else None
-    return s_.Reaction(NONE, split, felt if special.flow else None)
+    return s_.Reaction(NONE, split, contact if special.flow else None)
 
 
 def first_laws(special, p):
@@ -291,7 +291,7 @@ def blocks(parts, s: Scenario):
     axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
     growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
     hit = s_.Hit(INF, 0.0) if parts.hits else None
-    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.interface and parts.sampler else None
+    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.hardware and parts.sampler else None
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
         first_reaction(parts.special), first_laws(parts.special, NONE),
@@ -315,7 +315,7 @@ def traits(s: Scenario) -> tuple[Any, ...]:
     Args:
         s: the scenario.
     """
-    clay, io, own, law, wires = s.clay, s.interface, s.controller, None, None
+    clay, io, own, law, wires = s.clay, s.hardware, s.controller, None, None
     if clay is not None:
         block, hard = clay.groove, hardness(s, largest_damping(s))
         law = (
@@ -323,7 +323,11 @@ def traits(s: Scenario) -> tuple[Any, ...]:
             block is not None and bool(block.damping), block is not None, hard,
         )  # fmt: skip
     if io is not None:
-        random = io.jitter > 0.0, io.lost > 0.0 or io.force_noise > 0.0, io.delay > 0.0
+        random = (
+            io.jitter > 0.0,
+            io.dropout_probability > 0.0 or io.force_noise > 0.0,
+            io.delay > 0.0,
+        )
         order = io.filter_order if io.force_filter is not None else 0
         wires = (
             *random, order, io.velocity == "difference" and bool(io.velocity_filter), io.velocity,
@@ -334,8 +338,8 @@ def traits(s: Scenario) -> tuple[Any, ...]:
     forms = ((c.lag and c.lag[0], c.order) for c in s.compensators)
     more = kind_of(laws.parts_of(s)) if laws.TABLE else None
     return (
-        s.control, s.render, s.integrator, bool(s.shaping), any(s.operators), *driven, *forms, law,
-        wires, own and len(own.state), more,
+        s.control, s.render, s.integrator, bool(s.inertia_shaping), any(s.operators), *driven,
+        *forms, law, wires, own and len(own.state), more,
     )  # fmt: skip
 
 
@@ -368,7 +372,7 @@ def own_law(parts):
     return parts.sampler.own.law
 
 
-def beyond(parts):
+def cause_of_end(parts):
     """Why no step can go on."""
     law = own_law(parts)
     if law is not None and not law.finite():

@@ -9,7 +9,7 @@ from .march import place_behind, worked
 X, Y, MODE_X, MODE_Y = range(4)  # what is looked for: coordinates of borders, axes of modes
 
 
-def beyond(probe, parts, s, h, what, border):
+def gap_behind(probe, parts, s, h, what, border):
     """Distance by which a step of length h would pass a border [m]; of modes see modes.gap."""
     k = worked(probe, parts, s, h)
     return missed(parts.modal, probe, parts, s, k, h, what, border)
@@ -32,18 +32,18 @@ def felt_behind(parts, s, k, h):
 
 
 def find_root(b, fb, probe, parts, s, what, border):
-    """Root of `beyond` between 0 and b, to rounding (false position, Illinois) [s].
+    """Root of `gap_behind` between 0 and b, to rounding (false position, Illinois) [s].
 
     It may vanish at 0 itself, as when a handle enters stiff clay, stops and returns; the root of
     f/h is then found. Where f does not change its sign, the result lies next to 0.
 
     Args:
-        fb: `beyond` at b [m].
+        fb: `gap_behind` at b [m].
     """
     first, end, leaves, opening = 1e-9 * b, b, False, True
     a, fa, h = 0.0, 0.0, first
     for _ in range(100):
-        f = beyond(probe, parts, s, h, what, border)
+        f = gap_behind(probe, parts, s, h, what, border)
         if opening:
             opening = f == 0.0 or (f > 0.0) == (fb > 0.0)
             if opening:

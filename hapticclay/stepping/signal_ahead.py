@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..model import pieces
-from ..model.scenario import Scenario
 from ..model.signals import Signal
+from ..scene.scenario import Scenario
 from . import march
 from . import parts as p_
 

@@ -325,12 +325,12 @@ class Reaction(NamedTuple):
     Attributes:
         owed: impulse owed by stiff clay [N.s].
         split: how the damping of stiff clay was split.
-        felt: clay that yields.
+        contact: clay that yields.
     """
 
     owed: Any
     split: Any
-    felt: Any
+    contact: Any
 
 
 class Laws(NamedTuple):
@@ -387,7 +387,7 @@ class Flow(NamedTuple):
     old: Any
 
 
-class Felt(NamedTuple):
+class Contact(NamedTuple):
     """Clay that yields, in a kick.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Viscous clay in a kick: constant, growing, turned, smooth."""
+"""Viscous clay in a kick: constant, growing, with rotated axes, smooth."""
 
 from __future__ import annotations
 
@@ -69,14 +69,14 @@ def force(grain, b, v):
     """Force of damping, (x, y) [N]."""
     if grain is None:
         return b[0] * v[0], b[1] * v[1]
-    return law.turned_force(grain[0], grain[1], b[0], b[1], v[0], v[1])
+    return law.rotated_force(grain[0], grain[1], b[0], b[1], v[0], v[1])
 
 
 def tensor(grain, b):
     """Damping tensor, (xx, yy, xy) [N.s/m]."""
     if grain is None:
         return b[0], b[1], 0.0
-    return law.turned_damping(grain[0], grain[1], b[0], b[1])
+    return law.rotated_damping(grain[0], grain[1], b[0], b[1])
 
 
 def with_clay(part, grain, load, k, v):

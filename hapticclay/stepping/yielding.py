@@ -7,7 +7,7 @@ import math
 from ..model import controller, flow
 from . import grooves, viscous
 from .engine_step import put
-from .state import Felt, Flow, Handle
+from .state import Contact, Flow, Handle
 
 NONE = (0.0, 0.0)
 NOWHERE = (math.nan, math.nan)
@@ -38,7 +38,7 @@ def law_in_kick(groove, part, clay, L, B, v, u):
     """As `law_now`, of any clay that yields; v along its axes, u in x and y."""
     if groove is None:
         return law_now(part, clay.laws.flow, L, v)
-    return grooves.law_in_kick(groove, clay.reaction.felt.stuck, B, v, u)
+    return grooves.law_in_kick(groove, clay.reaction.contact.stuck, B, v, u)
 
 
 def resist_by(along, B, v, end, law, L):
@@ -74,11 +74,11 @@ def resist(part, groove, grain, clay, acting, law, load, u):
     """Velocity after the kick, and what the clay did; None where nothing yields."""
     if part is None:
         return u, None
-    step, at, felt = acting.step, acting.at, clay.reaction.felt
-    stuck, c, v = felt.stuck, at.c, at.v
+    step, at, contact = acting.step, acting.at, clay.reaction.contact
+    stuck, c, v = contact.stuck, at.c, at.v
     if flows_freely(groove, clay.laws.flow):
         s = v[0] + step.L * (u[0] - v[0]), v[1] + step.L * (u[1] - v[1])
-        return u, Felt(NONE, s, NONE, NONE, NOWHERE, 0.0, NONE)
+        return u, Contact(NONE, s, NONE, NONE, NOWHERE, 0.0, NONE)
     # a straight step in the joints bends the path of the handle: its mean velocities are these
     lead, on = step.H * step.L, step.H * (1.0 - step.L)
     ax, ay = v[0] + lead * c[0], v[1] + lead * c[1]
@@ -87,13 +87,14 @@ def resist(part, groove, grain, clay, acting, law, load, u):
     ax, ay = viscous.along(grain, ax, ay)
     a = 0.0 if stuck[0] > 0.0 else ax, 0.0 if stuck[1] > 0.0 else ay
     fyk = law_in_kick(groove, part, clay, step.L, B, a, (ex, ey))
-    B = turned_matrix(grain, B)
+    B = rotated_matrix(grain, B)
     ex, ey = viscous.along(grain, ex, ey)
     place = viscous.along(grain, at.p[0], at.p[1])
     # an axis that rests beside one that slides stays where it came to rest: no step leads away
     backx, backy = (
-        back(stuck[0], felt.anchor[0], place[0], on), back(stuck[1], felt.anchor[1], place[1], on)
-    )  # fmt: skip
+        back(stuck[0], contact.anchor[0], place[0], on),
+        back(stuck[1], contact.anchor[1], place[1], on),
+    )
     r, w, s, f, stops = split_resist(
         resist_by(part.along, B, a, (ex - backx, ey - backy), fyk, step.L)
     )
@@ -111,10 +112,10 @@ def resist(part, groove, grain, clay, acting, law, load, u):
         1.0 if w[1] == 0.0 and fyk[3] > 0.0 else 0.0,
     )
     anchor = (
-        anchored(still, stuck[0], rests[0], felt.anchor[0], place[0]),
-        anchored(still, stuck[1], rests[1], felt.anchor[1], place[1]),
+        anchored(still, stuck[0], rests[0], contact.anchor[0], place[0]),
+        anchored(still, stuck[1], rests[1], contact.anchor[1], place[1]),
     )
-    return u, Felt(
+    return u, Contact(
         viscous.across(grain, r[0], r[1]), viscous.across(grain, s[0], s[1]),
         viscous.across(grain, f[0], f[1]), rests, anchor, 1.0 if still else 0.0,
         (stop_time(step, stops[0]), stop_time(step, stops[1])),
@@ -131,7 +132,7 @@ def stop_time(step, share):
     return step.H * (share - step.L) if share >= 0.0 else 0.0
 
 
-def turned_matrix(grain, B):
+def rotated_matrix(grain, B):
     """A matrix along the axes of the clay, R' B R."""
     if grain is None:
         return B
@@ -141,18 +142,18 @@ def turned_matrix(grain, B):
     return first[0], first[1], second[0], second[1]
 
 
-def mean(part, felt):
+def mean(part, contact):
     """Mean force of yielding in a kick, (x, y) [N]."""
     if part is None:
         return 0.0, 0.0
-    return felt.mean
+    return contact.mean
 
 
-def is_still(part, felt):
+def is_still(part, contact):
     """Whether both axes rest behind a kick."""
     if part is None:
         return False
-    return felt.still > 0.0
+    return contact.still > 0.0
 
 
 def creeping(part, stiff, groove, state, acting, g):
@@ -196,11 +197,11 @@ def at_sample(part, stiff, grain, state, slow):
     """Velocity at the sample: 0.0 where it is against the yield force, which holds the handle."""
     if part is None:
         return slow
-    felt = state.felt
-    x, y = over_stiff(stiff, state.split, felt.v, slow)
+    contact = state.contact
+    x, y = over_stiff(stiff, state.split, contact.v, slow)
     if grain is not None:
         return x, y
-    px, py = x * felt.f[0], y * felt.f[1]
+    px, py = x * contact.f[0], y * contact.f[1]
     if part.along is not None:
         px = py = px + py
     return 0.0 if px < 0.0 else x, 0.0 if py < 0.0 else y
@@ -224,11 +225,11 @@ def behind(part, state):
     return Flow(state.law, state.law)
 
 
-def noted(part, e, felt, before, t, n):
+def noted(part, e, contact, before, t, n):
     """Notes where clay that yields stops the handle or lets it go; how many are then noted."""
     if part is None:
         return n
-    now, was, times = felt.stuck, before.stuck, felt.times
+    now, was, times = contact.stuck, before.stuck, contact.times
     if now[0] != was[0]:
         axis = 2.0 if part.along is not None else 0.0
         n = note(e.stops, n, axis, now[0], t + times[0] if now[0] > 0.0 else t)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..files import versions
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..simulation.accuracy import (
     METHODS,
     ROUNDING_LEFT,
@@ -26,8 +26,9 @@ from ..simulation.accuracy import (
     compare_positions,
     compare_times,
 )
+from ..simulation.engines import has_numba
 from ..simulation.record import Record
-from ..simulation.simulate import has_numba, simulate
+from ..simulation.simulate import simulate
 
 LADDER_SCHEMA = "hapticclay-accuracy-1"
 TOP = 0.02  # [s] longest step; the others are halves of halves of it

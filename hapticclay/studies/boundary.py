@@ -6,38 +6,37 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
-from ..errors import Bound, choice, number
+from ..arguments import named
+from ..errors import Bound, ParameterError, number
 from ..model import arm
 from ..model.arm import Arm
 from ..model.clay import Clay, Profile
 from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
-from ..model.hardware import Interface
-from ..model.scenario import Position, Scenario, TorqueLimit
+from ..model.hardware import Hardware
 from ..model.spring import Spring
-from ..simulation.record import Record
+from ..scene.scenario import Position, Scenario, TorqueLimit
 from ..simulation.simulate import simulate
-from ..theory import gain_limit, linear_loop
-from ..theory.linear_loop import TIMING, Loop
+from ..theory import gain_crossings, gain_limits, linear_loop
+from ..theory.loops import TIMING, Loop
 from ..theory.roots import first_failure
+from . import growth
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
 LARGE_PUSH = 0.05  # [m/s] initial velocity that a hand gives
 PUSH_TIME = 0.01  # [s] in which a force takes the place of such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
 CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer while the motors are in their limits
-FITTED_SHARE = 0.7  # of a run, its end, from which growth is read
-GROWTH_SAMPLE = 4e-3  # [s] between the samples from which growth is read
-SINGULAR_SHARE = 1e-7  # singular values below this share of the largest are rounding
-MODE_SHARE = 1e-4  # so are modes below this share of the strongest
-SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are the hand's spring, no oscillation
 BRACKET = 2e-3  # boundaries are found to this share
 
+Subject = TypeVar("Subject")
 
+
+@named
 @dataclass(frozen=True)
 class PushedLoop(Loop):
     """A loop to be run: the handle pushed along its axis, in clay all around it.
@@ -48,7 +47,8 @@ class PushedLoop(Loop):
         b: clay on both axes [N.s/m].
         k: stiffness of it on both axes, with its rest where the handle starts [N/m].
         K: compensator gain, > 0, at most 1e6.
-        shaping: as in Scenario; without it the arm's mobility takes the place of the gain of Sh.
+        inertia_shaping: as in Scenario; without it the arm's mobility takes the place of the gain
+            of Sh.
         pose: place of the handle, from its nominal position [m].
         push: velocity of the handle at the start [m/s]. Where C does not integrate no state of it
             goes with a velocity; a constant force then would give it to a free handle in PUSH_TIME.
@@ -58,7 +58,7 @@ class PushedLoop(Loop):
 
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
     K: Annotated[float, Bound(0.0, 1e6, above=True)] = 1.0
-    shaping: bool = True
+    inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
     push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
     torque_limit: TorqueLimit = TORQUE_LIMIT
@@ -68,12 +68,45 @@ class PushedLoop(Loop):
         super().__post_init__()
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
-    def scenario(self, t_max: float = GROWTH_SPAN, stop: bool = True) -> Scenario:
+    @classmethod
+    def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
+        """The loop of one axis of a scenario as one to be run, its clay all around the handle.
+
+        Args:
+            scenario: whose arm, servo, compensator, hand and control it has.
+            axis: "x" or "y".
+            b: clay [N.s/m]; None for that of the scenario with the least gain limit.
+
+        Raises:
+            ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
+        """
+        loop = Loop.of(scenario, axis, b)
+        given = scenario.hardware
+        if given and replace(given, delay=0.0, seed=0) != type(given)():
+            bound = "must have no hardware but a delay: the impedance is that of a linear loop"
+            raise ParameterError("hardware", given, bound)
+        return cls(
+            loop.axis,
+            b=loop.b,
+            operator=loop.operator,
+            servo=scenario.servo[AXES.index(loop.axis)],
+            compensator=loop.compensator,
+            K=loop.gain,
+            Ts=loop.Ts,
+            delay=loop.delay,
+            render=loop.render,
+            inertia_shaping=scenario.inertia_shaping,
+            torque_limit=scenario.torque_limit,
+            arm=scenario.arm,
+            k=loop.k,
+        )
+
+    def scenario(self, t_max: float = GROWTH_SPAN, stop_when_unstable: bool = True) -> Scenario:
         """Build the scenario of a run of it.
 
         Args:
             t_max: length of the run [s].
-            stop: as in Scenario.
+            stop_when_unstable: as in Scenario.
         """
         i, everywhere = AXES.index(self.axis), Profile((), (self.b,), springs=(Spring(self.k),))
         x, y = self._nominal
@@ -86,16 +119,16 @@ class PushedLoop(Loop):
             force=(0.0, 0.0) if moves else along(self.push / (self.servo.S.gain * PUSH_TIME)),
             velocity=along(self.push) if moves else (0.0, 0.0),
             operator=self.operator,
-            shaping=self.shaping,
+            inertia_shaping=self.inertia_shaping,
             dt=self.Ts or TS,
             control="sampled" if self.Ts else "continuous",
             render=self.render if self.Ts else "held",
-            interface=Interface(delay=self.delay) if self.delay else None,
+            hardware=Hardware(delay=self.delay) if self.delay else None,
             origin=(x + self.pose[0], y + self.pose[1]),
             torque_limit=self.torque_limit,
             length=None,
             t_max=t_max,
-            stop=stop,
+            stop_when_unstable=stop_when_unstable,
             arm=self.arm,
             servo=(self.servo, SERVO[1]) if i == 0 else (SERVO[0], self.servo),
             compensator=self.compensator,
@@ -112,50 +145,14 @@ class PushedLoop(Loop):
         return self.arm.l2, self.arm.l1
 
 
-def growth_rate(
-    record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
-) -> float:
-    """Rate at which the oscillation of a free motion grows: that of its least damped mode.
-
-    The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
-    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
+def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
+    """The loop of an axis of a scenario, as a study runs it; any other subject as it is.
 
     Args:
-        record: of the motion.
-        axis: "x" or "y".
-        sample: about the time between the samples that are read [s].
-        slowest: modes slower than this do not count [rad/s, 1/s].
-
-    Returns:
-        [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
+        subject: a scenario, a loop or a wall.
+        axis: of the scenario, "x" or "y".
     """
-    i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
-    if len(record.t) > 2:  # kept each so many steps
-        dt *= max(1, round((record.t[1] - record.t[0]) / dt))
-    v = record.v[:-1, i]  # the last step may be short
-    v = v[int((1.0 - FITTED_SHARE) * len(v)) :]
-    # Odd, and two of them: half the sampling frequency must fold onto zero in neither.
-    skip = 2 * round(0.5 * sample / dt) + 1
-    found = [_least_damped(v[::n], n * dt, slowest) for n in (skip, skip + 2) if len(v) >= 32 * n]
-    if not found:
-        return math.inf if record.outcome.code != "time limit" else -math.inf
-    return max(found)
-
-
-def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
-    rows = min(len(v) // 2, 700)  # of a long run: all its modes, at a fraction of the cost
-    hankel = np.lib.stride_tricks.sliding_window_view(v, rows).T
-    u, s, _ = np.linalg.svd(hankel, full_matrices=False)
-    r = max(1, min(int(np.sum(s > SINGULAR_SHARE * s[0])), rows // 3))
-    z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
-    z = z[np.abs(z) > 1e-6]
-    powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
-    amplitude = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0])
-    weight = amplitude * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
-    rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
-    strong = weight > MODE_SHARE * weight.max(initial=0.0)
-    counts = strong & ((omega > slowest) | (rate > slowest))
-    return float(rate[counts].max()) if counts.any() else -math.inf
+    return PushedLoop.of(subject, axis) if isinstance(subject, Scenario) else subject
 
 
 def classify_run(loop: PushedLoop) -> str:
@@ -169,15 +166,15 @@ def classify_run(loop: PushedLoop) -> str:
     """
     limit = (1.0 - 1e-9) * np.array(loop.torque_limit)
     for t_max in CLASSIFIED_SPANS:
-        record = simulate(loop.scenario(t_max, stop=False))
+        record = simulate(loop.scenario(t_max, stop_when_unstable=False))
         code = record.outcome.code
         if code in ("diverged", "out of reach", "singular"):
             return "diverges"
         if code in ("limit cycle", "saturated"):
             break
-        end = record.tau[int((1.0 - FITTED_SHARE) * len(record.tau)) :]
+        end = record.tau[int((1.0 - growth.FITTED_SHARE) * len(record.tau)) :]
         if not np.any(np.abs(end) >= limit):
-            return "diverges" if growth_rate(record, loop.axis) > 0.0 else "stable"
+            return "diverges" if growth.growth_rate(record, loop.axis) > 0.0 else "stable"
     return "limit cycle"
 
 
@@ -278,13 +275,13 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
         guess: start of the search [N/m]; None for the limit of the linear loop.
         most: end of the search [N/m].
     """
-    guess = gain_limit.stiffness_limit(loop.linear) if guess is None else guess
+    guess = gain_limits.stiffness_limit(loop.linear) if guess is None else guess
     return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
 
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
     def rate(value: float) -> float:
-        return growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
+        return growth.growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
 
     return find_crossing(rate, guess, most)
 
@@ -295,7 +292,7 @@ def nominal_limit(loop: PushedLoop) -> float:
     Args:
         loop: all but K.
     """
-    return gain_limit.gain_limit(loop.linear)
+    return gain_limits.gain_limit(loop.linear)
 
 
 def pose_matrix(loop: PushedLoop) -> np.ndarray:
@@ -328,8 +325,8 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
     W = np.array([[xx, xy], [xy, yy]])
     if loop.Ts is None:
-        return linear_loop.state_space(*loops, mobility=None if loop.shaping else W)[0]
-    less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.shaping))
+        return linear_loop.state_space(*loops, mobility=None if loop.inertia_shaping else W)[0]
+    less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.inertia_shaping))
     return np.eye(len(less)) + less + beta @ np.diag([x.gain for x in loops]) @ gamma
 
 
@@ -366,7 +363,7 @@ def continuous_stable(loop: PushedLoop) -> bool:
     Args:
         loop: the loop.
     """
-    return gain_limit.is_stable(replace(loop.linear, **TIMING))
+    return gain_crossings.is_stable(replace(loop.linear, **TIMING))
 
 
 def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
@@ -386,8 +383,8 @@ def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
         ("saturation", dict(torque_limit=(1e6, 1e6))),
         ("size of the motion", dict(push=SMALL_PUSH)),
     ]
-    if not loop.shaping:
-        changes.insert(0, ("pose-dependent Lambda", dict(shaping=True)))
+    if not loop.inertia_shaping:
+        changes.insert(0, ("pose-dependent Lambda", dict(inertia_shaping=True)))
     if loop.Ts:
         changes.insert(0, ("sampling", dict(Ts=None, delay=0.0)))
     if loop.delay:

@@ -4,38 +4,43 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError
-from ..model.fields import plain_data
-from ..model.scenario import Scenario
-from ..model.scenario_file import load_scenario, read_settings
-from ..model.virtual_wall import WALL_SCHEMA, VirtualWall
+from ..results import Result
+from ..scene.fields import plain_data
+from ..scene.files import read_settings
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import design, margins, wall_limits
-from ..theory.gain_limit import gain_limit
+from ..theory import design, stability_margins, wall_limits
+from ..theory.gain_limits import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
-from ..theory.linear_loop import TIMING, Loop
+from ..theory.loops import TIMING, Loop
 from ..theory.mbk import dynamic_range, least_mass
 from .zwidth import ZRegion, zwidth
 
 MOST_COMPARED = 5  # as many looks as curves have
-COMPARED_HANDS = margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
+COMPARED_HANDS = stability_margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
 SLOW = 1e-4  # [rad/s] at which motion counts as steady
 FELT_AT = (1.0, 10.0)  # [Hz] at which the table has the impedance, below and above the loop's swing
 RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
 LEAST_DECAY = 10.0  # [1/s] B/M of the least mass: that of the paper's compensator
 PUSHED = 0.01  # [m/s] of a device in its run
 PUSHED_TIME = 0.5  # [s] of that run
-WALL_WORDS = frozenset(("device", "K", "B", "M", "window", "velocity_filter", "surface"))
+WALL_WORDS = frozenset(
+    ("device", "K", "B", "M", "velocity_window", "velocity_filter", "unilateral")
+)
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Compared:
     """One file: what it says, what theory says of it, and its run.
@@ -58,7 +63,7 @@ class Compared:
     record: Record
     region: ZRegion | None = None
 
-    def felt(self, omega: np.ndarray) -> Impedance:
+    def impedance(self, omega: np.ndarray) -> Impedance:
         """What a hand feels that is not in the loop; of a controller in continuous time.
 
         Args:
@@ -70,11 +75,43 @@ class Compared:
         return loop_response(replace(self.loop, operator=None, **TIMING), omega)
 
 
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Files side by side, in the order in which they were given.
+
+    Attributes:
+        files: what each says, what theory says of it, and its run.
+    """
+
+    files: tuple[Compared, ...]
+
+    def __iter__(self) -> Iterator[Compared]:
+        return iter(self.files)
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __getitem__(self, i: int) -> Compared:
+        return self.files[i]
+
+    def headline(self) -> str:
+        """The files and how their runs ended, in one line."""
+        return "; ".join(f"{x.name}: {x.record.status}" for x in self.files)
+
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
+        """Key numbers of each file."""
+        names = dict.fromkeys(n for x in self.files for n in x.numbers)
+        columns = {n: [x.numbers.get(n, math.nan) for x in self.files] for n in names}
+        return {"numbers": {"file": [x.name for x in self.files], **columns}}
+
+
+@checked
 def compare_files(
     paths: Sequence[str | os.PathLike[str]],
     axis: str = "x",
     progress: Callable[[Iterable], Iterable] = iter,
-) -> tuple[Compared, ...]:
+) -> Comparison:
     """Loads, judges and runs controllers (scenario files) or bare devices (files of walls).
 
     Args:
@@ -99,7 +136,8 @@ def compare_files(
     stems = [Path(p).stem for p in paths]
     names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]
     judge = compared_wall if kinds == {True} else compared_scenario
-    return tuple(judge(p, n, axis) for p, n in progress(list(zip(paths, names, strict=True))))
+    pairs = progress(list(zip(paths, names, strict=True)))
+    return Comparison(tuple(judge(p, n, axis) for p, n in pairs))
 
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
@@ -109,7 +147,9 @@ def is_wall_file(path: str | os.PathLike[str]) -> bool:
         path: the file, .toml or .json.
     """
     data = read_settings(path)
-    return data.get("schema") == WALL_SCHEMA or bool(WALL_WORDS & {k.split(".")[0] for k in data})
+    return data.get("schema") in (WALL_SCHEMA, WALL_SCHEMA_0_2) or bool(
+        WALL_WORDS & {k.split(".")[0] for k in data}
+    )
 
 
 def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Compared:
@@ -123,12 +163,12 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
         name: to be shown.
         axis: "x" or "y".
     """
-    scenario = load_scenario(path)
+    scenario = Scenario.load(path)
     loop = Loop.of(scenario, axis)
     plain = replace(loop, **TIMING)
     record, error = run_and_error(scenario)
     alone = replace(plain, operator=None)
-    m = margins.margins(plain)
+    m = stability_margins.margins(plain)
     Z = loop_response(alone, np.array([SLOW])).Z[0]
     steady = Z.real - loop.b if SLOW * abs(Z.imag) < 1e-3 * max(abs(Z.real), 1.0) else math.nan
     numbers = {
@@ -163,7 +203,7 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
     low, high = wall_limits.stiffness_band(wall)
     passive = wall_limits.colgate_schenkel_limit(wall)
     region = zwidth(wall, quick=True).regions[0]
-    linear = replace(wall, device=replace(wall.device, friction=0.0, quantum=0.0), surface=False)
+    linear = replace(wall, device=replace(wall.device, friction=0.0, quantum=0.0), unilateral=False)
     spread = dynamic_range(linear, 2.0 * math.pi * RANGE_AT[RANGE_AT < 0.5 / wall.Ts])
     edge = math.pi / wall.Ts
     omega = np.geomspace(1e-4 * edge, edge * (1.0 - 1e-9), 2000)
@@ -191,11 +231,11 @@ def worst_limit(loop: Loop) -> float:
     Args:
         loop: one axis, in continuous time.
     """
-    return margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
+    return stability_margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
 
 
 def _passivity_margin(loop: Loop) -> float:
-    from ..theory.passivity import passivity
+    from ..theory.loop_passivity import passivity
 
     return passivity(loop).margin
 
@@ -227,7 +267,7 @@ def _felt_numbers(found: Compared) -> dict[str, float]:
     out: dict[str, float] = {}
     for f in FELT_AT:
         known = not isinstance(found.subject, VirtualWall) or f < 0.5 / found.subject.Ts
-        Z = found.felt(np.array([2.0 * math.pi * f])) if known else None
+        Z = found.impedance(np.array([2.0 * math.pi * f])) if known else None
         for part, unit in (("stiffness", "N/m"), ("damping", "N.s/m"), ("mass", "kg")):
             value = float(getattr(Z, part)[0]) if Z else math.nan
             out[f"effective {part} at {f:g} Hz [{unit}]"] = value
@@ -243,7 +283,7 @@ def _run_numbers(record: Record, error: float) -> dict[str, float]:
     }
 
 
-def differing_fields(found: Sequence[Compared]) -> dict[str, list[Any]]:
+def differing_fields(found: Comparison) -> dict[str, list[Any]]:
     """Fields that are not alike in all files: the value of each file, None where it has none.
 
     Args:

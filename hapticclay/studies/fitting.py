@@ -23,6 +23,7 @@ from ..errors import ParameterError, choice, number, numbers_of
 from ..files import versions
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
+from ..results import Result
 from ..simulation.record import Record
 from .measurement import Measurement
 from .trajectory import (
@@ -66,6 +67,7 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 TRIAL_INDICES = (0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2)  # flow indices from which fits start
 
 
+@named
 @dataclass(frozen=True)
 class FlowParameter:
     """One parameter of a law.
@@ -85,6 +87,7 @@ class FlowParameter:
     high: float = math.nan
 
 
+@named
 @dataclass(frozen=True)
 class FittedLaw:
     """One candidate.
@@ -105,8 +108,8 @@ class FittedLaw:
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Fitted:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fitted(Result):
     """A law of resistance fitted to a motion.
 
     Attributes:
@@ -145,6 +148,14 @@ class Fitted:
     axis: str
     source: str
 
+    def headline(self) -> str:
+        """The law and its parameters with their intervals, in one line."""
+        told = (
+            f"{p.name} {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) {p.unit}".rstrip()
+            for p in self.parameters
+        )
+        return f"{self.law}: {', '.join(told)}"
+
     @property
     def flow(self) -> Flow:
         """The law as clay: `hc.slab(fitted.flow)`."""
@@ -170,6 +181,13 @@ class Fitted:
         """Returns what a figure of the fit shows: its samples, and the law over the velocity."""
         law = [self.flow.force(v) for v in self.v]
         return {
+            "parameters": {
+                "name": [p.name for p in self.parameters],
+                "unit": [p.unit for p in self.parameters],
+                "value": [p.value for p in self.parameters],
+                "low": [p.low for p in self.parameters],
+                "high": [p.high for p in self.parameters],
+            },
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
@@ -177,13 +195,6 @@ class Fitted:
                 "force of the law [N]": law,
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
-            },
-            "parameters": {
-                "name": [p.name for p in self.parameters],
-                "unit": [p.unit for p in self.parameters],
-                "value": [p.value for p in self.parameters],
-                "low": [p.low for p in self.parameters],
-                "high": [p.high for p in self.parameters],
             },
         }
 
@@ -328,7 +339,7 @@ def _of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, An
         raise ParameterError("data", r.scenario.name, bound)
     axis = choice("axis", axis or ("path" if clay.isotropic else "x"), (*AXES, "path"))
     if clay.angle and axis != "path":
-        raise ParameterError("axis", axis, 'must be "path" in clay that is turned')
+        raise ParameterError("axis", axis, 'must be "path" in clay with rotated axes')
     if axis == "path" and clay.yields and not clay.isotropic:
         raise ParameterError("axis", axis, "must be x or y in clay whose axes yield by themselves")
     index = AXES.index(axis) if axis in AXES else 0

@@ -1,17 +1,28 @@
-"""Whether an oscillation grows, told from a few samples of many short motions at once.
+"""Rate at which the oscillation of a free motion grows, read from its samples.
 
-The modes of a free linear motion are found from a few dozen samples by linear prediction of low
-rank (ESPRIT: Roy, Kailath, IEEE Trans. ASSP 37, 1989), as in `boundary.growth_rate`, for all
-motions in one stroke: about 0.2 ms a motion. The fit is made twice, of two ranks. Motions for which
-the two disagree, that grow or decay by too little, or that are not linear, stay undecided.
+The modes of a free linear motion are those of a linear prediction of low rank (ESPRIT: Roy,
+Kailath, IEEE Trans. ASSP 37, 1989). `growth_rate` reads them from a record. `short_growth` reads
+those of many short motions at once, of a few dozen samples each: about 0.2 ms a motion. It fits
+twice, with two ranks. Motions for which the two disagree, that grow or decay by too little, or that
+are not linear, stay undecided.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .boundary import MODE_SHARE, SLOWEST_MODE
+from ..errors import choice
+from ..model.constants import AXES
+from ..simulation.record import Record
 
+FITTED_SHARE = 0.7  # of a run, its end, from which growth is read
+GROWTH_SAMPLE = 4e-3  # [s] between the samples from which growth is read
+SINGULAR_SHARE = 1e-7  # singular values below this share of the largest are rounding
+MODE_SHARE = 1e-4  # so are modes below this share of the strongest
+SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are the hand's spring, no oscillation
+FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
 MOTION_SAMPLES = 55  # of a motion
 RANKS = (1e-5, 1e-7)  # singular values below these shares of the largest are left out
 LEAST_RATE = 0.3  # [1/s] slower growth or decay is left undecided
@@ -19,10 +30,74 @@ AGREEMENT = 0.1  # the two rates may differ by this share of the smaller one
 LINEAR_SHARE = 1e-4  # of the largest sample: what a linear motion may miss of the samples
 
 
+def growth_rate(
+    record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
+) -> float:
+    """Rate at which the oscillation of a free motion grows: that of its least damped mode.
+
+    The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
+    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
+
+    Args:
+        record: of the motion.
+        axis: "x" or "y".
+        sample: about the time between the samples that are read [s].
+        slowest: modes slower than this do not count [rad/s, 1/s].
+
+    Returns:
+        [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
+    """
+    i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
+    if len(record.t) > 2:  # kept each so many steps
+        dt *= max(1, round((record.t[1] - record.t[0]) / dt))
+    v = record.v[:-1, i]  # the last step may be short
+    v = v[int((1.0 - FITTED_SHARE) * len(v)) :]
+    # Odd, and two of them: half the sampling frequency must fold onto zero in neither.
+    skip = 2 * round(0.5 * sample / dt) + 1
+    found = [_least_damped(v[::n], n * dt, slowest) for n in (skip, skip + 2) if len(v) >= 32 * n]
+    if not found:
+        return math.inf if record.outcome.code != "time limit" else -math.inf
+    return max(found)
+
+
+def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
+    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean.
+
+    Args:
+        record: of a free motion.
+        sample: as in `growth_rate` [s].
+        slowest: as there [rad/s, 1/s].
+        axis: "x" or "y".
+    """
+    speed = np.abs(record.v[:, AXES.index(axis)])
+    n = len(speed)
+    share = math.ceil(0.1 * n)
+    change = (speed[-share:].max() + 1e-300) / (speed[:share].max() + 1e-300)
+    if n > 2 * share and not FADED < change < 1.0 / FADED:
+        return math.log(change) / record.t[-1]
+    return growth_rate(record, axis, sample, slowest)
+
+
+def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
+    rows = min(len(v) // 2, 700)  # of a long run: all its modes, at a fraction of the cost
+    hankel = np.lib.stride_tricks.sliding_window_view(v, rows).T
+    u, s, _ = np.linalg.svd(hankel, full_matrices=False)
+    r = max(1, min(int(np.sum(s > SINGULAR_SHARE * s[0])), rows // 3))
+    z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
+    z = z[np.abs(z) > 1e-6]
+    powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
+    amplitude = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0])
+    weight = amplitude * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
+    rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
+    strong = weight > MODE_SHARE * weight.max(initial=0.0)
+    counts = strong & ((omega > slowest) | (rate > slowest))
+    return float(rate[counts].max()) if counts.any() else -math.inf
+
+
 def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
     """Growth rates of the oscillations of many free motions: those of their least damped modes.
 
-    Modes slower than `boundary.SLOWEST_MODE` do not count.
+    Modes slower than `SLOWEST_MODE` do not count.
 
     Args:
         v: velocities, evenly sampled, in any unit, shape (motions, samples).

@@ -21,10 +21,11 @@ from ..files import versions
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
-from ..model.fields import function_of
 from ..model.operator import Operator
-from ..model.scenario import Control, Scenario
 from ..model.signals import Multisine
+from ..results import Result
+from ..scene.fields import function_of
+from ..scene.scenario import Control, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
@@ -74,6 +75,7 @@ class Noise:
         object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
 
 
+@named
 @dataclass(frozen=True)
 class Coefficient:
     """One coefficient of a fit.
@@ -118,8 +120,8 @@ class Estimate(NamedTuple):
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Identified:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identified(Result):
     """A frequency response and the coefficients fitted to it.
 
     Attributes:
@@ -152,6 +154,23 @@ class Identified:
     periods: int
     realisations: int
     source: str = ""
+
+    def headline(self) -> str:
+        """Block, axis and coefficients with their intervals, in one line."""
+        told = (
+            f"{c.name} {c.value:.5g} ({c.low:.5g} to {c.high:.5g}) {c.unit}"
+            for c in self.coefficients
+        )
+        return f"{self.what} of {self.axis}: {', '.join(told)}"
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Coefficients, and the response beside those of the fit and of the paper."""
+        rows = self.coefficients
+        names = ("name", "unit", "printed", "value", "low", "high")
+        return {
+            "coefficients": {name: [getattr(c, name) for c in rows] for name in names},
+            "response": response_tables([self])[self.axis],
+        }
 
     @property
     def estimate(self) -> str:
@@ -261,7 +280,7 @@ class Identification:
         axis: "x" or "y".
         what: "G", "S" (Sh) or "Th".
         origin: world position about which the handle moves [m].
-        shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: True lets the servo shape the inertia, so that Sh holds at every pose.
         noise: of the sensors; None for none.
         seed: of the phases and of the noise.
         band: lowest and highest frequency [Hz], to 0.1/dt; None for (0.15, 20), Th (0.08, 3).
@@ -281,7 +300,7 @@ class Identification:
     what: str = "G"
     _: KW_ONLY
     origin: tuple[float, float] = NOMINAL_POSE
-    shaping: bool = False
+    inertia_shaping: bool = False
     noise: Noise | None = None
     seed: int = 0
     band: tuple[float, float] | None = None
@@ -302,7 +321,7 @@ class Identification:
             force=(0.0, 0.0),
             origin=pair("origin", self.origin, unit="m"),
             operator=Operator() if self.what == "Th" else None,
-            shaping=flag("shaping", self.shaping),
+            inertia_shaping=flag("inertia_shaping", self.inertia_shaping),
             control=self.control,
             dt=self.dt,
             length=None,
@@ -331,7 +350,9 @@ class Identification:
         length = number("period", length, 0.1, 1000.0, unit="s")
         base = self.scenario()
         n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
-        gain = S[i].gain if self.shaping or what != "S" else endpoint_mobility(*base.origin)[i]
+        gain = (
+            S[i].gain if self.inertia_shaping or what != "S" else endpoint_mobility(*base.origin)[i]
+        )
         rms = size * S[i].stiffness / gain if what == "S" else size
         along = (rms, 0.0) if i == 0 else (0.0, rms)
         band = IDENTIFICATION_BAND[what] if self.band is None else self.band
@@ -355,7 +376,7 @@ class Identification:
         found = estimate_response(np.array(signals), n, bins)
         # The difference equation of the continuous loop; none of second order describes a hold.
         step = base.dt if self.control == "continuous" else None
-        settling = SHAPED if what == "S" and self.shaping else SETTLING[what]
+        settling = SHAPED if what == "S" and self.inertia_shaping else SETTLING[what]
         floor = settling * (size / AMPLITUDE[what]) ** 2
         fitted = fitted_coefficients(what, self.axis, frequency, found, step, floor)
         return Identified(

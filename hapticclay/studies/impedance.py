@@ -7,26 +7,25 @@ response is taken at its lines over whole periods, as in `identification`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, choice, integer, number
+from ..errors import ParameterError, integer, number
 from ..files import versions
 from ..model.constants import AXES
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
-from ..model.virtual_wall import VirtualWall
+from ..results import Result
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit
+from ..theory import gain_crossings, gain_limits
 from ..theory.impedance import Impedance, loop_response, wall_response
-from ..theory.linear_loop import Loop
 from ..theory.wall_limits import stable_wall, stiffness_band
-from .boundary import PushedLoop
+from .boundary import PushedLoop, of_scenario
 from .identification import _multisine, estimate_response
 
 IMPEDANCE_SCHEMA = "hapticclay-impedance-1"
@@ -44,8 +43,8 @@ Subject = PushedLoop | VirtualWall
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class MeasuredImpedance:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredImpedance(Result):
     """An impedance measured on a run, beside the computed one at the same lines.
 
     Attributes:
@@ -65,6 +64,11 @@ class MeasuredImpedance:
     scenario: Scenario
     notes: tuple[str, ...] = ()
 
+    def headline(self) -> str:
+        """Band, and how far measured and computed are apart, in one line."""
+        f = self.measured.frequency
+        return f"{f[0]:.3g} to {f[-1]:.3g} Hz, {100.0 * self.gap:.2g} % from the computed one"
+
     @property
     def gap(self) -> float:
         """Largest relative difference of the measured Z from the computed one."""
@@ -73,10 +77,10 @@ class MeasuredImpedance:
     @property
     def felt_gap(self) -> float:
         """Largest relative difference of the measured fe/fh from the computed; NaN without any."""
-        there = self.computed.felt != 0.0
+        there = self.computed.transparency != 0.0
         if not np.any(there):
             return math.nan
-        ratio = self.measured.felt[there] / self.computed.felt[there]
+        ratio = self.measured.transparency[there] / self.computed.transparency[there]
         return float(np.max(np.abs(ratio - 1.0)))
 
     def over(self, frequency: np.ndarray) -> Impedance:
@@ -87,24 +91,10 @@ class MeasuredImpedance:
         """
         return computed_impedance(self.subject, 2.0 * math.pi * np.asarray(frequency, dtype=float))
 
-    def tables(self) -> dict[str, dict[str, Sequence[float]]]:
+    def tables(self) -> dict[str, dict[str, list[float]]]:
         """What the figures show, by table, columns headed with their units."""
-        out: dict[str, dict[str, Sequence[float]]] = {}
-        for name, x in (("measured", self.measured), ("computed", self.computed)):
-            out[name] = {
-                "f [Hz]": x.frequency.tolist(),
-                "Re Z [N.s/m]": x.Z.real.tolist(),
-                "Im Z [N.s/m]": x.Z.imag.tolist(),
-                "effective stiffness [N/m]": x.stiffness.tolist(),
-                "effective damping [N.s/m]": x.damping.tolist(),
-                "effective mass [kg]": x.mass.tolist(),
-                "|fe/fh|": np.abs(x.felt).tolist(),
-                "phase of fe/fh [deg]": np.degrees(np.angle(x.felt)).tolist(),
-                "|Z/Ze|": np.abs(x.ratio).tolist(),
-                "phase of Z/Ze [deg]": np.degrees(np.angle(x.ratio)).tolist(),
-            }
-        out["measured"]["deviation"] = self.deviation.tolist()
-        return out
+        (measured,), (computed,) = (x.tables().values() for x in (self.measured, self.computed))
+        return {"measured": measured | {"deviation": self.deviation.tolist()}, "computed": computed}
 
     def summary(self) -> dict[str, Any]:
         """Return everything, ready for JSON."""
@@ -132,42 +122,10 @@ def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
     return loop_response(subject.linear, omega)
 
 
-def subject_of(scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
-    """The loop of one axis of a scenario as one to be run, its clay all around the handle.
-
-    Args:
-        scenario: whose arm, servo, compensator, hand and control it has.
-        axis: "x" or "y".
-        b: clay [N.s/m]; None for that of the scenario with the least gain limit.
-
-    Raises:
-        ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
-    """
-    loop, i = Loop.of(scenario, axis, b), AXES.index(choice("axis", axis, AXES))
-    given = scenario.interface
-    if given and replace(given, delay=0.0, seed=0) != type(given)():
-        bound = "must have no hardware but a delay: the impedance is that of a linear loop"
-        raise ParameterError("interface", given, bound)
-    return PushedLoop(
-        loop.axis,
-        b=loop.b,
-        operator=loop.operator,
-        servo=scenario.servo[i],
-        compensator=loop.compensator,
-        K=loop.gain,
-        Ts=loop.Ts,
-        delay=loop.delay,
-        render=loop.render,
-        shaping=scenario.shaping,
-        torque_limit=scenario.torque_limit,
-        arm=scenario.arm,
-        k=loop.k,
-    )
-
-
 @checked
 def measure_impedance(
-    subject: Subject,
+    subject: Subject | Scenario,
+    axis: str = "x",
     *,
     band: tuple[float, float] = IMPEDANCE_BAND,
     lines: int = IMPEDANCE_LINES,
@@ -181,8 +139,9 @@ def measure_impedance(
     dt)^2/6, by the amplitude over the length of a link, and by what is left of the transient.
 
     Args:
-        subject: a `PushedLoop`, whose own push and pose do not matter, or a `VirtualWall` that acts
-            everywhere.
+        subject: a `Scenario`; a `PushedLoop`, whose own push and pose do not matter; or a
+            `VirtualWall` that acts everywhere.
+        axis: of a scenario, "x" or "y".
         band: lowest and highest frequency [Hz].
         lines: of the multisine, spread over the logarithm of frequency.
         period: of the multisine [s], rounded up to whole samples that are quick to transform.
@@ -193,6 +152,7 @@ def measure_impedance(
         ParameterError: a value is out of its bounds; the loop is unstable with this hand; or the
             run ends early, meets the limits of the motors, or does not settle.
     """
+    subject = of_scenario(subject, axis)
     _check_subject(subject)
     amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     length = number("period", period, 0.1, 1000.0, unit="s")
@@ -217,9 +177,9 @@ def measure_impedance(
         part = slice(settling * n, (settling + 2) * n)
         measured, deviation = _measured(subject, record, part, n, steps, i, wave)
         if deviation.max() <= STEADY_RESPONSE or _rough(subject):
-            felt = replace(measured, rendered=computed.rendered)
+            seen = replace(measured, rendered=computed.rendered)
             notes = _notes(subject, dt)
-            return MeasuredImpedance(subject, felt, computed, deviation, scenario, notes)
+            return MeasuredImpedance(subject, seen, computed, deviation, scenario, notes)
     bound = (
         f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
         f"after {settling} periods of {wave.period:.3g} s; give a longer period"
@@ -230,9 +190,9 @@ def measure_impedance(
 def _check_subject(subject: Subject) -> None:
     """Refuse what no steady response exists of."""
     if isinstance(subject, VirtualWall):
-        if subject.surface:
+        if subject.unilateral:
             bound = "must be False: a wall that acts on one side alone is not linear"
-            raise ParameterError("wall.surface", True, bound)
+            raise ParameterError("wall.unilateral", True, bound)
         if not _rough(subject) and not stable_wall(subject):
             bound = (
                 f"must leave the wall stable with this hand: between {{:.4g}} and {{:.4g}} N/m "
@@ -242,9 +202,11 @@ def _check_subject(subject: Subject) -> None:
             raise ParameterError("wall.K", subject.K, bound)
         return
     if not isinstance(subject, PushedLoop):
-        raise ParameterError("subject", subject, "must be a PushedLoop or a VirtualWall")
-    if not gain_limit.is_stable(subject.linear):
-        limit = gain_limit.gain_limit(subject.linear)
+        raise ParameterError(
+            "subject", subject, "must be a Scenario, a PushedLoop or a VirtualWall"
+        )
+    if not gain_crossings.is_stable(subject.linear):
+        limit = gain_limits.gain_limit(subject.linear)
         bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
         raise ParameterError("K", subject.K, bound)
 
@@ -273,7 +235,7 @@ def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
 def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
     if isinstance(subject, VirtualWall):
         return subject.scenario(t_max, muscle=wave, steps=round(subject.Ts / dt))
-    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop=True)
+    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop_when_unstable=True)
     base = replace(subject, pose=(0.0, 0.0)).scenario(t_max)
     return replace(base, name="impedance", muscle=wave, dt=dt, Ts=subject.Ts, **still)
 
@@ -299,13 +261,13 @@ def _measured(
     bins = np.round(wave.omega / (2.0 * math.pi) * wave.period).astype(int)
     reference = wave(record.t[part])[:, i]
     Z = estimate_response(np.array([[reference, v, fh]]), n, bins)
-    felt = np.zeros_like(Z.response)
+    transparency = np.zeros_like(Z.response)
     if np.any(fe):
-        felt = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
+        transparency = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
     if held:
         turn = 1j * wave.omega * wave.period / n
-        felt = felt * -np.expm1(-turn) / turn
-    found = Impedance(wave.omega, Z.response, felt, np.zeros_like(felt))
+        transparency = transparency * -np.expm1(-turn) / turn
+    found = Impedance(wave.omega, Z.response, transparency, np.zeros_like(transparency))
     return found, Z.deviation / np.abs(Z.response)
 
 

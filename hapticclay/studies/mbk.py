@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..errors import integer, numbers_of
+from ..arguments import checked, named
+from ..errors import choice, integer, numbers_of
 from ..files import versions
-from ..model.virtual_wall import VirtualWall
-from ..theory.margins import Box
+from ..results import Result
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
@@ -23,7 +24,8 @@ from ..theory.mbk import (
     renderable,
     stable_band,
 )
-from .boundary import PushedLoop, find_crossing, simulated_gain
+from ..theory.stability_margins import Box
+from .boundary import PushedLoop, find_crossing, of_scenario, simulated_gain
 from .zwidth import growth_rates
 
 MBK_SCHEMA = "hapticclay-mbk-1"
@@ -50,8 +52,9 @@ class Border(NamedTuple):
     end: str
 
 
-@dataclass(frozen=True, eq=False)
-class DeviceMBK:
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class DeviceMBK(Result):
     """What a bare device renders: a region over each plane, and its dynamic range.
 
     Attributes:
@@ -65,6 +68,11 @@ class DeviceMBK:
     regions: dict[str, Region]
     found: dict[str, tuple[Border, ...]]
     range: DynamicRange
+
+    def headline(self) -> str:
+        """Dynamic range and stiffest wall, in one line."""
+        r = self.range
+        return f"{r.mean:.3g} dB from free motion to the stiffest wall of {r.stiffest.K:.4g} N/m"
 
     @property
     def gap(self) -> float:
@@ -111,8 +119,9 @@ class DeviceMBK:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class ArmMBK:
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class ArmMBK(Result):
     """The least masses that the arm renders as an admittance 1/(M s^2 + B s).
 
     Every larger mass of the same B/M is stable as well.
@@ -130,6 +139,11 @@ class ArmMBK:
     nominal: np.ndarray
     worst: np.ndarray
     found: tuple[Border, ...]
+
+    def headline(self) -> str:
+        """Least mass with the own hand and with any of the box, in one line."""
+        M, worst = self.nominal[0].min(), self.worst[0].min()
+        return f"masses from {M:.4g} kg with this hand, from {worst:.4g} kg with any of the box"
 
     @property
     def gap(self) -> float:
@@ -188,7 +202,7 @@ def device_mbk(
     columns = integer("columns", columns, 0, 100)
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
-    wall = replace(wall, device=linear, surface=False)
+    wall = replace(wall, device=linear, unilateral=False)
     regions = {plane: renderable(wall, plane, points) for plane in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
@@ -204,6 +218,7 @@ def device_mbk(
     return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)
 
 
+@checked
 def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
     """The borders of one column of a plane found by runs, the search begun at the exact ones.
 
@@ -214,7 +229,7 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
         plane: one of PLANES.
         x: the part along the plane.
     """
-    across, up = PLANES[plane]
+    across, up = PLANES[choice("plane", plane, tuple(PLANES))]
     wall = replace(wall, **{across: x})
     low, high = stable_band(wall, up)
     out = []
@@ -233,9 +248,10 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
 
 @checked
 def arm_mbk(
-    loop: PushedLoop,
+    loop: PushedLoop | Scenario,
     box: Box = HANDS,
     *,
+    axis: str = "x",
     columns: int = 5,
     points: int = 15,
     samples: int = 24,
@@ -244,8 +260,10 @@ def arm_mbk(
     """The least masses that the arm renders over their damper, beside runs.
 
     Args:
-        loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
+        loop: arm, servo, hand and sampling, or a scenario; its own compensator and gain do not
+            matter.
         box: hands.
+        axis: of a scenario, "x" or "y".
         columns: number of B/M at which runs look for the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
         samples: random members of the box tried in a sampled or late loop.
@@ -254,6 +272,7 @@ def arm_mbk(
     Raises:
         ParameterError: a value is out of its bounds.
     """
+    loop = of_scenario(loop, axis)
     points, columns = integer("points", points, 2, 1001), integer("columns", columns, 0, 100)
     decays, linear = np.geomspace(*DECAYS, points), loop.linear
     nominal, worst, found = [], [], []

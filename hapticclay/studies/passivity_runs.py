@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, number
-from ..model.hardware import Interface
-from ..model.scenario import Scenario
-from ..model.virtual_wall import VirtualWall
+from ..model.hardware import Hardware
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record, port_energy
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
-from ..theory.gain_limit import is_stable
+from ..theory.gain_crossings import is_stable
 from ..theory.impedance import wall_impedance
-from .boundary import PushedLoop
+from .boundary import PushedLoop, of_scenario
 from .impedance import computed_impedance, measure_impedance
 from .port_energy import passivity_limit, polygon, taken_energy
 from .stability_map import Progress
@@ -33,6 +34,7 @@ REGION_POINTS = 61
 WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class IndexOverFrequency:
     """Damping that a wall, or an arm in clay, shows the hand at each frequency, with runs beside.
@@ -76,13 +78,14 @@ class IndexOverFrequency:
         return out
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class EnergyOverTime:
     """One run without and with the observer and controller of Hannaford and Ryu.
 
     Attributes:
         without: the run as it is.
-        controlled: the same with `Interface(passivity=True)`.
+        controlled: the same with `Hardware(passivity=True)`.
     """
 
     without: Record
@@ -115,6 +118,7 @@ class EnergyOverTime:
         return out
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class PassiveRegion:
     """Largest passive stiffness of a wall over the control sample, for several delays.
@@ -147,6 +151,7 @@ class PassiveRegion:
         return out
 
 
+@checked
 def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequency:
     """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
 
@@ -181,15 +186,17 @@ def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequen
     )
 
 
-def arm_index(loop: PushedLoop) -> IndexOverFrequency:
+@checked
+def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequency:
     """The passivity of the arm in clay over frequency: Re Z by theory and by a run of sines.
 
     Args:
         loop: one axis, its hand left out; in continuous time it is passive where Re Z >= 0 at all
             frequencies. Re Z of a sampled loop is that at one frequency; a hand of others may find
-            less.
+            less. Or a scenario.
+        axis: of a scenario, "x" or "y".
     """
-    loop = replace(loop, operator=None)
+    loop = replace(of_scenario(loop, axis), operator=None)
     omega = 2.0 * math.pi * np.geomspace(ARM_BAND[0] / 5.0, 5.0 * ARM_BAND[1], INDEX_POINTS)
     measured_omega = measured = np.zeros(0)
     if is_stable(loop.linear):
@@ -207,6 +214,7 @@ def arm_index(loop: PushedLoop) -> IndexOverFrequency:
     )
 
 
+@checked
 def energy_over_time(scenario: Scenario) -> EnergyOverTime:
     """Runs a scenario without and with the passivity controller.
 
@@ -219,13 +227,14 @@ def energy_over_time(scenario: Scenario) -> EnergyOverTime:
     if scenario.control != "sampled" or scenario.render != "held" or scenario.clay is None:
         bound = "must be 'held' under control = 'sampled', in clay: the controller acts on that"
         raise ParameterError("render", scenario.render, bound)
-    parts = scenario.interface or Interface()
+    parts = scenario.hardware or Hardware()
     without, controlled = (
-        simulate(replace(scenario, interface=replace(parts, passivity=x))) for x in (False, True)
+        simulate(replace(scenario, hardware=replace(parts, passivity=x))) for x in (False, True)
     )
     return EnergyOverTime(without, controlled)
 
 
+@checked
 def passive_region(
     wall: VirtualWall,
     delays: Sequence[float] = (0.0, 0.5, 1.0, 2.0),
@@ -277,9 +286,9 @@ def rendered_energy(record: Record) -> np.ndarray:
 
 
 def _check_linear(wall: VirtualWall) -> None:
-    if wall.surface:
+    if wall.unilateral:
         bound = "must be False: the index is that of a wall that acts everywhere"
-        raise ParameterError("wall.surface", True, bound)
+        raise ParameterError("wall.unilateral", True, bound)
     if wall.velocity == "exact" and (wall.B or wall.M):
         bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
         raise ParameterError("wall.velocity", wall.velocity, bound)

@@ -12,11 +12,12 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
 from ..model.operator import Operator
-from ..model.virtual_wall import VirtualWall
+from ..results import Result
+from ..scene.virtual_wall import VirtualWall
 from ..theory import wall_limits
-from ..theory.gain_limit import gain_limit
-from ..theory.linear_loop import Loop
-from ..theory.margins import Box
+from ..theory.gain_limits import gain_limit
+from ..theory.loops import Loop
+from ..theory.stability_margins import Box
 from .distribution import LAWS, Distribution, normal_score
 from .stability_map import Progress
 
@@ -204,8 +205,8 @@ def open_uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray
 
 
 @named
-@dataclass(frozen=True)
-class Band:
+@dataclass(frozen=True, repr=False)
+class Band(Result):
     """A limit over a parameter, as a band over a population of hands.
 
     Attributes:
@@ -225,6 +226,12 @@ class Band:
     hands: list[Operator]
     nominal: np.ndarray
     told: str
+
+    def headline(self) -> str:
+        """Least limit of the hands drawn, in one line."""
+        i = int(self.least.argmin())
+        least = f"{self.y_name} at least {self.least[i]:.4g}"
+        return f"{self.told}: {least}, at {self.x_name} = {self.x[i]:.4g}"
 
     def quantile(self, share: float) -> np.ndarray:
         """Limit that a share of the hands lies at or below, shape (n,).

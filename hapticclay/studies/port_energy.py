@@ -16,12 +16,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..errors import Bound, ParameterError, check_fields, integer
+from ..arguments import checked, named
+from ..errors import Bound, ParameterError, check_fields, integer, number, numbers_of
 from ..model import hardware
 from ..model.samples import Samples
-from ..model.scenario import Scenario
 from ..model.spring import STIFFNESS_MAX
-from ..model.virtual_wall import LEVER, UPRIGHT, VirtualWall, wall_law
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import LEVER, UPRIGHT, VirtualWall, wall_law
 from ..simulation import record
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
@@ -42,6 +43,7 @@ K_SHARE = 2e-4  # limits are found to this share
 FILTER_TIMES = 12.0  # time constants of the filter before energy is counted
 
 
+@named
 @dataclass(frozen=True)
 class Path:
     """A path that a hand imposes on the device: an even polygon in the samples, which repeats.
@@ -64,6 +66,7 @@ class Path:
             raise ParameterError("path.middles", self.middles, bound)
 
 
+@checked
 def zigzag(amplitude: float, about: float = 0.0) -> Path:
     """The path at half the sampling frequency, in step with the samples: a triangle.
 
@@ -71,12 +74,15 @@ def zigzag(amplitude: float, about: float = 0.0) -> Path:
     4 b A^2/Ts.
 
     Args:
-        amplitude: A [m].
-        about: its middle [m].
+        amplitude: A [m], > 0, at most 0.1.
+        about: its middle [m], -0.1 to 0.1.
     """
+    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
+    about = number("about", about, -0.1, 0.1, unit="m")
     return Path((about + amplitude, about - amplitude))
 
 
+@checked
 def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -> Path:
     """The path of least loss through a sine of the samples.
 
@@ -86,9 +92,12 @@ def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -
     Args:
         wall: the wall with its K, of a device with a damper.
         turn: omega Ts as (p, q) of pi p/q, 1 <= p <= q.
-        amplitude: of the sine [m].
+        amplitude: of the sine [m], > 0, at most 0.1.
     """
-    p, q = turn
+    p, q = (int(n) for n in numbers_of("turn", turn, ("p", "q"), 1.0, 1e6))
+    if p > q:
+        raise ParameterError("turn", turn, "must be (p, q) with 1 <= p <= q")
+    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     angle = math.pi * p / q * np.arange(2 * q)
     places = amplitude * np.cos(angle)
     middle = wall_limits.worst_middle(wall, math.pi * p / q)
@@ -119,11 +128,11 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
     d, Ts = wall.device, wall.Ts
     if wall.operator is not None:
         raise ParameterError("wall.operator", wall.operator, "must be None: the path is the hand")
-    if wall.surface:
-        raise ParameterError("wall.surface", True, "must be False: the wall acts along the path")
+    if wall.unilateral:
+        raise ParameterError("wall.unilateral", True, "must be False: the wall acts along the path")
     steps = min(integer("steps", steps, 2, 10_000), max(2, int(Ts / LEAST_STEP)))
     n, h = len(path.places), Ts / steps
-    memory = wall.window + math.ceil(wall.delay / Ts) + 2.0
+    memory = wall.velocity_window + math.ceil(wall.delay / Ts) + 2.0
     if wall.velocity_filter is not None:
         memory += FILTER_TIMES / (2.0 * math.pi * wall.velocity_filter * Ts)
     first = math.ceil(memory / n)
@@ -153,8 +162,8 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
 
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
     """Mean force of the wall over the kicks at t, for a device at these places at the samples."""
-    scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.window
-    counts = (scenario.interface.encoder if scenario.interface else None) or 0
+    scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.velocity_window
+    counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
     assert scenario.controller is not None
     params, state = scenario.controller.params, (0.0, 0.0)
     lever = params[3]
@@ -178,6 +187,7 @@ def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -
     return (np.interp(high, begins, work) - np.interp(low, begins, work)) / (high - low)
 
 
+@checked
 def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
     """Energy that the device takes from the hand over a period of a path, by a run [J].
 
@@ -206,6 +216,7 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
     return float(given[-1] - given[first] - stored) / periods
 
 
+@checked
 def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
     """Largest K at which no path of a hand takes energy from the wall, by runs [N/m].
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, number
 from ..model.clay import Clay, extent
-from ..model.scenario import Scenario
 from ..model.tool import Tool
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 
 CELL_SIZE = 2e-3  # [m] largest cell of a picture's map

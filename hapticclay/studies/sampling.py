@@ -15,12 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer
 from ..files import versions
-from ..model.experiments import EXPERIMENTS
-from ..model.fields import join_names, named_values
-from ..model.scenario import Scenario
-from ..model.scenario_file import read_settings, scenario_of
+from ..scene.earlier_names import with_present_names
+from ..scene.experiments import EXPERIMENTS
+from ..scene.fields import join_names, named_values
+from ..scene.files import read_settings
+from ..scene.scenario import Scenario
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
 DESIGNS = ("grid", "lhs", "sobol")
@@ -28,6 +30,7 @@ RANGE_PATTERN = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST_RUNS = 10_000_000  # runs in one sweep
 
 
+@named
 @dataclass(frozen=True)
 class Range:
     """Values of one parameter: from low to high, evenly spaced or by constant factors; or a list.
@@ -111,12 +114,13 @@ class Range:
         return self.low + (self.high - self.low) * u
 
 
+@named
 @dataclass(frozen=True)
 class Sweep:
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
     A number is a parameter of the experiment, as on the command line, or any field of the scenario
-    by dotted name (`model/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    by dotted name (`scene/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
     without axis gets the value on both. "operator.mass" puts an arm at the handle.
 
     Attributes:
@@ -220,7 +224,7 @@ class Sweep:
         """
         settings = self.scenario or {"experiment": self.experiment}
         varied = dict(zip(self.vary, point.tolist(), strict=True))
-        return scenario_of(settings, self.fixed, varied)
+        return Scenario.of(settings, self.fixed, varied)
 
     def described(self) -> dict[str, Any]:
         """The sweep as data."""
@@ -245,6 +249,7 @@ def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndar
     return engine.random(runs)
 
 
+@checked
 def parse_grid(text: str) -> dict[str, Range]:
     """Reads "b=1:1000:50log gain=0.2:2:20 force=1:2 log".
 
@@ -258,6 +263,8 @@ def parse_grid(text: str) -> dict[str, Range]:
         "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, "
         "each name once"
     )
+    if not isinstance(text, str):
+        raise ParameterError("grid", text, how)
     together = re.sub(r"\s+log(?!\S)", "log", text)
     return {
         name: Range.parse(name, values)
@@ -266,7 +273,7 @@ def parse_grid(text: str) -> dict[str, Range]:
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
-    """Reads "t_max=2 shaping=true force=1,0 growth=30/s arm.l1=30cm".
+    """Reads "t_max=2 inertia_shaping=true force=1,0 growth=30/s arm.l1=30cm".
 
     Args:
         text: the values.
@@ -313,7 +320,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
     for name in ("vary", "fixed"):
         if not isinstance(data.get(name, {}), dict):
             raise ParameterError(name, data[name], "must be a table")
-        data[name] = _flat(data.get(name, {}))
+        data[name] = _flat(with_present_names(data.get(name, {})))
     if "scenario" in data:
         if "experiment" in data or not isinstance(data["scenario"], str):
             bound = "must be the path of a scenario file, without an experiment beside it"

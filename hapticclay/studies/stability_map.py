@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import choice
 from ..model.constants import TS
-from ..theory import gain_limit, margins, passivity
-from ..theory.linear_loop import TIMING
+from ..theory import gain_crossings, loop_passivity, stability_margins
+from ..theory.loops import TIMING
 from ..theory.roots import bisect, first_failure
 from . import boundary
 from .boundary import PushedLoop, nominal_limit
@@ -134,10 +134,10 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
         return fine, [law(b) for b in fine]
 
     def small_gain(b: float, K: float) -> bool:
-        return bool(margins.small_gain(replace(linear, b=b), K=K))
+        return bool(stability_margins.small_gain(replace(linear, b=b), K=K))
 
     def passive(b: float, K: float) -> bool:
-        return bool(passivity.passivity(replace(linear, b=b), K=K))
+        return bool(loop_passivity.passivity(replace(linear, b=b), K=K))
 
     lines = {"continuous time": line(lambda b: nominal_limit(replace(continuous, b=b)))}
     if loop.Ts:
@@ -217,9 +217,9 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
 def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
     fine = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
     x = np.linspace(-MAP_POSES, MAP_POSES, columns).tolist()
-    loop_at = replace(loop, shaping=False)
+    loop_at = replace(loop, inertia_shaping=False)
     plain = [replace(loop_at, pose=(dx, 0.0)) for dx in x]
-    shaped = [replace(each, shaping=True) for each in plain]
+    shaped = [replace(each, inertia_shaping=True) for each in plain]
     nominal = nominal_limit(loop)
     how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
@@ -280,7 +280,7 @@ def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float
     linear = replace(loop.linear, Ts=Ts, delay=delay)
 
     def stable(b: float) -> bool:
-        return gain_limit.is_stable(replace(linear, b=b))
+        return gain_crossings.is_stable(replace(linear, b=b))
 
     low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
     return high if low else 0.0
@@ -295,4 +295,4 @@ def _passive_damping(Ts: float, delay: float, damper: float) -> float:
     def late(z: np.ndarray) -> np.ndarray:
         return (1.0 - 1.0 / z) / Ts * z ** (-delay / Ts)
 
-    return damper / (damper - passivity.colgate_schenkel(late, Ts, damper, 2001).margin)
+    return damper / (damper - loop_passivity.colgate_schenkel(late, Ts, damper, 2001).margin)

@@ -28,11 +28,11 @@ from ..arguments import checked
 from ..errors import ParameterError
 from ..files import atomic
 from ..model.constants import AXES
-from ..model.experiments import parameter_unit
+from ..scene.experiments import parameter_unit
 from ..simulation.batch import cores
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limit
+from ..theory import gain_limits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
@@ -150,7 +150,7 @@ def result_row(
         clay = r and r.scenario.clay
         linear = not (clay and (clay.yields or clay.springs))  # the loop has b alone
         if r and linear and r.scenario.gain[i] > 0.0:
-            limit = gain_limit.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
+            limit = gain_limits.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
             margin = limit / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0
@@ -420,9 +420,10 @@ def _hold(lock: int, out: Path) -> None:
         os.write(lock, f"process {os.getpid()} on {platform.node()}".encode())
 
 
+@checked
 def run_sweep(
     sweep: Sweep,
-    out: Path,
+    out: str | os.PathLike[str],
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -440,7 +441,7 @@ def run_sweep(
     Raises:
         ParameterError: as `claimed` and `run_chunks`.
     """
-    done = 0
+    done, out = 0, Path(out)
     with (
         claimed(sweep, out) as (plan, todo),
         contextlib.closing(run_chunks(plan, out, todo, workers, scheduler)) as results,

@@ -68,7 +68,7 @@ class Drift:
                     "what": what,
                     "axis": axis,
                     "name": COEFFICIENT_NAMES[what][n],
-                    "shaping": bool(k),
+                    "inertia_shaping": bool(k),
                     "printed": printed_form(what, axis)[n],
                     "lowest": float(values.min()),
                     "highest": float(values.max()),
@@ -141,7 +141,12 @@ def drift_map(
     for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
         for k, j, i in np.ndindex(2, 2, 2):
             found = identify(
-                AXES[i], DRIFT_BLOCKS[j], origin=at, shaping=bool(k), seed=seed, **DRIFT_SETTINGS
+                AXES[i],
+                DRIFT_BLOCKS[j],
+                origin=at,
+                inertia_shaping=bool(k),
+                seed=seed,
+                **DRIFT_SETTINGS,
             )
             out[m, k, j, i] = found.values
         if progress:

@@ -13,12 +13,12 @@ from ..errors import ParameterError, choice
 from ..model.clay import slab
 from ..model.constants import AXES
 from ..model.flow import Flow
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..theory.describing import limit_cycles, push_outcomes
-from ..theory.gain_limit import gain_limit
-from ..theory.linear_loop import TIMING, Loop
+from ..theory.gain_limits import gain_limit
+from ..theory.loops import TIMING, Loop
 from ..theory.relay_cycle import critical_push, exact_cycles
 from ..theory.roots import first_failure
 from .boundary import LARGE_PUSH, PushedLoop
@@ -127,7 +127,7 @@ def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
         flow: the law of the clay.
         t_max: length of the run [s].
     """
-    scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop=False)
+    scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop_when_unstable=False)
     return replace(scenario, clay=slab(flow))
 
 

@@ -17,17 +17,19 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model.constants import AXES, TS
-from ..model.fields import with_fields
 from ..model.operator import Operator
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
-from ..model.virtual_wall import VirtualWall
+from ..results import Result
+from ..scene.fields import with_fields
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.record import Record
-from ..theory import gain_limit, wall_limits
-from ..theory.margins import Box
+from ..theory import gain_crossings, gain_limits, wall_limits
 from ..theory.roots import bisect
-from . import boundary
+from ..theory.stability_margins import Box
+from . import boundary, growth
 
 VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit that a label shows
     "Ts": ("Ts", "ms", 1e3),
@@ -37,7 +39,7 @@ VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit
     "friction": ("device.friction", "N", 1.0),
     "mass": ("device.mass", "kg", 1.0),
     "filter": ("velocity_filter", "Hz", 1.0),
-    "window": ("window", "samples", 1.0),
+    "velocity_window": ("velocity_window", "samples", 1.0),
 }
 VARIED_ARM = {
     "Ts": VARIED_DEVICE["Ts"],
@@ -50,6 +52,7 @@ LETTERS = {
     "friction": "fc",
     "mass": "m",
     "quantum": "Delta",
+    "velocity_window": "window",
 }  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
 LIMIT_POINTS = 61  # of a line of theory
@@ -58,7 +61,6 @@ FEWEST_SAMPLES, MOST_SAMPLES = 300, 6000  # samples of a run whose growth is rea
 READ_SWINGS = 4.0  # periods of device and wall in such a run, at least
 READ = 400  # samples of it that are read, about
 SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) are no oscillation
-FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
 GROWTH_STEPS, REST_STEPS = 16, 4  # engine steps a sample, at least
 STEP_DECAY = 0.1  # largest share of its speed that the damper takes in a step
 DEEPEST = 5e-3  # [m] into the wall that the force presses, so that the arm moves straight
@@ -78,9 +80,18 @@ REST_RESOLVED = 0.01  # share of K to which the decay of a swing tells stable fr
 FALLEN = 0.01  # share of the largest K below which a boundary has fallen to nothing
 BY_GROWTH, BY_REST = "growth rate", "rest after a push"
 
-Wall = VirtualWall | boundary.PushedLoop  # on a bare device, or clay of k and b on this arm
+# on a bare device, or clay of k and b on this arm
+Wall = VirtualWall | boundary.PushedLoop
 Search = Generator[float, Any, float]
 Share = Callable[[float], None]
+
+
+def unshown(share: float) -> None:
+    """Shows no progress.
+
+    Args:
+        share: of the work that is done.
+    """
 
 
 @named
@@ -104,6 +115,7 @@ class Press:
         check_fields(self, "press.")
 
 
+@named
 @dataclass(frozen=True)
 class Limit:
     """A published or exact line in the plane of B and K.
@@ -132,6 +144,7 @@ class Limit:
         return float(np.interp(B, self.B, self.K, math.nan, math.nan))
 
 
+@named
 @dataclass(frozen=True)
 class ZRegion:
     """Walls that one device renders stably: those below K(B), found by runs.
@@ -217,8 +230,8 @@ class ZRegion:
 
 
 @named
-@dataclass(frozen=True)
-class ZWidth:
+@dataclass(frozen=True, repr=False)
+class ZWidth(Result):
     """Regions of stable walls: one, or a family.
 
     Attributes:
@@ -230,6 +243,15 @@ class ZWidth:
     regions: tuple[ZRegion, ...]
     vary: str = ""
     press: Press = Press()
+
+    def headline(self) -> str:
+        """Largest stiffness and damping of each region, in one line."""
+        told = (
+            f"{f'{r.name}: ' if r.name else ''}K to {r.largest_K:.4g} N/m, B to "
+            f"{r.largest_B:.4g} N.s/m"
+            for r in self.regions
+        )
+        return "; ".join(told)
 
     def gap(self) -> float:
         """Largest relative gap between runs and exact lines; NaN if no loop is linear."""
@@ -275,7 +297,7 @@ class ZWidth:
 
 @checked
 def zwidth(
-    wall: Wall,
+    wall: Wall | Scenario,
     vary: str = "",
     values: Iterable[Any] = (),
     *,
@@ -283,7 +305,7 @@ def zwidth(
     box: Box | None = None,
     press: Press = Press(),
     quick: bool = False,
-    progress: Share = lambda share: None,
+    progress: Share = unshown,
 ) -> ZWidth:
     """Find the walls that a device renders stably, by runs, beside what theory says.
 
@@ -294,9 +316,10 @@ def zwidth(
 
     Args:
         wall: device, hand and timing; its own K and B do not matter. Or the arm with its servo and
-            compensator: the plane is then that of the clay's b and k, under the gain of the loop.
+            compensator, or a scenario, of which it takes x (y is `PushedLoop.of(scenario, "y")`):
+            the plane is then that of the clay's b and k, under the gain of the loop.
         vary: what differs in a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
-            "filter" or "window", of an arm "Ts", "delay" or "gain"; "" for one region.
+            "filter" or "velocity_window", of an arm "Ts", "delay" or "gain"; "" for one region.
         values: of what differs [SI]; None among those of "filter" is no filter.
         B: virtual damping to try [N.s/m], ascending; None for 0 and others up to the largest that
             is stable.
@@ -309,6 +332,7 @@ def zwidth(
         ParameterError: wall is none, an unknown name, a value out of its bounds, no values, or an
             arm in continuous time.
     """
+    wall = boundary.of_scenario(wall, AXES[0])
     if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
         raise ParameterError("Ts", None, "must be given: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):
@@ -408,7 +432,7 @@ def is_linear(wall: Wall) -> bool:
     """
     if isinstance(wall, boundary.PushedLoop):
         return True
-    return not (wall.surface or wall.device.friction or wall.device.quantum)
+    return not (wall.unilateral or wall.device.friction or wall.device.quantum)
 
 
 def theoretical_damping(wall: Wall) -> float:
@@ -423,7 +447,7 @@ def theoretical_damping(wall: Wall) -> float:
         tried = _at(wall, 0.0, B)
         if isinstance(tried, VirtualWall):
             return wall_limits.stable_wall(tried)
-        return gain_limit.is_stable(tried.linear)
+        return gain_crossings.is_stable(tried.linear)
 
     grid = np.geomspace(1e-5 * unit, 1e3 * unit, 120).tolist()
     low = next((i for i, B in enumerate(grid) if stable(B)), None)
@@ -452,7 +476,7 @@ def _exact(wall: Wall) -> float:
     """Largest stable K of the linear loop."""
     if isinstance(wall, VirtualWall):
         return wall_limits.stiffness_band(wall)[1]
-    return gain_limit.stiffness_limit(wall.linear)
+    return gain_limits.stiffness_limit(wall.linear)
 
 
 def _softest(wall: Wall, top: float) -> float:
@@ -504,7 +528,7 @@ def _theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]
         line("exact, linear loop", "exact", _exact, "sampled loop at the nominal pose")
         return parts
     left_out = [n for n in ("friction", "quantum") if getattr(wall.device, n)]
-    left_out += ["surface"] if wall.surface else []
+    left_out += ["surface"] if wall.unilateral else []
     note = f"of the linear loop: {' and '.join(left_out)} left out" if left_out else "eigenvalues"
     line("exact, linear loop", "exact", _exact, note)
     line(
@@ -514,7 +538,7 @@ def _theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]
         "passive: stable in every passive hand"
         + (", but for the quantum" * bool(wall.device.quantum)),
     )
-    if wall.velocity == "difference" and wall.window == 1 and wall.velocity_filter is None:
+    if wall.velocity == "difference" and wall.velocity_window == 1 and wall.velocity_filter is None:
         note = "linear rule, for (b + B) Ts and K Ts^2 far below the mass"
         line("Hulin et al. 2006", "rule", wall_limits.hulin_limit, note)
     if wall.delay == 0.0 and wall.M == 0.0:
@@ -576,7 +600,7 @@ def _side_by_side(
     searches: Sequence[Search],
     wall: Callable[[int, float], Any],
     judge: Callable[[Sequence[Any]], Sequence[Any]],
-    show: Share = lambda share: None,
+    show: Share = unshown,
 ) -> list[float]:
     """Results of searches that each ask for one run at a time; a batch has one of each."""
     results = [math.nan] * len(searches)
@@ -622,8 +646,8 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
     arms = [w for w in walls if isinstance(w, boundary.PushedLoop)]
     if arms:
         records = simulate_batch(w.scenario() for w in arms)
-        how = boundary.GROWTH_SAMPLE, boundary.SLOWEST_MODE
-        return [growth_of_run(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
+        how = growth.GROWTH_SAMPLE, growth.SLOWEST_MODE
+        return [growth.growth_of_run(r, *how, w.axis) for r, w in zip(records, arms, strict=True)]
     bare = [w for w in walls if isinstance(w, VirtualWall)]
     steps = growth_steps(bare[0]) if bare else 1
     read = [growth_reading(w) for w in bare]
@@ -635,7 +659,7 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
         every=steps,
     )
     return [
-        growth_of_run(r, sample, slowest)
+        growth.growth_of_run(r, sample, slowest)
         for r, (_, sample, slowest) in zip(records, read, strict=True)
     ]
 
@@ -661,7 +685,7 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
         third do not count [rad/s, 1/s].
     """
     omega = math.sqrt((wall.K + wall.hand.spring) / _mass(wall))
-    order = wall.window + wall.delay / wall.Ts
+    order = wall.velocity_window + wall.delay / wall.Ts
     n = max(
         FEWEST_SAMPLES + 12.0 * order,
         READ_SWINGS * math.tau / max(omega * wall.Ts, 1e-9) if omega else 0.0,
@@ -669,24 +693,6 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
     n = math.ceil(span * min(n, MOST_SAMPLES + 12.0 * order))
     kept = max(READ, 6.0 * order)
     return n, wall.Ts * max(1.0, n / kept), SLOWEST * omega
-
-
-def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
-    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean.
-
-    Args:
-        record: of a free motion.
-        sample: as in `boundary.growth_rate` [s].
-        slowest: as there [rad/s, 1/s].
-        axis: "x" or "y".
-    """
-    speed = np.abs(record.v[:, AXES.index(axis)])
-    n = len(speed)
-    share = math.ceil(0.1 * n)
-    change = (speed[-share:].max() + 1e-300) / (speed[:share].max() + 1e-300)
-    if n > 2 * share and not FADED < change < 1.0 / FADED:
-        return math.log(change) / record.t[-1]
-    return boundary.growth_rate(record, axis, sample, slowest)
 
 
 def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[bool]:

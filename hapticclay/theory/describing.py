@@ -20,7 +20,7 @@ from ..arguments import checked, named
 from ..errors import ParameterError, array_of
 from ..model.flow import Flow
 from . import linear_loop, roots
-from .linear_loop import Loop, of_loop
+from .loops import Loop, of_loop
 
 EXTREME = 300.0  # no amplitude is sought beyond exp(+-300) m/s
 HARMONICS = 199  # the last one that counts: their effect falls as its square

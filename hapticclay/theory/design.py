@@ -12,8 +12,9 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, number, pair
 from ..model.compensator import Compensator
-from . import gain_limit, margins
-from .linear_loop import TIMING, Loop, of_loop
+from ..results import Result
+from . import gain_limits, stability_margins
+from .loops import TIMING, Loop, of_loop
 from .roots import first_failure
 
 K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain
@@ -52,7 +53,7 @@ def design_gain(
     phase = number("phase_margin", phase_margin, 0.0, math.pi, unit="rad")
     disk = number("disk_margin", disk_margin, 0.0, 2.0)
     late = number("delay_margin", delay_margin, 0.0, unit="s")
-    top = gain_limit.gain_limit(loop)
+    top = gain_limits.gain_limit(loop)
     if loop.Ts is not None or loop.delay:
         if phase or disk or late or at != "compensator":
             bound = "must stay as they are with sampling or delay, where only gain_margin is known"
@@ -61,7 +62,7 @@ def design_gain(
         return top / gain
 
     def good(K: float) -> bool:
-        m = margins.margins(loop, K=K, at=at)
+        m = stability_margins.margins(loop, K=K, at=at)
         kept = m.phase >= phase and m.disk >= disk and m.delay >= late
         return m.stable and m.gain[1] >= gain and kept
 
@@ -75,8 +76,8 @@ def design_gain(
 
 
 @named
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, repr=False)
+class Design(Result):
     """A compensator tuned to a margin; shape and gain are `Scenario.compensator` and `gain`.
 
     Attributes:
@@ -90,7 +91,27 @@ class Design:
     compensator: Compensator
     K: float
     error: float
-    margins: margins.Margins
+    margins: stability_margins.Margins
+
+    def headline(self) -> str:
+        """Gain, transparency error and margins, in one line."""
+        m = self.margins
+        return (
+            f"K = {self.K:.5g}, transparency error {self.error:.4g}, gain margin {m.gain[1]:.4g}, "
+            f"phase margin {math.degrees(m.phase):.4g} degrees, disk margin {m.disk:.4g}"
+        )
+
+    def tables(self) -> dict[str, dict[str, list[float]]]:
+        """Gain, error and margins."""
+        m = self.margins
+        return {
+            "design": {
+                "K": [self.K], "transparency error": [self.error],
+                "gain margin, less": [m.gain[0]], "gain margin, more": [m.gain[1]],
+                "phase margin [rad]": [m.phase], "delay margin [s]": [m.delay],
+                "disk margin": [m.disk],
+            }
+        }  # fmt: skip
 
 
 @of_loop("K", "b")
@@ -106,7 +127,7 @@ def transparency_error(loop: Loop, *, band: tuple[float, float] = DESIGN_BAND) -
 
     low, high = _design_band(band)
     x = np.linspace(math.log(low), math.log(high), 401)
-    error = np.abs(1.0 - margins.transparency(loop, np.exp(x))) ** 2
+    error = np.abs(1.0 - stability_margins.transparency(loop, np.exp(x))) ** 2
     return math.sqrt(float(simpson(error, x=x)) / (x[-1] - x[0]))
 
 
@@ -143,7 +164,7 @@ def compare(
             raise ParameterError("compensators", c, bound)
         tried = replace(tried, K=K)
         error = transparency_error(replace(tried, **TIMING), band=band)
-        out.append(Design(c, K, error, margins.margins(tried, at=at)))
+        out.append(Design(c, K, error, stability_margins.margins(tried, at=at)))
     return sorted(out, key=lambda d: d.error)
 
 

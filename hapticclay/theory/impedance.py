@@ -19,16 +19,17 @@ from ..arguments import checked, named
 from ..errors import ParameterError, array_of
 from ..model import controller
 from ..model.operator import Operator
-from ..model.virtual_wall import VirtualWall
+from ..results import Result
+from ..scene.virtual_wall import VirtualWall
 from . import linear_loop
-from .linear_loop import Loop, of_loop
+from .loops import Loop, of_loop
 
 UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Impedance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Impedance(Result):
     """What a hand feels over frequency, computed or measured.
 
     Stiffness, damping and mass are the effective ones of Colonnese, Sketch, Okamura, Closed-loop
@@ -38,14 +39,37 @@ class Impedance:
     Attributes:
         omega: [rad/s], shape (n,).
         Z: fh/v, hand force over handle velocity [N.s/m], complex, shape (n,).
-        felt: transparency fe/fh, the share of the hand's force that is rendered, complex, (n,).
+        transparency: fe/fh, the share of the hand's force that is rendered, complex, (n,).
         rendered: Ze, the impedance that is to be rendered [N.s/m], complex, shape (n,).
     """
 
     omega: np.ndarray
     Z: np.ndarray
-    felt: np.ndarray
+    transparency: np.ndarray
     rendered: np.ndarray
+
+    def headline(self) -> str:
+        """Band and range of |Z|, in one line."""
+        f, size = self.frequency, np.abs(self.Z)
+        span = f"{len(f)} lines, {f[0]:.3g} to {f[-1]:.3g} Hz"
+        return f"{span}, |Z| {size.min():.3g} to {size.max():.3g} N.s/m"
+
+    def tables(self) -> dict[str, dict[str, list[float]]]:
+        """What the figures show, columns headed with their units."""
+        return {
+            "impedance": {
+                "f [Hz]": self.frequency.tolist(),
+                "Re Z [N.s/m]": self.Z.real.tolist(),
+                "Im Z [N.s/m]": self.Z.imag.tolist(),
+                "effective stiffness [N/m]": self.stiffness.tolist(),
+                "effective damping [N.s/m]": self.damping.tolist(),
+                "effective mass [kg]": self.mass.tolist(),
+                "|fe/fh|": np.abs(self.transparency).tolist(),
+                "phase of fe/fh [deg]": np.degrees(np.angle(self.transparency)).tolist(),
+                "|Z/Ze|": np.abs(self.ratio).tolist(),
+                "phase of Z/Ze [deg]": np.degrees(np.angle(self.ratio)).tolist(),
+            }
+        }
 
     @property
     def frequency(self) -> np.ndarray:
@@ -215,7 +239,7 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     Ts, th, b, k, n = loop.Ts, loop.hand, loop.b, loop.k, loop.compensator.order
     assert Ts is not None
-    s, physical = 1j * omega, float(loop.render == "implicit")
+    s, physical = 1j * omega, float(loop.render == "physical")
     W = loop.servo.S.gain if loop.mobility is None else loop.mobility
     shaped = loop.servo.S.gain / W - 1.0  # share of the net force that shapes the inertia
     total = 1.0 / W + th.mass
@@ -249,8 +273,8 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
 def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     """What the hand at a virtual wall feels, over frequency: the fundamental, exact.
 
-    The wall acts everywhere (surface=False), without Coulomb friction and encoder steps. The arm of
-    the operator sends sidebands back, so another arm changes the answer a little.
+    The wall acts everywhere (unilateral=False), without Coulomb friction and encoder steps. The arm
+    of the operator sends sidebands back, so another arm changes the answer a little.
 
     Args:
         wall: the wall; its device's friction and quantum do not matter.
@@ -269,7 +293,7 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
         speed = rate
     else:
         keep = math.exp(-2.0 * math.pi * wall.velocity_filter * Ts) if wall.velocity_filter else 0.0
-        slope = -np.expm1(-s * Ts * wall.window) / (wall.window * Ts)
+        slope = -np.expm1(-s * Ts * wall.velocity_window) / (wall.velocity_window * Ts)
         place = place + rate * slope * (1.0 - keep) / (1.0 - keep * z1)
     held = place * arm.held_place + speed * arm.held_speed
     asked = -(place * arm.place + speed * arm.speed) / (1.0 + held)

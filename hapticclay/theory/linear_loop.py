@@ -1,48 +1,38 @@
 """The linear loop (Fig. 2): its parts, closed-loop polynomials, state space and sampled map.
 
-Everything that `theory` and `studies` say of a loop starts from a `Loop`: one axis at the nominal
-pose. Polynomials treat one such axis; state spaces one, or both where a pose couples them.
+Everything that `theory` and `studies` say of a loop starts from one axis at the nominal pose.
+Polynomials treat one such axis; state spaces one, or both where a pose couples them.
 """
 
 from __future__ import annotations
 
 import cmath
-import functools
-import inspect
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, Literal, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..arguments import checked, known_names, named
+from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..model import controller
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES, B_MAX
 from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
-from ..model.scenario import Render, Scenario
 from ..model.spring import STIFFNESS_MAX
+from ..scene.scenario import Render
 from . import roots
 
-Answer = TypeVar("Answer")
-NO_TIMING = "must be {} here: the analysis is one of continuous time without delay"
-MOST_DAMPINGS = 64  # of the clay of a scenario, of which the worst is sought
-TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
 FASTEST = 1e9  # [m/s] of a steady velocity
 
 
 @named
 @dataclass(frozen=True)
-class Loop:
-    """The linear loop of one axis at the nominal pose: the parts of a run, for the analysis.
-
-    What is said of it holds for the machine at the nominal pose, where the axes are decoupled, in
-    small motions and with the motors within their torque limits. Elsewhere it holds with inertia
-    shaping in continuous time.
+class LinearLoop:
+    """One axis of the loop at the nominal pose, by its parts.
 
     Attributes:
         axis: "x" or "y".
@@ -56,11 +46,11 @@ class Loop:
         delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts.
             Everything the motors do is late by it: the servo's feedback, what the compensator
             commands, and clay that is held.
-        render: the clay is "held" (a force of the motors) or "implicit" (physical, never late).
+        render: the clay is "held" (a force of the motors) or "physical" (physical, never late).
         mobility: of the bare handle where the servo shapes its inertia [1/kg], which tells with
             sampling or delay; None for the gain of Sh.
         k: stiffness of the clay, an elastic wall with its rest at p = 0, Te = b s + k [N/m], 0 to
-            1e9; held, implicit or late as b is.
+            1e9; held, physical or late as b is.
     """
 
     axis: Literal["x", "y"] = "x"
@@ -85,56 +75,6 @@ class Loop:
         if self.Ts is not None:
             number("delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
 
-    @classmethod
-    def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
-        """The loop of one axis of a scenario, at the nominal pose of its arm.
-
-        Muscle force, pose, friction and what else the interface has besides its delay are not part
-        of it. Of clay that yields or springs back it has b alone: Fy, K and springs are left out,
-        so that in clay of b = 0 a gain limit may be inf however large Fy is. For clay that yields
-        see `push_outcomes` and `limit_cycles`.
-
-        Args:
-            scenario: the run.
-            axis: "x" or "y".
-            b: clay [N.s/m]; None for that of the scenario's clay, before it grows, with the least
-                gain limit, 0 without clay. Of more than MOST_DAMPINGS values so many are tried;
-                turned clay resists by those of both of its own axes.
-
-        Raises:
-            ParameterError: no scenario, one with a controller of the user's own, unknown axis, or b
-                out of its bounds.
-        """
-        if not isinstance(scenario, Scenario):
-            raise ParameterError("scenario", scenario, "must be a Scenario")
-        if scenario.controller is not None:
-            bound = "must be None: the analysis is of compensator and servo, not of a law"
-            raise ParameterError("controller", scenario.controller, bound)
-        i, clay = AXES.index(choice("axis", axis, AXES)), scenario.clay
-        servo, bare = scenario.servo[i], scenario.arm.nominal_mobility[i]
-        shaped = scenario.shaping and bare != servo.S.gain
-        sampled = scenario.control == "sampled"
-        loop = Loop(
-            axis=AXES[i],
-            operator=scenario.operators[i],
-            servo=servo if scenario.shaping else replace(servo, S=replace(servo.S, gain=bare)),
-            compensator=scenario.compensators[i],
-            K=scenario.gain[i],
-            Ts=(scenario.Ts or scenario.dt) if sampled else None,
-            delay=scenario.interface.delay if scenario.interface else 0.0,
-            render=scenario.render if sampled else "held",
-            mobility=bare if shaped else None,
-        )
-        if b is not None:
-            return replace(loop, b=b)
-        from .gain_limit import gain_limit
-
-        laws = () if clay is None else clay.laws if clay.angle else clay.laws[i : i + 1]
-        dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
-        if len(dampings) > MOST_DAMPINGS:
-            dampings = dampings[np.linspace(0, len(dampings) - 1, MOST_DAMPINGS).astype(int)]
-        return min((replace(loop, b=x) for x in dampings.tolist()), key=gain_limit, default=loop)
-
     @property
     def gain(self) -> float:
         """K.
@@ -156,119 +96,6 @@ class Loop:
         """Te + Th, clay and the operator's arm (Eqs. 4, 19), as a polynomial in s."""
         th = self.hand
         return Polynomial([th.spring + self.k, th.damper + self.b, th.mass])
-
-
-PARTS = tuple(f.name for f in fields(Loop))
-
-
-def of_loop(
-    *order: str, timing: bool = False
-) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
-    """Lets an analysis of a `Loop` be asked of the parts of one, too.
-
-    `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
-    asks of `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
-    names by position or by name, and every other part of a Loop by name.
-
-    Args:
-        order: parts of the loop and arguments of the analysis that may follow the axis by position;
-            all but the operator must be given. Only the latter may follow a Loop by position.
-        timing: whether the analysis is one of sampled and late loops too.
-
-    Returns:
-        A decorator.
-    """
-
-    def decorate(analysis: Callable[..., Answer]) -> Callable[..., Answer]:
-        name = analysis.__name__
-        own = [p for n, p in inspect.signature(analysis).parameters.items() if n != "loop"]
-        free = tuple(n for n in order if n not in PARTS)
-        guarded, signature = checked(analysis), _signature(order, own)
-        known = {"loop", *PARTS, *signature.parameters}
-        known = known if all(p.kind is not p.VAR_KEYWORD for p in own) else None
-
-        @functools.wraps(analysis)
-        def ask(*args: Any, **given: Any) -> Answer:
-            if known:
-                known_names(name, given, known)
-            whole, *rest = _loop_first(name, args, given)
-            _by_name(name, free if isinstance(whole, Loop) else order, rest, given)
-            parts = {word: given.pop(word) for word in PARTS if word in given}
-            if isinstance(whole, Loop):
-                loop = _with_gain(whole, parts)
-            else:
-                missing = [n for n in order if n in PARTS and n not in ("operator", *parts)]
-                if missing:
-                    raise TypeError(f"{name}() lacks {', '.join(missing)}")
-                loop = Loop(whole, **parts)
-            if not timing:
-                _refuse_timing(loop)
-            return guarded(loop, **given)
-
-        ask.__signature__ = signature  # type: ignore[attr-defined]
-        return ask
-
-    return decorate
-
-
-def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequence[Any]:
-    """What an analysis was asked by position, after a Loop, that of a Scenario, or an axis.
-
-    What makes the first is taken from `given`, the arguments by name.
-    """
-    if args and isinstance(args[0], Scenario):
-        scenario, *rest = args
-        if not rest and "axis" not in given:
-            raise TypeError(f"{name}() of a Scenario needs an axis")
-        axis = rest.pop(0) if rest else given.pop("axis")
-        args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
-    for word in ("loop", "axis"):
-        if word in given:
-            args = (given.pop(word), *args)
-    if not args:
-        raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
-    return args
-
-
-def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[str, Any]) -> None:
-    """Puts arguments that follow by position among those by name."""
-    if len(rest) > len(names):
-        raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
-    for word, value in zip(names, rest, strict=False):
-        if word in given:
-            raise TypeError(f"{name}() got multiple values for argument {word!r}")
-        given[word] = value
-
-
-def _refuse_timing(loop: Loop) -> None:
-    """Refuses a loop that is sampled or late."""
-    for word, value in TIMING.items():
-        if getattr(loop, word) != value:
-            raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
-
-
-def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
-    """The loop, with K where it is given."""
-    for word, value in parts.items():
-        if word != "K":
-            raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
-    return replace(loop, **parts) if parts else loop
-
-
-def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
-    """What an analysis takes: an axis or a Loop, what may follow by position, and the rest."""
-    P, more = inspect.Parameter, {p.name: p for p in own}
-    blank = {"operator": None}
-    out = [P("axis", P.POSITIONAL_OR_KEYWORD, annotation="str | Loop | Scenario")]
-    out += [P(n, P.POSITIONAL_OR_KEYWORD, default=blank.get(n, P.empty)) for n in order]
-    out += [
-        P(f.name, P.KEYWORD_ONLY, default=f.default)
-        for f in fields(Loop)
-        if f.name != "axis" and f.name not in order
-    ]
-    rest = [p for n, p in more.items() if n not in order]
-    out += [p.replace(kind=P.KEYWORD_ONLY) for p in rest if p.kind is not P.VAR_KEYWORD]
-    return inspect.Signature(out + [p for p in rest if p.kind is P.VAR_KEYWORD])
 
 
 def steady_speed(
@@ -369,7 +196,7 @@ def reduced(compensator: Compensator) -> Compensator:
 # ---- polynomials ---------------------------------------------------------------------------------
 
 
-def loop_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial: denominator + passive + K driven.
 
     The first is the common denominator of G, C and Sh, so the loop's transfer function
@@ -387,13 +214,13 @@ def loop_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
     return cg * servo, s.gain * (cg * t), forward
 
 
-def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial with late motors: physical + late (motors + K driven).
 
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
     without shaping) and T = Te + Th,
 
-        0 = s^2 + W (Th + [implicit] Te) + late (kd s + kp + [held] W Te + (Wn - W) T
+        0 = s^2 + W (Th + [physical] Te) + late (kd s + kp + [held] W Te + (Wn - W) T
             + (s^2 + kd s + kp) G C T)
 
     times the denominator of G C.
@@ -405,7 +232,7 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
         (physical, motors, driven).
     """
     s, th, cg = loop.servo.S, loop.hand, _forward_denominator(loop)
-    k, b = (loop.k, loop.b) if loop.render == "implicit" else (0.0, 0.0)  # physical
+    k, b = (loop.k, loop.b) if loop.render == "physical" else (0.0, 0.0)  # physical
     W = s.gain if loop.mobility is None else loop.mobility
     physical = cg * Polynomial([W * (th.spring + k), W * (th.damper + b), 1.0 + W * th.mass])
     motors = cg * Polynomial([s.stiffness + W * (loop.k - k), s.damping + W * (loop.b - b)])
@@ -414,13 +241,13 @@ def delayed_polynomials(loop: Loop) -> tuple[Polynomial, Polynomial, Polynomial]
     return physical, motors, loop_polynomials(loop)[2]
 
 
-def _forward_denominator(loop: Loop) -> Polynomial:
+def _forward_denominator(loop: LinearLoop) -> Polynomial:
     """Denominator of G C."""
     g = loop.servo.G
     return loop.compensator.fraction[1] * Polynomial([g.stiffness, g.damping, 1.0])
 
 
-def characteristic(loop: Loop) -> Polynomial:
+def characteristic(loop: LinearLoop) -> Polynomial:
     """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
 
     Args:
@@ -433,7 +260,7 @@ def characteristic(loop: Loop) -> Polynomial:
     return denominator + passive + loop.gain * driven
 
 
-def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
+def device_admittance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """G C + Sh, handle position over net force, as (numerator, denominator).
 
     Args:
@@ -444,7 +271,7 @@ def device_admittance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     return passive + loop.gain * driven, denominator
 
 
-def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
+def device_impedance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
 
     Args:
@@ -454,19 +281,7 @@ def device_impedance(loop: Loop) -> tuple[Polynomial, Polynomial]:
     return (d, roots.VARIABLE * e) if d.coef[0] else (d // roots.VARIABLE, e)
 
 
-@of_loop("K", "b", "operator")
-def closed_loop_poles(loop: Loop) -> np.ndarray:
-    """Poles of the loop at the nominal pose [rad/s], shape (4 + order of C,).
-
-    With an integrator in C and no spring in Th one of them is that which moves the handle (s = 0).
-
-    Args:
-        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
-    """
-    return roots.roots(characteristic(loop))
-
-
-def stable(loop: Loop) -> bool:
+def stable(loop: LinearLoop) -> bool:
     """Return True if no closed-loop pole lies right of the imaginary axis.
 
     Args:
@@ -478,7 +293,9 @@ def stable(loop: Loop) -> bool:
 # ---- state spaces --------------------------------------------------------------------------------
 
 
-def state_space(*loops: Loop, mobility: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def state_space(
+    *loops: LinearLoop, mobility: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """The loop in continuous time: z' = A z + B uh, with y = G delta.
 
     The servo's law is that of docs/equations.md, section 3.
@@ -512,7 +329,7 @@ def state_space(*loops: Loop, mobility: np.ndarray | None = None) -> tuple[np.nd
 
 
 def sampled_differences(
-    *loops: Loop, pose: tuple[np.ndarray, bool] | None = None
+    *loops: LinearLoop, pose: tuple[np.ndarray, bool] | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The sampled loop x(k+1) = (M + beta K gamma) x(k), x at the sample before it acts.
 
@@ -535,7 +352,7 @@ def sampled_differences(
         of the gains.
     """
     n, at, first = len(loops), _places(loops), loops[0]
-    Ts, implicit = first.Ts, first.render == "implicit"
+    Ts, implicit = first.Ts, first.render == "physical"
     assert Ts is not None
     nominal = _shaped_mobility(loops)
     W, shaping = _nominal_pose(loops) if pose is None else pose
@@ -598,7 +415,7 @@ def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
     return whole, part if part > 1e-9 else 0.0
 
 
-def _places(loops: Sequence[Loop]) -> list[int]:
+def _places(loops: Sequence[LinearLoop]) -> list[int]:
     """Where the states of each axis begin, and where those of the last end."""
     at = [0]
     for loop in loops:
@@ -606,24 +423,24 @@ def _places(loops: Sequence[Loop]) -> list[int]:
     return at
 
 
-def _shaped_mobility(loops: Sequence[Loop]) -> np.ndarray:
+def _shaped_mobility(loops: Sequence[LinearLoop]) -> np.ndarray:
     return np.diag([x.servo.S.gain for x in loops])
 
 
-def _nominal_pose(loops: Sequence[Loop]) -> tuple[np.ndarray, bool]:
+def _nominal_pose(loops: Sequence[LinearLoop]) -> tuple[np.ndarray, bool]:
     """Mobility of the bare handle at the nominal pose, and whether the servo shapes it."""
     bare = [x.servo.S.gain if x.mobility is None else x.mobility for x in loops]
     return np.diag(bare), any(x.mobility is not None for x in loops)
 
 
-def _resistance(loops: Sequence[Loop]) -> tuple[np.ndarray, np.ndarray]:
+def _resistance(loops: Sequence[LinearLoop]) -> tuple[np.ndarray, np.ndarray]:
     """Hand and clay without the hand's mass: force per place and per velocity of each axis."""
     hands = [x.hand for x in loops]
     dampers = np.array([-h.damper - x.b for h, x in zip(hands, loops, strict=True)])
     return np.array([-h.spring - x.k for h, x in zip(hands, loops, strict=True)]), dampers
 
 
-def _feedback(loops: Sequence[Loop]) -> np.ndarray:
+def _feedback(loops: Sequence[LinearLoop]) -> np.ndarray:
     """The servo's law over the states of all axes, without what passes straight through C."""
     at = _places(loops)
     out = np.zeros((len(loops), at[-1]))
@@ -634,7 +451,9 @@ def _feedback(loops: Sequence[Loop]) -> np.ndarray:
 
 
 def _over_states(
-    loops: Sequence[Loop], place: Sequence[float] | np.ndarray, rate: Sequence[float] | np.ndarray
+    loops: Sequence[LinearLoop],
+    place: Sequence[float] | np.ndarray,
+    rate: Sequence[float] | np.ndarray,
 ) -> np.ndarray:
     """Rows over the states of all axes that hold a factor on p and one on p' of each."""
     at = _places(loops)
@@ -711,7 +530,7 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
 
 
 def crossing_times(
-    loop: Loop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
+    loop: LinearLoop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
 ) -> list[float]:
     """Times at which a handle that starts at rest under a constant force passes each border.
 
@@ -743,10 +562,10 @@ def crossing_times(
         if t >= t_max:
             break
 
-        def beyond(h: float, A=A, z=z, edge=edge) -> float:
+        def gap(h: float, A=A, z=z, edge=edge) -> float:
             return float((controller.matrix_exponential(A * h) @ z)[0]) - edge
 
-        h: Any = brentq(beyond, 0.0, step, xtol=1e-15)
+        h: Any = brentq(gap, 0.0, step, xtol=1e-15)
         z, t = controller.matrix_exponential(A * h) @ z, t + h
         out.append(t)
     return out

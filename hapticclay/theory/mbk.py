@@ -16,15 +16,15 @@ from typing import Literal
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
-from ..model.virtual_wall import VirtualWall
-from . import gain_limit, margins
+from ..scene.virtual_wall import VirtualWall
+from . import gain_limits, stability_margins
 from .impedance import frequencies, wall_response
-from .linear_loop import Loop
-from .margins import Box
+from .loops import Loop
 from .roots import bisect
+from .stability_margins import Box
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
@@ -40,6 +40,7 @@ WIDEST = 16.0
 SLIGHT = 1e-8  # of that: the least spring that is tried
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Region:
     """Where a virtual wall is stable, over a plane of two of its parts; between low and high.
@@ -201,9 +202,9 @@ def least_mass(
     decay = number("decay", decay, 0.0, 1e6, unit="1/s")
     loop = replace(loop, compensator=Compensator((1.0,), (1.0, decay, 0.0)), K=1.0)
     if box is None:
-        limit = gain_limit.gain_limit(loop)
+        limit = gain_limits.gain_limit(loop)
     else:
-        limit = margins.worst_case(loop, box, samples=samples).limit
+        limit = stability_margins.worst_case(loop, box, samples=samples).limit
     M = math.inf if limit == 0.0 else 1.0 / limit
     return M, decay * M if decay else 0.0
 
@@ -211,6 +212,7 @@ def least_mass(
 # ---- dynamic range -----------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class DynamicRange:
     """What a device spans, from its free motion to its stiffest stable wall.
@@ -262,7 +264,7 @@ def dynamic_range(
         ParameterError: a value is out of its bounds, or no wall is stable.
     """
     omega, share = frequencies(omega), number("share", share, 0.1, 0.999)
-    off = replace(wall, K=0.0, B=0.0, M=0.0, surface=False)
+    off = replace(wall, K=0.0, B=0.0, M=0.0, unilateral=False)
     low, high = stable_band(off, "B")
     if not high > low:
         raise ParameterError("wall", wall, "must be stable with some virtual damper")

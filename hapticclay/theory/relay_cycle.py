@@ -21,7 +21,7 @@ from ..model.controller import matrix_exponential
 from ..model.flow import Flow
 from . import linear_loop, roots
 from .describing import is_flow, limit_cycles, push_outcomes, without_spring
-from .linear_loop import Loop, of_loop
+from .loops import Loop, of_loop
 from .roots import first_failure
 
 SPAN = np.geomspace(0.5, 2.0, 61)  # half periods tried, as shares of the predicted one

@@ -18,9 +18,9 @@ from numpy.polynomial import Polynomial
 from ..arguments import checked
 from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
-from ..model.virtual_wall import Device, VirtualWall
-from . import gain_limit, linear_loop, roots
-from .margins import Box
+from ..scene.virtual_wall import Device, VirtualWall
+from . import gain_crossings, linear_loop, roots
+from .stability_margins import Box
 
 MOST_STATES = 600  # of a map whose eigenvalues are asked for
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
@@ -71,7 +71,7 @@ def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
         ParameterError: window and delay are of more than 600 samples together.
     """
     family, typical = _every_stiffness(wall), (wall.device.mass + wall.hand.mass) / wall.Ts**2
-    edges = [0.0, *sorted(K for K, _ in gain_limit.gain_crossings(family)), math.inf]
+    edges = [0.0, *sorted(K for K, _ in gain_crossings.gain_crossings(family)), math.inf]
     low = None
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         if b <= (1.0 + 1e-9) * a:
@@ -105,13 +105,15 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
     change, soon, late, whole, part = _motion(wall)
     Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
     differs = moves and wall.velocity == "difference"
-    window = wall.window if differs else 0
+    window = wall.velocity_window if differs else 0
     filtered = int(differs and wall.velocity_filter is not None)
     queue = whole + (part > 0.0)
     at = np.cumsum([2, window, filtered, int(wall.M != 0.0), queue])
     n = int(at[-1])
     if n > MOST_STATES:
-        raise ParameterError("wall.window", wall.window, f"must lie below {MOST_STATES - whole}")
+        raise ParameterError(
+            "wall.velocity_window", wall.velocity_window, f"must lie below {MOST_STATES - whole}"
+        )
     steps, smooth, last, first = (int(x) for x in at[:-1])  # where each kind of state begins
     unit = np.eye(n)
     speed = unit[1]
@@ -176,7 +178,7 @@ def _within(less: np.ndarray) -> bool:
     """Whether every eigenvalue of 1 + less lies within the unit circle."""
     if not np.all(np.any(less, axis=0)):  # a state that nothing depends on: one lies at z = 1
         return False
-    z1 = gain_limit.eigenvalues(less)
+    z1 = gain_crossings.eigenvalues(less)
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
 
 
@@ -199,11 +201,11 @@ def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray
         return 0.0 * back, law
     keep = _kept(wall)
     smooth = (1.0 - keep) / ((1.0 - keep) + keep * back)
-    rate = -np.expm1(-1j * turn * wall.window) / (wall.window * wall.Ts)
+    rate = -np.expm1(-1j * turn * wall.velocity_window) / (wall.velocity_window * wall.Ts)
     return law * smooth * rate, 0.0 * back
 
 
-def _every_stiffness(wall: VirtualWall) -> gain_limit.LoopFamily:
+def _every_stiffness(wall: VirtualWall) -> gain_crossings.LoopFamily:
     """The wall for every K."""
     wall = replace(wall, K=0.0)
     free = wall_differences(wall)
@@ -219,9 +221,9 @@ def _every_stiffness(wall: VirtualWall) -> gain_limit.LoopFamily:
     poles = np.log1p(z1[(np.abs(1.0 + z1) > 1e-6) & (z1 != 0.0)]) / Ts
     size = np.abs(poles[poles != 0.0])
     low = max(1e-3 * min(size.min(initial=math.inf), 1e-3 * top), 1e-12 * top)
-    near = gain_limit.frequency_grid(low, top * (1.0 - 1e-9), poles.imag[poles.imag > 0.0])
+    near = gain_crossings.frequency_grid(low, top * (1.0 - 1e-9), poles.imag[poles.imag > 0.0])
     grid = np.union1d(np.linspace(low, top, 40 * n)[:-1], near)
-    return gain_limit.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
+    return gain_crossings.LoopFamily(h, grid, lambda K: _within(free + K * spring), ends=(top,))
 
 
 @checked
@@ -294,7 +296,9 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
     b, Ts = wall.device.damper, wall.Ts
     if wall.velocity == "exact" and (wall.B or wall.M):
         return 0.0
-    plain = not wall.delay and not wall.M and (wall.velocity == "exact" or wall.window == 1)
+    plain = (
+        not wall.delay and not wall.M and (wall.velocity == "exact" or wall.velocity_window == 1)
+    )
     if plain and wall.velocity_filter is None:
         return max(0.0, 2.0 * (b - abs(wall.B)) / Ts)
     whole, part = _split_delay(wall)
@@ -398,7 +402,7 @@ def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
 
 def _turns(wall: VirtualWall) -> np.ndarray:
     """omega Ts, dense enough for window and delay."""
-    n = TRIED_ANGLES + 40 * (wall.window + _split_delay(wall)[0])
+    n = TRIED_ANGLES + 40 * (wall.velocity_window + _split_delay(wall)[0])
     slow = np.geomspace(SLOWEST_TURN, math.pi, TRIED_ANGLES)[:-1]
     return np.union1d(slow, np.linspace(0.0, math.pi, n)[1:])
 
@@ -479,7 +483,7 @@ def jury_limit(wall: VirtualWall) -> float:
     if part or whole > 1:
         raise ParameterError("wall.delay", wall.delay, "must be 0 or Ts")
     plain = VirtualWall()
-    for field in ("M", "velocity", "window", "velocity_filter"):
+    for field in ("M", "velocity", "velocity_window", "velocity_filter"):
         if getattr(wall, field) != getattr(plain, field):
             bound = f"must be {getattr(plain, field)} here"
             raise ParameterError(f"wall.{field}", getattr(wall, field), bound)

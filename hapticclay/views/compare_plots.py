@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,11 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
-from ..model.virtual_wall import VirtualWall
-from ..studies.comparison import Compared
-from ..theory import margins, wall_limits
-from ..theory.gain_limit import gain_limit
-from ..theory.linear_loop import TIMING
+from ..scene.virtual_wall import VirtualWall
+from ..studies.comparison import Compared, Comparison
+from ..theory import stability_margins, wall_limits
+from ..theory.gain_limits import gain_limit
+from ..theory.loops import TIMING
 from . import figure as shown
 from .style import (
     BLACK,
@@ -35,14 +35,14 @@ CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s
 BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 
 
-def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Figure]]:
+def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
     """Returns the figures of a comparison by name, each with a title.
 
     Args:
         found: from `compare_files`, all of one kind.
     """
     if isinstance(found[0].subject, VirtualWall):
-        plots: dict[str, tuple[str, Callable[[Sequence[Compared]], Figure]]] = {
+        plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
             "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
             "passivity": ("Damping to spare over frequency", spare_plot),
             "impedance": ("Impedance that the hand feels", impedance_overlay),
@@ -63,8 +63,18 @@ def compare_figures(found: Sequence[Compared]) -> dict[str, tuple[str, shown.Fig
     }
 
 
+def main_overlay(found: Comparison) -> Figure:
+    """Plots what tells the files apart first: walls that are stable, or velocity over position.
+
+    Args:
+        found: from `compare_files`.
+    """
+    walls = isinstance(found[0].subject, VirtualWall)
+    return wall_region_plot(found) if walls else velocity_overlay(found)
+
+
 def _overlay(
-    found: Sequence[Compared], curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
+    found: Comparison, curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
 ) -> Figure:
     """One curve a file, each in a look of its own."""
     with figure_style():
@@ -80,7 +90,7 @@ def _overlay(
     return figure
 
 
-def _looks(found: Sequence[Compared]) -> Iterator[tuple[Compared, dict[str, Any]]]:
+def _looks(found: Comparison) -> Iterator[tuple[Compared, dict[str, Any]]]:
     for x, (color, dash) in zip(found, CURVE_STYLES, strict=False):
         yield x, dict(color=color, ls=dash)
 
@@ -90,7 +100,7 @@ def _zero(figure: Figure) -> Figure:
     return figure
 
 
-def velocity_overlay(found: Sequence[Compared]) -> Figure:
+def velocity_overlay(found: Comparison) -> Figure:
     """Plots velocity over position of each run.
 
     Args:
@@ -101,7 +111,7 @@ def velocity_overlay(found: Sequence[Compared]) -> Figure:
     return _overlay(found, lambda x: (100.0 * x.record.p[:, i], x.record.v[:, i]), **labels)
 
 
-def gain_overlay(found: Sequence[Compared]) -> Figure:
+def gain_overlay(found: Comparison) -> Figure:
     """Plots the gain limit over b, with the sampling of each file; a mark at its own b and K.
 
     Args:
@@ -130,7 +140,7 @@ def _shown_band(x: Compared) -> np.ndarray:
     return BAND
 
 
-def spare_plot(found: Sequence[Compared]) -> Figure:
+def spare_plot(found: Comparison) -> Figure:
     """Plots the damping to spare: the index of a sampled wall, Re Z of an arm.
 
     Args:
@@ -143,13 +153,13 @@ def spare_plot(found: Sequence[Compared]) -> Figure:
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
             return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
         omega = _shown_band(x)
-        return omega / (2.0 * math.pi), x.felt(omega).damping
+        return omega / (2.0 * math.pi), x.impedance(omega).damping
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
     return _zero(_overlay(found, spare, xscale="log", **labels))
 
 
-def impedance_overlay(found: Sequence[Compared]) -> Figure:
+def impedance_overlay(found: Comparison) -> Figure:
     """Plots the size of the impedance fh/v over frequency.
 
     Args:
@@ -158,13 +168,13 @@ def impedance_overlay(found: Sequence[Compared]) -> Figure:
 
     def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         omega = _shown_band(x)
-        return omega / (2.0 * math.pi), np.abs(x.felt(omega).Z)
+        return omega / (2.0 * math.pi), np.abs(x.impedance(omega).Z)
 
     labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("|f$_h$/v| [N.s/m]"))
     return _overlay(found, size, xscale="log", yscale="log", **labels)
 
 
-def parts_overlay(found: Sequence[Compared]) -> Figure:
+def parts_overlay(found: Comparison) -> Figure:
     """Plots effective stiffness, damping and mass over frequency; a panel with none is left out.
 
     Args:
@@ -172,17 +182,17 @@ def parts_overlay(found: Sequence[Compared]) -> Figure:
     """
     panels = {"stiffness": "[N/m]", "damping": "[N.s/m]", "mass": "[kg]"}
     curves = [(look, _shown_band(x), x) for x, look in _looks(found)]
-    felt = [(look, omega, x.felt(omega), x.name) for look, omega, x in curves]
+    known = [(look, omega, x.impedance(omega), x.name) for look, omega, x in curves]
     panels = {
         p: u
         for p, u in panels.items()
-        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in felt)
+        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in known)
     }
     with figure_style():
         figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (part, unit) in zip(axes, panels.items(), strict=True):
-            for look, omega, Z, name in felt:
+            for look, omega, Z, name in known:
                 ax.plot(omega / (2.0 * math.pi), getattr(Z, part), label=name, **look)
             ax.axhline(0.0, color=BLACK, lw=stroke(0.8), zorder=1)
             ax.set(xscale="log", ylabel=unit_text(f"{part} {unit}"))
@@ -193,7 +203,7 @@ def parts_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def transparency_overlay(found: Sequence[Compared]) -> Figure:
+def transparency_overlay(found: Comparison) -> Figure:
     """Plots |fe/fh| over frequency, in continuous time.
 
     Args:
@@ -203,7 +213,7 @@ def transparency_overlay(found: Sequence[Compared]) -> Figure:
     def share(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         assert x.loop is not None
         loop = replace(x.loop, **TIMING)
-        return BAND / (2.0 * math.pi), np.abs(margins.transparency(loop, BAND))
+        return BAND / (2.0 * math.pi), np.abs(stability_margins.transparency(loop, BAND))
 
     labels = dict(xlabel="frequency [Hz]", ylabel="|f$_e$/f$_h$|")
     figure = _overlay(found, share, xscale="log", **labels)
@@ -211,7 +221,7 @@ def transparency_overlay(found: Sequence[Compared]) -> Figure:
     return figure
 
 
-def wall_region_plot(found: Sequence[Compared]) -> Figure:
+def wall_region_plot(found: Comparison) -> Figure:
     """Plots the walls that each device renders stably, by runs and exact, and the wall itself.
 
     Args:
@@ -221,7 +231,7 @@ def wall_region_plot(found: Sequence[Compared]) -> Figure:
     return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
 
 
-def push_plot(found: Sequence[Compared]) -> Figure:
+def push_plot(found: Comparison) -> Figure:
     """Plots position over time after a push.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.impedance import MeasuredImpedance, Subject
 from ..studies.mbk import ArmMBK, Border, DeviceMBK
 from ..theory.mbk import PLANES
@@ -84,7 +84,7 @@ def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
     m = found.measured
     fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
     line = found.over(fine)
-    curves = [("f$_e$/f$_h$", m.felt, line.felt, BLUE, "-", "o")]
+    curves = [("f$_e$/f$_h$", m.transparency, line.transparency, BLUE, "-", "o")]
     if np.any(line.rendered):
         curves.append(("Z/Z$_e$", m.ratio, line.ratio, VERMILION, "--", "s"))
     with figure_style():

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ..studies.monte_carlo import Instability, RiskMap
 from ..studies.population import Band
+from ..studies.robustness import Instability, RiskMap
 from .style import (
     BLACK,
     BLUE,

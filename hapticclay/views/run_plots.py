@@ -20,8 +20,8 @@ from ..model.compensator import PRINTED
 from ..model.constants import AXES
 from ..model.controller import SERVO
 from ..model.flow import Flow
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
+from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..theory import linear_loop
 from . import figure as shown
@@ -84,7 +84,7 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
             if s.clay and (s.clay.yields or s.clay.springs):
                 _expected_speeds(ax, record, name)
                 _mark_held(ax, record, i, v)
-            elif built_in and s.operators[i] is None and s.muscle is None and not s.turned:
+            elif built_in and s.operators[i] is None and s.muscle is None and not s.rotated:
                 c, servo = s.compensators[i], s.servo[i]
                 law = functools.partial(
                     linear_loop.steady_speed, s.gain[i], s.force[i], compensator=c, servo=servo
@@ -322,7 +322,8 @@ def force_velocity_plot(record: Record) -> Figure:
 
     Clay that resists along the motion has one panel: force and speed along the motion, negative
     where the handle goes back. Otherwise each axis on which it yields has one, of the clay's own
-    axes where it is turned. b v is left out of forces and laws where b is not one number a region.
+    axes where they are rotated. b v is left out of forces and laws where b is not one number a
+    region.
 
     Args:
         record: the run, in clay that yields somewhere.
@@ -700,11 +701,11 @@ def _scenario_parts(s: Scenario) -> list[str]:
         out += [f"b = {told} N$\\cdot$s/m"] * bool(values or not s.clay.yields)
         rates = [g for f in s.clay.laws for g in f.rates.ravel().tolist() if g]
         out += [f"growing {g:g} a second" for g in rates][:1]
-        out += [f"turned by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
+        out += [f"axes rotated by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
     printed = {"arm": PAPER, "servo": SERVO, "compensator": (PRINTED, PRINTED)}
     own = {"arm": s.arm, "servo": s.servo, "compensator": s.compensators}
     out += [f"another {name}" for name, part in own.items() if part != printed[name]]
-    return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.shaping
+    return out + ["T$_h$ in the loop"] * any(s.operators) + ["inertia shaped"] * s.inertia_shaping
 
 
 def _finish(figure: Figure, panels: list[Axes], record: Record) -> None:

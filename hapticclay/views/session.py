@@ -18,26 +18,23 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..errors import ParameterError, integer, number
 from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
-from ..model.scenario import Scenario
 from ..model.signals import Multisine
+from ..scene.scenario import Scenario
+from ..simulation.engines import has_numba, load_compiled, saved_in_a_step
 from ..simulation.record import Record
-from ..simulation.simulate import has_numba, load_compiled, saved_in_a_step
 from ..simulation.stepwise import scaled
 from ..stepping import monitor, path
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Kernel, Run
 from ..studies.removal import TOOL, Tool, removed
-from ..theory import gain_limit
-
-if TYPE_CHECKING:
-    from .stream import UdpStream
+from ..theory import gain_limits
 
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
@@ -168,9 +165,9 @@ class LiveRun(Run):
     def held(self) -> tuple[bool, bool]:
         """Whether clay that yields holds the handle still, along x and along y."""
         reaction = self.state.clay.reaction
-        if reaction is None or reaction.felt is None:
+        if reaction is None or reaction.contact is None:
             return False, False
-        x, y = reaction.felt.stuck
+        x, y = reaction.contact.stuck
         return bool(x), bool(y)
 
     def judge(self, made: np.ndarray) -> int:
@@ -245,6 +242,17 @@ class Clock:
         return simulated / real
 
 
+class Listener(Protocol):
+    """Takes each slice of a session or a replay, as a `UdpStream` does."""
+
+    def send(self, play: Any) -> None:
+        """Takes a slice.
+
+        Args:
+            play: the session or replay that has played it.
+        """
+
+
 class Frame(NamedTuple):
     """State at the end of a slice, for plots that run along.
 
@@ -283,7 +291,7 @@ class Session:
         stream: that a player tells of each slice; None for none.
     """
 
-    stream: UdpStream | None = None
+    stream: Listener | None = None
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
@@ -545,7 +553,7 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
         command=None,
         length=None,
         t_max=LONGEST_SESSION,
-        stop=False,
+        stop_when_unstable=False,
     )
 
 
@@ -602,7 +610,7 @@ class Replay:
         stream: as of a session.
     """
 
-    stream: UdpStream | None = None
+    stream: Listener | None = None
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample.
@@ -795,5 +803,5 @@ def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float,
         scenario: the run.
         b: damping of the clay at the handle [N.s/m].
     """
-    x, y = map(functools.partial(gain_limit.continuous_limit, scenario), AXES, b)
+    x, y = map(functools.partial(gain_limits.continuous_limit, scenario), AXES, b)
     return x, y

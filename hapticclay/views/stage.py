@@ -15,7 +15,7 @@ import numpy as np
 from ..model.arm import PAPER, Arm
 from ..model.clay import Clay
 from ..model.constants import AXES
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
 from .style import BLUE, PART_COLORS, SHADED_SPEED, SKY_BLUE, clay_color, clay_share, rgb

@@ -171,7 +171,7 @@ def _map_parts(chart: StabilityMap) -> list[str]:
     if s.delay and chart.kind != "delay-damping":
         parts.append(f"delay {1e3 * s.delay:g} ms")
     if chart.kind != "gain-pose":
-        parts.append("shaping" if s.shaping else "no shaping")
+        parts.append("inertia_shaping" if s.inertia_shaping else "no shaping")
     return [*parts[:-1], parts[-1] + "; stable below the lines"]
 
 
@@ -249,7 +249,7 @@ def yield_map_plot(chart: YieldMap) -> Figure:
         parts += [
             hand_name(s.operator),
             "continuous time",
-            "shaping" if s.shaping else "no shaping",
+            "inertia_shaping" if s.inertia_shaping else "no shaping",
         ]
         set_title(ax, *parts[:-1], parts[-1] + "; hatched: grows; white: sticks")
     return figure
@@ -312,6 +312,15 @@ def identification_plot(results: Sequence[Identified]) -> Figure:
         figure.align_ylabels(named.ravel())
         add_legend(figure, axes[0, 0], 3)
     return figure
+
+
+def identified_plot(result: Identified) -> Figure:
+    """As `identification_plot` of one axis.
+
+    Args:
+        result: from `identify` or `identify_data`.
+    """
+    return identification_plot([result])
 
 
 def _response_column(axes: Sequence[Axes], result: Identified) -> None:

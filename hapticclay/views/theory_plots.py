@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from numpy.polynomial import Polynomial
 
 from ..model.compensator import Compensator
-from ..theory import linear_loop, margins
+from ..theory import linear_loop, stability_margins
 from ..theory.design import DESIGN_BAND
-from ..theory.linear_loop import Loop, of_loop
+from ..theory.loops import Loop, of_loop
 from .style import (
     BLACK,
     BLUE,
@@ -48,9 +48,9 @@ def bode_plot(
         at: where the loop is broken, "compensator" or "force".
         omega: range shown [rad/s].
     """
-    m = margins.margins(loop, at=at)
+    m = stability_margins.margins(loop, at=at)
     w = np.geomspace(*omega, 2000)
-    L = _response(*margins.open_loop(loop, at=at), w)
+    L = _response(*stability_margins.open_loop(loop, at=at), w)
     phase = np.degrees(np.unwrap(np.angle(L)))
     phase -= 360.0 * round((phase[0] + 90.0) / 360.0)
     bar: Any = dict(lw=stroke(3.0), solid_capstyle="butt")
@@ -100,8 +100,8 @@ def nyquist_plot(
         columns, turn = 2, np.linspace(0.0, 2.0 * np.pi, 361)
         ax.plot(np.cos(turn), np.sin(turn), color=MID_GREY, lw=stroke(0.9), ls=(0, (4, 3)))
         for K, (color, style) in zip(gains, CURVE_STYLES, strict=False):
-            found = margins.nyquist(loop, K=K, at=at)
-            m = margins.margins(loop, K=K, at=at)
+            found = stability_margins.nyquist(loop, K=K, at=at)
+            m = stability_margins.margins(loop, K=K, at=at)
             if m.stable:
                 gain = f"\u00d7{m.gain[1]:.3g}" if math.isfinite(m.gain[1]) else "any gain"
                 label = f"K = {K:g}: {gain}, {math.degrees(m.phase):.3g}\u00b0"
@@ -113,7 +113,7 @@ def nyquist_plot(
             if m.stable and math.isfinite(m.gain[1]):
                 ax.plot(-1.0 / m.gain[1], 0.0, "o", color=color, ms=stroke(4.5), zorder=4)
             if m.stable and math.isfinite(m.phase):
-                L = margins.open_loop(loop, K=K, at=at)
+                L = stability_margins.open_loop(loop, K=K, at=at)
                 z = _response(*L, np.array([m.phase_omega]))[0]
                 ax.plot(z.real, z.imag, "s", color=color, ms=stroke(4.5), zorder=4)
         ax.plot(-1.0, 0.0, "+", color=BLACK, ms=stroke(12), mew=stroke(2.0), zorder=5)
@@ -134,13 +134,13 @@ def small_gain_plot(loop: Loop, *, omega: tuple[float, float] = (0.1, 1000.0)) -
         loop: the loop with its K; or axis, K, b, and operator and other parts by name.
         omega: range shown [rad/s].
     """
-    verdict = margins.small_gain(loop)
-    stable = margins.coupled_stability(loop)
+    verdict = stability_margins.small_gain(loop)
+    stable = stability_margins.coupled_stability(loop)
     w = np.geomspace(*omega, 2000)
     passive, d = linear_loop.device_admittance(replace(loop, K=0.0))
     active = linear_loop.device_admittance(loop)[0] - passive
     left = np.abs(_response(active, d, w))
-    right = left / np.abs(_response(*margins.open_loop(loop, at="compensator"), w))
+    right = left / np.abs(_response(*stability_margins.open_loop(loop, at="compensator"), w))
     with figure_style():
         figure = Figure(figsize=figure_size(1, 3.8))
         ax = figure.add_subplot()
@@ -181,7 +181,7 @@ def transparency_plot(
         ax.axvspan(*band, color=PALE_GREY, lw=0, zorder=0)
         ax.axhline(1.0, color=BLACK, lw=stroke(0.8))
         for (label, K, shape), (color, style) in zip(designs, CURVE_STYLES, strict=False):
-            share = np.abs(margins.transparency(replace(loop, compensator=shape, K=K), w))
+            share = np.abs(stability_margins.transparency(replace(loop, compensator=shape, K=K), w))
             ax.semilogx(w, share, color=color, ls=style, label=label)
         _note(ax, omega[1], 1.0, "ideal", BLACK, "right", 8.0)
         ax.set(xlabel=f"{OMEGA_LABEL}; grey: band of the error", ylabel="|f$_e$/f$_h$|")

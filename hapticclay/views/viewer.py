@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..model.constants import AXES
-from ..model.scenario import Scenario
+from ..scene.scenario import Scenario
 from ..stepping.engine import mujoco
 from ..studies.removal import Tool
 from .session import FRAME_TIME, Frame

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
-from ..model.virtual_wall import VirtualWall
+from ..scene.virtual_wall import VirtualWall
 from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
 from .style import (
     BLACK,
@@ -235,7 +235,7 @@ def _left_out(r: ZRegion) -> str:
     assert isinstance(r.wall, VirtualWall)
     d = r.wall.device
     parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
-    return ", ".join(parts + ["surface"] * r.wall.surface)
+    return ", ".join(parts + ["surface"] * r.wall.unilateral)
 
 
 def _device_parts(chart: ZWidth) -> list[str]:
@@ -251,11 +251,11 @@ def _device_parts(chart: ZWidth) -> list[str]:
             told["friction"] = f"fc = {d.friction:g} N"
         if d.quantum:
             told["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
-        if w.window > 1:
-            told["window"] = f"window = {w.window} samples"
+        if w.velocity_window > 1:
+            told["velocity_window"] = f"window = {w.velocity_window} samples"
         if w.velocity_filter:
             told["filter"] = f"filter = {w.velocity_filter:g} Hz"
-        if w.surface:
+        if w.unilateral:
             told["surface"] = "surface"
     else:
         told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told

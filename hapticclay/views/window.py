@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import ParameterError
-from ..model.experiments import SCENARIOS
+from ..scene.experiments import SCENARIOS
 from .session import Player, Replay, Session, flow_text
 from .stage import hardest, held_words
 from .viewer import Rows, Sight, Writing
@@ -71,7 +71,7 @@ class Window:
     def _anew(self) -> None:
         self.shown, self.written = 0, -math.inf
 
-    def show(self, until: Callable[[], bool] = lambda: False) -> None:
+    def show(self, until: Callable[[], bool] | None = None) -> None:
         """Shows the window until it is closed; raises the error that ended the player, if any.
 
         Args:
@@ -88,13 +88,13 @@ class Window:
             self.other = False
             self._show(until)
 
-    def _show(self, until: Callable[[], bool]) -> None:
+    def _show(self, until: Callable[[], bool] | None) -> None:
         """Shows one scenario until the window is closed or a key chooses another."""
         player = Player(self.play)
         self._anew()
         with _viewer((self.play.scenario, self.play.tool)) as (heard, say):
             try:
-                while not (until() or self.other or player.error):
+                while not ((until and until()) or self.other or player.error):
                     try:
                         words = heard.get(timeout=POLL_TIME)
                     except queue.Empty:

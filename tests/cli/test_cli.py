@@ -44,7 +44,15 @@ def test_run_constant_writes_record_summary_and_plots(capsys, tmp_path):
 
 def test_run_free_and_no_plots(capsys, tmp_path):
     code, out, _ = run(
-        capsys, "run", "free", "--shaping", "--no-plots", "--every", "10", "--out", str(tmp_path)
+        capsys,
+        "run",
+        "free",
+        "--inertia-shaping",
+        "--no-plots",
+        "--every",
+        "10",
+        "--out",
+        str(tmp_path),
     )
     assert code == 0 and "border x = 20 cm" in out
     assert sorted(os.listdir(tmp_path)) == ["record.npz", "scenario.toml", "summary.json"]
@@ -418,7 +426,7 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
     "words,ordered",
     [
         ("run --out o constant --b 50", "run constant --out o --b 50"),
-        ("run --gain 1 0.5 --impedance constant", "run constant --gain 1 0.5 --impedance"),
+        ("run --gain 1 0.5 --operator constant", "run constant --gain 1 0.5 --operator"),
         ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
         ("run --out constant variable", "run variable --out constant"),
         ("run --help", "run --help"),
@@ -540,7 +548,7 @@ def test_memory_that_gives_out_is_one_line(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
-HAND = ("impedance=true", "operator.mass=0.5")
+HAND = ("operator=true", "operator.mass=0.5")
 PARTS = ("arm.l1=30cm", "servo.x.G.damping=50", "compensator.den=1,40,0", *HAND)
 
 

@@ -73,7 +73,7 @@ def test_info_tells_what_a_record_holds(capsys, folder):
         code, out, err = run(capsys, "info", given)
         assert (code, err) == (0, "")
         size = (folder / "record.npz").stat().st_size
-        assert out.startswith(f"record of constant, hapticclay-record-1, {1e-3 * size:.3g} kB\n")
+        assert out.startswith(f"record of constant, hapticclay-record-2, {1e-3 * size:.3g} kB\n")
     rows = dict(x.split("  ", 1) for x in out.splitlines() if "  " in x)
     assert rows["status"].strip() == record.status
     assert rows["samples"].strip() == "801, from 0 to 0.8 s, every 0.001 s"

@@ -12,7 +12,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import Bound, ParameterError
-from hapticclay.model.experiments import (
+from hapticclay.scene.experiments import (
     EXPERIMENTS,
     Damping,
     Gains,
@@ -89,7 +89,7 @@ def said(capsys, *args):
 
 
 def test_a_new_experiment_runs_and_is_drawn(capsys, tmp_path, staircase):
-    words = ["--steps", "4", "--b", "30", "--impedance", "--t-max", "3", "--out", str(tmp_path)]
+    words = ["--steps", "4", "--b", "30", "--operator", "--t-max", "3", "--out", str(tmp_path)]
     code, out, err = said(capsys, "run", "staircase", *words)
     assert (code, err) == (0, "") and "border x = 1 cm crossed" in out
     assert sorted(os.listdir(tmp_path)) == [
@@ -129,7 +129,7 @@ def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
         "--grid",
         "depth=0.01,0.02 steps=1,2 gain.x=1,2",
         "--fixed",
-        "t_max=0.5 impedance=true",
+        "t_max=0.5 operator=true",
         "--workers",
         "1",
         "--out",

@@ -5,7 +5,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli.run import unstable_axes
-from hapticclay.theory import linear_loop
+from hapticclay.theory import linear_loop, loops
 
 HAND = hc.Operator(mass=0.25, damper=2.0, spring=6.0)
 
@@ -26,7 +26,7 @@ def test_what_is_said_agrees_with_the_poles(b):
     s = hc.constant_cut(b=b)
     unstable = []
     for axis in "xy":
-        found = linear_loop.characteristic(linear_loop.Loop.of(s, axis, b))
+        found = linear_loop.characteristic(loops.Loop.of(s, axis, b))
         unstable.append(np.roots(found.coef[::-1]).real.max() > 0.0)
     assert any(unstable) == bool(unstable_axes(s))
 

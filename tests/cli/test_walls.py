@@ -11,12 +11,12 @@ from hapticclay.cli.walls import DeviceOptions, WallOptions, box_of
 from hapticclay.errors import ParameterError
 
 WORDS = (
-    "--mass 200g --damper 0.5 --friction 0.01 --quantum 5um --Ts 2ms --delay 0.5ms --window 2 "
-    "--filter 80 --hand 0.25 2 6 --surface"
+    "--mass 200g --damper 0.5 --friction 0.01 --quantum 5um --Ts 2ms --delay 0.5ms "
+    "--velocity-window 2 --filter 80 --hand 0.25 2 6 --unilateral"
 )
 MEANT = hc.VirtualWall(
     device=hc.Device(0.2, 0.5, 0.01, 5e-6), operator=hc.Operator(0.25, 2.0, 6.0), Ts=2e-3,
-    delay=5e-4, window=2, velocity_filter=80.0, surface=True,
+    delay=5e-4, velocity_window=2, velocity_filter=80.0, unilateral=True,
 )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ def test_a_family_is_written_with_its_numbers(capsys, tmp_path):
     assert sorted(os.listdir(tmp_path / "z")) == names
     assert "b = 0.2 N.s/m" in out and "no run was unstable below a line" in out
     found = json.loads((tmp_path / "z" / "zwidth.json").read_text())
-    expected = hc.zwidth(hc.VirtualWall(), "damper", (0.2, 1.0), B=(0.0, 2.0))
+    expected = hc.walls.zwidth(hc.VirtualWall(), "damper", (0.2, 1.0), B=(0.0, 2.0))
     assert found["tables"]["runs"]["K [N/m]"] == [K for r in expected.regions for K in r.K]
     assert found["gap"] < 3e-3 and found["violations"] == []
 

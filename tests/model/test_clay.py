@@ -268,14 +268,14 @@ def test_bad_grids_are_refused_by_name(make, said):
 
 
 @given(*[st.floats(0.0, 1e9)] * 2, st.floats(-np.pi, np.pi), *[st.floats(-1.0, 1.0)] * 2)
-def test_the_force_of_turned_clay_is_that_of_its_tensor(bx, by, angle, vx, vy):
+def test_the_force_of_rotated_axes_is_that_of_its_tensor(bx, by, angle, vx, vy):
     c, s = np.cos(angle), np.sin(angle)
     R = np.array([[c, -s], [s, c]])
     B = R @ np.diag([bx, by]) @ R.T
     close = dict(rtol=0.0, atol=1e-15 * 16 * max(bx, by, 1e-200))  # some roundings
-    xx, yy, xy = clay.turned_damping(c, s, bx, by)
+    xx, yy, xy = clay.rotated_damping(c, s, bx, by)
     np.testing.assert_allclose([[xx, xy], [xy, yy]], B, **close)
-    fe = clay.turned_force(c, s, bx, by, vx, vy)
+    fe = clay.rotated_force(c, s, bx, by, vx, vy)
     np.testing.assert_allclose(fe, B @ [vx, vy], **close)
     assert fe[0] * vx + fe[1] * vy >= -1e-15 * 16 * max(bx, by, 1e-200)  # it takes energy
 

@@ -136,7 +136,7 @@ def test_systems_of_other_packages(name):
     assert c.order == 2 and len(c.num) == 2
     np.testing.assert_allclose(c.num, (1.0, 4.0), rtol=1e-12)
     np.testing.assert_allclose(c.den, (1.0, 12.0, 0.0), rtol=1e-12, atol=1e-12)
-    assert hc.free(shaping=True).compensator == Compensator()
+    assert hc.free(inertia_shaping=True).compensator == Compensator()
 
 
 @pytest.mark.parametrize("name", [n for n in SYSTEMS if n not in ("coefficients", "arrays")])

@@ -164,7 +164,7 @@ def test_paper_clay_is_the_papers_whatever_the_tool():
 
 def test_constant_cut_takes_a_material_in_place_of_b():
     scenario = hc.constant_cut(material="stiff clay")
-    assert scenario.clay == hc.slab(hc.material("stiff clay"), 0.05, 0.15)
+    assert scenario.clay == hc.slab(hc.materials.material("stiff clay"), 0.05, 0.15)
     with pytest.raises(ParameterError, match="give one of the two"):
         hc.constant_cut(50.0, material="stiff clay")
 
@@ -178,10 +178,10 @@ def test_bad_names_and_numbers_are_refused():
         of_strength(2.0, 1.0)
     with pytest.raises(ParameterError, match="material.strength.high"):
         of_strength(0.0, math.nan)
-    for take in (hc.material, lambda name, tool: MATERIALS[name].range(tool)):
+    for take in (hc.materials.material, lambda name, tool: MATERIALS[name].range(tool)):
         with pytest.raises(ParameterError, match="tool = 0.01: must be a Tool"):
             take("stiff clay", 0.01)
-    with pytest.raises(ParameterError, match=r"as hc.material\('stiff clay'\) returns"):
+    with pytest.raises(ParameterError, match=r"as hc.materials.material\('stiff clay'\) returns"):
         hc.slab("stiff clay", 0.05, 0.15)
     with pytest.raises(ParameterError, match="tool.width"):
         hc.Tool(0.001)

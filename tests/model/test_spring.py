@@ -87,7 +87,7 @@ def test_a_relaxing_spring_never_gives_energy(tau, way, h, moves):
 def test_bad_springs_are_refused():
     for bad in (
         dict(k=-1.0), dict(k=1e12), dict(limit=1.0), dict(k=1.0, limit=0.0), dict(tau=0.0),
-        dict(k=1.0, tau=0.1), dict(surface=True),  # without effect
+        dict(k=1.0, tau=0.1), dict(unilateral=True),  # without effect
     ):  # fmt: skip
         with pytest.raises(hc.ParameterError, match=r"spring\."):
             hc.Spring(**bad)

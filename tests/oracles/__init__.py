@@ -2,7 +2,7 @@
 
 from .arm import G0, G1, I1, I2, L1, L2, ORIGIN, S0, S1, SG, Arm
 from .hybrid import hybrid
-from .linear import Linear, bounces, piecewise_linear
+from .linear import Linear, axis_rates, bounces, piecewise_linear
 from .nonlinear import Pieces, Solved, nonlinear, nonlinear_pieces
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Linear",
     "Pieces",
     "Solved",
+    "axis_rates",
     "bounces",
     "hybrid",
     "nonlinear",

@@ -1,11 +1,12 @@
-"""The arm in joint space under SciPy, in clay of cells on a grid, turned or not."""
+"""The arm in joint space under SciPy, in clay of cells on a grid, with rotated axes or not."""
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .arm import G0, G1, ORIGIN, S0, S1, SG, Arm
+from .arm import ORIGIN, Arm
+from .arm_loop import arm_loop
 
 
 class Solved(NamedTuple):
@@ -23,7 +24,7 @@ def cells(  # noqa: PLR0913  # a case, spelt out
     uh,
     times,
     th=(0.0, 0.0, 0.0),
-    shaping=False,
+    inertia_shaping=False,
     angle=0.0,
     grows=None,
     length=np.inf,
@@ -34,29 +35,18 @@ def cells(  # noqa: PLR0913  # a case, spelt out
     b(i, j) are the dampings of the clay's own axes in the cell (i, j) between the edges, and
     grows(i, j) the rates at which they grow from the first entry; place(p), if given, replaces b.
     """
-    K, uh, (m, d, k) = np.array(K), np.array(uh), th
+    rates = arm_loop(K, uh, th, inertia_shaping)
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     entered = {}
 
     def rhs(t, z, cell):
-        q, w, delta, rate, y, yr = z.reshape(6, 2)
-        J, Jd = Arm.jacobian(q), Arm.jacobian_rate(q, w)
-        p, v, c = Arm.forward(q) - ORIGIN, J @ w, Jd @ w
-        W = J @ np.linalg.solve(Arm.M, J.T)
-        now = np.array(place(p) if place else b(*cell), float)
-        if grows:
-            now = now + np.array(grows(*cell)) * (t - entered[cell])
-        fe = R @ (now * (R.T @ v))
-        y2 = G0 * (delta - y) - G1 * yr
-        want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if shaping else W
-        rest = uh - d * v - k * p - fe
-        acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)
-        f = rest - m * acc
-        tau = J.T @ np.linalg.solve(W, want - c + (S - W) @ f)
-        return np.concatenate(
-            (w, np.linalg.solve(Arm.M, tau + J.T @ f), rate, K * f - 10 * rate, yr, y2)
-        )
+        def clay(p, v):
+            now = np.array(place(p) if place else b(*cell), float)
+            if grows:
+                now = now + np.array(grows(*cell)) * (t - entered[cell])
+            return R @ (now * (R.T @ v))
+
+        return rates(z, clay)
 
     z, t, crossings, p, v = np.concatenate((Arm.start((0.0, 0.0)), np.zeros(10))), 0.0, [], [], []
     cell = tuple(int(np.searchsorted(e, 0.0, side="right")) for e in edges)

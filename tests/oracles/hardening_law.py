@@ -43,7 +43,7 @@ def start(part, p):
 
 
 def refuses(scenario):
-    return "must not be turned" if scenario.clay.angle else ""
+    return "must not have rotated axes" if scenario.clay.angle else ""
 
 
 def damping(part, state):

@@ -13,7 +13,7 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
     K,
     uh,
     th=None,
-    shaping=False,
+    inertia_shaping=False,
     render="held",
     t_end=1.0,
     edges=(0.05, 0.15),
@@ -23,7 +23,7 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
     """The sampled loop: measured and held every Ts, the arm exact (DOP853 at 1e-12) in between.
 
     b_of_x(x) is the damping on both axes; without edges it may change smoothly. render "held": the
-    clay's force is the motors', held too; "implicit": it is physical. It starts at p0 and moves
+    clay's force is the motors', held too; "physical": it is physical. It starts at p0 and moves
     with v0 as it had before t = 0, without acceleration. Returns positions at the samples (n, 2),
     the velocities there (n, 2), and the torques held (n, 2).
     """
@@ -55,13 +55,13 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
         J, Jd = Arm.jacobian(q), Arm.jacobian_rate(q, w)
         p, v = Arm.forward(q) - ORIGIN, J @ w
         b = b_of_x(p[0])
-        physical = b if render == "implicit" else 0.0
+        physical = b if render == "physical" else 0.0
         fh = uh - k * p - d * v if tau is None else hand_and_rates(q, w, tau, physical)[0]
         fe = b * v
         f = fh - fe
         W = J @ np.linalg.solve(Arm.M, J.T)
         want = G0 * (z[:, 0] - z[:, 2]) - G1 * z[:, 3] + S1 * (z[:, 3] - v) + S0 * (z[:, 2] - p)
-        shape = (np.diag(SG) if shaping else W) - W
+        shape = (np.diag(SG) if inertia_shaping else W) - W
         tau = J.T @ np.linalg.solve(W, want - Jd @ w + shape @ f)
         if render == "held":
             tau = tau - J.T @ fe
@@ -71,15 +71,15 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
         z = np.array([(blocks[i] @ np.append(z[i], f[i]))[:4] for i in (0, 1)])
         t, x = 0.0, np.concatenate((q, w))
         while t < Ts:
-            b = b_of_x(Arm.forward(x[:2])[0] - ORIGIN[0] + 1e-15) if render == "implicit" else 0.0
+            b = b_of_x(Arm.forward(x[:2])[0] - ORIGIN[0] + 1e-15) if render == "physical" else 0.0
 
             def rhs(t, x, tau=tau, b=b):
-                if render == "implicit" and not edges:
+                if render == "physical" and not edges:
                     b = b_of_x(Arm.forward(x[:2])[0] - ORIGIN[0])
                 return np.concatenate((x[2:], hand_and_rates(x[:2], x[2:], tau, b)[1]))
 
             events = []
-            if render == "implicit":
+            if render == "physical":
                 for edge in edges:
 
                     def hit(t, x, edge=edge):

@@ -28,6 +28,22 @@ class Linear:
         return np.linalg.eigvals(self.A[:6, :6])
 
 
+def axis_rates(axis, K, th=(0.0, 0.0, 0.0)):
+    """Rates of z = (p, v, delta, delta', y, y') of one axis, a function of z, b, uh and a command.
+
+    The command adds to delta where the reference model sees it.
+    """
+    free, one = (Linear(axis, b, K, 0.0, th).A for b in (0.0, 1.0))
+    forced = Linear(axis, 0.0, K, 1.0, th).A[:, 6]
+
+    def rates(z, b, uh, command=0.0):
+        shown = np.append(z, 0.0)
+        shown[2] += command
+        return ((free + b * (one - free)) @ shown + forced * uh)[:6]
+
+    return rates
+
+
 def piecewise_linear(edges, values, K, uh, th=(0.0, 0.0, 0.0), axis=0, t_max=60.0, z0=None):
     """Exact solution along one axis, moving forward through the borders `edges` with b = `values`.
 

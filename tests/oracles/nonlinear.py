@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .arm import G0, G1, ORIGIN, S0, S1, SG, Arm
+from .arm import ORIGIN, Arm
+from .arm_loop import arm_loop
 
 
 class Pieces:
@@ -41,7 +42,7 @@ def nonlinear(  # noqa: PLR0913  # a case, spelt out
     K,
     uh,
     th=None,
-    shaping=False,
+    inertia_shaping=False,
     t_max=60.0,
     t_eval=None,
     rtol=1e-11,
@@ -55,7 +56,7 @@ def nonlinear(  # noqa: PLR0913  # a case, spelt out
     Forward crossings of x only; ends at the last edge. Solved at the times t_eval before the end.
     """
     pieces = nonlinear_pieces(
-        b_of_region, edges, K, uh, th, shaping, t_max, rtol, atol, p0, t_eval is not None
+        b_of_region, edges, K, uh, th, inertia_shaping, t_max, rtol, atol, p0, t_eval is not None
     )
     t = np.empty(0) if t_eval is None else t_eval[t_eval < pieces.spans[-1][1]]
     there = pieces(t) if len(t) else (np.empty((0, 2)), np.empty((0, 2)))
@@ -68,7 +69,7 @@ def nonlinear_pieces(  # noqa: PLR0913  # a case, spelt out
     K,
     uh,
     th,
-    shaping,
+    inertia_shaping,
     t_max,
     rtol,
     atol,
@@ -77,26 +78,10 @@ def nonlinear_pieces(  # noqa: PLR0913  # a case, spelt out
     method="DOP853",
 ):
     """As `nonlinear`, the solution as Pieces."""
-    K, uh = np.array(K), np.array(uh)
-    m, d, k = th or (0.0, 0.0, 0.0)
-    p0 = np.array(p0, float)
+    rates, p0 = arm_loop(K, uh, th, inertia_shaping), np.array(p0, float)
 
     def rhs(t, z, b):
-        q, w, delta, rate, y, yr = z.reshape(6, 2)
-        J, Jd = Arm.jacobian(q), Arm.jacobian_rate(q, w)
-        p, v, c = Arm.forward(q) - ORIGIN, J @ w, Jd @ w
-        W = J @ np.linalg.solve(Arm.M, J.T)
-        Lam = np.linalg.inv(W)
-        y2 = G0 * (delta - y) - G1 * yr
-        want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if shaping else W
-        # p'' = want + S f,  f = uh - m p'' - d v - k p - b v
-        rest = uh - d * v - k * p - b * v
-        acc = np.linalg.solve(np.eye(2) + m * S, want + S @ rest)
-        f = rest - m * acc
-        tau = J.T @ (Lam @ (want - c + (S - W) @ f))
-        wd = np.linalg.solve(Arm.M, tau + J.T @ f)
-        return np.concatenate((w, wd, rate, K * f - 10 * rate, yr, y2))
+        return rates(z, lambda p, v: b * v)
 
     z = np.concatenate((Arm.start(p0), [0, 0], p0, [0, 0], p0, [0, 0]))
     t, out = 0.0, Pieces()

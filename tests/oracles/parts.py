@@ -198,7 +198,7 @@ class Loop:
 
     def torque(self, J, c, W, want, f):
         """Of the joints, that give the handle `want` and Sh beside the net force f."""
-        shape = np.diag(self.S[0]) if self.s.shaping else W
+        shape = np.diag(self.S[0]) if self.s.inertia_shaping else W
         at_hand = np.linalg.solve(W, want - c + (shape - W) @ f)
         on_links = J.T @ at_hand
         return np.array([on_links.sum(), on_links[1]])
@@ -207,7 +207,7 @@ class Loop:
         p, v, J, c, W = self.motion(z)
         want, y2 = self.wanted(z, p, v)
         rest = self.force_of(t, p, v) - b * v
-        shape = np.diag(self.S[0]) if self.s.shaping else W
+        shape = np.diag(self.S[0]) if self.s.inertia_shaping else W
         all_of_f = shape + np.diag(self.G[0] * self.D)
         acc = np.linalg.solve(np.eye(2) + all_of_f * self.th[0], want + all_of_f @ rest)
         f = rest - self.th[0] * acc
@@ -293,7 +293,7 @@ def sampled(scenario, t_end, uh=None, friction=(0.0, 0.0), way=(1.0, 1.0)):
         m[n + 1] = [*gain * C, -stiffness, -damping, gain * loop.shown[i], gain * D]
         blocks.append(expm(m * T))
     z, limit, torque = loop.start(), np.array(scenario.torque_limit), None
-    physical, rub = scenario.render == "implicit", -np.multiply(friction, way)
+    physical, rub = scenario.render == "physical", -np.multiply(friction, way)
     P, V, Q = [], [], []
     for k in range(round(t_end / T) + 1):
         t = k * T

@@ -12,7 +12,7 @@ def sample_map(wall):
     m, b, k = d.mass + hand.mass, d.damper + hand.damper, hand.spring
     whole = math.floor(wall.delay / Ts + 1e-9)
     part = wall.delay - whole * Ts
-    past, queue = wall.window + 1, whole + 1
+    past, queue = wall.velocity_window + 1, whole + 1
 
     def moved(x, v, f, t):
         own = np.array([[0.0, 1.0, 0.0], [-k / m, -b / m, 1.0 / m], [0.0, 0.0, 0.0]])
@@ -24,7 +24,7 @@ def sample_map(wall):
         if wall.velocity == "exact":
             rate = v
         else:
-            rate = (x - old[wall.window - 1]) / (wall.window * Ts)
+            rate = (x - old[wall.velocity_window - 1]) / (wall.velocity_window * Ts)
             if wall.velocity_filter:
                 keep = math.exp(-2.0 * math.pi * wall.velocity_filter * Ts)
                 rate = y = keep * state[2 + past] + (1.0 - keep) * rate

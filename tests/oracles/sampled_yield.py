@@ -122,7 +122,7 @@ class Plant:
 
 
 def yielding(  # noqa: PLR0913  # a case, spelt out
-    law, Ts, K, uh, th=(0.0, 0.0, 0.0), along=False, render="implicit", t_end=0.2, v0=(0.0, 0.0)
+    law, Ts, K, uh, th=(0.0, 0.0, 0.0), along=False, render="physical", t_end=0.2, v0=(0.0, 0.0)
 ):
     """The sampled loop in clay that yields everywhere, as `hybrid.hybrid`.
 

@@ -74,7 +74,7 @@ class Yielding:
     """
 
     def __init__(  # noqa: PLR0913  # a case, spelt out
-        self, laws, edges=(), gain=(1.0, 0.5), uh=None, breaks=(), hand=None, shaping=False,
+        self, laws, edges=(), gain=(1.0, 0.5), uh=None, breaks=(), hand=None, inertia_shaping=False,
         t_end=1.0, p0=(0.0, 0.0), v0=(0.0, 0.0), isotropic=False, angle=0.0, limit=None,
         method="DOP853", rtol=1e-12,
     ):  # fmt: skip
@@ -82,7 +82,7 @@ class Yielding:
         self.edges, self.K, self.limit = np.array(edges, float), np.array(gain, float), limit
         self.uh = uh
         self.m, self.d, self.k = hand or (0.0, 0.0, 0.0)
-        self.shaping, self.isotropic, self.method = shaping, isotropic, method
+        self.inertia_shaping, self.isotropic, self.method = inertia_shaping, isotropic, method
         self.rtol = rtol
         c, s = np.cos(angle), np.sin(angle)
         self.R = np.array([[c, s], [-s, c]])  # world to clay
@@ -116,7 +116,7 @@ class Yielding:
         W = J @ np.linalg.solve(Arm.M, J.T)
         y2 = G0 * (delta - y) - G1 * yr
         want = y2 + S1 * (yr - v) + S0 * (y - p)
-        S = np.diag(SG) if self.shaping else W
+        S = np.diag(SG) if self.inertia_shaping else W
         damping = self.R.T @ np.diag(self.laws[self.at]["b"]) @ self.R
         rest = self.uh(t + near) - self.d * v - self.k * p - damping @ v
         P = np.linalg.inv(np.eye(2) + self.m * S)

@@ -44,20 +44,20 @@ def scenes(draw):
         gain=(real(0.5, 1.2), real(0.2, 0.4)),
         force=put(push, 0.0 if shaped else across),
         operator=hc.Operator(real(0.1, 0.5), real(1.0, 5.0), real(0.0, 60.0)) if hand else None,
-        shaping=shaped,
+        inertia_shaping=shaped,
         start=put(ahead, 0.0),
         velocity=put(v, 0.0),
         origin=ORIGIN if not shaped else (0.35, 0.19) if axis else hits.NOMINAL_BORDER,
         torque_limit=hits.STRONG if strong else TORQUE_LIMIT,
         length=None,
         t_max=real(0.3, 0.8),
-        stop=False,
+        stop_when_unstable=False,
     )
 
 
 def exact(s, times):
     """Crossings as (axis, border, time), and positions at the ascending times."""
-    if not s.shaping:
+    if not s.inertia_shaping:
         x = reference.solve(s, times)
         return [(AXES[i], border, t) for i, border, t in x.crossings], x.p
     i, th = AXES.index(s.clay.x.along), (0.0, 0.0, 0.0)
@@ -118,7 +118,7 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
 
 def test_sampled_control_keeps_its_samples_and_the_physics_its_error():
     """Beside the hybrid system, exact between samples: steps divide Ts, and the error is kept."""
-    s = hc.constant_cut(control="sampled", dt=4e-3, render="implicit", t_max=0.75)
+    s = hc.constant_cut(control="sampled", dt=4e-3, render="physical", t_max=0.75)
     r = hc.simulate(s, error="1e-7 m")
     e, Ts = r.error, r.scenario.Ts
     assert Ts == 4e-3 and e.reached and (Ts / e.dt) % 1.0 == 0.0 and e.dt < Ts
@@ -245,15 +245,15 @@ def test_it_is_saved_with_the_record_and_old_records_have_none(tmp_path):
 
 def test_a_refused_finer_step_keeps_what_is_there(monkeypatch):
     """Memory that a finer run would not fit into."""
-    real, made = accuracy.simulate, []
+    real, made = accuracy.run_once, []
 
-    def limited(s, **how):
+    def limited(s, *how):
         made.append(s.dt)
         if len(made) > 3:
             raise ParameterError("every", 1, "keep fewer")
-        return real(s, **how)
+        return real(s, *how)
 
-    monkeypatch.setattr(accuracy, "simulate", limited)
+    monkeypatch.setattr(accuracy, "run_once", limited)
     r = hc.simulate(hits.jobs(1e5)["hit"], error=1e-9)  # whose errors are large for their step
     assert not r.error.reached and "keep fewer" in r.error.note and r.error.estimate > 1e-9
     assert r.error.dt == made[2]

@@ -11,22 +11,22 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model.controller import SERVO, Servo
-from hapticclay.simulation import batch, record, simulate
+from hapticclay.simulation import batch, engines, record
 from hapticclay.stepping import many, run, scene
 from hapticclay.stepping.machine_code import kind_of
 
 pytest.importorskip("numba")
 CUT = hc.constant_cut(start=(0.02, 0.0), t_max=0.05)
-WIRED = dataclasses.replace(CUT, control="sampled", interface=hc.Interface(delay=2e-4))
-RICH = hc.Interface(
-    delay=1e-4, encoder=4000, velocity="difference", window=3, velocity_filter=80.0, adc_bits=12,
-    dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
+WIRED = dataclasses.replace(CUT, control="sampled", hardware=hc.Hardware(delay=2e-4))
+RICH = hc.Hardware(
+    delay=1e-4, encoder=4000, velocity="difference", velocity_window=3, velocity_filter=80.0,
+    adc_bits=12, dac_bits=12, force_filter=200.0, friction=(0.02, 0.01),
 )  # fmt: skip
 GUARDED = dataclasses.replace(RICH, passivity=True, coupling=hc.Coupling(5e3, 5.0))
 HELD = dataclasses.replace(CUT, operator=hc.Operator())
 REPAID = [
     HELD,
-    dataclasses.replace(WIRED, interface=GUARDED),
+    dataclasses.replace(WIRED, hardware=GUARDED),
 ]  # kinds compiled here: some 20 s each
 
 
@@ -46,14 +46,14 @@ def varied(like, rng, **own):
     """The same scene with other numbers."""
     u = [rng.random() for _ in range(9)]
     hand = hc.Operator(0.1 + u[0], 1.0 + u[1], 5.0 * u[2])
-    wires = like.interface and dataclasses.replace(like.interface, delay=2e-3 * u[8])
+    wires = like.hardware and dataclasses.replace(like.hardware, delay=2e-3 * u[8])
     numbers = dict(
         gain=(0.2 + u[3], 0.2 + u[4]),
         force=(3.0 * u[5], u[6] - 0.5),
         operator=hand if like.operator else None,
         start=(0.045 + 0.01 * u[7], 0.01 * u[8]),
         velocity=(0.4 * u[0], 0.1 * u[1]),
-        interface=wires,
+        hardware=wires,
     )
     return dataclasses.replace(like, **{**numbers, **own})
 
@@ -68,7 +68,7 @@ def kinds(rng):
         yield varied(CUT, rng, clay=clay)
         yield varied(HELD, rng)
         yield varied(CUT, rng, clay=hc.slab(1e5 * b, 0.05, 0.15))  # stiff
-        yield varied(CUT, rng, clay=None, shaping=True)
+        yield varied(CUT, rng, clay=None, inertia_shaping=True)
         yield varied(CUT, rng, operator=(hc.Operator(0.2, b, 1.0), None))
         yield varied(CUT, rng, servo=(other if b > 100.0 else SERVO[0], SERVO[1]))
         yield varied(CUT, rng, origin=(rng.uniform(0.0, 0.02), 0.15), torque_limit=(9.0, 5.0))
@@ -78,16 +78,16 @@ def kinds(rng):
         )
         yield varied(WIRED, rng, clay=clay)
         yield varied(dataclasses.replace(WIRED, operator=hc.Operator()), rng, clay=clay)
-        yield varied(dataclasses.replace(WIRED, interface=None), rng, clay=clay)
-        yield varied(dataclasses.replace(WIRED, interface=RICH), rng, clay=clay)
-        yield varied(dataclasses.replace(WIRED, interface=GUARDED), rng, clay=clay, Ts=7.2e-4)
-        yield varied(WIRED, rng, clay=clay, render="implicit")
+        yield varied(dataclasses.replace(WIRED, hardware=None), rng, clay=clay)
+        yield varied(dataclasses.replace(WIRED, hardware=RICH), rng, clay=clay)
+        yield varied(dataclasses.replace(WIRED, hardware=GUARDED), rng, clay=clay, Ts=7.2e-4)
+        yield varied(WIRED, rng, clay=clay, render="physical")
         yield dataclasses.replace(HELD, gain=(100.0 * b, 100.0 * b), start=(0.06, 0.0), t_max=0.3)
         # and, one by one
         yield dataclasses.replace(grown, start=(rng.uniform(0.0, 0.01), 0.0))
         yield varied(CUT, rng, clay=hc.slab(hc.Flow(Fy=0.5, b=b), 0.05, 0.15))
         yield dataclasses.replace(CUT, integrator="accurate", gain=(rng.uniform(0.1, 1.0), 0.2))
-        yield varied(WIRED, rng, interface=hc.Interface(jitter=2e-5, force_noise=0.01))
+        yield varied(WIRED, rng, hardware=hc.Hardware(jitter=2e-5, force_noise=0.01))
 
 
 def entry(s):
@@ -167,7 +167,7 @@ def test_numbers_of_many_runs_are_those_of_each_to_the_bit():
 
 
 def test_places_are_those_of_the_numbers():
-    parts = scene.parts_of(dataclasses.replace(WIRED, operator=hc.Operator(), interface=RICH))
+    parts = scene.parts_of(dataclasses.replace(WIRED, operator=hc.Operator(), hardware=RICH))
     at, numbers = many.places(parts), many.numbers_of(parts)
     assert numbers[at.lag[0].K] == parts.lag[0].K
     assert numbers[at.hand[1].damper] == parts.hand[1].damper
@@ -216,7 +216,7 @@ class NoLane:
 def test_steps_are_compiled_for_the_kinds_of_runs_made_alone_that_repay_them(monkeypatch):
     asked = []
     monkeypatch.setattr(batch, "pays", lambda s, steps: asked.append(round(steps)) or steps > 1000)
-    monkeypatch.setattr(simulate, "saved", {})
+    monkeypatch.setattr(engines, "saved", {})
     grown = hc.variable_cut(t_max=0.05)
     runs = [dataclasses.replace(grown, start=(1e-3 * i, 0.0)) for i in range(9)]
     other = dataclasses.replace(CUT, integrator="accurate", t_max=0.01)

@@ -12,8 +12,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.fields import make_part
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.fields import make_part
+from hapticclay.scene.scenario import Scenario
 from hapticclay.simulation import export, tables
 
 FORMATS = tuple(export.EXPORTS)
@@ -407,9 +407,9 @@ def test_fit_and_identify_read_the_csv(tmp_path):
     cut = hc.simulate(hc.constant_cut(), every=10)
     assert np.diff(cut.t)[-1] < 0.9 * np.diff(cut.t)[0]
     names = {"t": "t", "input": "fe_x", "output": "p_x"}
-    data = hc.Measurement.load(cut.export(tmp_path / "cut.csv"), names)
+    data = hc.studies.Measurement.load(cut.export(tmp_path / "cut.csv"), names)
     assert len(data.t) == len(cut.t) - 1
-    found = hc.fit_flow(data, place=(0.06, 0.14))
+    found = hc.studies.fit_flow(data, place=(0.06, 0.14))
     assert found.law == "viscous"
     # rounding alone
     assert found.parameters[0].value == pytest.approx(90.0, rel=1e-6)
@@ -418,14 +418,14 @@ def test_fit_and_identify_read_the_csv(tmp_path):
         gain=(0.0, 0.0),
         force=(0.0, 0.0),
         muscle=hc.Multisine((0.3, 0.0), low=0.2, high=8.0, period=10.0),
-        shaping=True,
+        inertia_shaping=True,
         length=None,
         t_max=30.0,
         dt=1e-3,
     )
     file = hc.simulate(push).export(tmp_path / "push.csv")
-    data = hc.Measurement.load(file, {"t": "t", "input": "fh_x", "output": "p_x"})
-    block = hc.identify_data(data, "S", "x")
+    data = hc.studies.Measurement.load(file, {"t": "t", "input": "fh_x", "output": "p_x"})
+    block = hc.studies.identify_data(data, "S", "x")
     for c in block.coefficients:
         assert c.value == pytest.approx(c.printed, rel=1e-2), c.name  # steps of 1 ms, 8 Hz
 

@@ -10,18 +10,19 @@ from hapticclay.simulation import record
 
 HARDWARE = dataclasses.replace(
     hc.constant_cut(control="sampled", t_max=3.5),
-    interface=hc.Interface(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
+    hardware=hc.Hardware(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
 )
+CUT = hc.constant_cut(t_max=3.5)  # some steps longer than two looks
 SCENES = {  # name: scenario, engine, every
-    "fast": (hc.constant_cut(), "python", 1),
-    "fast, some samples": (hc.constant_cut(), "python", 7),
-    "driven": (hc.stability_test(3.0), "python", 1),
-    "growing": (hc.variable_cut(), "python", 1),
-    "native": (hc.constant_cut(), "native", 1),
-    "native, some samples": (hc.constant_cut(), "native", 7),
-    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3), "python", 1),
-    "accurate, native": (hc.constant_cut(integrator="accurate"), "native", 3),
-    "sampled": (hc.constant_cut(control="sampled"), "python", 1),
+    "fast": (CUT, "python", 1),
+    "fast, some samples": (CUT, "python", 7),
+    "driven": (hc.stability_test(3.0, t_max=3.5), "python", 1),
+    "growing": (hc.variable_cut(t_max=3.5), "python", 1),
+    "native": (CUT, "native", 1),
+    "native, some samples": (CUT, "native", 7),
+    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=9.5), "python", 1),
+    "accurate, native": (hc.constant_cut(integrator="accurate", t_max=9.5), "native", 3),
+    "sampled": (hc.constant_cut(control="sampled", t_max=3.5), "python", 1),
     "hardware": (HARDWARE, "python", 1),
 }
 

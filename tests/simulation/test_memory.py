@@ -8,11 +8,11 @@ import tracemalloc
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation import memory, simulate
+from hapticclay.simulation import memory, one_run
 
 GB = 10**9
 WIRED = dataclasses.replace(
-    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.75), interface=hc.Interface()
+    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.75), hardware=hc.Hardware()
 )
 
 
@@ -87,19 +87,19 @@ def test_need_is_what_a_run_takes(scenario, engine, every, monkeypatch):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert record.outcome.code == "time limit"  # so it took what the longest run would
-    monkeypatch.setattr(simulate, "SMALL_MEMORY", 0.0)
+    monkeypatch.setattr(one_run, "SMALL_MEMORY", 0.0)
     for left, fits in ((0.9 * peak, False), (1.5 * peak, True)):
-        monkeypatch.setattr(simulate, "memory_left", lambda left=left: left)
+        monkeypatch.setattr(one_run, "memory_left", lambda left=left: left)
         if fits:
-            simulate._check_memory(scenario, every)
+            one_run.check_memory(scenario, every)
         else:
             with pytest.raises(hc.ParameterError):
-                simulate._check_memory(scenario, every)
+                one_run.check_memory(scenario, every)
 
 
 def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
-    monkeypatch.setattr(simulate, "memory_left", lambda: 4.0 * GB)
-    monkeypatch.setattr(simulate, "kernel_for", lambda *a: pytest.fail("ran"))
+    monkeypatch.setattr(one_run, "memory_left", lambda: 4.0 * GB)
+    monkeypatch.setattr(one_run, "kernel_for", lambda *a: pytest.fail("ran"))
     scenario = hc.constant_cut(dt=1e-6)
     with pytest.raises(hc.ParameterError) as error:
         hc.simulate(scenario)
@@ -107,19 +107,19 @@ def test_what_does_not_fit_is_refused_and_the_advice_helps(monkeypatch):
         "every = 1: up to 60000002 samples take 25.8 GB of memory, and 4 GB are left: "
         "keep fewer (--every 8), or lower t_max"
     )
-    simulate._check_memory(scenario, 8)
+    one_run.check_memory(scenario, 8)
     with pytest.raises(hc.ParameterError, match="every = 6"):
-        simulate._check_memory(scenario, 6)
+        one_run.check_memory(scenario, 6)
 
 
 def test_what_is_not_kept_takes_no_memory(monkeypatch):
     """Hardware remembers no more of a run than what it keeps."""
-    monkeypatch.setattr(simulate, "memory_left", lambda: 0.1 * GB)
+    monkeypatch.setattr(one_run, "memory_left", lambda: 0.1 * GB)
     long = dataclasses.replace(WIRED, t_max=1e4)
-    simulate._check_memory(long, 1000)
+    one_run.check_memory(long, 1000)
     with pytest.raises(hc.ParameterError, match="t_max = 10000.0: up to 100000000 steps take"):
-        monkeypatch.setattr(simulate, "memory_left", lambda: 0.0)
-        simulate._check_memory(long, 100)
+        monkeypatch.setattr(one_run, "memory_left", lambda: 0.0)
+        one_run.check_memory(long, 100)
 
 
 def test_a_process_may_have_less_than_the_machine():
@@ -127,10 +127,10 @@ def test_a_process_may_have_less_than_the_machine():
     code = (
         "import resource, hapticclay as hc\n"
         "from hapticclay.cli import app\n"
-        "from hapticclay.simulation import simulate\n"
+        "from hapticclay.simulation import one_run\n"
         "taken = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (taken + 10**9,) * 2)\n"
-        "assert 0.5e9 < simulate.memory_left() <= 1e9\n"
+        "assert 0.5e9 < one_run.memory_left() <= 1e9\n"
         "raise SystemExit(app.main(['run', 'free', '--force', '0', '0', '--dt', '1e-5', '--t-max', "
         "'100']))"
     )

@@ -190,7 +190,7 @@ BEFORE_PARTS = {  # a scenario as release 0.1 wrote it in its records
     "gain": [2.0, 0.5],
     "force": [0.0, 0.0],
     "operator": {"mass": 0.25, "damper": 2.0, "spring": 6.0},
-    "shaping": False,
+    "inertia_shaping": False,
     "dt": 0.00036,
     "t_max": 0.1,
     "length": None,
@@ -212,7 +212,7 @@ BEFORE_PARTS = {  # a scenario as release 0.1 wrote it in its records
     },
     "command": None,
     "stop": False,
-    "interface": {"delay": 0.0001, "coupling": {"spring": 1e4, "damper": 10.0}, "seed": 3},
+    "hardware": {"delay": 0.0001, "coupling": {"spring": 1e4, "damper": 10.0}, "seed": 3},
 }
 
 
@@ -235,8 +235,8 @@ def test_a_record_of_the_release_before_is_read(run, tmp_path):
         origin=(0.35, 0.24),
         control="sampled",
         muscle=hc.Multisine(seed=7),
-        stop=False,
-        interface=hc.Interface(delay=1e-4, coupling=hc.Coupling(1e4, 10.0), seed=3),
+        stop_when_unstable=False,
+        hardware=hc.Hardware(delay=1e-4, coupling=hc.Coupling(1e4, 10.0), seed=3),
     )
 
 

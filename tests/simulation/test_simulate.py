@@ -39,7 +39,7 @@ def test_shaped_cut_against_the_exact_solution(impedance, force):
             hc.constant_cut(
                 force=(force, 0.0),
                 operator=hc.Operator() if impedance else None,
-                shaping=True,
+                inertia_shaping=True,
                 dt=dt,
             )
         )
@@ -53,8 +53,8 @@ CASES = {
     "plain": dict(),
     "hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
     "off axis": dict(force=(1.0, 0.3)),
-    "off axis, shaped": dict(force=(1.0, 0.3), shaping=True),
-    "off axis, hand, shaped": dict(force=(2.0, -0.5), shaping=True, operator=hc.Operator()),
+    "off axis, shaped": dict(force=(1.0, 0.3), inertia_shaping=True),
+    "off axis, hand, shaped": dict(force=(2.0, -0.5), inertia_shaping=True, operator=hc.Operator()),
 }
 
 
@@ -75,7 +75,7 @@ def test_second_order_against_the_nonlinear_arm(name):
         s.gain,
         s.force,
         th,
-        s.shaping,
+        s.inertia_shaping,
         60.0,
         grid,
     )
@@ -121,7 +121,7 @@ def test_any_stable_shaped_cut(b, K, f, hand):
         gain=(K, 0.2),
         force=(f, 0.0),
         operator=hc.Operator() if hand else None,
-        shaping=True,
+        inertia_shaping=True,
         t_max=8.0,
     )
     exact, position = piecewise_linear(EDGES, (0, b, 0), K, f, th, t_max=8.0)
@@ -143,8 +143,8 @@ def test_any_stable_shaped_cut(b, K, f, hand):
 @settings(max_examples=5)
 @given(**stable_cut)
 def test_any_stable_cut_without_shaping(b, K, f):
-    assume(K < 0.6 * min(hc.gain_limit("x", b), 3.0))
-    Ky = 0.3 * min(hc.gain_limit("y", b), 1.0)
+    assume(K < 0.6 * min(hc.theory.gain_limit("x", b), 3.0))
+    Ky = 0.3 * min(hc.theory.gain_limit("y", b), 1.0)
     s = hc.constant_cut(b=b, gain=(K, Ky), force=(f, 0.0), t_max=3.0)
     exact, *_ = nonlinear((0, b, 0), EDGES, s.gain, s.force, t_max=3.0, rtol=1e-9, atol=1e-11)
     r = hc.simulate(s)
@@ -166,10 +166,10 @@ def test_clay_force_and_speeds_of_the_default_cut():
 @given(b=st.floats(1, 500), K=st.floats(0.2, 1.0), f=st.floats(0.5, 2.0))
 @settings(max_examples=15)
 def test_steady_speed_law(b, K, f):
-    assume(K < 0.5 * hc.gain_limit("x", b))
+    assume(K < 0.5 * hc.theory.gain_limit("x", b))
     r = hc.simulate(
         hc.constant_cut(
-            b=b, gain=(K, 0.1), force=(f, 0.0), start=(0.06, 0.0), shaping=True, t_max=4.0
+            b=b, gain=(K, 0.1), force=(f, 0.0), start=(0.06, 0.0), inertia_shaping=True, t_max=4.0
         )
     )
     inside = r.b[:, 0] > 0.0
@@ -180,7 +180,7 @@ def test_steady_speed_law(b, K, f):
 
 def test_free_run_is_exact_to_second_order():
     exact, position = piecewise_linear((0.20,), (0.0,), 1.0, 1.0)
-    r = hc.simulate(hc.free(shaping=True))
+    r = hc.simulate(hc.free(inertia_shaping=True))
     np.testing.assert_allclose(times(r), exact, atol=1e-6)
     np.testing.assert_allclose(r.p[:-1, 0], position(r.t[:-1]), atol=1e-7)
     assert np.all(r.fe == 0.0) and np.all(r.b == 0.0)
@@ -199,13 +199,15 @@ def test_run_ends_on_the_border_and_on_time():
 
 def test_start_inside_the_clay():
     exact, _ = piecewise_linear((0.15, 0.20), (90, 0), 1.0, 1.0, z0=[0.1, 0, 0.1, 0, 0.1, 0, 1])
-    r = hc.simulate(hc.constant_cut(start=(0.1, 0.0), shaping=True))
+    r = hc.simulate(hc.constant_cut(start=(0.1, 0.0), inertia_shaping=True))
     np.testing.assert_allclose(times(r), exact, atol=1e-6)
     assert r.fe[0, 0] == 0.0 and r.b[0, 0] == 90.0
 
 
 def test_opposing_force_leaves_through_the_near_border():
-    r = hc.simulate(hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), shaping=True, t_max=3.0))
+    r = hc.simulate(
+        hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), inertia_shaping=True, t_max=3.0)
+    )
     exact, _ = piecewise_linear((0.01,), (90,), 1.0, 1.0)  # 1 cm of clay, mirrored
     assert r.crossings[0].border == 0.05 and r.crossings[0].speed < 0.0
     assert r.crossings[0].time == pytest.approx(exact[0], abs=1e-6)
@@ -217,12 +219,12 @@ def test_no_force_no_motion():
 
 
 @pytest.mark.parametrize("b", [9000.0, 1e5, 1e6, 1e9])
-@pytest.mark.parametrize("shaping", [False, True])
-def test_stiff_clay_stops_the_handle_where_it_should(b, shaping):
-    s = hc.constant_cut(b=b, shaping=shaping, t_max=3.0)
+@pytest.mark.parametrize("inertia_shaping", [False, True])
+def test_stiff_clay_stops_the_handle_where_it_should(b, inertia_shaping):
+    s = hc.constant_cut(b=b, inertia_shaping=inertia_shaping, t_max=3.0)
     r = hc.simulate(s)
     assert r.outcome.code in ("time limit", "stalled")
-    if shaping:
+    if inertia_shaping:
         _, position = piecewise_linear(EDGES, (0, b, 0), 1.0, 1.0, t_max=3.0)
         expected = position(np.array([3.0]))[0]
     else:  # quasi-static beyond the border
@@ -285,7 +287,7 @@ def test_a_handle_that_slides_along_a_border_goes_on():
 def test_a_border_into_stiff_clay_on_the_other_axis_is_crossed_once():
     from hapticclay.model.clay import Clay, Profile
     from hapticclay.model.operator import Operator
-    from hapticclay.model.scenario import Scenario
+    from hapticclay.scene.scenario import Scenario
 
     e = (0.008008749625277495, 0.11265424819257426)
     s = Scenario(

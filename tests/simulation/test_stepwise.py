@@ -10,22 +10,22 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.simulation.simulate import has_numba
+from hapticclay.simulation.engines import has_numba
 
 pytestmark = pytest.mark.plain
 fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03)
-HARD = hc.Interface(
-    delay=5e-4, encoder=100_000, velocity="difference", window=3, jitter=1e-4, force_noise=0.1,
-    passivity=True,
+HARD = hc.Hardware(
+    delay=5e-4, encoder=100_000, velocity="difference", velocity_window=3, jitter=1e-4,
+    force_noise=0.1, passivity=True,
 )  # fmt: skip
 SCENES = {
     "cut": CUT,
-    "hand": replace(CUT, operator=hc.Operator(), shaping=True),
+    "hand": replace(CUT, operator=hc.Operator(), inertia_shaping=True),
     "stiff": hc.constant_cut(b=1e6, clay=(0.001, 0.00102), length=0.0011, t_max=2.0),
     "accurate": replace(CUT, integrator="accurate"),
     "sampled": replace(CUT, control="sampled", Ts=7.2e-4),
-    "hardware": replace(CUT, control="sampled", Ts=7.2e-4, interface=HARD),
+    "hardware": replace(CUT, control="sampled", Ts=7.2e-4, hardware=HARD),
     "driven": hc.stability_test(t_max=0.2),
     "driven accurate": replace(hc.stability_test(t_max=0.1), integrator="accurate"),
     "driven sampled": hc.stability_test(t_max=0.1, control="sampled"),
@@ -75,7 +75,7 @@ def test_torques_of_ones_own_are_those_of_the_same_law():
     def law(t, q, qd, fh, state, params):
         return (4.0 * (1.5 - q[0]) - qd[0], 4.0 * (-1.5 - q[1]) - qd[1]), ()
 
-    s = hc.Scenario(control="sampled", render="implicit", t_max=0.2, length=None)
+    s = hc.Scenario(control="sampled", render="physical", t_max=0.2, length=None)
     want = hc.simulate(replace(s, controller=hc.Controller(law)), engine="python")
     with hc.Simulation(s) as sim:
         for q, qd in zip(want.q, want.qd, strict=True):
@@ -245,7 +245,7 @@ def test_a_copy_goes_on_by_itself(name, twin):
 
 def test_a_gain_from_a_sample_on_is_that_of_the_exact_loop():
     """After a change of K the handle follows the free loop with the new K: its steady speed."""
-    s = replace(CUT, clay=hc.slab(20.0), length=None, t_max=4.0, shaping=True)
+    s = replace(CUT, clay=hc.slab(20.0), length=None, t_max=4.0, inertia_shaping=True)
     speeds = []
     with hc.Simulation(s) as sim:
         for K in (0.4, 0.8, 0.2):

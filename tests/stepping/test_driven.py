@@ -14,7 +14,7 @@ import hapticclay as hc
 from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine
-from tests.oracles import G0, G1, Linear, piecewise_linear
+from tests.oracles import G0, G1, axis_rates, piecewise_linear
 
 TH = (0.25, 2.0, 6.0)
 
@@ -28,15 +28,7 @@ def axis_solution(  # noqa: PLR0913  # a case, spelt out
     i, b, K, uh, th, t_end, command=lambda t: 0.0, z0=None, edge=None
 ):
     """One axis under b(t), uh(t), command(t); z = (p, v, delta, delta', y, y')."""
-    free, one = Linear(i, 0.0, K, 0.0, th).A, Linear(i, 1.0, K, 0.0, th).A
-    forced = Linear(i, 0.0, K, 1.0, th).A[:, 6]
-
-    def rhs(t, z):
-        A = free + b(t) * (one - free)
-        shown = np.append(z, 0.0)
-        shown[2] += command(t)
-        return (A @ shown + forced * uh(t))[:6]
-
+    rates = axis_rates(i, K, th)
     events = None
     if edge is not None:
 
@@ -45,7 +37,7 @@ def axis_solution(  # noqa: PLR0913  # a case, spelt out
 
         events.terminal = True
     return solve_ivp(
-        rhs,
+        lambda t, z: rates(z, b(t), uh(t), command(t)),
         (0.0, t_end),
         np.zeros(6) if z0 is None else z0,
         "DOP853",
@@ -72,7 +64,7 @@ def test_varying_muscle_force_and_command(kw, tolerance):
     muscle = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
     command = Multisine(rms=(1e-3, 2e-3), low=0.5, high=3.0, period=5.0, seed=6)
     s = dataclasses.replace(
-        hc.free(shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0),
+        hc.free(inertia_shaping=True, operator=hc.Operator(), force=(0.5, 0.0), t_max=4.0),
         length=None,
         muscle=muscle,
         command=command,
@@ -117,7 +109,7 @@ def test_varying_scenes_converge_at_second_order():
 )
 def test_growing_clay_counts_from_entry(kw, tolerance):
     clay = Clay(Profile((0.02,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
-    s = dataclasses.replace(hc.free(shaping=True, t_max=6.0), clay=clay, **kw)
+    s = dataclasses.replace(hc.free(inertia_shaping=True, t_max=6.0), clay=clay, **kw)
     r = hc.simulate(s)
     first = axis_solution(0, lambda t: 50.0, 1.0, lambda t: 1.0, (0, 0, 0), 6.0, edge=0.02)
     entry = first.t[-1]
@@ -140,7 +132,7 @@ def test_growth_counts_from_the_first_entry():
     clay = Clay(Profile((0.0,), (50.0, 100.0), growth=(0.0, 30.0)), Profile((), (50.0,)))
     muscle = Multisine(rms=(3.0, 0.0), low=0.5, high=0.5, period=2.0, seed=1)
     s = dataclasses.replace(
-        hc.free(shaping=True, t_max=4.0, force=(0.0, 0.0)),
+        hc.free(inertia_shaping=True, t_max=4.0, force=(0.0, 0.0)),
         clay=clay,
         length=None,
         muscle=muscle,
@@ -163,10 +155,10 @@ def test_clay_hit_at_speed(b, speed, control):
     s = dataclasses.replace(
         hc.constant_cut(
             b=b,
-            shaping=True,
+            inertia_shaping=True,
             t_max=0.7,
             control=control,
-            render="implicit",
+            render="physical",
             torque_limit=(1e5, 1e5),
         ),
         velocity=(speed, 0.0),
@@ -195,7 +187,7 @@ def test_clay_hit_at_speed(b, speed, control):
         ("native", dict()),
         ("python", dict(integrator="accurate", dt=1.8e-3)),
         ("python", dict(control="sampled")),
-        ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, interface=hc.Interface())),
+        ("python", dict(control="sampled", dt=1.8e-4, Ts=3.6e-4, hardware=hc.Hardware())),
     ],
 )
 def test_command_is_counted_from_the_start(engine, kw):
@@ -204,7 +196,7 @@ def test_command_is_counted_from_the_start(engine, kw):
     delta is the command less its value at t = 0, however the run is stepped; p = G delta.
     """
     command = Multisine(rms=(1e-3, 0.0), low=1.0, high=2.0, period=1.0, seed=2)
-    s = hc.free(force=(0.0, 0.0), shaping=True, t_max=8000 * 3.6e-4)
+    s = hc.free(force=(0.0, 0.0), inertia_shaping=True, t_max=8000 * 3.6e-4)
     s = dataclasses.replace(s, gain=(0.0, 0.0), length=None, command=command, **kw)
     r, sig = hc.simulate(s, engine=engine), command
     assert abs(sig(0.0)[0]) > 1e-4  # a jump, if it were not counted from there
@@ -231,6 +223,6 @@ def test_driven_records_survive_the_disk(tmp_path):
         command=Multisine(rms=(1e-3, 0.0)),
         operator=Operator(),
         velocity=(0.1, 0.0),
-        stop=False,
+        stop_when_unstable=False,
     )
     assert hc.Record.load(hc.simulate(s).save(tmp_path)).scenario == s

@@ -43,7 +43,7 @@ def test_every_entry_converges_to_the_exact_integral_at_second_order(uh, th):
             hc.constant_cut(
                 force=(uh, 0.0),
                 operator=hc.Operator() if any(th) else None,
-                shaping=True,
+                inertia_shaping=True,
                 dt=float(dt),
             )
         ).energy
@@ -59,7 +59,7 @@ def test_every_entry_converges_to_the_exact_integral_at_second_order(uh, th):
     "kw",
     [
         dict(),
-        dict(shaping=True),
+        dict(inertia_shaping=True),
         dict(b=1e6, t_max=2.0),
         dict(gain=(1.0, 1.0)),
         dict(dt=5e-3),
@@ -102,6 +102,6 @@ def test_an_engine_that_disobeys_shows_in_the_balance(monkeypatch):
 
 def test_reference_kinetic_energy_of_the_shaped_handle():
     """At the nominal pose the arm's inertia along x is 1/0.7919 kg."""
-    r = hc.simulate(hc.free(shaping=True, length=0.1))
+    r = hc.simulate(hc.free(inertia_shaping=True, length=0.1))
     kinetic = 0.5 * r.v[-1, 0] ** 2 / 0.7919
     assert r.energy["kinetic"] == pytest.approx(kinetic, rel=1e-9)

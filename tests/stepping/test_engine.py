@@ -84,12 +84,12 @@ def binary(model):
     "part",
     [
         {"operator": hc.Operator()},
-        {"shaping": True},
+        {"inertia_shaping": True},
         {"muscle": Multisine(rms=(1.0, 1.0), low=0.2, high=3.0, period=5.0, seed=1)},
         {"control": "sampled"},
         {
             "control": "sampled",
-            "interface": hc.Interface(encoder=4096, friction=(0.1, 0.1), passivity=True),
+            "hardware": hc.Hardware(encoder=4096, friction=(0.1, 0.1), passivity=True),
         },
     ],
     ids=lambda part: "-".join(part),
@@ -209,14 +209,14 @@ def test_a_step_beyond_arithmetic_keeps_the_events_before_it(monkeypatch):
     )  # fmt: skip
     whole = hc.simulate(s, engine="python")
     assert len(whole.crossings) == 2 and whole.stops
-    careful, last = path.careful, whole.stops[-1].start + s.dt
+    careful, last = path.step_to_event, whole.stops[-1].start + s.dt
 
     def breaking(parts, now, e):
         if now.clock.t > last:
             raise ZeroDivisionError
         return careful(parts, now, e)
 
-    monkeypatch.setattr(path, "careful", breaking)
+    monkeypatch.setattr(path, "step_to_event", breaking)
     broken = hc.simulate(s, engine="python")
     assert broken.outcome.code == "out of reach" and len(broken.t) < len(whole.t)
     assert broken.crossings == whole.crossings

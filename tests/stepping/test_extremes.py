@@ -115,7 +115,7 @@ def test_a_scene_that_raises_is_a_row(monkeypatch):
 
 
 def test_reference_is_the_matrix_exponential_where_the_loop_is_linear():
-    s = hc.constant_cut(shaping=True, operator=hc.Operator(), force=(2.0, 0.0), t_max=3.0)
+    s = hc.constant_cut(inertia_shaping=True, operator=hc.Operator(), force=(2.0, 0.0), t_max=3.0)
     t = np.linspace(0.0, 2.9, 50)
     x = reference.solve(s, t)
     crossings, position = piecewise_linear(
@@ -129,7 +129,7 @@ def test_reference_finds_the_poles_of_the_linear_loop():
     s = hc.constant_cut(gain=(1.0, 1.0), origin=(0.35, 0.24), start=(0.0, 0.0), length=0.1)
     loop = reference.Loop(s)
     sigma = loop.growth(loop.start(), (90.0, 90.0))
-    poles = np.concatenate([hc.closed_loop_poles(a, 1.0, 90.0) for a in ("x", "y")])
+    poles = np.concatenate([hc.theory.closed_loop_poles(a, 1.0, 90.0) for a in ("x", "y")])
     assert sigma == pytest.approx(max(p.real for p in poles if abs(p) > 0.5), rel=1e-5)
 
 

@@ -40,14 +40,14 @@ def ring(axis, K, b, parts=None, **kw):
         operator=Operator(),
         length=None,
         control="sampled",
-        interface=parts,
-        stop=False,
+        hardware=parts,
+        stop_when_unstable=False,
         **kw,
     )
 
 
 def cut(parts, **kw):
-    return replace(hc.constant_cut(control="sampled", **kw), interface=parts)
+    return replace(hc.constant_cut(control="sampled", **kw), hardware=parts)
 
 
 # ---- nothing, and seeds
@@ -56,15 +56,15 @@ def cut(parts, **kw):
 
 @pytest.mark.parametrize(
     "kw",
-    [dict(), dict(render="implicit", operator=hc.Operator(), force=(2.0, 0.3)), dict(Ts=3 * TS)],
+    [dict(), dict(render="physical", operator=hc.Operator(), force=(2.0, 0.3)), dict(Ts=3 * TS)],
 )
 def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
     kw = dict(clay=(0.02, 0.15), t_max=0.4) | kw
-    a, b = hc.simulate(cut(None, **kw)), hc.simulate(cut(hc.Interface(), **kw))
+    a, b = hc.simulate(cut(None, **kw)), hc.simulate(cut(hc.Hardware(), **kw))
     assert a.crossings and a.crossings == b.crossings and a.energy == b.energy
     for name in ("t", "p", "v", "fh", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
-    if kw.get("render") == "implicit":
+    if kw.get("render") == "physical":
         np.testing.assert_array_equal(a.fe, b.fe)
     elif (
         "Ts" not in kw
@@ -88,7 +88,7 @@ def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
 
 def test_random_effects_are_drawn_part_by_part(monkeypatch):
     """No run holds those of all its samples; return to a sample brings them back."""
-    s = cut(hc.Interface(jitter=5e-5, lost=0.1, force_noise=0.1), t_max=0.1)
+    s = cut(hc.Hardware(jitter=5e-5, dropout_probability=0.1, force_noise=0.1), t_max=0.1)
     whole = hc.simulate(s)
     monkeypatch.setattr(scene, "NOISE_AHEAD", 8)
     run = Run(s, 1)
@@ -106,7 +106,7 @@ def test_random_effects_are_drawn_part_by_part(monkeypatch):
 
 
 def test_seeds_repeat_and_differ():
-    parts = hc.Interface(jitter=5e-5, lost=0.1, force_noise=0.1, seed=3)
+    parts = hc.Hardware(jitter=5e-5, dropout_probability=0.1, force_noise=0.1, seed=3)
     a, b, c = (hc.simulate(cut(x, t_max=0.1)) for x in (parts, parts, replace(parts, seed=4)))
     np.testing.assert_array_equal(a.p, b.p)
     np.testing.assert_array_equal(a.tau, b.tau)
@@ -114,10 +114,10 @@ def test_seeds_repeat_and_differ():
 
 
 def test_scenario_survives_the_record(tmp_path):
-    parts = hc.Interface(
+    parts = hc.Hardware(
         encoder=4096,
         velocity="difference",
-        window=3,
+        velocity_window=3,
         delay=1e-4,
         coupling=hc.Coupling(1e3, 10.0),
         friction=(0.01, 0.0),
@@ -133,33 +133,33 @@ def test_scenario_survives_the_record(tmp_path):
 @pytest.mark.parametrize(
     "kw,field",
     [
-        (dict(jitter=-1.0), "interface.jitter"),
-        (dict(jitter=0.5 * TS), "interface.jitter"),
-        (dict(lost=1.0), "interface.lost"),
-        (dict(encoder=2.5), "interface.encoder"),
-        (dict(velocity="diff"), "interface.velocity"),
-        (dict(window=2), "interface.velocity"),
-        (dict(adc_bits=1), "interface.adc_bits"),
-        (dict(filter_order=3), "interface.filter_order"),
-        (dict(dac_range=(1.0,)), "interface.dac_range"),
-        (dict(delay=101 * TS), "interface.delay"),
-        (dict(friction=(-0.1, 0.0)), "interface.friction[shoulder]"),
-        (dict(coupling=3.0), "interface.coupling"),
-        (dict(passivity=1), "interface.passivity"),
-        (dict(seed=None), "interface.seed"),
+        (dict(jitter=-1.0), "hardware.jitter"),
+        (dict(jitter=0.5 * TS), "hardware.jitter"),
+        (dict(dropout_probability=1.0), "hardware.dropout_probability"),
+        (dict(encoder=2.5), "hardware.encoder"),
+        (dict(velocity="diff"), "hardware.velocity"),
+        (dict(velocity_window=2), "hardware.velocity"),
+        (dict(adc_bits=1), "hardware.adc_bits"),
+        (dict(filter_order=3), "hardware.filter_order"),
+        (dict(dac_range=(1.0,)), "hardware.dac_range"),
+        (dict(delay=101 * TS), "hardware.delay"),
+        (dict(friction=(-0.1, 0.0)), "hardware.friction[shoulder]"),
+        (dict(coupling=3.0), "hardware.coupling"),
+        (dict(passivity=1), "hardware.passivity"),
+        (dict(seed=None), "hardware.seed"),
     ],
 )
 def test_bad_parts_are_refused(kw, field):
     with pytest.raises(ParameterError) as e:
-        cut(hc.Interface(**kw))
+        cut(hc.Hardware(**kw))
     assert e.value.field == field
 
 
 def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
     with pytest.raises(ParameterError, match="sampled"):
-        replace(hc.constant_cut(), interface=hc.Interface())
+        replace(hc.constant_cut(), hardware=hc.Hardware())
     with pytest.raises(ParameterError, match="held"):
-        cut(hc.Interface(passivity=True), render="implicit")
+        cut(hc.Hardware(passivity=True), render="physical")
     with pytest.raises(ParameterError):
         hc.Coupling(0.0, 1.0)
 
@@ -204,11 +204,11 @@ def test_halves_go_to_the_even_level():
 
 
 def test_in_a_run_torques_lie_on_levels_within_the_range():
-    r = hc.simulate(cut(hc.Interface(dac_bits=8, dac_range=(2.0, 1.0)), t_max=0.2))
+    r = hc.simulate(cut(hc.Hardware(dac_bits=8, dac_range=(2.0, 1.0)), t_max=0.2))
     levels = r.tau[:-1] / np.array([4.0, 2.0]) * 256
     np.testing.assert_allclose(levels, np.round(levels), atol=1e-9)
     assert len(np.unique(levels[:, 0])) > 3
-    few = hc.simulate(cut(hc.Interface(dac_bits=8, dac_range=(0.1, 1.0)), t_max=0.05))
+    few = hc.simulate(cut(hc.Hardware(dac_bits=8, dac_range=(0.1, 1.0)), t_max=0.05))
     assert np.abs(few.tau[:, 0]).max() == 0.1
 
 
@@ -263,7 +263,7 @@ def test_difference_lags_half_its_window_in_a_run():
     """Under a steady acceleration the mean over m samples is the rate m Ts/2 ago."""
     s = hc.free(control="sampled", t_max=0.02)
     for m in (1, 4):
-        run = Run(replace(s, interface=hc.Interface(velocity="difference", window=m)), 1)
+        run = Run(replace(s, hardware=hc.Hardware(velocity="difference", velocity_window=m)), 1)
         shown = []
         for _ in range(run.parts.time.last):
             run.advance(run.filled + 1)  # one step; the kick to its sample ended with event.w
@@ -304,7 +304,10 @@ def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
 
 def test_noise_has_its_rms_and_each_part_its_own_stream():
     n = 20_000
-    a, b = (hardware.SampleNoise(hc.Interface(force_noise=0.3, lost=x, seed=5)) for x in (0.0, 0.5))
+    a, b = (
+        hardware.SampleNoise(hc.Hardware(force_noise=0.3, dropout_probability=x, seed=5))
+        for x in (0.0, 0.5)
+    )
     noise = a.table(0, n)[:, 2:]
     assert np.all(np.abs(noise.std(axis=0) - 0.3) < 5 * 0.3 / math.sqrt(2 * n))
     assert np.abs(np.corrcoef(noise.T)[0, 1]) < 5 / math.sqrt(n)
@@ -317,7 +320,7 @@ def test_noise_has_its_rms_and_each_part_its_own_stream():
 
 def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
     n, rms = 20_000, 0.28 * TS
-    c = hardware.SampleNoise(hc.Interface(jitter=rms))
+    c = hardware.SampleNoise(hc.Hardware(jitter=rms))
     late = c.table(0, n)[:, 0]
     assert late[0] == 0.0 and np.all(np.diff(np.arange(n) * TS + late) > 0.0)
     assert abs(late.std() - rms) < 5 * rms / math.sqrt(
@@ -328,7 +331,7 @@ def test_jitter_is_uniform_of_its_rms_and_keeps_the_order():
 
 def test_lost_samples_hold_the_torque_as_often_as_they_should():
     p = 0.2
-    r = hc.simulate(cut(hc.Interface(lost=p), t_max=0.9))
+    r = hc.simulate(cut(hc.Hardware(dropout_probability=p), t_max=0.9))
     same = np.all(np.diff(r.tau[:-1], axis=0) == 0.0, axis=1)
     n = len(same)
     assert abs(same.mean() - p) < 5.0 * math.sqrt(p * (1.0 - p) / n)
@@ -338,7 +341,7 @@ def test_lost_samples_hold_the_torque_as_often_as_they_should():
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 2.7])
 def test_torques_come_late_by_the_delay_to_the_step(delay):
     n = 5  # physics steps in a sample; 0.4 and 2.7 fall on the grid and off it
-    s = cut(hc.Interface(delay=delay * n * 1e-4), dt=1e-4, Ts=n * 1e-4, t_max=0.02)
+    s = cut(hc.Hardware(delay=delay * n * 1e-4), dt=1e-4, Ts=n * 1e-4, t_max=0.02)
     r = hc.simulate(s)
     changes = np.flatnonzero(np.any(np.diff(r.tau[:-1], axis=0) != 0.0, axis=1)) + 1
     first = math.ceil(delay * n - 1e-9)
@@ -353,10 +356,10 @@ def test_delayed_run_follows_the_lifted_map(axis, b, Ts, delay):
     """At the nominal pose the small motion of the arm is x(k+1) = M x(k), exact between samples."""
     K, i = 0.5, "xy".index(axis)
     less, beta, gamma = linear_loop.sampled_differences(
-        hc.Loop(axis, b, Operator(), Ts=Ts, delay=delay)
+        hc.theory.Loop(axis, b, Operator(), Ts=Ts, delay=delay)
     )
     A = np.eye(len(less)) + less + K * np.outer(beta, gamma)
-    r = hc.simulate(ring(axis, K, b, hc.Interface(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
+    r = hc.simulate(ring(axis, K, b, hc.Hardware(delay=delay), dt=Ts / 8, Ts=Ts, t_max=60 * Ts))
     x = np.zeros(len(A))
     lead = {"x": 41.8 / 910.19, "y": 30.3 / 765.5}[axis] * 1e-4
     x[[1, 2, 3, 5]] = 1e-4, lead, 1e-4, 1e-4
@@ -381,10 +384,10 @@ def growth(record, i, span):
 
 @pytest.mark.parametrize("axis,b,Ts,delay", [("x", 90.0, 1e-3, 1.5e-3), ("y", 90.0, 1e-3, 1e-3)])
 def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(axis, b, Ts, delay):
-    limit = hc.gain_limit(axis, b, Operator(), Ts=Ts, delay=delay)
+    limit = hc.theory.gain_limit(axis, b, Operator(), Ts=Ts, delay=delay)
     found = []
     for factor in (0.98, 1.02):
-        r = hc.simulate(ring(axis, factor * limit, b, hc.Interface(delay=delay), dt=Ts, t_max=1.8))
+        r = hc.simulate(ring(axis, factor * limit, b, hc.Hardware(delay=delay), dt=Ts, t_max=1.8))
         found.append(growth(r, "xy".index(axis), 1.0))
     assert found[0] < 0.0 < found[1]
     assert 0.0 < np.interp(0.0, found, [0.98, 1.02]) - 0.98 < 0.04
@@ -425,14 +428,14 @@ def test_a_push_below_the_friction_does_not_move_the_arm_and_one_above_does():
     u = arm.jacobian(*q, s.arm.links)
     tau = arm.joint_torques(0.1, 0.0, u)
     for factor, moves in ((1.01, False), (0.99, True)):
-        parts = hc.Interface(friction=(factor * abs(tau[0]), factor * abs(tau[1])))
-        r = hc.simulate(replace(s, interface=parts))
+        parts = hc.Hardware(friction=(factor * abs(tau[0]), factor * abs(tau[1])))
+        r = hc.simulate(replace(s, hardware=parts))
         assert (np.abs(r.p).max() > 1e-9) == moves
 
 
 def test_friction_takes_its_torque_times_the_travel():
     limit = (0.02, 0.01)
-    e = hc.simulate(cut(hc.Interface(friction=limit), t_max=0.7))
+    e = hc.simulate(cut(hc.Hardware(friction=limit), t_max=0.7))
     travel = np.abs(np.diff(e.q, axis=0)).sum(axis=0)
     assert travel.min() > 0.1
     # exact while a joint slides; half a step of it at the start and at the end
@@ -446,7 +449,7 @@ def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
         gain=(0.0, 0.0),
         force=(0.0, 0.0),
         velocity=(0.05, 0.0),
-        interface=hc.Interface(friction=(2.0, 2.0)),
+        hardware=hc.Hardware(friction=(2.0, 2.0)),
     )
     r = hc.simulate(s)
     assert abs(r.qd[0, 1]) > 0.1
@@ -490,7 +493,7 @@ def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, b):
 @pytest.mark.parametrize("b", [8e3, 1e6])
 def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     kw = dict(b=b, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.5)
-    wild, tame = (hc.simulate(cut(hc.Interface(passivity=x), **kw)) for x in (False, True))
+    wild, tame = (hc.simulate(cut(hc.Hardware(passivity=x), **kw)) for x in (False, True))
     assert wild.outcome.code == "limit cycle" and wild.energy.keys().isdisjoint(
         ("passivity_controller",)
     )
@@ -502,11 +505,16 @@ def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
 
 
 @pytest.mark.parametrize(
-    "parts", [dict(), dict(force_noise=0.1, adc_bits=12, dac_bits=12), dict(jitter=1e-5, lost=0.01)]
+    "parts",
+    [
+        dict(),
+        dict(force_noise=0.1, adc_bits=12, dac_bits=12),
+        dict(jitter=1e-5, dropout_probability=0.01),
+    ],
 )
 def test_the_controller_leaves_passive_clay_alone(parts):
     kw = dict(t_max=0.8, clay=(0.02, 0.15))
-    a, b = (hc.simulate(cut(hc.Interface(passivity=x, **parts), **kw)) for x in (False, True))
+    a, b = (hc.simulate(cut(hc.Hardware(passivity=x, **parts), **kw)) for x in (False, True))
     np.testing.assert_array_equal(a.p, b.p)
     assert b.energy["passivity_controller"] == 0.0
 
@@ -514,8 +522,8 @@ def test_the_controller_leaves_passive_clay_alone(parts):
 @pytest.mark.parametrize("parts", [dict(encoder=65536), dict(velocity="difference")])
 def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exact(parts):
     """On the idle axis, whose velocity passes zero: some 1e-7 J and 1e-6 m, of 5 N and 20 cm."""
-    kw = dict(shaping=True, force=(5.0, 0.0))
-    a, b = (hc.simulate(cut(hc.Interface(passivity=x, **parts), **kw)) for x in (False, True))
+    kw = dict(inertia_shaping=True, force=(5.0, 0.0))
+    a, b = (hc.simulate(cut(hc.Hardware(passivity=x, **parts), **kw)) for x in (False, True))
     n = min(len(a.p), len(b.p))
     assert 0.0 < np.abs(a.p[:n] - b.p[:n]).max() < 1e-5
     assert 0.0 < b.energy["passivity_controller"] < 1e-6
@@ -545,10 +553,10 @@ def test_in_steady_motion_a_coupling_renders_the_clay_itself():
 
 def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
     kw = dict(b=1e8, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.4)
-    r = hc.simulate(cut(hc.Interface(coupling=hc.Coupling(3000.0, 300.0)), **kw))
+    r = hc.simulate(cut(hc.Hardware(coupling=hc.Coupling(3000.0, 300.0)), **kw))
     assert r.outcome.code == "time limit" and np.abs(r.v).max() < 5e-3
     assert r.energy["coupling"] > 0.0 and abs(r.energy["residual"]) < 1e-11 * r.energy["throughput"]
-    assert hc.simulate(cut(hc.Interface(), **kw)).outcome.code == "limit cycle"
+    assert hc.simulate(cut(hc.Hardware(), **kw)).outcome.code == "limit cycle"
 
 
 # ---- all of it -----------------------------------------------------------------------------------
@@ -556,10 +564,10 @@ def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
 
 
 def test_the_constant_cut_runs_through_an_encoder_converters_delay_and_hold():
-    parts = hc.Interface(
-        encoder=65536, velocity="difference", window=16, adc_bits=12, dac_bits=12, delay=TS
+    parts = hc.Hardware(
+        encoder=65536, velocity="difference", velocity_window=16, adc_bits=12, dac_bits=12, delay=TS
     )
-    r = hc.simulate(cut(parts, shaping=True, force=(4.0, 0.0)))
+    r = hc.simulate(cut(parts, inertia_shaping=True, force=(4.0, 0.0)))
     assert r.outcome.code == "finished"
     inside = (r.p[:, 0] > 0.08) & (r.p[:, 0] < 0.14)
     v, fe = r.v[inside, 0].mean(), r.fe[inside, 0].mean()

@@ -12,7 +12,7 @@ from benchmarks import hits, reference
 from hapticclay.model.clay import Clay, Profile, slab
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.model.scenario import Scenario
+from hapticclay.scene.scenario import Scenario
 from tests.oracles import bounces, store
 
 REBOUND = Scenario(
@@ -21,7 +21,7 @@ REBOUND = Scenario(
     velocity=(0.3, 0.0),
     start=(0.03, 0.0),
     length=None,
-    shaping=True,
+    inertia_shaping=True,
     t_max=0.6,
 )
 
@@ -99,12 +99,12 @@ def test_any_hit_is_within_second_order_of_the_exact_solution(power, v, hand, y,
         velocity=put(v),
         start=put(0.05 - 0.05 * v),
         gain=(1.0, 0.3),
-        shaping=True,
+        inertia_shaping=True,
         torque_limit=hits.STRONG,
         length=None,
         t_max=0.4,
         dt=dt,
-        stop=False,
+        stop_when_unstable=False,
         origin=(0.35, 0.19) if y else hits.NOMINAL_BORDER,
     )
     exact, _ = bounces(
@@ -161,7 +161,7 @@ def test_sampled_control_measures_the_speed_in_stiff_clay(b):
         velocity=(0.0, 0.0),
         t_max=0.1,
         control="sampled",
-        render="implicit",
+        render="physical",
     )
     r = hc.simulate(s)
     x = store.solution(f"sampled-stiff-{b:g}", reference.solve, s, r.t[:-1])

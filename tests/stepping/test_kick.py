@@ -45,7 +45,7 @@ def cut(**parts):
 
 CASES = {
     "plain": hc.constant_cut(t_max=1.0),
-    "shaped": hc.constant_cut(t_max=1.0, shaping=True, force=(1.0, 0.3)),
+    "shaped": hc.constant_cut(t_max=1.0, inertia_shaping=True, force=(1.0, 0.3)),
     "hand": hc.constant_cut(t_max=1.0, operator=hc.Operator(), force=(2.0, 0.0)),
     "stiff": hc.constant_cut(t_max=1.0, b=1e6),
     "heavy hand": dataclasses.replace(
@@ -55,7 +55,7 @@ CASES = {
     "free": hc.free(t_max=1.0),
     "other": cut(force=(1.0, 0.3), **OTHER),
     "two hands": cut(operator=HANDS, force=(2.0, 0.3), **OTHER),
-    "hand on y": cut(operator=(None, HANDS[1]), shaping=True, **OTHER),
+    "hand on y": cut(operator=(None, HANDS[1]), inertia_shaping=True, **OTHER),
     "formed": cut(compensator=ZEROS, force=(1.0, 0.3)),
     "all": cut(compensator=ZEROS, operator=HANDS, **OTHER),
 }
@@ -89,7 +89,11 @@ def kick_by_laws(run, state, before, after):
     (w1, w2), (g1, g2) = state.body.w, state.body.g
     v = arm.handle_velocity(w1, w1 + w2, u)
     c = arm.centripetal(w1 + 0.5 * before * g1, w1 + w2 + 0.5 * before * g2, u)
-    W = [s.servo[0].S.gain, 0.0, s.servo[1].S.gain] if s.shaping else [*arm.mobility(u, links)]
+    W = (
+        [s.servo[0].S.gain, 0.0, s.servo[1].S.gain]
+        if s.inertia_shaping
+        else [*arm.mobility(u, links)]
+    )
     b = run.b()
     trace = s.arm.l1**2 / s.arm.I1 + s.arm.l2**2 / s.arm.I2
     Wmost = trace / (1.0 + min(th.mass for th in hands) * trace)
@@ -200,7 +204,7 @@ def test_engine_does_what_the_kick_foretold(name, monkeypatch):
 @pytest.mark.parametrize("name", CASES)
 def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
     gliding = hc.simulate(CASES[name], engine="python")
-    monkeypatch.setattr(path, "glide", lambda parts, s, e, room: s)
+    monkeypatch.setattr(path, "run_whole_steps", lambda parts, s, e, room: s)
     careful = hc.simulate(CASES[name], engine="python")
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(gliding, field), getattr(careful, field), field)

@@ -33,13 +33,13 @@ def check_finite(r):
     assert len({len(getattr(r, name)) for name in ARRAYS}) == 1
 
 
-@pytest.mark.parametrize("shaping", [False, True])
+@pytest.mark.parametrize("inertia_shaping", [False, True])
 @pytest.mark.parametrize("impedance", [False, True])
-def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
+def test_unit_gain_on_y_is_unstable_and_says_so(inertia_shaping, impedance):
     r = hc.simulate(
         hc.constant_cut(
             gain=(1.0, 1.0),
-            shaping=shaping,
+            inertia_shaping=inertia_shaping,
             operator=hc.Operator() if impedance else None,
             force=(2.0, 0.1),
         )
@@ -49,7 +49,7 @@ def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
     assert f"{r.outcome.time:.4f}" in r.status
     assert 0.6 < r.outcome.time < 5.0 and r.t[-1] == pytest.approx(r.outcome.time, abs=1e-9)
     assert "gain[y]" in r.outcome.advice
-    limit = hc.gain_limit("y", 90.0, hc.Operator() if impedance else None)
+    limit = hc.theory.gain_limit("y", 90.0, hc.Operator() if impedance else None)
     assert f"{limit:.4g}" in r.outcome.advice
     assert r.summary()["outcome"]["advice"] == r.outcome.advice
     check_finite(r)
@@ -63,9 +63,9 @@ def test_unit_gain_on_y_is_unstable_and_says_so(shaping, impedance):
 def test_growth_rate_is_that_of_the_unstable_poles():
     """Small swings of y under shaping grow as exp(sigma t), sigma from the closed-loop poles."""
     r = hc.simulate(
-        hc.constant_cut(gain=(1.0, 1.0), shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0))
+        hc.constant_cut(gain=(1.0, 1.0), inertia_shaping=True, force=(1.0, 1e-4), start=(0.06, 0.0))
     )
-    sigma = hc.closed_loop_poles("y", 1.0, 90.0).real.max()
+    sigma = hc.theory.closed_loop_poles("y", 1.0, 90.0).real.max()
     v = r.v[:, 1]
     k = np.flatnonzero((v[1:-1] - v[:-2]) * (v[2:] - v[1:-1]) < 0) + 1
     k = k[len(k) // 2 :]
@@ -144,7 +144,7 @@ def test_a_beat_between_the_axes_is_no_instability():
     "kw",
     [
         dict(),
-        dict(shaping=True),
+        dict(inertia_shaping=True),
         dict(operator=hc.Operator(), force=(2.0, 0.0)),
         dict(gain=(2.5, 0.5)),
         dict(gain=(1.0, 0.7)),
@@ -214,7 +214,10 @@ def test_how_a_stable_run_ends(kw, code, word):
 
 
 @pytest.mark.parametrize("clay,advice", [
-    (hc.slab(hc.material("stiff clay"), 0.05, 0.15), "above the yield force, 24.75 N, or lower Fy"),
+    (
+        hc.slab(hc.materials.material("stiff clay"), 0.05, 0.15),
+        "above the yield force, 24.75 N, or lower Fy",
+    ),
     (
         hc.Clay.of_groove(hc.Groove((0.02, 0.08), (-0.02, 0.02), pressure=40e3)),
         "above the yield force, 2 N, or lower the pressure",  # of 10 x 5 mm
@@ -224,13 +227,15 @@ def test_how_a_stable_run_ends(kw, code, word):
 def test_advice_to_a_run_held_in_clay_that_yields(clay, advice):
     s = hc.constant_cut(t_max=3.0)
     if clay.groove:  # unshaped, the tool does not come to rest in 3 s
-        s = dataclasses.replace(s, gain=(1.0, 0.0), shaping=True)
+        s = dataclasses.replace(s, gain=(1.0, 0.0), inertia_shaping=True)
     r = hc.simulate(dataclasses.replace(s, clay=clay))
     assert r.outcome.code == "stalled" and advice in r.outcome.advice, r.status
 
 
 def at_nominal(**kw):
-    s = hc.constant_cut(b=100.0, shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=6.0)
+    s = hc.constant_cut(
+        b=100.0, inertia_shaping=True, operator=hc.Operator(), force=(0.0, 0.0), t_max=6.0
+    )
     clay = hc.Clay(hc.Profile((), (100.0,)), hc.Profile((), (100.0,)))
     muscle = hc.Multisine(rms=(1.0, 0.0), low=0.1, high=1.0, period=10.0)
     return dataclasses.replace(s, clay=clay, muscle=muscle, length=None, origin=(0.35, 0.24), **kw)
@@ -240,7 +245,7 @@ def at_nominal(**kw):
     "K,code", [(2.0, "time limit"), (3.0, "time limit"), (25.0, "limit cycle")]
 )
 def test_an_unstable_run_may_go_on_against_the_torque_limits(K, code):
-    r = hc.simulate(at_nominal(gain=(K, 0.3), stop=False))
+    r = hc.simulate(at_nominal(gain=(K, 0.3), stop_when_unstable=False))
     assert r.outcome.code == code, r.status
     assert r.t[-1] == pytest.approx(6.0) and np.max(np.abs(r.tau)) <= 40.0
     if code == "limit cycle":
@@ -297,16 +302,16 @@ def test_a_command_may_beat_as_it_likes():
 def test_gain_limits_are_worked_out_once_a_clay(monkeypatch):
     """However far and however long an axis swings: each costs a root finding."""
     asked = []
-    exact = monitor.gain_limit.continuous_limit
+    exact = monitor.gain_limits.continuous_limit
     monkeypatch.setattr(
-        monitor.gain_limit, "continuous_limit", lambda *a: asked.append(a[1:]) or exact(*a)
+        monitor.gain_limits, "continuous_limit", lambda *a: asked.append(a[1:]) or exact(*a)
     )
     edges = tuple(np.linspace(-0.08, 0.08, 200).tolist())
     b = tuple(np.linspace(20.0, 3000.0, 201).tolist())
     clay = hc.Clay(hc.Profile(edges, b), hc.Profile(edges, b, "y"))
     s = hc.constant_cut(gain=(0.4, 0.4), t_max=10.0)
     push = hc.Multisine((2.0, 2.0), 0.5, 40.0, 1.0)
-    s = dataclasses.replace(s, clay=clay, stop=False, length=None, muscle=push)
+    s = dataclasses.replace(s, clay=clay, stop_when_unstable=False, length=None, muscle=push)
     watch = monitor.StabilityMonitor(s)
     t = np.arange(64) * s.dt
     for k in range(100):  # swings that grow, over ever more of the clay

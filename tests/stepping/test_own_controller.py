@@ -30,22 +30,24 @@ def same(a, b, names=ARRAYS):
     "kw",
     [
         {},
-        dict(operator=hc.Operator()),
         dict(Ts=1.44e-3, force=(1.0, 0.3)),
         dict(torque_limit=(0.05, 0.05)),
-        dict(interface=hc.Interface(delay=5e-4, jitter=1e-5, lost=0.1, dac_bits=12)),
+        dict(
+            hardware=hc.Hardware(delay=5e-4, jitter=1e-5, dropout_probability=0.1, dac_bits=12),
+            operator=hc.Operator(),
+        ),
     ],
-    ids=["ideal", "hand", "slow", "limits", "hardware"],
+    ids=["ideal", "slow", "limits", "hardware, hand"],
 )
 def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine):
-    if kw.get("interface"):  # a lost sample holds the torque, but the compensator goes on
-        kw = {"interface": replace(kw["interface"], lost=0.0)}
+    if kw.get("hardware"):  # a lost sample holds the torque, but the compensator goes on
+        kw = {"hardware": replace(kw["hardware"], dropout_probability=0.0)}
     s = replace(CUT, **kw)
     params = [0.01, 0.02, 90.0, *paper_law.memory(s.gain, s.Ts or s.dt)]
     own = replace(s, controller=hc.Controller(paper_law.paper, [0.0] * 8, params))
     built_in, mine = hc.simulate(s, engine=engine), hc.simulate(own, engine=engine)
-    # where an interface is given, fe of the built-in one is what the motors hold
-    names = set(ARRAYS) - ({"fe"} if s.interface else set())
+    # where hardware is given, fe of the built-in one is what the motors hold
+    names = set(ARRAYS) - ({"fe"} if s.hardware else set())
     assert not same(built_in, mine, names)
     assert str(built_in.outcome) == str(mine.outcome) and built_in.crossings == mine.crossings
     assert not mine.delta.any()  # there is no compensator
@@ -61,7 +63,7 @@ def to_pose(t, q, qd, fh, state, params):
 
 POSE = hc.Scenario(
     control="sampled",
-    render="implicit",
+    render="physical",
     clay=hc.constant_cut(b=30.0).clay,
     controller=hc.Controller(to_pose, (0.0, 0.0), (20.0, 2.0, 0.01)),
     start=(0.05, 0.02),
@@ -219,8 +221,8 @@ def burst(t, q, qd, fh, state, params):
         (lambda: hc.Controller(to_pose, state=("a",)), "controller.state[0]"),
         (lambda: hc.Controller(to_pose, params=(math.nan,)), "controller.params[0]"),
         (lambda: replace(POSE, control="continuous", Ts=None, render="held"), "control"),
-        (lambda: replace(POSE, render="held", interface=hc.Interface(passivity=True)), "interface"),
-        (lambda: replace(POSE, shaping=True), "shaping"),
+        (lambda: replace(POSE, render="held", hardware=hc.Hardware(passivity=True)), "hardware"),
+        (lambda: replace(POSE, inertia_shaping=True), "inertia_shaping"),
         (lambda: hc.Scenario(controller=to_pose), "controller"),
     ],
 )
@@ -282,7 +284,9 @@ def idle(t, q, qd, fh, state, params):
 
 @pytest.mark.parametrize("when", [0.0, 0.05])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, GeneratorExit])
-@pytest.mark.parametrize("parts", [None, hc.Interface(delay=2e-3, lost=0.2)], ids=["bare", "late"])
+@pytest.mark.parametrize(
+    "parts", [None, hc.Hardware(delay=2e-3, dropout_probability=0.2)], ids=["bare", "late"]
+)
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_what_a_law_raises_ends_the_run_and_is_raised(engine, parts, error, when):
     asked, raised = [], error("as asked")
@@ -293,7 +297,7 @@ def test_what_a_law_raises_ends_the_run_and_is_raised(engine, parts, error, when
             raise raised
         return (0.0, 0.0), state
 
-    s = replace(POSE, controller=hc.Controller(law), interface=parts, t_max=0.2)
+    s = replace(POSE, controller=hc.Controller(law), hardware=parts, t_max=0.2)
     with pytest.raises(error) as e:
         hc.simulate(s, engine=engine)
     assert e.value is raised
@@ -320,11 +324,11 @@ def test_ctrl_c_at_any_moment_of_a_law_ends_the_run():
     asked = []
 
     class Signalled(LawCaller):
-        def __call__(self, desk=None):
+        def __call__(self, buffer=None):
             asked.append(1)
             if len(asked) == 3:
                 raise KeyboardInterrupt
-            super().__call__(desk)
+            super().__call__(buffer)
 
     s = replace(POSE, controller=hc.Controller(counting()), t_max=0.2)
     with pytest.MonkeyPatch.context() as patch:
@@ -351,10 +355,10 @@ def nan_later(t, q, qd, fh, state, params):
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
-@pytest.mark.parametrize("parts", [None, hc.Interface(delay=2e-3)], ids=["bare", "late"])
+@pytest.mark.parametrize("parts", [None, hc.Hardware(delay=2e-3)], ids=["bare", "late"])
 def test_torques_that_are_once_not_finite_end_the_run_at_once(engine, parts):
     r = hc.simulate(
-        replace(POSE, controller=hc.Controller(nan_later), interface=parts, t_max=0.2),
+        replace(POSE, controller=hc.Controller(nan_later), hardware=parts, t_max=0.2),
         engine=engine,
     )
     assert r.outcome.code == "out of reach" and 0.1 < r.outcome.time < 0.102

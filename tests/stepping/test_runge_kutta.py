@@ -1,7 +1,6 @@
 """The accurate integrator: fourth order, by the laws of the loop, one source for both engines."""
 
 import dataclasses
-import importlib.util
 
 import mujoco
 import numpy as np
@@ -12,10 +11,9 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import arm, controller
-from hapticclay.model.clay import Clay, Profile
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping.instant import instant
-from hapticclay.stepping.run import PLAIN, Run
+from hapticclay.stepping.run import Run
 from hapticclay.stepping.state import Axis, Moment, Point
 from tests.oracles import laws, nonlinear, piecewise_linear, store
 from tests.oracles.links import Links
@@ -23,7 +21,7 @@ from tests.oracles.links import Links
 EDGES = (0.05, 0.15, 0.20)
 CASES = {
     "plain": dict(),
-    "shaped": dict(shaping=True),
+    "shaped": dict(inertia_shaping=True),
     "hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
     "off axis": dict(force=(1.0, 0.3)),
 }
@@ -35,8 +33,8 @@ def test_fourth_order_and_1e_9_s_at_2_ms(name):
     th = (0.25, 2.0, 6.0) if s.operator else None
     grid = np.arange(1, 15_000) * 4e-3  # in every dt below
     exact = store.solution(
-        f"fourth-order-{name}", nonlinear, (0, 90, 0), EDGES, s.gain, s.force, th, s.shaping, 60.0,
-        grid, 1e-13, 1e-15,
+        f"fourth-order-{name}", nonlinear, (0, 90, 0), EDGES, s.gain, s.force, th,
+        s.inertia_shaping, 60.0, grid, 1e-13, 1e-15,
     )  # fmt: skip
     steps, border, place = np.array([4e-3, 2e-3, 1e-3]), [], []
     for dt in steps:
@@ -83,9 +81,9 @@ def test_residual_of_the_energy_converges_at_fourth_order():
 
 def test_free_path_and_a_last_step_that_is_shorter():
     exact, position = piecewise_linear((0.20,), (0.0,), 1.0, 1.0)
-    r = hc.simulate(hc.free(shaping=True, integrator="accurate", dt=2e-3))
+    r = hc.simulate(hc.free(inertia_shaping=True, integrator="accurate", dt=2e-3))
     assert r.crossings[0].time == pytest.approx(exact[0], abs=1e-10)
-    r = hc.simulate(hc.free(shaping=True, integrator="accurate", dt=2e-3, t_max=0.1234567))
+    r = hc.simulate(hc.free(inertia_shaping=True, integrator="accurate", dt=2e-3, t_max=0.1234567))
     assert r.t[-1] == 0.1234567 and r.p[-1, 0] == pytest.approx(position(r.t[-1:])[0], abs=1e-10)
 
 
@@ -144,7 +142,7 @@ STAGES = CASES | {
     "weak": dict(torque_limit=(0.2, 0.1)),
     "other": OTHER,
     "two hands": dict(operator=HANDS, **OTHER),
-    "hand on y": dict(operator=(None, HANDS[1]), shaping=True, **OTHER),
+    "hand on y": dict(operator=(None, HANDS[1]), inertia_shaping=True, **OTHER),
     "formed": dict(compensator=ZEROS),
     "all": dict(compensator=ZEROS, operator=HANDS, **OTHER),
 }
@@ -176,7 +174,11 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     u = arm.jacobian(q1, q2, links)
     p = (Links(*links[:4]).forward((q1, q2)) - s.origin).tolist()
     v, c = arm.handle_velocity(w1, w1 + w2, u), arm.centripetal(w1, w1 + w2, u)
-    W = [s.servo[0].S.gain, 0.0, s.servo[1].S.gain] if s.shaping else [*arm.mobility(u, links)]
+    W = (
+        [s.servo[0].S.gain, 0.0, s.servo[1].S.gain]
+        if s.inertia_shaping
+        else [*arm.mobility(u, links)]
+    )
     fe = b * v[0], b * v[1]
     a, hand, shown, feed = [], [], [dx, dy], [0.0, 0.0]
     for i, (y, yd) in enumerate(((yx, ydx), (yy, ydy))):
@@ -203,51 +205,6 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     expected = (*p, *v, *fh, *out[6:8], *delta)
     sample = *now.p, *now.v, *now.fh, *now.tau, *now.delta
     np.testing.assert_allclose(sample, expected, rtol=1e-11, atol=1e-11)
-
-
-LAYERS = Clay(
-    Profile((0.01, 0.03), (0.0, 90.0, 30.0), "x"), Profile((0.01,), (40.0, 120.0), "y", (0.0, 9.0))
-)
-
-
-def cut(**parts):
-    return dataclasses.replace(hc.constant_cut(), **parts)
-
-
-SHAKEN = dict(operator=hc.Operator(), muscle=hc.Multisine(rms=(2.0, 0.5), high=3.0))
-ONE_SOURCE = {  # four kinds, each compiled for some 10 s
-    "stiff": hc.constant_cut(b=1e4, force=(20.0, 0.5)),
-    "layers": dataclasses.replace(hc.free(force=(1.5, 0.7)), clay=LAYERS),
-    "growing": hc.variable_cut(force=(3.0, 0.0)),
-    "weak": dataclasses.replace(hc.constant_cut(torque_limit=(0.1, 0.15)), **SHAKEN),
-    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
-    "all": cut(
-        compensator=ZEROS,
-        operator=HANDS,
-        force=(2.0, 0.3),
-        command=hc.Multisine(rms=(0.01, 0.01), high=3.0),
-        **OTHER,
-    ),
-}
-
-
-@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs hapticclay[fast]")
-@pytest.mark.parametrize("whole", [False, True], ids=["whole steps", "all steps"])
-@pytest.mark.parametrize("name", ONE_SOURCE)
-def test_all_engines_step_bit_for_bit_alike(name, whole, monkeypatch):
-    from hapticclay.stepping import compiled
-
-    if whole and name not in ("stiff", "layers", "all"):
-        return  # what surrounds whole steps is the same source for all
-    monkeypatch.setattr(compiled, "CAREFUL", -1 if whole else 10**9)
-    s = dataclasses.replace(ONE_SOURCE[name], integrator="accurate", dt=1e-3, t_max=4.0)
-    plain, other = Run(s, 3, PLAIN), Run(s, 3, compiled.KERNEL)
-    for run in (plain, other):
-        run.go(None)
-    assert other.outcome == plain.outcome and other.crossings == plain.crossings
-    assert other.steps == plain.steps and other.balance() == plain.balance()
-    for key, values in plain.arrays().items():
-        np.testing.assert_array_equal(other.arrays()[key], values, err_msg=key)
 
 
 def test_the_choice_is_checked():

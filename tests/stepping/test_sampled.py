@@ -15,9 +15,9 @@ from tests.oracles import hybrid
 
 CASES = {
     "held": dict(),
-    "implicit": dict(render="implicit"),
-    "held, shaped, off axis": dict(shaping=True, force=(1.0, 0.3)),
-    "implicit, hand": dict(render="implicit", operator=hc.Operator(), force=(2.0, 0.0)),
+    "physical": dict(render="physical"),
+    "held, shaped, off axis": dict(inertia_shaping=True, force=(1.0, 0.3)),
+    "implicit, hand": dict(render="physical", operator=hc.Operator(), force=(2.0, 0.0)),
     "held, hand": dict(operator=hc.Operator(), force=(2.0, 0.0)),
 }
 
@@ -31,7 +31,9 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     kw = dict(force=(1.5, 0.0), clay=(0.03, 0.15), t_max=0.5) | CASES[name]
     s = hc.constant_cut(control="sampled", **kw)
     th = (0.25, 2.0, 6.0) if s.operator else None
-    P, V, T = hybrid(slab, s.dt, s.gain, s.force, th, s.shaping, s.render, 0.45, (0.03, 0.15))
+    P, V, T = hybrid(
+        slab, s.dt, s.gain, s.force, th, s.inertia_shaping, s.render, 0.45, (0.03, 0.15)
+    )
     r = hc.simulate(s)
     n = len(P)
     assert r.crossings and r.crossings[0].time < 0.43
@@ -40,14 +42,14 @@ def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     np.testing.assert_allclose(r.tau[: n - 1], T[: n - 1], atol=1e-3)
 
 
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 @pytest.mark.parametrize(
     "kw",
     [
         dict(),
         dict(start=(0.06, 0.0), velocity=(0.05, -0.02)),
-        dict(shaping=True),
-        dict(interface=hc.Interface()),
+        dict(inertia_shaping=True),
+        dict(hardware=hc.Hardware()),
     ],
 )
 def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
@@ -66,7 +68,16 @@ def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
     s = dataclasses.replace(cut, **kw)
     at = dict(p0=s.start, v0=s.velocity)
     P, V, T = hybrid(
-        lambda x: 90.0, s.dt, s.gain, s.force, (0.25, 2.0, 6.0), s.shaping, render, 0.15, (), **at
+        lambda x: 90.0,
+        s.dt,
+        s.gain,
+        s.force,
+        (0.25, 2.0, 6.0),
+        s.inertia_shaping,
+        render,
+        0.15,
+        (),
+        **at,
     )
     r = hc.simulate(s)
     n = len(P)
@@ -84,9 +95,9 @@ def test_the_recorded_force_belongs_to_its_sample(operator, late):
     drive = Multisine((1.0, 0.5), low=2.0, high=8.0, period=1.0, seed=2)
     error, lead = [], []
     for Ts in (2e-3, 1e-3):
-        parts = hc.Interface(delay=late * Ts) if late else None
+        parts = hc.Hardware(delay=late * Ts) if late else None
         s = hc.constant_cut(control="sampled", dt=Ts, t_max=0.5, force=(0.0, 0.0))
-        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, interface=parts))
+        r = hc.simulate(dataclasses.replace(s, muscle=drive, operator=operator, hardware=parts))
         want = drive(r.t)[1:-1]
         if operator:
             want -= 6.0 * r.p[1:-1] + 2.0 * r.v[1:-1] + 0.25 * np.diff(r.p, 2, axis=0) / Ts**2
@@ -101,10 +112,10 @@ def test_the_recorded_force_belongs_to_its_sample(operator, late):
 def test_substeps_converge_to_the_hybrid_system_at_second_order():
     Ts = 4e-3
     kw = dict(
-        force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="implicit", Ts=Ts, t_max=0.45
+        force=(2.0, 0.0), clay=(0.03, 0.15), control="sampled", render="physical", Ts=Ts, t_max=0.45
     )
     P, *_ = hybrid(
-        slab, Ts, (1.0, 0.5), (2.0, 0.0), render="implicit", t_end=0.4, edges=(0.03, 0.15)
+        slab, Ts, (1.0, 0.5), (2.0, 0.0), render="physical", t_end=0.4, edges=(0.03, 0.15)
     )
     error = []
     for n in (1, 2, 4):
@@ -136,13 +147,13 @@ def test_sampled_tends_to_continuous_as_the_sample_shrinks():
 
 def test_rendering_a_held_force_goes_unstable_where_physical_clay_does_not():
     kw = dict(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1))
-    assert hc.simulate(hc.constant_cut(render="implicit", **kw)).outcome.code == "time limit"
+    assert hc.simulate(hc.constant_cut(render="physical", **kw)).outcome.code == "time limit"
     held = hc.simulate(hc.constant_cut(render="held", **kw))
     assert held.outcome.code == "limit cycle" and np.all(np.isfinite(held.p))
 
 
 def test_balance_closes():
-    for render in ("held", "implicit"):
+    for render in ("held", "physical"):
         e = hc.simulate(hc.constant_cut(control="sampled", render=render, t_max=1.5)).energy
         assert abs(e["residual"]) < 1e-12 * e["throughput"]
 

@@ -35,7 +35,7 @@ def test_a_wall_throws_the_slider_back(k):
         errors.append(abs(r.crossings[1].time - back))
         assert errors[-1] < math.pi / omega * (omega * h) ** 2 / 12.0 + 1e-7
         assert r.v[-1, 0] == pytest.approx(-V0, rel=1e-3)
-        assert r.energy["springs_stored"] == 0.0 and r.energy["springs_lost"] < 1e-20
+        assert r.energy["springs_stored"] == 0.0 and r.energy["springs_dissipated"] < 1e-20
         assert abs(r.energy["clay"]) < 1e-3 * M * V0**2
         assert abs(r.energy["residual"]) < 1e-14
     if k == 1e3:
@@ -46,11 +46,11 @@ def test_a_dent_stays():
     # the spring takes Fp^2/(2 k), what is left of the energy makes the dent
     k, Fp = 2000.0, 3.0
     dent = (0.5 * M * V0**2 - Fp**2 / (2.0 * k)) / Fp
-    s = slider(wall(hc.Spring(k=k, limit=Fp, surface=True)), 1e-4, 0.4)
+    s = slider(wall(hc.Spring(k=k, limit=Fp, unilateral=True)), 1e-4, 0.4)
     r = hc.simulate(s)
     assert r.p[:, 0].max() == pytest.approx(0.03 + dent + Fp / k, abs=1e-7)
     assert r.v[-1, 0] == pytest.approx(-Fp / math.sqrt(k * M), rel=1e-5)
-    assert r.energy["springs_lost"] == pytest.approx(Fp * dent, rel=1e-4)
+    assert r.energy["springs_dissipated"] == pytest.approx(Fp * dent, rel=1e-4)
     # the handle leaves the ground of the dent, not the border, and touches nothing on its way
     out = (r.v[:, 0] < 0.0) & (r.p[:, 0] > 0.03) & (r.p[:, 0] < 0.03 + 0.9 * dent)
     assert out.any() and not r.fe[out].any()
@@ -62,8 +62,8 @@ def test_a_second_push_meets_the_wall_in_its_dent():
     t = (0.0, 0.05, 0.06, 0.35, 0.36, 0.7, 0.71, 2.5)
     push = hc.Samples(t, tuple((f, 0.0) for f in (0.0, 0.0, 6.0, 6.0, -3.0, -3.0, 1.0, 1.0)))
     s = dataclasses.replace(
-        hc.free(), clay=wall(hc.Spring(k=k, limit=Fp, surface=True), edges=(0.01,)),
-        force=(0.0, 0.0), muscle=push, t_max=2.5, length=None, stop=False,
+        hc.free(), clay=wall(hc.Spring(k=k, limit=Fp, unilateral=True), edges=(0.01,)),
+        force=(0.0, 0.0), muscle=push, t_max=2.5, length=None, stop_when_unstable=False,
     )  # fmt: skip
     r = hc.simulate(s)
     deepest = r.p[r.t < 1.0, 0].max()
@@ -81,7 +81,7 @@ def test_a_spring_that_sticks_to_the_tool_loses_a_loop_each_cycle():
     push = hc.Multisine((10.0, 0.0), 0.9, 1.1, 1.0, lines=1)
     s = dataclasses.replace(
         hc.free(), clay=hc.Clay(law, hc.Profile((), (0.0,))), force=(0.0, 0.0), gain=(0.3, 0.1),
-        muscle=push, t_max=8.0, length=None, stop=False, start=(0.1, 0.0), dt=1e-3,
+        muscle=push, t_max=8.0, length=None, stop_when_unstable=False, start=(0.1, 0.0), dt=1e-3,
     )  # fmt: skip
     r = hc.simulate(s)
     last = r.t > 7.0
@@ -89,7 +89,7 @@ def test_a_spring_that_sticks_to_the_tool_loses_a_loop_each_cycle():
     swing = 0.5 * np.ptp(r.p[last, 0])
     assert area == pytest.approx(4.0 * Fp * (swing - Fp / k), rel=4e-3)  # corners between samples
     assert r.energy["clay"] == pytest.approx(
-        r.energy["springs_lost"] + r.energy["springs_stored"], rel=1e-4
+        r.energy["springs_dissipated"] + r.energy["springs_stored"], rel=1e-4
     )
 
 
@@ -98,28 +98,27 @@ def test_a_zener_wall_relaxes_to_its_lasting_spring():
     k, k1, tau, F = 1000.0, 4000.0, 0.2, 2.0
     s = dataclasses.replace(
         hc.free(), clay=wall(hc.Spring(k=k, k1=k1, tau=tau), b=200.0, edges=(0.005,)),
-        force=(F, 0.0), t_max=12.0, length=None, gain=(0.2, 0.2), stop=False,
+        force=(F, 0.0), t_max=12.0, length=None, gain=(0.2, 0.2), stop_when_unstable=False,
     )  # fmt: skip
     r = hc.simulate(s)
     # delta comes to rest where the clay bears all of the push
     assert r.p[-1, 0] - 0.005 == pytest.approx(F / k, rel=1e-3)
     assert r.fe[-1, 0] == pytest.approx(F, rel=1e-3)
-    assert r.energy["springs_lost"] > 0.0
+    assert r.energy["springs_dissipated"] > 0.0
 
 
 @pytest.mark.plain
-def test_python_compiled_batch_steps_and_files_agree(tmp_path):
-    spring = hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, surface=True)
+def test_steps_and_files_agree_with_the_run(tmp_path):
+    spring = hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, unilateral=True)
     s = dataclasses.replace(
         hc.free(), clay=wall(spring, b=20.0, edges=(0.01, 0.012), Fy=(0.0, 0.5, 0.2)),
-        force=(4.0, 1.0), t_max=0.25, length=None, stop=False, operator=hc.Operator(),
+        force=(4.0, 1.0), t_max=0.25, length=None, stop_when_unstable=False, operator=hc.Operator(),
     )  # fmt: skip
-    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
-    (c,) = hc.simulate_batch([s])
+    a = hc.simulate(s, engine="python")
     with hc.Simulation(s) as sim:
         while sim.outcome is None:
             sim.step()
-    for r in (b, c, sim.record(), hc.Record.load(a.save(tmp_path))):
+    for r in (sim.record(), hc.Record.load(a.save(tmp_path))):
         for name in ("t", "p", "v", "fh", "fe", "q", "qd", "tau", "delta"):
             assert np.array_equal(getattr(a, name), getattr(r, name)), name
         assert r.energy == a.energy
@@ -127,13 +126,14 @@ def test_python_compiled_batch_steps_and_files_agree(tmp_path):
 
 
 @pytest.mark.plain
-@pytest.mark.parametrize("render", ["implicit", "held"])
+@pytest.mark.parametrize("render", ["physical", "held"])
 def test_sampled_control_meets_the_same_springs(render):
     clay = wall(
         hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1), b=20.0, edges=(0.01,), Fy=(0.0, 0.3)
     )
     s = dataclasses.replace(
-        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.3, length=None, stop=False, dt=2e-5,
+        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.3, length=None, stop_when_unstable=False,
+        dt=2e-5,
     )  # fmt: skip
     exact = hc.simulate(s)
     gaps = []
@@ -141,13 +141,11 @@ def test_sampled_control_meets_the_same_springs(render):
         late = dataclasses.replace(s, control="sampled", render=render, Ts=Ts)
         r = hc.simulate(late)
         gaps.append(np.abs(r.p[-1] - exact.p[-1]).max())
-        assert r.energy["springs_lost"] == pytest.approx(exact.energy["springs_lost"], rel=0.02)
+        assert r.energy["springs_dissipated"] == pytest.approx(
+            exact.energy["springs_dissipated"], rel=0.02
+        )
     # what a hold of half a sample does falls with the sample
     assert gaps[1] < 0.7 * gaps[0] < 1e-4
-    short = dataclasses.replace(late, t_max=0.05, start=(0.009, 0.0))
-    a, b = (hc.simulate(short, engine=e) for e in ("python", "native"))
-    for name in ("t", "p", "v", "fh", "fe", "tau"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
 
 
 def test_springs_are_refused_where_no_law_of_them_is_known():
@@ -164,12 +162,11 @@ def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
     k, counts = 800.0, 4096
     clay = wall(hc.Spring(k=k), edges=(0.0,))
     s = dataclasses.replace(
-        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.06, length=None, stop=False, dt=1e-4,
-        Ts=5e-4, control="sampled", render="held", interface=hc.Interface(encoder=counts),
+        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.06, length=None,
+        stop_when_unstable=False, dt=1e-4,
+        Ts=5e-4, control="sampled", render="held", hardware=hc.Hardware(encoder=counts),
     )  # fmt: skip
-    a, b = (hc.simulate(s, engine=e) for e in ("python", "native"))
-    for name in ("t", "p", "v", "fh", "fe", "tau"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+    a = hc.simulate(s, engine="python")
     step = 2.0 * math.pi / counts
     q = step * np.round(a.q[:-1:5] / step)
     l1, l2 = s.arm.l1, s.arm.l2
@@ -182,14 +179,14 @@ def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
 @pytest.mark.plain
 def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
     # far finer than the motion: the same run as without one, to what a count does to the force
-    spring = hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1, surface=True)
+    spring = hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1, unilateral=True)
     s = dataclasses.replace(
         hc.free(), clay=wall(spring, b=20.0, edges=(0.01,)), force=(4.0, 0.0), t_max=0.3,
-        length=None, stop=False, dt=1e-4, Ts=5e-4, control="sampled", render="held",
+        length=None, stop_when_unstable=False, dt=1e-4, Ts=5e-4, control="sampled", render="held",
     )  # fmt: skip
     exact = hc.simulate(s)
-    fine = hc.simulate(dataclasses.replace(s, interface=hc.Interface(encoder=2**36)))
-    assert exact.energy["springs_lost"] > 0.0
+    fine = hc.simulate(dataclasses.replace(s, hardware=hc.Hardware(encoder=2**36)))
+    assert exact.energy["springs_dissipated"] > 0.0
     # 2 pi/2^36 of 0.25 m is 2e-11 m, times 2.5 kN/m 6e-8 N
     assert np.abs(fine.fe - exact.fe).max() < 1e-5
     assert np.abs(fine.p - exact.p).max() < 1e-8
@@ -198,8 +195,8 @@ def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
 def bonded(k, b, **changes):
     """Clay of one region that springs back along x from the start, under a push that sets in."""
     law = hc.Profile((), (b,), springs=(hc.Spring(k=k),))
-    own = dict(clay=hc.Clay(law, hc.Profile((), (0.0,))), shaping=True, force=(2.0, 0.0))
-    own |= dict(length=None, stop=False, torque_limit=(1e5, 1e5), t_max=0.05)
+    own = dict(clay=hc.Clay(law, hc.Profile((), (0.0,))), inertia_shaping=True, force=(2.0, 0.0))
+    own |= dict(length=None, stop_when_unstable=False, torque_limit=(1e5, 1e5), t_max=0.05)
     return dataclasses.replace(hc.free(), **(own | changes))
 
 
@@ -221,7 +218,7 @@ LIGHT = (hc.Servo(X.G, dataclasses.replace(X.S, gain=100.0)), Y)
 def test_a_step_resolves_a_spring_in_the_loop_that_it_closes(k, b, changes):
     """Mobility of a light handle, and of a force that the compensator passes on at once."""
     s = bonded(k, b, **changes)
-    loop = dataclasses.replace(hc.Loop.of(s, "x", b), k=k)
+    loop = dataclasses.replace(hc.theory.Loop.of(s, "x", b), k=k)
     A, B = linear_loop.state_space(loop)
     r = hc.simulate(s)
     assert r.outcome.code in ("time limit", "stalled")
@@ -242,10 +239,10 @@ def test_a_spring_too_fast_for_any_step_is_refused():
 
 @pytest.mark.parametrize("k1", [0.0, 500.0])
 def test_a_start_inside_a_wall_has_no_energy(k1):
-    spring = hc.Spring(k=1e4, k1=k1, surface=True)
+    spring = hc.Spring(k=1e4, k1=k1, unilateral=True)
     s = dataclasses.replace(
         hc.free(), clay=wall(spring, edges=(0.0,)), start=(0.03, 0.0), length=None,
-        force=(0.0, 0.0), t_max=0.05, stop=False,
+        force=(0.0, 0.0), t_max=0.05, stop_when_unstable=False,
     )  # fmt: skip
     r = hc.simulate(s)
     assert not r.fe.any() and np.abs(r.p[:, 0] - 0.03).max() < 1e-12
@@ -264,7 +261,7 @@ def test_a_start_inside_a_wall_has_no_energy(k1):
 
 def test_a_wall_reached_from_its_side_has_no_energy():
     # a slider comes into a block that is a wall along x from below, 2 cm behind its front
-    springs = hc.Spring(), hc.Spring(k=1e4, surface=True)
+    springs = hc.Spring(), hc.Spring(k=1e4, unilateral=True)
     law = hc.Profile((0.01,), (0.0, 0.0), "y", springs=springs)
     s = slider(hc.Clay(law, hc.Profile((), (0.0,))), 1e-3, 0.2, v=(0.0, 0.2))
     r = hc.simulate(s)

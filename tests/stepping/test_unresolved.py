@@ -12,13 +12,13 @@ AFTER = hc.Pulse((8.0, 0.0), 0.0, 0.3, 0.6)
 NONE = hc.Profile((), (0.0,))
 GROWING = hc.Scenario(
     clay=hc.Clay(hc.Profile((), (50.0,), growth=(6e4,)), NONE),
-    gain=(1.0, 0.1), force=(3.0, 0.0), shaping=True, t_max=0.3, integrator="accurate",
+    gain=(1.0, 0.1), force=(3.0, 0.0), inertia_shaping=True, t_max=0.3, integrator="accurate",
 )  # fmt: skip
 SCENES = {
     # it leaves clay that yields along the motion, and comes back
     "left": hc.Scenario(
         clay=hc.slab(hc.Flow(Fy=1.0, b=5.0), 0.02, 0.1), gain=(0.5, 0.0), force=(-4.0, 0.0),
-        muscle=AFTER, t_max=1.5, dt=2e-3, shaping=True, integrator="accurate",
+        muscle=AFTER, t_max=1.5, dt=2e-3, inertia_shaping=True, integrator="accurate",
     ),
     # it slides along a border
     "border": hc.Scenario(
@@ -33,13 +33,13 @@ SCENES = {
             hc.Profile((), (46.4,), Fy=(9.92,)), hc.Profile((), (31.6,), Fy=(0.231,)), angle=1.19
         ),
         force=(-12.9, -4.06), gain=(0.436, 0.0865), torque_limit=(0.11, 2.38), dt=6.36e-4,
-        t_max=0.2, shaping=True, integrator="accurate", length=None,
+        t_max=0.2, inertia_shaping=True, integrator="accurate", length=None,
     ),
     # a jump of the push falls into a step as short as the slack of its time
     "jump": hc.Scenario(
         clay=hc.slab(hc.Flow(Fy=3.1, b=5.4)), gain=(0.77, 0.29), force=(5.8, -1.9),
         muscle=hc.Pulse((-11.0, 3.0), 0.0, 0.1, 0.2), t_max=0.15,
-        dt=4.64e-4, shaping=True, integrator="accurate",
+        dt=4.64e-4, inertia_shaping=True, integrator="accurate",
     ),
 }  # fmt: skip
 

@@ -33,9 +33,11 @@ def slider(clay, dt, t_max, v=(V0, 0.0), **changes):
     """
     free = hc.free()
     servo = tuple(hc.Servo(x.G, hc.SecondOrder(1.0 / M, 1e-9, 1e-9)) for x in free.servo)
-    own = dict(clay=clay, gain=(0.0, 0.0), shaping=True, servo=servo, force=(0.0, 0.0), dt=dt)
+    own = dict(
+        clay=clay, gain=(0.0, 0.0), inertia_shaping=True, servo=servo, force=(0.0, 0.0), dt=dt
+    )
     own |= dict(velocity=v, start=(0.02, 0.0), compensator=hc.Compensator((1.0,), (1.0, 0.0, 0.0)))
-    own |= dict(t_max=t_max, length=None, torque_limit=(1e5, 1e5), stop=False)
+    own |= dict(t_max=t_max, length=None, torque_limit=(1e5, 1e5), stop_when_unstable=False)
     return dataclasses.replace(free, **(own | changes))
 
 
@@ -150,7 +152,8 @@ def test_no_chatter_at_any_step_and_yield_force(dt, Fy):
     s = dataclasses.replace(
         hc.free(), clay=hc.slab(hc.Flow(Fy=Fy, b=max(300.0, 100.0 * Fy))), dt=dt,
         force=(0.0, 0.0), muscle=push,
-        t_max=10.0 * period, length=None, stop=False, torque_limit=(1e6, 1e6), gain=(0.05, 0.05),
+        t_max=10.0 * period, length=None, stop_when_unstable=False, torque_limit=(1e6, 1e6),
+        gain=(0.05, 0.05),
     )  # fmt: skip
     r = hc.simulate(s)
     turns = np.count_nonzero(np.diff(np.sign(r.v[r.v[:, 0] != 0.0, 0])))
@@ -187,14 +190,14 @@ def scenes(draw):
         velocity=tuple(rng.normal(size=2) * rng.choice([0.0, 0.1])),
         gain=tuple(rng.uniform(0.01, 1.0, 2)),
         operator=hc.Operator() if rng.integers(2) else None,
-        shaping=bool(rng.integers(2)),
+        inertia_shaping=bool(rng.integers(2)),
         muscle=hc.Multisine(
             tuple(rng.uniform(0.0, 20.0, 2)), 0.5, min(20.0, 0.4 / dt), 2.0, lines=8, seed=1
         ),
         dt=dt,
         t_max=300.0 * dt,
         length=None,
-        stop=False,
+        stop_when_unstable=False,
     )
 
 
@@ -214,19 +217,6 @@ def test_clay_takes_energy_whatever_moves_in_it(scene):
     assert r.energy["clay"] >= -len(r.t) * bend * np.abs(r.fe).max() - 1e-9 * through
     if scene.operator is None:  # with a hand the spring's mean over three samples leaves dt^2
         assert abs(r.energy["residual"]) <= 1e-10 * through + 1e-12
-
-
-@pytest.mark.plain
-@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(scene=scenes())
-def test_python_compiled_and_batch_give_the_same_bits(scene):
-    runs = [hc.simulate(scene, engine=e) for e in ("python", "native")]
-    runs += hc.simulate_batch([scene])
-    for name in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
-        a, *others = (getattr(r, name) for r in runs)
-        assert all(np.array_equal(a, x) for x in others), name
-    assert runs[0].energy == runs[1].energy == runs[2].energy
-    assert runs[0].stops == runs[1].stops == runs[2].stops
 
 
 def test_step_by_step_it_is_the_same_run_and_a_file_keeps_it(tmp_path):
@@ -255,13 +245,14 @@ def test_in_steady_motion_the_clay_and_the_compensator_share_the_push():
 
 
 @pytest.mark.parametrize("isotropic", [False, True])
-def test_turned_clay_is_felt_along_its_own_axes(isotropic):
+def test_rotated_axes_is_felt_along_its_own_axes(isotropic):
     # beside the accurate method, which errs by 1e-9: second order, in velocity as in place
     hard = hc.Profile((), (30.0,), Fy=(2.0,))
     soft = hard if isotropic else hc.Profile((), (10.0,), Fy=(1.0,))
     s = dataclasses.replace(
         hc.free(), clay=hc.Clay(hard, soft, angle=0.7, isotropic=isotropic), force=(6.0, 2.0),
-        muscle=hc.Multisine((3.0, 3.0), 0.5, 6.0, 2.0, lines=6), t_max=0.5, length=None, stop=False,
+        muscle=hc.Multisine((3.0, 3.0), 0.5, 6.0, 2.0, lines=6), t_max=0.5, length=None,
+        stop_when_unstable=False,
     )  # fmt: skip
     for dt in (1e-3, 2.5e-4):
         fast = dataclasses.replace(s, dt=dt)
@@ -287,8 +278,8 @@ def test_stiff_clay_with_a_consistency_creeps_evenly(law, push, isotropic):
     for dt in (1e-2, 3.6e-4):
         s = dataclasses.replace(
             hc.free(), clay=hc.Clay(profile, profile, isotropic=isotropic), force=(push, 0.0),
-            gain=(0.3, 0.1), shaping=True, dt=dt, t_max=1.5, length=None, stop=False,
-            torque_limit=(1e5, 1e5),
+            gain=(0.3, 0.1), inertia_shaping=True, dt=dt, t_max=1.5, length=None,
+            stop_when_unstable=False, torque_limit=(1e5, 1e5),
         )  # fmt: skip
         r = hc.simulate(s)
         # delta' settles as exp(-10 t); the last step is a short one, and divides v of both steps

@@ -11,7 +11,7 @@ from hapticclay.studies import accuracy
 from hapticclay.views import study_plots
 from tests.oracles import piecewise_linear
 
-SHAPED = hc.constant_cut(b=90.0, clay=(0.01, 0.02), length=0.03, shaping=True)
+SHAPED = hc.constant_cut(b=90.0, clay=(0.01, 0.02), length=0.03, inertia_shaping=True)
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,8 @@ from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
-from hapticclay.studies import boundary, stability_map
-from hapticclay.theory import gain_limit
+from hapticclay.studies import boundary, growth, stability_map
+from hapticclay.theory import gain_crossings
 from hapticclay.views import study_plots
 from tests.oracles import Linear
 
@@ -43,7 +43,7 @@ def test_growth_is_that_of_the_least_damped_mode(sigma, omega, fast, phase):
     rec = SimpleNamespace(
         t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
     )
-    assert boundary.growth_rate(rec, "x") == pytest.approx(
+    assert growth.growth_rate(rec, "x") == pytest.approx(
         sigma, abs=1e-3
     )  # the mode above it starts 30 times as large
 
@@ -54,7 +54,7 @@ def test_growth_sees_half_the_sampling_frequency():
     rec = SimpleNamespace(
         t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
     )
-    assert boundary.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
+    assert growth.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
 
 
 @pytest.mark.parametrize("K", [2.0, 4.5])
@@ -62,7 +62,7 @@ def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
     r = hc.simulate(Loop(K=K).scenario())
     poles = Linear(0, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles()
     pole = poles[np.abs(poles.imag) > 1.0].real.max()
-    assert boundary.growth_rate(r, "x") == pytest.approx(
+    assert growth.growth_rate(r, "x") == pytest.approx(
         pole, abs=2e-3
     )  # second order: (omega dt)^2/12 of omega
 
@@ -72,28 +72,34 @@ def test_boundary_of_the_shaped_arm_is_within_2_percent_of_the_exact_one(axis):
     found = boundary.simulated_gain(
         Loop(axis=axis), guess=3.0 if axis == "x" else 1.0
     )  # not told where
-    assert found == pytest.approx(hc.gain_limit(axis, 90.0, TH), rel=3e-3)  # CLOSE, and the step
+    assert found == pytest.approx(
+        hc.theory.gain_limit(axis, 90.0, TH), rel=3e-3
+    )  # CLOSE, and the step
 
 
 def test_boundary_of_the_sampled_arm():
-    exact = hc.gain_limit("x", 90.0, TH, Ts=2e-3)
+    exact = hc.theory.gain_limit("x", 90.0, TH, Ts=2e-3)
     assert boundary.simulated_gain(Loop(Ts=2e-3)) == pytest.approx(exact, rel=5e-3)
-    assert abs(exact / hc.gain_limit("x", 90.0, TH) - 1.0) > 0.1  # it would tell the two apart
+    assert (
+        abs(exact / hc.theory.gain_limit("x", 90.0, TH) - 1.0) > 0.1
+    )  # it would tell the two apart
 
 
 def test_boundary_with_a_delay_and_no_hand():
     loop = Loop(axis="y", operator=None, Ts=2e-3, delay=3e-3)
-    exact = hc.gain_limit("y", 90.0, Ts=2e-3, delay=3e-3)
+    exact = hc.theory.gain_limit("y", 90.0, Ts=2e-3, delay=3e-3)
     assert boundary.simulated_gain(loop) == pytest.approx(exact, rel=5e-3)
 
 
 def test_without_shaping_the_gap_is_that_of_the_pose():
-    loop = Loop(shaping=False, pose=(0.10, 0.0))
+    loop = Loop(inertia_shaping=False, pose=(0.10, 0.0))
     exact = boundary.pose_limit(loop)
     found = boundary.simulated_gain(loop, exact)
-    nominal = hc.gain_limit("x", 90.0, TH)
+    nominal = hc.theory.gain_limit("x", 90.0, TH)
     assert found == pytest.approx(exact, rel=5e-3) and found < 0.7 * nominal
-    assert boundary.pose_limit(replace(loop, shaping=True)) == pytest.approx(nominal, rel=1e-6)
+    assert boundary.pose_limit(replace(loop, inertia_shaping=True)) == pytest.approx(
+        nominal, rel=1e-6
+    )
     assert boundary.pose_limit(replace(loop, pose=(0.0, 0.0))) == pytest.approx(nominal, rel=1e-6)
 
 
@@ -101,21 +107,21 @@ def test_without_shaping_the_gap_is_that_of_the_pose():
 def test_sampled_loop_at_a_pose(delay):
     loop = Loop(Ts=2e-3, delay=delay, pose=(0.10, 0.0))
     for operator in (TH, None):
-        exact = hc.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
+        exact = hc.theory.gain_limit("x", 90.0, operator, Ts=2e-3, delay=delay)
         for shaping in (True, False):
-            nominal = replace(loop, operator=operator, pose=(0.0, 0.0), shaping=shaping)
+            nominal = replace(loop, operator=operator, pose=(0.0, 0.0), inertia_shaping=shaping)
             assert boundary.pose_limit(nominal) == pytest.approx(
                 exact, rel=1e-9
             )  # both are found to 1e-10
     assert boundary.pose_limit(loop) == pytest.approx(boundary.simulated_gain(loop), rel=5e-3)
-    loop = replace(loop, shaping=False)
+    loop = replace(loop, inertia_shaping=False)
     exact = boundary.pose_limit(loop)
-    assert exact < 0.8 * hc.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
+    assert exact < 0.8 * hc.theory.gain_limit("x", 90.0, TH, Ts=2e-3, delay=delay)
     assert boundary.simulated_gain(loop, exact) == pytest.approx(exact, rel=5e-3)
 
 
 def test_pose_matrix_has_the_poles_of_both_axes_where_they_are_decoupled():
-    A = boundary.pose_matrix(Loop(K=2.0, shaping=False))
+    A = boundary.pose_matrix(Loop(K=2.0, inertia_shaping=False))
     parts = [Linear(i, 90.0, K, 0.0, (0.25, 2.0, 6.0)).poles() for i, K in ((0, 2.0), (1, 0.0))]
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.concatenate(parts)), atol=1e-6
@@ -176,15 +182,17 @@ def test_motors_that_leave_their_limits_late_are_no_divergence():
 def test_causes():
     push = dict(push=boundary.LARGE_PUSH)
     assert (
-        boundary.explain_disagreement(Loop(K=2.8, shaping=False, pose=(0.1, 0.0), **push), False)
+        boundary.explain_disagreement(
+            Loop(K=2.8, inertia_shaping=False, pose=(0.1, 0.0), **push), False
+        )
         == "pose-dependent Lambda"
     )
     Ts = 4e-3
-    K = 0.5 * (hc.gain_limit("x", 90.0, TH) + hc.gain_limit("x", 90.0, TH, Ts=Ts))
+    K = 0.5 * (hc.theory.gain_limit("x", 90.0, TH) + hc.theory.gain_limit("x", 90.0, TH, Ts=Ts))
     assert boundary.explain_disagreement(Loop(K=K, Ts=Ts, **push), False) == "sampling"
-    both = Loop(K=K, Ts=Ts, shaping=False, pose=(0.1, 0.0), **push)
+    both = Loop(K=K, Ts=Ts, inertia_shaping=False, pose=(0.1, 0.0), **push)
     assert boundary.explain_disagreement(both, False) == "sampling and pose-dependent Lambda"
-    K = 0.5 * sum(hc.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
+    K = 0.5 * sum(hc.theory.gain_limit("x", 90.0, TH, Ts=1e-3, delay=d) for d in (0.0, 4e-3))
     assert boundary.explain_disagreement(Loop(K=K, Ts=1e-3, delay=4e-3, **push), False) == "delay"
 
 
@@ -210,7 +218,7 @@ def test_bad_loops_are_refused(kw, field):
 
 @pytest.fixture(scope="module")
 def poses():
-    return stability_map._gain_pose(Loop(shaping=False), 2, 3, iter)
+    return stability_map._gain_pose(Loop(inertia_shaping=False), 2, 3, iter)
 
 
 def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(poses):
@@ -243,7 +251,7 @@ def hatched(figure):
 def test_picture_hatches_gains_above_the_limit_of_the_loop_of_the_runs(poses, x, factor):
     """The limit at both ends of the path is worked out anew, for the loop that the runs are of."""
     (area,) = hatched(study_plots.stability_map_plot(poses))
-    K = factor * boundary.pose_limit(replace(Loop(shaping=False), pose=(x, 0.0)))
+    K = factor * boundary.pose_limit(replace(Loop(inertia_shaping=False), pose=(x, 0.0)))
     inside = 0.999 * 100.0 * x  # [cm], just within the edge
     assert area.get_paths()[0].contains_point((inside, K)) == (factor > 1.0)
     assert area.get_label() == "gain margin < 1"
@@ -259,9 +267,9 @@ def test_picture_hatches_nothing_where_nothing_is_unstable(poses):
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():
     Ts, delay = 1e-3, 2e-3
     b = stability_map._unstable_damping(Loop(), Ts, delay)
-    loop = hc.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
-    assert gain_limit.is_stable(replace(loop, b=0.999 * b))
-    assert not gain_limit.is_stable(replace(loop, b=1.001 * b))
+    loop = hc.theory.Loop("x", operator=TH, K=1.0, Ts=Ts, delay=delay)
+    assert gain_crossings.is_stable(replace(loop, b=0.999 * b))
+    assert not gain_crossings.is_stable(replace(loop, b=1.001 * b))
     assert (
         stability_map._unstable_damping(Loop(), 2e-3, 0.032) == 0.0
     )  # the servo itself does not bear it
@@ -294,7 +302,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     out = capsys.readouterr().out
     assert (
         "sampled every 0.36 ms" in out
-        and f" {hc.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
+        and f" {hc.theory.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
     )
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80
@@ -312,33 +320,35 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
         },
         "Ts": 0.36e-3,
         "delay": 1e-3,
-        "shaping": False,
+        "inertia_shaping": False,
         "map": "gain-pose",
         "quick": False,
     }
     limits = [r["value"] for r in data["verdicts"] if r["what"] == "largest stable K"]
     kinds = ({}, {"Ts": 0.36e-3}, {"delay": 1e-3}, {"Ts": 0.36e-3, "delay": 1e-3})
     assert limits == pytest.approx(
-        [hc.gain_limit("x", 90.0, TH, **kw) for kw in kinds], rel=1e-12
+        [hc.theory.gain_limit("x", 90.0, TH, **kw) for kw in kinds], rel=1e-12
     )  # whatever K
     assert sorted(p.name for p in (tmp_path / "o").iterdir()) == ["gain-pose.png", "stability.json"]
 
 
 def test_command_takes_a_compensator_and_a_servo_as_numbers(capsys, tmp_path):
-    words = "stability --b 50 --gain 0.5 --num 1 20 --den 1 40 0 --shaping --Ts 1e-3"
+    words = "stability --b 50 --gain 0.5 --num 1 20 --den 1 40 0 --inertia-shaping --Ts 1e-3"
     words += " --G 800 40 900 --S 0.5 40 400 --out"
     assert app.main([*words.split(), str(tmp_path)]) == 0
     capsys.readouterr()
     rows = json.loads((tmp_path / "stability.json").read_text())["verdicts"]
     servo = hc.Servo(SecondOrder(800.0, 40.0, 900.0), SecondOrder(0.5, 40.0, 400.0))
     c = hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))
-    loop = hc.Loop("x", 50.0, TH, servo, c, 0.5)
+    loop = hc.theory.Loop("x", 50.0, TH, servo, c, 0.5)
     bare = hc.Arm().nominal_mobility[0]
     limits = [r["value"] for r in rows if r["what"] == "largest stable K"]
-    sampled = hc.gain_limit(replace(loop, Ts=1e-3, mobility=bare))
+    sampled = hc.theory.gain_limit(replace(loop, Ts=1e-3, mobility=bare))
     assert limits[1] == pytest.approx(sampled, rel=1e-12)
     found = {r["question"]: r["value"] for r in rows}
-    assert found["phase margin"] == pytest.approx(math.degrees(hc.margins(loop).phase), rel=1e-12)
+    assert found["phase margin"] == pytest.approx(
+        math.degrees(hc.theory.margins(loop).phase), rel=1e-12
+    )
     assert app.main(["stability", "--num", "1", "2", "3", "4", "--out", str(tmp_path)]) == 2
     assert "compensator.num" in capsys.readouterr().err
 
@@ -354,7 +364,7 @@ ARM = hc.Arm(0.3, 0.32, 0.09, 0.7)
         dict(
             compensator=hc.Compensator((0.2, 1.0), (1.0, 8.0)), servo=SERVO, operator=None, b=20.0
         ),
-        dict(servo=SERVO, arm=ARM, shaping=False, pose=(0.05, 0.0)),
+        dict(servo=SERVO, arm=ARM, inertia_shaping=False, pose=(0.05, 0.0)),
         dict(servo=SERVO, arm=ARM, Ts=2e-3, delay=1e-3),
         dict(compensator=hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)), Ts=2e-3),
     ],

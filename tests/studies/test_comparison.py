@@ -43,16 +43,16 @@ def walls(tmp_path_factory):
 
 def test_numbers_are_those_of_the_analysis(controllers):
     for x, (K, b) in zip(controllers, ((1.0, 90.0), (2.0, 60.0)), strict=True):
-        n, m = x.numbers, hc.margins("x", K, b, operator=None)
+        n, m = x.numbers, hc.theory.margins("x", K, b, operator=None)
         assert n["gain K [1/kg]"] == K and n["clay b [N.s/m]"] == b
         # the arm's own mobility differs from the printed gain of Sh by some percent
         assert n["gain margin"] == pytest.approx(m.gain[1], rel=0.05)
         assert n["steady damper [N.s/m]"] == pytest.approx(10.0 / K, rel=1e-4)  # 10/K, the paper's
         assert n["engine steps"] == x.record.steps
-        Z = hc.loop_impedance("x", K, b, [2.0 * np.pi], operator=None)[0]
+        Z = hc.theory.loop_impedance("x", K, b, [2.0 * np.pi], operator=None)[0]
         assert n["effective damping at 1 Hz [N.s/m]"] == pytest.approx(Z.real, rel=0.05)
         # the compensator is 1/(M (s^2 + 10 s)), so the least M is that of the largest gain
-        limit = hc.gain_limit(hc.Loop.of(x.subject, "x", 0.0))
+        limit = hc.theory.gain_limit(hc.theory.Loop.of(x.subject, "x", 0.0))
         assert n["least mass in free motion [kg]"] == pytest.approx(
             1.0 / limit if limit else np.inf
         )

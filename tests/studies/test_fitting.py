@@ -105,7 +105,7 @@ def test_of_known_velocities_the_fit_is_that_of_the_textbook(law, names):
     v = 0.1 * np.sin(np.linspace(0.2, 40.0, 20000))
     truth = hc.Flow(**{"Fy": 2.0} | ({"b": 30.0} if law == "Bingham" else {"K": 15.0, "n": 0.6}))
     f = truth.force(v) + 0.1 * rng.standard_normal(len(v))
-    fitted = hc.fit_flow(standing(f, np.cumsum(v) * 1e-3, v), "x", level=0.9)
+    fitted = hc.studies.fit_flow(standing(f, np.cumsum(v) * 1e-3, v), "x", level=0.9)
     assert fitted.law == law
     v, f = np.abs(fitted.v), fitted.f * np.sign(fitted.v)
     quantile = stats.t.ppf(0.95, len(v) - len(fitted.parameters))
@@ -129,24 +129,24 @@ def test_of_known_velocities_the_fit_is_that_of_the_textbook(law, names):
 
 def test_a_record_gives_back_its_own_clay():
     """Noise-free: within 1e-4, what is left to splines and steps."""
-    cut = hc.fit_flow(hc.simulate(hc.constant_cut(b=90.0)))
+    cut = hc.studies.fit_flow(hc.simulate(hc.constant_cut(b=90.0)))
     assert cut.law == "viscous" and cut.flow.b == pytest.approx(90.0, rel=1e-6)
     assert any("factor" in x for x in cut.warnings)  # a cut's speed hardly changes
     layers = hc.Profile((0.05, 0.1, 0.15), (0.0, 40.0, 90.0, 0.0))
     scene = dataclasses.replace(hc.constant_cut(), clay=hc.Clay(layers, layers))
     cuts = hc.simulate(scene)
     with pytest.raises(hc.ParameterError, match="one law: choose a part"):
-        hc.fit_flow(cuts)
-    part = hc.fit_flow(cuts, place=(0.051, 0.099))
+        hc.studies.fit_flow(cuts)
+    part = hc.studies.fit_flow(cuts, place=(0.051, 0.099))
     assert part.flow.b == pytest.approx(40.0, rel=1e-6)
     wall = hc.Profile((0.1,), (40.0, 40.0), springs=(hc.Spring(), hc.Spring(k=100.0)))
     hit = hc.simulate(dataclasses.replace(hc.constant_cut(t_max=12.0), clay=hc.Clay(wall, wall)))
     with pytest.raises(hc.ParameterError, match="does not spring back"):
-        hc.fit_flow(hit)
-    assert hc.fit_flow(hit, place=(0.0, 0.099)).flow.b == pytest.approx(40.0, rel=1e-6)
+        hc.studies.fit_flow(hit)
+    assert hc.studies.fit_flow(hit, place=(0.0, 0.099)).flow.b == pytest.approx(40.0, rel=1e-6)
     field = hc.Smooth((0.0, 0.2), (-0.1, 0.1), ((50.0,), (50.0,)))
     even = hc.simulate(dataclasses.replace(hc.constant_cut(t_max=3.0), clay=hc.Clay(field, field)))
-    assert hc.fit_flow(even).flow.b == pytest.approx(50.0, rel=1e-6)
+    assert hc.studies.fit_flow(even).flow.b == pytest.approx(50.0, rel=1e-6)
 
 
 PUSH = hc.Samples(
@@ -168,7 +168,7 @@ def test_runs_through_encoder_and_converter_tell_their_clay(law):
     scene = hc.Scenario(clay=clay, muscle=PUSH, force=(0.0, 0.0), length=None, t_max=8.0, dt=1e-3)
     record = hc.simulate(scene)
     assert record.outcome.code == "time limit", record.status
-    own = hc.fit_flow(record)
+    own = hc.studies.fit_flow(record)
     assert own.law == law
     for p in own.parameters:
         assert p.value == pytest.approx(getattr(flow, p.name), rel=1e-3)
@@ -176,8 +176,8 @@ def test_runs_through_encoder_and_converter_tell_their_clay(law):
     count = 2.0 * math.pi * 0.3 / 65536
     x = record.p[:, 0] + 1e-5 * rng.standard_normal(len(record.t))
     f = record.fe[:, 0] + 0.05 * rng.standard_normal(len(record.t))
-    seen = hc.Measurement(record.t, 0.02 * np.round(f / 0.02), count * np.round(x / count))
-    fitted = hc.fit_flow(seen, level=0.99)
+    seen = hc.studies.Measurement(record.t, 0.02 * np.round(f / 0.02), count * np.round(x / count))
+    fitted = hc.studies.fit_flow(seen, level=0.99)
     assert fitted.law == law
     for p in fitted.parameters:
         assert p.low <= getattr(flow, p.name) <= p.high
@@ -197,13 +197,13 @@ def test_isotropic_clay_is_fitted_along_the_path():
     p = np.cumsum(v, axis=0) * 1e-3
     fe = flow.force(speed)[:, None] * v / speed[:, None]
     record = dataclasses.replace(record, v=v, p=p, fe=fe, scenario=scene)
-    fitted = hc.fit_flow(record)
+    fitted = hc.studies.fit_flow(record)
     assert (fitted.axis, fitted.law) == ("path", "Herschel-Bulkley")
     for name, x in values(fitted).items():
         assert x == pytest.approx(getattr(flow, name), rel=1e-3)
     with pytest.raises(hc.ParameterError, match="axes yield by themselves"):
         apart = dataclasses.replace(scene, clay=dataclasses.replace(scene.clay, isotropic=False))
-        hc.fit_flow(dataclasses.replace(record, scenario=apart), "path")
+        hc.studies.fit_flow(dataclasses.replace(record, scenario=apart), "path")
 
 
 @settings(max_examples=6, deadline=None)
@@ -217,8 +217,10 @@ def test_units_direction_and_zeros_do_not_matter(law, scale, way, zero):
     data = coverage.measured(law, 7, FINE._replace(position_count=0.0, force_count=0.0))
     few = slice(0, 2500)
     f, p = data.input[few], data.output[few]
-    a = hc.fit_flow(hc.Measurement(data.t[few], f, p))
-    b = hc.fit_flow(hc.Measurement(data.t[few] + zero, way * scale * f, way * p + zero))
+    a = hc.studies.fit_flow(hc.studies.Measurement(data.t[few], f, p))
+    b = hc.studies.fit_flow(
+        hc.studies.Measurement(data.t[few] + zero, way * scale * f, way * p + zero)
+    )
     assert a.law == b.law
     for x, y in zip(a.parameters, b.parameters, strict=True):
         factor = 1.0 if x.name == "n" else scale
@@ -249,7 +251,7 @@ def test_intervals_widen_for_noise_that_is_correlated():
         for i in range(1, len(e)):
             x[i] = 0.8 * x[i - 1] + e[i]
         record = standing(60.0 * v + x[200:], np.cumsum(v) * 1e-3, v)
-        fitted = hc.fit_flow(record, laws=["viscous"])
+        fitted = hc.studies.fit_flow(record, laws=["viscous"])
         assert 5.0 < fitted.correlation < 16.0
         missed += not fitted.parameters[0].low <= 60.0 <= fitted.parameters[0].high
     assert missed <= 5  # 1.5 expected; more than 5: 3e-3. Without, half of them would miss
@@ -260,7 +262,7 @@ def test_limits_of_a_claim_are_told():
 
     def told(p, f, t=None, **kw):
         t = 2e-3 * np.arange(len(p)) if t is None else t
-        return " | ".join(hc.fit_flow(hc.Measurement(t, f, p), **kw).warnings)
+        return " | ".join(hc.studies.fit_flow(hc.studies.Measurement(t, f, p), **kw).warnings)
 
     t = 2e-3 * np.arange(3000)
     v = 0.05 + 0.01 * np.sin(3.0 * t)
@@ -292,22 +294,22 @@ def test_what_cannot_be_fitted_is_refused():
         ({"place": (0.1, 0.1)}, "place .*must ascend"),
     ):
         with pytest.raises(hc.ParameterError, match=words):
-            hc.fit_flow(data, **kw)
+            hc.studies.fit_flow(data, **kw)
     with pytest.raises(hc.ParameterError, match="must resist"):
-        hc.fit_flow(hc.Measurement(data.t, -data.input, data.output))
+        hc.studies.fit_flow(hc.studies.Measurement(data.t, -data.input, data.output))
     rng = np.random.default_rng(1)
-    rest = hc.Measurement(data.t, data.input, 1e-5 * rng.standard_normal(len(data.t)))
+    rest = hc.studies.Measurement(data.t, data.input, 1e-5 * rng.standard_normal(len(data.t)))
     with pytest.raises(hc.ParameterError, match="that slide"):
-        hc.fit_flow(rest)
+        hc.studies.fit_flow(rest)
     with pytest.raises(hc.ParameterError, match="a record with clay"):
-        hc.fit_flow(hc.simulate(hc.free(t_max=0.1)))
+        hc.studies.fit_flow(hc.simulate(hc.free(t_max=0.1)))
     block = hc.Groove(x=(0.02, 0.08), y=(-0.02, 0.02), pressure=20e3)
     grooved = dataclasses.replace(hc.free(t_max=0.1), clay=hc.Clay.of_groove(block))
     with pytest.raises(hc.ParameterError, match="a groove has no law of speed"):
-        hc.fit_flow(hc.simulate(grooved))
+        hc.studies.fit_flow(hc.simulate(grooved))
     with pytest.raises(hc.ParameterError, match="data = 3: must be a Measurement"):
-        hc.fit_flow(3)  # pyright: ignore[reportArgumentType]
-    assert hc.fit_flow(data, laws="power-law").law == "power law"
+        hc.studies.fit_flow(3)  # pyright: ignore[reportArgumentType]
+    assert hc.studies.fit_flow(data, laws="power-law").law == "power law"
 
 
 def test_counts_are_found_in_what_is_quantised():
@@ -356,7 +358,7 @@ def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys
 
 
 def test_figure_shows_data_law_and_what_is_left():
-    fitted = hc.fit_flow(coverage.measured("Bingham", 3, FINE))
+    fitted = hc.studies.fit_flow(coverage.measured("Bingham", 3, FINE))
     law, speed, time, lag = fit_plot(fitted).axes
     np.testing.assert_allclose(law.lines[0].get_ydata(), fitted.f[: len(fitted.f)][_shown(fitted)])
     curve = law.lines[2]  # forward

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from benchmarks import intervals
 from hapticclay.cli import app
-from hapticclay.model.fields import make_part, plain_data
+from hapticclay.scene.fields import make_part, plain_data
 from hapticclay.studies import identification
 from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses
@@ -34,7 +34,9 @@ def quick(what, axis, **kw):
     short = (
         dict(period=2.5, band=(0.35, 3.0)) if what == "Th" else dict(period=1.5, band=(0.6, 15.0))
     )
-    return hc.identify(axis, what, **{"realisations": 2, "periods": 1, "lines": 20, **short, **kw})
+    return hc.studies.identify(
+        axis, what, **{"realisations": 2, "periods": 1, "lines": 20, **short, **kw}
+    )
 
 
 def kick_response(what, axis, f, dt=DT):
@@ -83,7 +85,7 @@ def test_printed_coefficients_from_noisy_data(what, axis):
     degrees of freedom of four runs, beyond which a coefficient lies with a chance of 2.5e-3.
     """
     short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else {}
-    r = quick(what, axis, noise=hc.Noise(), seed=1, realisations=4, **short)
+    r = quick(what, axis, noise=hc.studies.Noise(), seed=1, realisations=4, **short)
     for c in r.coefficients:
         assert abs(c.error) < (0.02 if what == "S" else 0.005), c
         assert abs(c.value - c.printed) < 1.5 * (c.high - c.low), c
@@ -213,7 +215,7 @@ def test_noise_on_the_input_does_not_bias_the_estimate():
 )
 def test_any_seed_and_any_band_about_the_corner(block, seed, low, high, shaping):
     """Corners lie at 3.3 to 4.8 Hz. Tolerance: (omega dt)^2/6 at 20 Hz is 3.4e-4."""
-    r = quick(*block, seed=seed, band=(low, high), period=1.2, shaping=shaping)
+    r = quick(*block, seed=seed, band=(low, high), period=1.2, inertia_shaping=shaping)
     np.testing.assert_allclose(r.values, PRINTED["".join(block)], rtol=5e-4)
 
 
@@ -257,7 +259,7 @@ def mobility(x, y):
 
 @pytest.fixture(scope="module")
 def drift():
-    return hc.drift_map(0.3)
+    return hc.studies.drift_map(0.3)
 
 
 def test_drift_over_the_workspace(drift):
@@ -303,7 +305,7 @@ def test_other_half_of_the_workspace_is_its_mirror():
 
 def test_measured_is_within_a_count_and_repeats():
     r = hc.simulate(hc.constant_cut(t_max=0.2))
-    noise = hc.Noise(encoder_counts=4096, force=0.1)
+    noise = hc.studies.Noise(encoder_counts=4096, force=0.1)
     p, fh = measured(r, noise, np.random.default_rng(1))
     assert 0.0 < np.abs(p - r.p).max() < 0.5 * 2 * np.pi / 4096 * (0.24 + 2 * 0.35)
     assert np.std(fh - r.fh) == pytest.approx(0.1, rel=4 / np.sqrt(4 * len(r.t)))
@@ -312,7 +314,7 @@ def test_measured_is_within_a_count_and_repeats():
 
 
 def test_same_seed_same_result():
-    a, b = (quick("G", "x", noise=hc.Noise(), seed=5) for _ in range(2))
+    a, b = (quick("G", "x", noise=hc.studies.Noise(), seed=5) for _ in range(2))
     assert a.values == b.values and json.dumps(a.summary()) == json.dumps(b.summary())
     assert make_part(hc.Scenario, plain_data(a.scenario)) == a.scenario
 
@@ -325,7 +327,7 @@ def test_same_seed_same_result():
         (dict(noise=0.1), "noise"),
         (dict(seed=-1), "seed"),
         (dict(origin=(0.5, 0.5)), "start"),
-        (dict(shaping=1), "shaping"),
+        (dict(inertia_shaping=1), "inertia_shaping"),
         (dict(band=(1.0, 1e4)), "band[high]"),
         (dict(band=(2.0, 1.0)), "band"),
         (dict(band=(1.0, 1.1)), "band"),
@@ -342,7 +344,7 @@ def test_same_seed_same_result():
 )
 def test_bad_input_is_refused(kw, field):
     with pytest.raises(hc.ParameterError) as e:
-        hc.identify(**kw)
+        hc.studies.identify(**kw)
     assert e.value.field == field
 
 
@@ -387,5 +389,5 @@ def test_command_line_refuses(capsys, tmp_path, monkeypatch, args, words):
 
 def test_drift_refuses():
     with pytest.raises(hc.ParameterError, match="spacing"):
-        hc.drift_map(0.0)
+        hc.studies.drift_map(0.0)
     assert Drift.__doc__

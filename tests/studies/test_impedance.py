@@ -11,7 +11,7 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.studies.boundary import PushedLoop
-from hapticclay.studies.impedance import computed_impedance, measure_impedance, subject_of
+from hapticclay.studies.impedance import computed_impedance, measure_impedance
 from hapticclay.views import impedance_plots
 
 TH = hc.Operator()
@@ -28,9 +28,9 @@ CLOSE = 3e-4
         dict(),
         dict(Ts=1e-3),
         dict(Ts=1e-3, delay=1.5e-3, b=40.0, k=200.0),
-        dict(Ts=1e-3, render="implicit", axis="y", K=0.5),
+        dict(Ts=1e-3, render="physical", axis="y", K=0.5),
     ],
-    ids=["continuous", "sampled", "late", "implicit"],
+    ids=["continuous", "sampled", "late", "physical"],
 )
 def test_the_arm_feels_as_computed(parts, operator):
     found = measure_impedance(PushedLoop(operator=operator, **parts), lines=12)
@@ -44,7 +44,9 @@ def test_the_arm_feels_as_computed(parts, operator):
     "wall",
     [
         hc.VirtualWall(300.0, 2.0, device=DEVICE),
-        hc.VirtualWall(2000.0, 3.0, 0.05, DEVICE, TH, delay=1e-3, window=3, velocity_filter=90.0),
+        hc.VirtualWall(
+            2000.0, 3.0, 0.05, DEVICE, TH, delay=1e-3, velocity_window=3, velocity_filter=90.0
+        ),
         hc.VirtualWall(100.0, 1.0, -0.02, DEVICE, Ts=4e-3, velocity="exact"),
     ],
 )
@@ -79,7 +81,7 @@ def test_friction_is_measured_and_noted():
     [
         (PushedLoop(operator=TH, K=6.0), "K = 6.0: must leave the loop stable"),
         (hc.VirtualWall(3e4, 2.0, device=DEVICE), "wall.K = 30000.0: must leave the wall stable"),
-        (hc.VirtualWall(300.0, 2.0, device=DEVICE, surface=True), "must be False"),
+        (hc.VirtualWall(300.0, 2.0, device=DEVICE, unilateral=True), "must be False"),
         (hc.Device(), "must be a PushedLoop or a VirtualWall"),
     ],
 )
@@ -103,14 +105,14 @@ def test_what_has_not_settled_is_refused():
 
 def test_the_loop_of_a_scenario():
     scenario = hc.constant_cut()
-    found = subject_of(scenario, "y", 50.0)
+    found = PushedLoop.of(scenario, "y", 50.0)
     assert (found.axis, found.b, found.K) == ("y", 50.0, scenario.gain[1])
     assert found.linear == replace(found.linear, b=50.0)
-    late = replace(scenario, control="sampled", interface=hc.Interface(delay=1e-3))
-    assert subject_of(late).delay == 1e-3
-    rough = replace(late, interface=hc.Interface(encoder=1000))
+    late = replace(scenario, control="sampled", hardware=hc.Hardware(delay=1e-3))
+    assert PushedLoop.of(late).delay == 1e-3
+    rough = replace(late, hardware=hc.Hardware(encoder=1000))
     with pytest.raises(ParameterError, match="no hardware but a delay"):
-        subject_of(rough)
+        PushedLoop.of(rough)
 
 
 def test_figures_and_tables_of_a_wall_and_of_the_arm():
@@ -159,3 +161,20 @@ def test_nothing_rendered_has_no_ratio():
     assert math.isnan(found.felt_gap) and np.all(np.isnan(found.measured.ratio))
     assert found.gap < CLOSE
     impedance_plots.transparency_bode_plot(found)
+
+
+def test_a_scenario_is_a_subject_of_every_study_of_a_loop():
+    cut = replace(hc.constant_cut(b=30.0, inertia_shaping=True), operator=TH)
+    kw = dict(band=(2.0, 8.0), lines=4, period=1.0)
+    a, b = measure_impedance(cut, "y", **kw), measure_impedance(PushedLoop.of(cut, "y"), **kw)
+    assert np.array_equal(a.measured.Z, b.measured.Z) and a.subject == b.subject
+    sampled = replace(cut, control="sampled", dt=1e-3)
+    a, b = (
+        hc.walls.arm_mbk(x, columns=0, points=3, samples=0)
+        for x in (sampled, PushedLoop.of(sampled, "x"))
+    )
+    assert np.array_equal(a.nominal, b.nominal) and a.loop == b.loop
+    with pytest.raises(hc.ParameterError, match="axis = 'z'"):
+        measure_impedance(cut, "z")
+    with pytest.raises(hc.ParameterError, match="must be given: the walls are rendered at samples"):
+        hc.walls.zwidth(cut)

@@ -35,7 +35,7 @@ def test_runs_stop_being_stable_where_theory_says(plane, x):
 
 
 def test_growth_of_a_pushed_device():
-    limit = hc.stiffness_band(WALL)[1]
+    limit = hc.walls.stiffness_band(WALL)[1]
     below, above = zwidth.growth_rates([replace(WALL, K=x * limit) for x in (0.99, 1.01)])
     assert below < 0.0 < above
     assert zwidth.growth_rates([replace(WALL, B=80.0)])[0] < -10.0  # faded to rounding
@@ -52,7 +52,7 @@ def test_least_mass_of_the_arm_by_runs():
 
 
 def test_a_device_without_runs():
-    wall = replace(WALL, device=hc.Device(0.1, 0.5, 0.1, 1e-5), surface=True)
+    wall = replace(WALL, device=hc.Device(0.1, 0.5, 0.1, 1e-5), unilateral=True)
     found = mbk.device_mbk(wall, columns=0, points=7)
     assert math.isnan(found.gap) and found.wall.device.friction == 0.0
     assert len(impedance_plots.mbk_plot(found).axes) == 3

@@ -69,9 +69,9 @@ def columns(what, kind, rng, seconds=None, noise=0.1, colour=0.0):
     if what == "Th":
         m, d, k = PRINTED["Th"]
         p, minus = second_order(PRINTED["G"], u, t, False, [(1.0, 0.0, 0.0), (k, d, m)])
-        return hc.Measurement(t, -minus + np.std(minus) * v + 0.3, p + 0.1), held
+        return hc.studies.Measurement(t, -minus + np.std(minus) * v + 0.3, p + 0.1), held
     (p,) = second_order(PRINTED[what], u, t, held)
-    return hc.Measurement(t + 7.0, u, p + np.std(p) * v - 0.05), held
+    return hc.studies.Measurement(t + 7.0, u, p + np.std(p) * v - 0.05), held
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -82,7 +82,7 @@ def test_printed_coefficients_without_noise(what, kind):
     At 10 Hz and 1 ms it is 3e-4; for Th at the corner of G, which moves the hand, and 4 ms 1.2e-3.
     """
     data, held = columns(what, kind, np.random.default_rng(1), noise=0.0)
-    r = hc.identify_data(data, what, AXIS[what], held=held)
+    r = hc.studies.identify_data(data, what, AXIS[what], held=held)
     left = 1.3e-3 if what == "Th" else 3.3e-4
     np.testing.assert_allclose(r.values, PRINTED[what], rtol=left)
     assert r.periods == (3 if kind == "multisine" else 0)
@@ -114,7 +114,7 @@ def test_intervals_hold_the_truth_at_the_stated_rate(what, kind, colour):
     hits, error, half = [], [], []
     for seed in range(60):
         data, held = columns(what, kind, np.random.default_rng(seed), colour=colour)
-        found = hc.identify_data(data, what, AXIS[what], held=held).coefficients
+        found = hc.studies.identify_data(data, what, AXIS[what], held=held).coefficients
         hits.append([c.low <= c.printed <= c.high for c in found])
         error.append([c.error for c in found])
         half.append([0.5 * (c.high - c.low) / c.printed for c in found])
@@ -136,8 +136,8 @@ def test_a_step_decides_with_few_lines_and_says_so():
         t = np.arange(8000) * DT
         u = 2e-3 * (t >= 2.0)
         (p,) = second_order(PRINTED["G"], u, t, True)
-        data = hc.Measurement(t, u, p + rng.normal(0.0, 1e-4, len(t)))
-        found = hc.identify_data(data, held=True).coefficients
+        data = hc.studies.Measurement(t, u, p + rng.normal(0.0, 1e-4, len(t)))
+        found = hc.studies.identify_data(data, held=True).coefficients
         hits.append([c.low <= c.printed <= c.high for c in found])
     assert np.sum(hits, axis=0).min() >= 51, np.sum(hits, axis=0)
 
@@ -151,7 +151,8 @@ def test_a_held_input_comes_half_a_step_late():
     rng = np.random.default_rng(4)
     data, _ = columns("G", "steps", rng, seconds=20.0, noise=0.0)
     right, late = (
-        hc.identify_data(data, band=(0.2, 2.0), held=held).coefficients[1] for held in (True, False)
+        hc.studies.identify_data(data, band=(0.2, 2.0), held=held).coefficients[1]
+        for held in (True, False)
     )
     k, d = PRINTED["G"][2], PRINTED["G"][1]
     assert abs(right.error) < 1e-4
@@ -190,7 +191,9 @@ def test_a_reference_takes_the_bias_from_a_closed_loop():
         t, p, fh = loop(0.01 * x, 0.7 * tremor / np.std(tremor), dt)
         fh = fh + rng.normal(0.0, 0.02, len(t))
         for given in (True, False):
-            r = hc.identify_data(hc.Measurement(t, fh, p, x if given else None), "Th")
+            r = hc.studies.identify_data(
+                hc.studies.Measurement(t, fh, p, x if given else None), "Th"
+            )
             found[given].append(r.values)
             half += [[0.5 * (c.high - c.low) for c in r.coefficients]] if given else []
     deviation = np.median(half, axis=0) / 1.96 / np.sqrt(20)
@@ -202,8 +205,8 @@ def test_a_reference_takes_the_bias_from_a_closed_loop():
 def test_zeros_of_sensors_and_clock_do_not_matter():
     """An offset moves the line at 0 alone. Tolerance: rounding of 1e3 + 1e-3, 1e-10."""
     data, _ = columns("S", "noise", np.random.default_rng(3))
-    moved = hc.Measurement(data.t - 3.0, data.input + 10.0, data.output + 1.0)
-    a, b = (hc.identify_data(x, "S", "y") for x in (data, moved))
+    moved = hc.studies.Measurement(data.t - 3.0, data.input + 10.0, data.output + 1.0)
+    a, b = (hc.studies.identify_data(x, "S", "y") for x in (data, moved))
     np.testing.assert_allclose(a.values, b.values, rtol=1e-7)
     assert a.coefficients[0].high == pytest.approx(b.coefficients[0].high, rel=1e-7)
 
@@ -223,9 +226,9 @@ def test_columns_of_our_own_record_agree_with_the_built_in_route(what, tmp_path)
     again for the seed.
     """
     short = dict(period=5.0, band=(0.15, 3.0)) if what == "Th" else dict(period=1.5)
-    own = hc.identify("x", what, noise=hc.Noise(), seed=3, lines=20, **short)
+    own = hc.studies.identify("x", what, noise=hc.studies.Noise(), seed=3, lines=20, **short)
     record = hc.simulate(own.scenario)
-    p, fh = identification.measured(record, hc.Noise(), np.random.default_rng(1))
+    p, fh = identification.measured(record, hc.studies.Noise(), np.random.default_rng(1))
     given = record.delta[:, 0] if what == "G" else fh[:, 0]
     file = tmp_path / "data.csv"
     wave = record.scenario.muscle or record.scenario.command
@@ -238,9 +241,9 @@ def test_columns_of_our_own_record_agree_with_the_built_in_route(what, tmp_path)
         wave(record.t)[:, 0],
     )
     for names in ({}, {"reference": "ref"}):
-        data = hc.Measurement.load(file, names)
+        data = hc.studies.Measurement.load(file, names)
         np.testing.assert_array_equal(data.output, p[:, 0])
-        r = hc.identify_data(data, what, "x", band=short.get("band"))
+        r = hc.studies.identify_data(data, what, "x", band=short.get("band"))
         assert r.periods == 2 and r.scenario is None and r.source == "data.csv"
         for a, b in zip(r.coefficients, own.coefficients, strict=True):
             half = 0.5 * np.hypot(a.high - a.low, b.high - b.low)
@@ -254,7 +257,7 @@ def test_files_as_others_write_them(tmp_path):
     text += "".join(f'{x:.4f};{i % 7};"a ""b""; c";{i}\n' for i, x in enumerate(t))
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     names = {"t": "time", "input": "cmd, m", "output": "pos"}
-    data = hc.Measurement.load(tmp_path / "a.csv", names)
+    data = hc.studies.Measurement.load(tmp_path / "a.csv", names)
     np.testing.assert_array_equal(data.input, np.arange(100) % 7)
     np.testing.assert_array_equal(data.output, np.arange(100))
     assert data.name == "a.csv" and data.reference is None and data.dt == pytest.approx(DT)
@@ -272,7 +275,7 @@ def test_command_line(tmp_path, capsys):
     assert sorted(p.name for p in out.iterdir()) == ["fig5.png", "identify.json"]
     saved = json.loads((out / "identify.json").read_text())
     (r,) = saved["results"]
-    own = hc.identify_data(data, "S", "y", band=(0.2, 12.0)).summary()
+    own = hc.studies.identify_data(data, "S", "y", band=(0.2, 12.0)).summary()
     assert r["source"] == "rig.csv" and r["coefficients"] == own["coefficients"]
     assert "scenario" not in r and r["units"]["response"] == "m/N" and r["periods"] == 0
 
@@ -281,7 +284,7 @@ def test_plot_of_measured_columns():
     from hapticclay.views import study_plots
 
     low, high = (
-        hc.identify_data(columns("G", "noise", np.random.default_rng(2), noise=x)[0])
+        hc.studies.identify_data(columns("G", "noise", np.random.default_rng(2), noise=x)[0])
         for x in (3.0, 0.01)
     )
     figure = study_plots.identification_plot([low, high])
@@ -321,7 +324,7 @@ def replaced(x, row, value):
 )
 def test_bad_columns_are_refused(t, u, y, field, words):
     with pytest.raises(hc.ParameterError, match=words) as e:
-        hc.Measurement(t, u, y)
+        hc.studies.Measurement(t, u, y)
     assert e.value.field == field
 
 
@@ -340,15 +343,25 @@ def good(rng=0, **kw):
         (good(), dict(band=(1.0, 200.0)), "band[high]", "100"),
         (good(), dict(band=(1.0, 1.1)), "band", "too short"),
         (good(seconds=0.5), {}, "band", "too short"),
-        (hc.Measurement(T, np.sin(2 * np.pi * 60 * T), X[1]), {}, "input", "20 lines or more"),
-        (hc.Measurement(T, np.sin(2 * np.pi * 2 * T), X[1]), {}, "input", "5 lines or more"),
-        (hc.Measurement(T, X[0], X[1]), {}, "output", r"coherence must be 0.5 .* at .* Hz"),
-        (hc.Measurement(T, T, X[1]), {}, "output", "coherence"),
+        (
+            hc.studies.Measurement(T, np.sin(2 * np.pi * 60 * T), X[1]),
+            {},
+            "input",
+            "20 lines or more",
+        ),
+        (
+            hc.studies.Measurement(T, np.sin(2 * np.pi * 2 * T), X[1]),
+            {},
+            "input",
+            "5 lines or more",
+        ),
+        (hc.studies.Measurement(T, X[0], X[1]), {}, "output", r"coherence must be 0.5 .* at .* Hz"),
+        (hc.studies.Measurement(T, T, X[1]), {}, "output", "coherence"),
     ],
 )
 def test_bad_data_is_refused(data, kw, field, words):
     with pytest.raises(hc.ParameterError, match=words) as e:
-        hc.identify_data(data, **kw)
+        hc.studies.identify_data(data, **kw)
     assert e.value.field == field
 
 
@@ -368,9 +381,9 @@ ODD = {
 @pytest.mark.parametrize("odd", ODD)
 def test_what_is_no_such_block_gives_finite_numbers_or_a_refusal(what, odd):
     x = drive("noise", 10.0, 5.0, np.random.default_rng(9), DT)[1]
-    data = hc.Measurement(np.arange(len(x)) * DT, x, ODD[odd](x))
+    data = hc.studies.Measurement(np.arange(len(x)) * DT, x, ODD[odd](x))
     try:
-        r = hc.identify_data(data, what)
+        r = hc.studies.identify_data(data, what)
     except hc.ParameterError:
         return
     assert np.all(np.isfinite([(c.low, c.value, c.high) for c in r.coefficients]))
@@ -382,7 +395,9 @@ def test_what_is_no_such_block_gives_finite_numbers_or_a_refusal(what, odd):
 def test_a_wrong_sign_is_named(what):
     data, held = columns(what, "noise", np.random.default_rng(0))
     with pytest.raises(hc.ParameterError, match="wrong sign"):
-        hc.identify_data(hc.Measurement(data.t, -data.input, data.output), what, held=held)
+        hc.studies.identify_data(
+            hc.studies.Measurement(data.t, -data.input, data.output), what, held=held
+        )
 
 
 ROWS = "".join(f"{i * DT:.4f},{i % 7},{i % 5}\n" for i in range(200))
@@ -431,6 +446,8 @@ def test_command_line_refuses(text, words, said, tmp_path, monkeypatch, capsys):
 
 
 def test_the_simulated_route_says_nothing_of_files():
-    r = hc.identify("x", "G", period=1.0, band=(1.0, 10.0), lines=5, realisations=2, periods=1)
+    r = hc.studies.identify(
+        "x", "G", period=1.0, band=(1.0, 10.0), lines=5, realisations=2, periods=1
+    )
     assert r.source == "" and not {"source", "estimate"} & set(r.summary())
     assert r.estimate == "lines of 1 whole periods"

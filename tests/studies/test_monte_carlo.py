@@ -14,20 +14,21 @@ from scipy import stats
 import hapticclay as hc
 from benchmarks import robustness
 from hapticclay.cli import app
-from hapticclay.studies import growth, monte_carlo, sweep
+from hapticclay.studies import growth, sweep
+from hapticclay.studies import robustness as study
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from hapticclay.studies.sampling import Range
 from tests.oracles.sampled_wall import sample_map
 
-HANDS = hc.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
-GAIN = hc.Distribution("log-normal", 4.0, 1.0)
-CLAY = hc.Distribution("log-uniform", 10.0, 1000.0)
-SAMPLED = PushedLoop("x", Ts=0.5e-3, shaping=False)
+HANDS = hc.studies.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
+GAIN = hc.studies.Distribution("log-normal", 4.0, 1.0)
+CLAY = hc.studies.Distribution("log-uniform", 10.0, 1000.0)
+SAMPLED = PushedLoop("x", Ts=0.5e-3, inertia_shaping=False)
 MOVED = {
     "K": GAIN,
     "b": CLAY,
-    "pose.x": hc.Distribution("normal", 0.0, 0.03),
-    "delay": hc.Distribution("uniform", 0.0, 5e-4),
+    "pose.x": hc.studies.Distribution("normal", 0.0, 0.03),
+    "delay": hc.studies.Distribution("uniform", 0.0, 5e-4),
 }
 
 
@@ -77,8 +78,8 @@ def least_damped(loop):
     ids=["continuous", "sampled, late, at any pose, without shaping"],
 )
 def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
-    trials = hc.Trials(base, vary, HANDS, runs=n, seed=5)
-    result = hc.monte_carlo(trials)
+    trials = hc.studies.Trials(base, vary, HANDS, runs=n, seed=5)
+    result = hc.studies.monte_carlo(trials)
     rows = [dict(zip(trials.names, p, strict=True)) for p in result.points.tolist()]
     rate = np.array([least_damped(trials.loop(row)) for row in rows])
     # 0.01 1/s: what the steps of a run change in its rate, at most
@@ -95,16 +96,18 @@ def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
         (hc.VirtualWall(B=20.0, device=hc.Device(0.1, 0.5), Ts=1e-3), None),
         (hc.VirtualWall(B=5.0, device=hc.Device(0.5, 2.0), Ts=1e-3), HANDS),
         (hc.VirtualWall(B=20.0, device=hc.Device(2.0, 5.0), Ts=1e-2, delay=1.5e-2), HANDS),
-        (hc.VirtualWall(B=2.0, device=hc.Device(0.1, 1.0), Ts=1e-4, window=4), None),
+        (hc.VirtualWall(B=2.0, device=hc.Device(0.1, 1.0), Ts=1e-4, velocity_window=4), None),
     ],
     ids=["light, late", "light", "with hands", "slow", "fast, window"],
 )
 def test_a_wall_is_judged_as_its_eigenvalues_are(wall, hands):
-    limit = hc.stiffness_band(wall if hands is None else replace(wall, operator=HANDS.median))[1]
-    near = hc.Distribution("uniform", 0.96 * limit, 1.04 * limit)
-    for law in (near, hc.Distribution("log-uniform", 0.1 * limit, 10.0 * limit)):
-        trials = hc.Trials(wall, {"K": law}, hands, runs=30)
-        result = hc.monte_carlo(trials)
+    limit = hc.walls.stiffness_band(
+        wall if hands is None else replace(wall, operator=HANDS.median)
+    )[1]
+    near = hc.studies.Distribution("uniform", 0.96 * limit, 1.04 * limit)
+    for law in (near, hc.studies.Distribution("log-uniform", 0.1 * limit, 10.0 * limit)):
+        trials = hc.studies.Trials(wall, {"K": law}, hands, runs=30)
+        result = hc.studies.monte_carlo(trials)
         assert 0 < result.total.events < result.total.runs == 30
         for point, unstable in zip(result.points.tolist(), result.unstable, strict=True):
             drawn = trials.loop(dict(zip(trials.names, point, strict=True)))
@@ -121,14 +124,14 @@ def test_a_wall_is_judged_as_its_eigenvalues_are(wall, hands):
 @pytest.mark.parametrize(
     "change",
     [
-        dict(surface=True),
+        dict(unilateral=True),
         dict(device=hc.Device(friction=0.1)),
         dict(device=hc.Device(quantum=1e-6)),
     ],
 )
 def test_a_wall_that_is_not_linear_is_refused(change):
     with pytest.raises(hc.ParameterError, match="without surface, friction and encoder"):
-        hc.Trials(hc.VirtualWall(**change), {"K": CLAY})
+        hc.studies.Trials(hc.VirtualWall(**change), {"K": CLAY})
 
 
 # ---- estimates -----------------------------------------------------------------------------------
@@ -137,7 +140,7 @@ def test_a_wall_that_is_not_linear_is_refused(change):
 @given(st.integers(0, 300), st.integers(1, 300), st.floats(0.5, 0.999))
 def test_the_interval_is_that_of_clopper_and_pearson(k, n, level):
     k = min(k, n)
-    low, high = monte_carlo.clopper_pearson(k, n, level)
+    low, high = study.clopper_pearson(k, n, level)
     other = stats.binomtest(k, n).proportion_ci(level, method="exact")
     assert float(low) == pytest.approx(other.low, abs=1e-9)  # root finding of SciPy: 1e-12
     assert float(high) == pytest.approx(other.high, abs=1e-9)
@@ -148,28 +151,30 @@ def test_probability_agrees_with_quadrature_of_the_exact_limit():
     trials, names, _ = next(iter(robustness.cases().values()))
     exact = robustness.quadrature(trials, names, 6, robustness.exact_limit)
     n = 600
-    total = hc.monte_carlo(replace(trials, runs=n, seed=11)).total
+    total = hc.studies.monte_carlo(replace(trials, runs=n, seed=11)).total
     assert total.probability == pytest.approx(exact, abs=4.0 * math.sqrt(exact * (1 - exact) / n))
     assert total.low < total.probability < total.high
 
 
 def test_cells_of_a_grid_fill_evenly():
     grid = {"K": Range(2.0, 6.0, 3), "b": Range(50.0, 200.0, 2, log=True)}
-    result = hc.monte_carlo(hc.Trials(PushedLoop("x"), hands=HANDS, grid=grid, runs=8))
+    result = hc.studies.monte_carlo(
+        hc.studies.Trials(PushedLoop("x"), hands=HANDS, grid=grid, runs=8)
+    )
     chart = result.map()
     assert chart.runs.tolist() == [[8, 8]] * 3
     assert chart.x.tolist() == [2.0, 4.0, 6.0] and chart.y.tolist() == [50.0, 200.0]
     assert chart.events.sum() == result.total.events
     assert np.all(np.diff(chart.probability, axis=0) >= 0.0)  # unstable at more gain
     other, limit = result.boundary()
-    middle = hc.gain_limit("x", 50.0, HANDS.median)
+    middle = hc.theory.gain_limit("x", 50.0, HANDS.median)
     assert (other[0], limit[0]) == pytest.approx((50.0, middle))
     cells = result.tables()["cells"]
     assert len(cells["probability"]) == 6 and sum(cells["runs"]) == 48
 
 
 def test_bins_hold_every_run():
-    result = hc.monte_carlo(hc.Trials(PushedLoop("x"), {"K": GAIN}, HANDS, runs=60))
+    result = hc.studies.monte_carlo(hc.studies.Trials(PushedLoop("x"), {"K": GAIN}, HANDS, runs=60))
     chart = result.binned("K", "operator.damper", bins=3)
     assert chart.runs.sum() == 60 and chart.events.sum() == result.total.events
     with pytest.raises(hc.ParameterError, match="did you mean 'operator.damper'"):
@@ -179,10 +184,12 @@ def test_bins_hold_every_run():
 
 
 def test_what_cannot_be_run_is_not_counted():
-    far = hc.Distribution("uniform", -0.1, 0.45)  # the greater half is out of reach
-    result = hc.monte_carlo(hc.Trials(PushedLoop("x", b=50.0), {"pose.x": far}, runs=30))
+    far = hc.studies.Distribution("uniform", -0.1, 0.45)  # the greater half is out of reach
+    result = hc.studies.monte_carlo(
+        hc.studies.Trials(PushedLoop("x", b=50.0), {"pose.x": far}, runs=30)
+    )
     out = result.points[:, 0] > 0.2
-    assert np.all((result.unstable == monte_carlo.NOT_RUN)[out])
+    assert np.all((result.unstable == study.NOT_RUN)[out])
     assert result.refused >= out.sum() and result.total.runs == 30 - result.refused
 
 
@@ -190,7 +197,7 @@ def test_what_cannot_be_run_is_not_counted():
     "given, told",
     [
         (dict(vary={"operator.mas": GAIN}), "operator.mass"),
-        (dict(vary={"interface.frictio": GAIN}), "friction"),
+        (dict(vary={"hardware.frictio": GAIN}), "friction"),
         (dict(vary={}), "must hold a distribution"),
         (dict(vary={"K": GAIN}, grid={"K": Range(1.0, 2.0, 2)}), "given once"),
         (dict(vary={"K": GAIN}, grid={"b": Range(1.0, 2.0)}), "with a count"),
@@ -199,20 +206,20 @@ def test_what_cannot_be_run_is_not_counted():
 )
 def test_impossible_trials_are_refused(given, told):
     with pytest.raises(hc.ParameterError, match=told):
-        hc.Trials(**{"base": PushedLoop("x"), **given})
+        hc.studies.Trials(**{"base": PushedLoop("x"), **given})
 
 
 def test_any_field_of_the_scenario_may_vary():
-    cutoff = hc.Distribution("uniform", 500.0, 2000.0)
-    trials = hc.Trials(replace(SAMPLED, K=2.0), {"interface.force_filter": cutoff}, runs=6)
+    cutoff = hc.studies.Distribution("uniform", 500.0, 2000.0)
+    trials = hc.studies.Trials(replace(SAMPLED, K=2.0), {"hardware.force_filter": cutoff}, runs=6)
     values = trials.middle()
-    assert trials.scenario(values, 0.1).interface.force_filter == pytest.approx(1250.0)
-    assert hc.monte_carlo(trials).total.runs == 6
+    assert trials.scenario(values, 0.1).hardware.force_filter == pytest.approx(1250.0)
+    assert hc.studies.monte_carlo(trials).total.runs == 6
 
 
 # ---- interruption --------------------------------------------------------------------------------
 
-STUDY = hc.Trials(PushedLoop("x"), {"K": GAIN}, HANDS, runs=50, chunk=20, seed=9)
+STUDY = hc.studies.Trials(PushedLoop("x"), {"K": GAIN}, HANDS, runs=50, chunk=20, seed=9)
 
 
 def test_an_interrupted_study_goes_on(tmp_path):
@@ -220,31 +227,33 @@ def test_an_interrupted_study_goes_on(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        hc.monte_carlo(STUDY, out=tmp_path, progress=stop)
-    assert hc.stored_runs(STUDY, tmp_path).total.runs == 20
+        hc.studies.monte_carlo(STUDY, out=tmp_path, progress=stop)
+    assert hc.studies.stored_runs(STUDY, tmp_path).total.runs == 20
     costs, made = [], []
-    result = hc.monte_carlo(STUDY, out=tmp_path, announce=costs.append, progress=made.append)
+    result = hc.studies.monte_carlo(
+        STUDY, out=tmp_path, announce=costs.append, progress=made.append
+    )
     assert made == [20, 10] and costs[0].runs == 30 and costs[0].seconds > 0.0
-    whole = hc.monte_carlo(STUDY)
+    whole = hc.studies.monte_carlo(STUDY)
     assert result.points.tolist() == whole.points.tolist()
     assert result.unstable.tolist() == whole.unstable.tolist()
     # what the cost says of the room on disk: files are of whole chunks, within 30 %
     size = sum(f.stat().st_size for f in (tmp_path / "data").glob("part-*")) / 50
     assert costs[0].size / 30 == pytest.approx(size, rel=0.3)
     sweep.sweep_part(tmp_path, 1).write_bytes(b"damaged")
-    again = hc.monte_carlo(STUDY, out=tmp_path)
+    again = hc.studies.monte_carlo(STUDY, out=tmp_path)
     assert again.unstable.tolist() == whole.unstable.tolist()
     with pytest.raises(hc.ParameterError, match="holds another sweep"):
-        hc.monte_carlo(replace(STUDY, seed=1), out=tmp_path)
+        hc.studies.monte_carlo(replace(STUDY, seed=1), out=tmp_path)
     with pytest.raises(hc.ParameterError, match="other trials"):
-        hc.stored_runs(replace(STUDY, seed=1), tmp_path)
+        hc.studies.stored_runs(replace(STUDY, seed=1), tmp_path)
 
 
 def test_a_disk_without_room_is_refused_before_the_runs(tmp_path, monkeypatch):
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 10, 10))
     with pytest.raises(hc.ParameterError, match="room for"):
-        hc.monte_carlo(STUDY, out=tmp_path)
+        hc.studies.monte_carlo(STUDY, out=tmp_path)
     assert not list((tmp_path / "data").glob("*"))
 
 

@@ -10,13 +10,12 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.studies import passivity_runs as study
-from hapticclay.studies.impedance import subject_of
 from hapticclay.views import passivity_plots as plots
 
 WALL = hc.VirtualWall(K=1000.0, device=hc.Device(0.1, 1.0), Ts=1e-3)
 STIFF = replace(
     hc.constant_cut(control="sampled", b=8000.0, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.012),
-    stop=False,
+    stop_when_unstable=False,
 )
 
 
@@ -45,7 +44,7 @@ def test_a_spring_leaves_b_less_half_k_ts_by_theory_and_by_runs(index):
 
 def test_sines_find_the_real_part_of_the_impedance(index):
     """To 1 %: near half the sampling frequency the steps of the engine are (omega dt)^2/6 off."""
-    expected = hc.wall_impedance(WALL, index.measured_omega).real
+    expected = hc.walls.wall_impedance(WALL, index.measured_omega).real
     np.testing.assert_allclose(index.measured, expected, rtol=0.01)
     assert (index.damping >= index.index - 1e-9).all()  # one sine is never the worst hand
 
@@ -55,13 +54,13 @@ def test_late_damped_walls_too():
     wall = replace(WALL, K=500.0, B=0.2, delay=0.5e-3)
     found = study.wall_index(wall)
     edge = found.worst_omega * (1.0 - 1e-12)
-    np.testing.assert_allclose(found.worst, hc.passivity_index(wall, edge), rtol=0.01)
+    np.testing.assert_allclose(found.worst, hc.walls.passivity_index(wall, edge), rtol=0.01)
 
 
 def test_arm_is_passive_on_x_and_active_on_y():
     for axis, K, sign in (("x", 1.0, 1.0), ("y", 0.5, -1.0)):
-        found = study.arm_index(subject_of(hc.constant_cut(), axis))
-        exact = hc.passivity(axis, K, 90.0).margin
+        found = study.arm_index(hc.constant_cut(), axis)
+        exact = hc.theory.passivity(axis, K, 90.0).margin
         assert found.margin == pytest.approx(exact, rel=2e-3) and np.sign(exact) == sign
         near = np.interp(found.measured_omega, found.omega, found.damping)
         # large slopes between the points of the line, and 1 % of the largest
@@ -107,7 +106,7 @@ def test_the_active_half_is_named_where_there_is_room(index):
 
 
 @pytest.mark.parametrize("wrong,field", [
-    (dict(surface=True), "wall.surface"), (dict(velocity="exact", B=1.0), "wall.velocity"),
+    (dict(unilateral=True), "wall.unilateral"), (dict(velocity="exact", B=1.0), "wall.velocity"),
 ])  # fmt: skip
 def test_walls_without_an_index_are_refused(wrong, field):
     with pytest.raises(ParameterError) as told:

@@ -13,7 +13,7 @@ import hapticclay as hc
 from hapticclay.studies import distribution, population
 from hapticclay.studies.distribution import Distribution
 from hapticclay.theory import wall_limits
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 
 HAND = hc.Operator(0.4, 5.0, 80.0)
 
@@ -89,16 +89,16 @@ def test_a_name_stands_once():
 
 
 def test_published_hands_have_sources():
-    assert all(hands.source for hands in hc.POPULATIONS.values())
-    assert hc.POPULATIONS["paper"].median == hc.Operator()  # Eq. 19
-    low, high = hc.POPULATIONS["paper"], hc.POPULATIONS["posture"]
+    assert all(hands.source for hands in hc.studies.POPULATIONS.values())
+    assert hc.studies.POPULATIONS["paper"].median == hc.Operator()  # Eq. 19
+    low, high = hc.studies.POPULATIONS["paper"], hc.studies.POPULATIONS["posture"]
     for name in population.HAND:  # nothing but what was published is in the range
-        law = getattr(hc.POPULATIONS["published range"], name)
+        law = getattr(hc.studies.POPULATIONS["published range"], name)
         assert (law.first, law.second) == (getattr(low, name), getattr(high, name))
 
 
 def test_hands_are_spread_as_asked():
-    hands = hc.Hands(
+    hands = hc.studies.Hands(
         Distribution("log-normal", 0.4, 0.2),
         Distribution("log-normal", 5.0, 2.0),
         Distribution("log-uniform", 10.0, 200.0),
@@ -123,7 +123,7 @@ def test_hands_are_spread_as_asked():
 
 
 def test_fully_correlated_hands_move_together():
-    hands = replace(hc.Hands.around(HAND, 0.5), correlation=(1.0, 1.0, 1.0))
+    hands = replace(hc.studies.Hands.around(HAND, 0.5), correlation=(1.0, 1.0, 1.0))
     drawn = hands.sample(50)
     # 1e-7: the square root of an eigenvalue of 1e-16 that should be 0
     np.testing.assert_allclose([h.damper / h.mass for h in drawn], 5.0 / 0.4, rtol=1e-7)
@@ -140,12 +140,12 @@ def test_fully_correlated_hands_move_together():
 )
 def test_impossible_hands_are_refused(given, told):
     with pytest.raises(hc.ParameterError, match=told):
-        hc.Hands(**{"mass": 0.4, "damper": 5.0, "spring": 80.0, **given})
+        hc.studies.Hands(**{"mass": 0.4, "damper": 5.0, "spring": 80.0, **given})
 
 
 def test_an_unknown_population_names_the_nearest():
     with pytest.raises(hc.ParameterError, match="did you mean 'posture'"):
-        hc.gain_band(Loop("x"), "postures", [90.0])
+        hc.studies.gain_band(Loop("x"), "postures", [90.0])
 
 
 # ---- bands ---------------------------------------------------------------------------------------
@@ -154,10 +154,12 @@ def test_an_unknown_population_names_the_nearest():
 @pytest.mark.parametrize("timing", [{}, {"Ts": 1e-3, "delay": 5e-4}], ids=["continuous", "sampled"])
 def test_a_band_is_of_the_exact_limits(timing):
     clays, n = [20.0, 200.0], 6
-    band = hc.gain_band(Loop("x", **timing), hc.Hands.around(HAND, 0.5), clays, hc.Draw(n, 3))
-    hands = hc.Hands.around(HAND, 0.5).sample(n, 3)
+    band = hc.studies.gain_band(
+        Loop("x", **timing), hc.studies.Hands.around(HAND, 0.5), clays, hc.studies.Draw(n, 3)
+    )
+    hands = hc.studies.Hands.around(HAND, 0.5).sample(n, 3)
     for i, b in enumerate(clays):
-        limits = [hc.gain_limit("x", b, hand, **timing) for hand in hands]
+        limits = [hc.theory.gain_limit("x", b, hand, **timing) for hand in hands]
         assert band.limits[i].tolist() == limits
         assert band.least[i] == min(limits)
         assert band.quantile(0.5)[i] in limits
@@ -169,7 +171,9 @@ def test_a_band_is_of_the_exact_limits(timing):
 
 def test_a_wall_has_a_band_too():
     wall = hc.VirtualWall(device=hc.Device(0.5, 2.0), Ts=1e-3)
-    band = hc.wall_band(wall, hc.Hands.around(HAND, 0.5), [0.0, 20.0], hc.Draw(5))
+    band = hc.walls.wall_band(
+        wall, hc.studies.Hands.around(HAND, 0.5), [0.0, 20.0], hc.studies.Draw(5)
+    )
     for i, B in enumerate((0.0, 20.0)):
         for j, hand in enumerate(band.hands):
             limit = band.limits[i, j]
@@ -180,8 +184,8 @@ def test_a_wall_has_a_band_too():
 
 def test_bands_refuse_what_they_cannot_take():
     with pytest.raises(hc.ParameterError, match="must be a Loop"):
-        hc.gain_band(HAND, "paper", [90.0])
+        hc.studies.gain_band(HAND, "paper", [90.0])
     with pytest.raises(hc.ParameterError, match="must be a VirtualWall"):
-        hc.wall_band(Loop("x"), "paper", [90.0])
+        hc.walls.wall_band(Loop("x"), "paper", [90.0])
     with pytest.raises(hc.ParameterError, match="must hold a value"):
-        hc.gain_band(Loop("x"), "paper", [])
+        hc.studies.gain_band(Loop("x"), "paper", [])

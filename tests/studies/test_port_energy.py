@@ -34,14 +34,14 @@ def test_the_path_is_imposed_and_its_energy_is_that_of_the_derivation():
         dict(device=hc.Device(0.1, 2.0), delay=1e-3),
         dict(device=hc.Device(0.1, 2.0), delay=5e-4),
         dict(device=hc.Device(0.1, 2.0), delay=1.25e-3, B=0.5),
-        dict(device=hc.Device(0.1, 2.0), B=1.5, window=3),
+        dict(device=hc.Device(0.1, 2.0), B=1.5, velocity_window=3),
         dict(device=hc.Device(0.1, 2.0), B=1.5, velocity_filter=50.0),
     ],
 )
 def test_runs_are_passive_up_to_the_line_of_colgate_and_schenkel(parts):
     wall = hc.VirtualWall(**parts)
     # the slowest path is at pi/48, where the limit of slow paths is short of by 0.4 % at most
-    assert passivity_limit(wall) == pytest.approx(hc.colgate_schenkel_limit(wall), rel=5e-3)
+    assert passivity_limit(wall) == pytest.approx(hc.walls.colgate_schenkel_limit(wall), rel=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_runs_are_passive_up_to_the_line_of_colgate_and_schenkel(parts):
 def test_runs_are_passive_up_to_the_line_of_abbott_and_okamura(friction, quantum):
     wall = hc.VirtualWall(device=hc.Device(0.1, 5.0, friction, quantum))
     # friction along the large path and damping along the small one: fc Ts/(2 A b) and 2 A b/(Ts fc)
-    assert passivity_limit(wall) == pytest.approx(hc.abbott_okamura_limit(wall), rel=0.01)
+    assert passivity_limit(wall) == pytest.approx(hc.walls.abbott_okamura_limit(wall), rel=0.01)
 
 
 @pytest.mark.parametrize("mass", [0.7, 2.0])
@@ -66,9 +66,9 @@ def test_a_heavy_device_with_a_small_damper_is_no_less_passive(mass):
 def test_no_passive_motion_takes_energy_from_a_wall_below_the_lines():
     rng = np.random.default_rng(5)
     plain = hc.VirtualWall(B=1.0, device=hc.Device(0.1, 3.0))
-    plain = replace(plain, K=0.98 * hc.colgate_schenkel_limit(plain))
+    plain = replace(plain, K=0.98 * hc.walls.colgate_schenkel_limit(plain))
     rough = hc.VirtualWall(device=hc.Device(0.1, 3.0, 0.05, 2e-5))
-    rough = replace(rough, K=0.98 * hc.abbott_okamura_limit(rough))
+    rough = replace(rough, K=0.98 * hc.walls.abbott_okamura_limit(rough))
     for i in range(12):
         n = int(rng.integers(2, 9))
         path = Path(tuple((10.0 ** rng.uniform(-5.0, -3.5) * rng.uniform(-1.0, 1.0, n)).tolist()))
@@ -85,7 +85,7 @@ def test_a_device_that_takes_nothing_has_no_passive_wall():
     ("wall", "field"),
     [
         (hc.VirtualWall(operator=hc.Operator()), "wall.operator"),
-        (hc.VirtualWall(surface=True), "wall.surface"),
+        (hc.VirtualWall(unilateral=True), "wall.unilateral"),
         (hc.VirtualWall(B=1.0, velocity="exact"), "wall.velocity"),
     ],
 )

@@ -15,7 +15,7 @@ from tests.oracles.raster import volumes
 
 @pytest.fixture(scope="module")
 def constant():
-    return hc.simulate(hc.constant_cut(shaping=True))
+    return hc.simulate(hc.constant_cut(inertia_shaping=True))
 
 
 @pytest.mark.parametrize("cell", [0.5e-3, 1e-3, 2e-3, 3.3e-3])
@@ -32,7 +32,7 @@ def test_straight_cut_removes_width_times_depth_times_length(constant, width, de
 
 
 def test_samples_left_out_change_nothing(constant):
-    few = hc.simulate(hc.constant_cut(shaping=True), every=50)
+    few = hc.simulate(hc.constant_cut(inertia_shaping=True), every=50)
     assert removed(few)[0][-1] == pytest.approx(removed(constant)[0][-1], rel=1e-4)
 
 

@@ -118,13 +118,15 @@ def test_parameters_reach_the_scenario():
     s = Sweep(
         "constant",
         vary,
-        parse_fixed("shaping=true operator.damper=3 operator.spring=6 t_max=5 clay=0.01,0.02"),
+        parse_fixed(
+            "inertia_shaping=true operator.damper=3 operator.spring=6 t_max=5 clay=0.01,0.02"
+        ),
     )
     scenario = s.run_scenario(s.points(0, 1)[0])
     assert (
         scenario.gain == (1.0, 0.3)
         and scenario.force == (2.0, 2.0)
-        and scenario.shaping
+        and scenario.inertia_shaping
         and scenario.t_max == 5.0
     )
     assert (
@@ -144,14 +146,14 @@ def test_any_field_of_any_part_is_varied_by_name(tmp_path):
         "compensator.den.1": lambda s: s.compensator.den[1],
         "clay.x.values.1": lambda s: s.clay.x.values[1],
         "torque_limit.elbow": lambda s: s.torque_limit[1],
-        "interface.friction.x": lambda s: s.interface.friction[0],
+        "hardware.friction.x": lambda s: s.hardware.friction[0],
         "muscle.rms.x": lambda s: s.muscle.rms[0],
         "operator.y.mass": lambda s: s.operator[1].mass,
     }
     grid = " ".join(f"{name}=0.3:0.4:2" for name in names)
     sampled = {
-        "control": "sampled", "interface.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
-        "impedance": True,
+        "control": "sampled", "hardware.friction": 0.1, "compensator.den": [1.0, 40.0, 0.0],
+        "operator": True,
     }  # fmt: skip
     s = Sweep("constant", parse_grid(grid), sampled)
     assert len(s) == 2 ** len(names)
@@ -165,7 +167,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     (tmp_path / "mine.toml").write_text('experiment = "free"\ngain = [1, 0.4]\n[arm]\nl1 = 0.3\n')
     spec = tmp_path / "spec.toml"
     spec.write_text('scenario = "mine.toml"\n[vary]\narm.l2 = "0.3:0.4:2"\n"gain.x" = [1, 2]\n'
-                    "[fixed]\nt_max = 0.01\nimpedance = true\noperator.mass = 0.5\n")  # fmt: skip
+                    '[fixed]\nt_max = 0.01\noperator = true\n"operator.mass" = 0.5\n')  # fmt: skip
     s = Sweep(**sampling.load_sweep(spec))
     assert s.title == "mine" and list(s.vary) == ["arm.l2", "gain.x"]
     got = s.run_scenario(s.points(1, 2)[0])

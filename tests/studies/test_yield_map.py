@@ -15,7 +15,7 @@ from hapticclay.studies.yield_map import measured_cycle, yielding_run
 from hapticclay.theory.relay_cycle import critical_push
 from hapticclay.views.study_plots import yield_map_plot
 
-Y = PushedLoop("y", K=1.0, shaping=True)
+Y = PushedLoop("y", K=1.0, inertia_shaping=True)
 
 
 def cycle_of(flow, speed, dt=3.6e-4, t_max=6.0):
@@ -32,8 +32,8 @@ def test_runs_end_in_the_predicted_cycle(Fy, b):
     if (Fy, b) == (100.0, 50.0):
         pytest.skip("10 m/s, 0.3 m to either side: out of the arm's reach")
     flow = hc.Flow(Fy=Fy, b=b)
-    predicted = next(x for x in hc.limit_cycles(Y.linear, flow) if x.kind == "limit cycle")
-    exact = next(x for x in hc.exact_cycles(Y.linear, flow) if x.stable)
+    predicted = next(x for x in hc.theory.limit_cycles(Y.linear, flow) if x.kind == "limit cycle")
+    exact = next(x for x in hc.theory.exact_cycles(Y.linear, flow) if x.stable)
     run = cycle_of(flow, 1.2 * exact.speed)
     assert run is not None and predicted.trusted
     assert run.fundamental == pytest.approx(predicted.speed, rel=0.10)
@@ -46,7 +46,7 @@ def test_runs_end_in_the_predicted_cycle(Fy, b):
 
 def test_a_cycle_in_a_run_is_of_the_order_of_the_method():
     flow = hc.Flow(Fy=1.0)
-    exact = next(x for x in hc.exact_cycles(Y.linear, flow) if x.stable)
+    exact = next(x for x in hc.theory.exact_cycles(Y.linear, flow) if x.stable)
     coarse, fine = (
         abs(cycle_of(flow, exact.speed, dt).amplitude / exact.amplitude - 1.0)
         for dt in (4e-3, 2.5e-4)
@@ -57,7 +57,7 @@ def test_a_cycle_in_a_run_is_of_the_order_of_the_method():
 
 @pytest.mark.parametrize("flow", [hc.Flow(K=5.0, n=0.5, b=10.0), hc.Flow(Fy=2.0, K=5.0, n=0.3)])
 def test_runs_in_thinning_clay_end_in_the_predicted_cycle(flow):
-    predicted = next(x for x in hc.limit_cycles(Y.linear, flow) if x.kind == "limit cycle")
+    predicted = next(x for x in hc.theory.limit_cycles(Y.linear, flow) if x.kind == "limit cycle")
     run = cycle_of(flow, 1.2 * predicted.speed, t_max=8.0)
     assert run is not None and predicted.trusted
     assert run.fundamental == pytest.approx(predicted.speed, rel=0.10)
@@ -86,7 +86,7 @@ def test_a_push_that_cannot_go_on():
 def test_no_clay_stops_a_loop_that_is_unstable_when_it_is_held():
     unstable = hc.Compensator((1.0, 1.0), (1.0, -5.0, 0.0))
     flow = hc.Flow(Fy=1.0)
-    assert hc.push_outcomes("x", flow, 0.1, compensator=unstable)[0] != "sticks"
+    assert hc.theory.push_outcomes("x", flow, 0.1, compensator=unstable)[0] != "sticks"
     assert critical_push("x", flow, 0.1, compensator=unstable) == 0.0
 
 
@@ -142,7 +142,7 @@ def test_a_loop_that_never_buzzes_has_no_map(monkeypatch):
 def test_the_command_predicts(tmp_path, capsys):
     folder = tmp_path / ("long" * 20)  # a path has the length that it has
     command = stability.StabilityCommand(
-        "y", gain=1.0, impedance=False, clay=("Fy=5", "b=30"), out=folder
+        "y", gain=1.0, operator=False, clay=("Fy=5", "b=30"), out=folder
     )
     assert command() == 0
     out = capsys.readouterr().out
@@ -183,7 +183,7 @@ def test_clay_of_words():
     assert stability.clay_of(("Fy=5", "K=2", "n=0.5"), 9.0) == hc.Flow(5.0, 2.0, 0.5, 9.0)
     assert stability.clay_of(("Fy=5 b=30",)) == stability.clay_of(("Fy=5",), 30.0)
     assert stability.clay_of(("Fy=5",)) == hc.Flow(Fy=5.0)
-    assert stability.clay_of(("stiff", "clay")) == hc.material("stiff clay")
+    assert stability.clay_of(("stiff", "clay")) == hc.materials.material("stiff clay")
 
 
 @pytest.mark.parametrize(

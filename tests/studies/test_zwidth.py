@@ -21,7 +21,7 @@ from hapticclay.studies.zwidth import (
     worst_hand,
     zwidth,
 )
-from hapticclay.theory import gain_limit
+from hapticclay.theory import gain_crossings
 from hapticclay.views.style import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
 from tests.oracles.sampled_wall import sample_map
@@ -52,7 +52,7 @@ def largest_stiffness(wall):
         {"delay": 1e-3},
         {"delay": 2.6e-3},
         {"velocity": "exact"},
-        {"velocity_filter": 60.0, "window": 4},
+        {"velocity_filter": 60.0, "velocity_window": 4},
         {"operator": Operator(0.3, 2.0, 40.0), "delay": 0.5e-3},
         {"device": hc.Device(2.0, 1.0), "Ts": 2e-4},
         {"device": hc.Device(0.1, 50.0), "Ts": 1e-2},
@@ -100,7 +100,7 @@ def test_automatic_dampings_reach_from_zero_to_the_largest():
 
 
 def test_every_hand_of_the_box_holds_the_limit_of_the_worst():
-    box = hc.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))
+    box = hc.theory.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))
     wall = replace(BARE, delay=1.5e-3, velocity_filter=100.0)
     r = zwidth(wall, B=(0.0, 3.0), box=box).regions[0]
     for B, K, found in zip(r.B, r.box_exact, r.box_K, strict=True):
@@ -133,7 +133,7 @@ def test_published_lines_where_they_are_exact():
 
 def test_friction_outweighs_the_encoder_up_to_the_limit_of_abbott_and_okamura():
     limit = 2.0 * 0.02 / 5e-5
-    assert hc.abbott_okamura_limit(ROUGH) == pytest.approx(limit)
+    assert hc.walls.abbott_okamura_limit(ROUGH) == pytest.approx(limit)
     walls = [replace(ROUGH, K=share * limit, B=2.0) for share in (0.3, 0.9, 0.98)]
     assert all(come_to_rest(walls))
     # above it half a quantum of force moves the device: it buzzes, if B is large enough for the
@@ -170,7 +170,7 @@ def test_rest_is_the_verdict_of_loops_that_are_not_linear():
     assert r.verdict == BY_REST and not r.linear and math.isnan(r.gap())
     # a surface that is pressed is the linear wall; 1 % is what the decay of a swing resolves
     exact = largest_stiffness(replace(BARE, B=1.0))
-    walls = [replace(BARE, surface=True, B=1.0, K=share * exact) for share in (0.99, 1.01)]
+    walls = [replace(BARE, unilateral=True, B=1.0, K=share * exact) for share in (0.99, 1.01)]
     assert come_to_rest(walls) == [True, False]
 
 
@@ -216,7 +216,7 @@ def test_clay_on_the_arm():
     for B, K, exact in zip(r.B, r.K, r.exact, strict=True):
         for share in (0.99, 1.01):
             tried = replace(loop, b=B, k=share * K).linear
-            assert gain_limit.is_stable(tried) == (share < 1.0)
+            assert gain_crossings.is_stable(tried) == (share < 1.0)
         assert K == pytest.approx(exact, rel=3e-3)
 
 
@@ -271,7 +271,7 @@ def test_a_wall_is_saved_and_loaded(tmp_path, ending):
         ("quantum", (0.0, "10um", 6e-5), ["Delta = 0 um", "Delta = 10 um", "Delta = 60 um"]),
         ("Ts", ("0.5 ms", 1e-3), ["Ts = 0.5 ms", "Ts = 1 ms"]),
         ("filter", (None, "none", 150.0), ["no filter", "no filter", "filter = 150 Hz"]),
-        ("window", (1, 4.0), ["window = 1 samples", "window = 4 samples"]),
+        ("velocity_window", (1, 4.0), ["window = 1 samples", "window = 4 samples"]),
     ],
 )
 def test_a_family_is_named_by_symbol_and_unit(vary, values, names):

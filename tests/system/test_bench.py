@@ -160,7 +160,7 @@ def test_jobs_are_those_of_the_package():
 
 def test_sampled_control_is_as_late_as_its_hold_and_as_exact_as_the_hybrid_system():
     found = wp.against_hybrid(True)
-    assert {r["render"] for r in found} == {"held", "implicit"}
+    assert {r["render"] for r in found} == {"held", "physical"}
     for r in found:
         assert r["hybrid"] < 0.05 * r["continuous"]
     for coarse, fine in zip(found[0::2], found[1::2], strict=True):
@@ -213,7 +213,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
         "fast",
         "accurate",
         "sampled, held",
-        "sampled, implicit",
+        "sampled, physical",
     }
     text = readme.read_text()
     assert (

@@ -45,7 +45,7 @@ def test_sweep_snippet_runs_on_a_sweep(tmp_path, monkeypatch, capsys):
     assert app.main(["sweep", *grid, "--out", "out/map", "--workers", "1"]) == 0
     out = ran(code, tmp_path).splitlines()
     assert out[0] == "m/s - steady speed in that clay"
-    runs = hc.read_sweep("out/map").to_pandas()
+    runs = hc.studies.read_sweep("out/map").to_pandas()
     assert list(runs.columns[:3]) == ["run", "b", "gain.x"] and len(runs) == 4
     assert runs.attrs["units"]["gain.x"] == "1/kg" and runs.attrs["units"]["b"] == "N.s/m"
     assert runs.attrs["descriptions"]["b"] == "parameter of the run"
@@ -62,7 +62,7 @@ def test_units_of_a_sweep_are_in_its_files(tmp_path):
     schema = pq.read_schema(part)
     assert schema.field("end_time").metadata[b"unit"] == b"s"
     assert schema.field("fe_over_v_y").metadata[b"unit"] == b"N.s/m"
-    table = hc.read_sweep(tmp_path)
+    table = hc.studies.read_sweep(tmp_path)
     pd.testing.assert_frame_equal(table.to_pandas(), pd.read_parquet(tmp_path / "data"))
 
 

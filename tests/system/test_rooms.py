@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import grimp
+import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 HEAVY = (
     "matplotlib",
@@ -35,7 +38,7 @@ def loaded(code, names):
         ("import hapticclay as hc; hc.constant_cut()", (*HEAVY, "mujoco")),
         ("import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01))", HEAVY),
         (
-            "import hapticclay as hc; hc.gain_limit('x', 90.0)",
+            "import hapticclay as hc; hc.theory.gain_limit('x', 90.0)",
             ("matplotlib", "mujoco", "numba", "tyro"),
         ),
     ],
@@ -52,6 +55,19 @@ def test_the_rooms_stand_as_drawn():
         text=True,
     )
     assert out.returncode == 0, out.stdout
+
+
+def test_no_imports_run_in_a_circle():
+    """Those within functions and for types alone included."""
+    graph = grimp.build_graph("hapticclay", cache_dir=None)
+    modules = sorted(graph.modules)
+    ties = np.array(
+        [[b in graph.find_modules_directly_imported_by(a) for b in modules] for a in modules]
+    )
+    _, rings = connected_components(ties, connection="strong")
+    circles = {n: [m for m, k in zip(modules, rings, strict=True) if k == n] for n in rings}
+    assert [x for x in circles.values() if len(x) > 1] == []
+    assert ties.sum() > len(modules)  # it sees imports
 
 
 @pytest.mark.perf

@@ -14,7 +14,7 @@ from hapticclay.theory import describing, linear_loop
 from hapticclay.theory.describing import amplitudes, damping_crossings
 from tests.oracles import sticking
 
-Y = hc.Loop("y", K=1.0)
+Y = hc.theory.Loop("y", K=1.0)
 FLOWS = st.builds(
     hc.Flow,
     Fy=st.sampled_from((0.0, 0.1, 5.0, 100.0)),
@@ -35,23 +35,23 @@ def test_it_is_the_fundamental_of_the_force(flow, exponent):
 
     # over half a period, by symmetry; quad's own error at the edges, where |v|^n has no slope
     integral = 2.0 / math.pi * quad(share, 0.0, math.pi, epsrel=1e-10, limit=200)[0]
-    assert hc.describing_function(flow, V) * V == pytest.approx(integral, rel=1e-7)
+    assert hc.theory.describing_function(flow, V) * V == pytest.approx(integral, rel=1e-7)
 
 
 def test_named_laws():
     V = np.array([0.01, 0.1])
-    bingham = hc.describing_function(hc.Flow(Fy=5.0, b=30.0), V)
+    bingham = hc.theory.describing_function(hc.Flow(Fy=5.0, b=30.0), V)
     assert bingham == pytest.approx(30.0 + 4.0 * 5.0 / (math.pi * V), rel=1e-15)
     # c(1) = 1, a damper; c(2) = 8/(3 pi), quadratic damping
-    assert hc.describing_function(hc.Flow(K=7.0), 0.3) == pytest.approx(7.0, rel=1e-15)
-    quadratic = hc.describing_function(hc.Flow(K=7.0, n=2.0), 0.3)
+    assert hc.theory.describing_function(hc.Flow(K=7.0), 0.3) == pytest.approx(7.0, rel=1e-15)
+    quadratic = hc.theory.describing_function(hc.Flow(K=7.0, n=2.0), 0.3)
     assert quadratic == pytest.approx(7.0 * 8.0 / (3.0 * math.pi) * 0.3, rel=1e-15)
 
 
 @pytest.mark.parametrize("V", [0.0, -1.0, math.nan, [0.1, 0.0]])
 def test_no_amplitude_is_refused(V):
     with pytest.raises(hc.ParameterError, match="V"):
-        hc.describing_function(hc.Flow(Fy=1.0), V)
+        hc.theory.describing_function(hc.Flow(Fy=1.0), V)
 
 
 @given(FLOWS, st.floats(-1.0, 4.0))
@@ -62,9 +62,9 @@ def test_amplitudes_are_all_solutions(flow, exponent):
     assert list(found) == sorted(found)
     for V in found:
         # conditioning: V is a double, and N turns by at most |n - 1| <= 2 of its error
-        assert hc.describing_function(flow, V) == pytest.approx(N, rel=1e-11)
+        assert hc.theory.describing_function(flow, V) == pytest.approx(N, rel=1e-11)
     V = np.geomspace(1e-9, 1e9, 4001)
-    N_of_V = np.broadcast_to(hc.describing_function(flow, V), V.shape)
+    N_of_V = np.broadcast_to(hc.theory.describing_function(flow, V), V.shape)
     changes = np.count_nonzero(np.diff(np.sign(N_of_V - N)))
     if changes:  # a pair closer than this grid, or a root beyond it, shows in `found` alone
         assert len([x for x in found if V[0] <= x <= V[-1]]) >= changes
@@ -81,8 +81,8 @@ def test_amplitudes_of_laws_with_two():
 @given(st.floats(0.2, 10.0), HANDS, st.sampled_from("xy"))
 @settings(max_examples=40, deadline=None)
 def test_unstable_dampings_against_eigenvalues(K, hand, axis):
-    loop = hc.Loop(axis, K=K, operator=hand)
-    bands = hc.unstable_dampings(loop)
+    loop = hc.theory.Loop(axis, K=K, operator=hand)
+    bands = hc.theory.unstable_dampings(loop)
     edges = [x for band in bands for x in band]
     for b in np.geomspace(0.5, 1e5, 23):
         if any(abs(b / x - 1.0) < 1e-3 for x in edges if x):
@@ -96,14 +96,14 @@ def test_crossings_have_poles_on_the_axis():
     low, high = damping_crossings(Y)
     assert (low.below, low.above, high.below, high.above) == (0, 2, 2, 0)
     for x in (low, high):
-        z = hc.closed_loop_poles("y", 1.0, x.b, None)
+        z = hc.theory.closed_loop_poles("y", 1.0, x.b, None)
         assert np.min(np.abs(z - 1j * x.omega)) < 1e-9 * x.omega
 
 
 def test_bands_with_open_ends():
     unstable = hc.Compensator((1.0, 0.0), (1.0, -5.0, 0.0))  # C itself is, so no clay saves it
-    assert hc.unstable_dampings("x", 0.1, compensator=unstable)[-1][1] == math.inf
-    assert hc.unstable_dampings("x", 1.0) == ()
+    assert hc.theory.unstable_dampings("x", 0.1, compensator=unstable)[-1][1] == math.inf
+    assert hc.theory.unstable_dampings("x", 1.0) == ()
 
 
 # ---- the claims ----------------------------------------------------------------------------------
@@ -113,10 +113,10 @@ def test_bands_with_open_ends():
 @pytest.mark.parametrize("Fy", [0.1, 5.0, 100.0])
 def test_a_small_push_sticks_and_a_large_one_buzzes(b, Fy):
     flow = hc.Flow(Fy=Fy, b=b)
-    (low, high) = hc.unstable_dampings(Y)[0]
+    (low, high) = hc.theory.unstable_dampings(Y)[0]
     assert (low, high) == pytest.approx((62.06, 3903.0), rel=5e-4)
-    assert hc.push_outcomes(Y, flow) == ("sticks", "limit cycle")
-    threshold, cycle = hc.limit_cycles(Y, flow)
+    assert hc.theory.push_outcomes(Y, flow) == ("sticks", "limit cycle")
+    threshold, cycle = hc.theory.limit_cycles(Y, flow)
     assert (threshold.kind, cycle.kind) == ("threshold", "limit cycle")
     assert threshold.speed == pytest.approx(4.0 * Fy / (math.pi * (high - b)), rel=1e-12)
     assert cycle.speed == pytest.approx(4.0 * Fy / (math.pi * (low - b)), rel=1e-12)
@@ -126,33 +126,37 @@ def test_a_small_push_sticks_and_a_large_one_buzzes(b, Fy):
 
 def test_in_clay_within_the_band_a_large_push_grows():
     flow = hc.Flow(Fy=5.0, b=200.0)
-    assert hc.push_outcomes(Y, flow) == ("sticks", "grows")
-    assert [x.kind for x in hc.limit_cycles(Y, flow)] == ["threshold"]
+    assert hc.theory.push_outcomes(Y, flow) == ("sticks", "grows")
+    assert [x.kind for x in hc.theory.limit_cycles(Y, flow)] == ["threshold"]
 
 
 def test_beyond_the_band_everything_sticks():
     flow = hc.Flow(Fy=5.0, b=5000.0)
-    assert hc.push_outcomes(Y, flow) == ("sticks", "sticks")
-    assert hc.limit_cycles(Y, flow) == ()
+    assert hc.theory.push_outcomes(Y, flow) == ("sticks", "sticks")
+    assert hc.theory.limit_cycles(Y, flow) == ()
 
 
 def test_clay_without_a_yield_force():
-    assert hc.push_outcomes(Y, hc.Flow(b=30.0)) == ("comes to rest", "comes to rest")
-    assert hc.push_outcomes(Y, hc.Flow(b=300.0)) == ("grows", "grows")
+    assert hc.theory.push_outcomes(Y, hc.Flow(b=30.0)) == ("comes to rest", "comes to rest")
+    assert hc.theory.push_outcomes(Y, hc.Flow(b=300.0)) == ("grows", "grows")
     # thickening clay: damping falls to b in a small motion, which grows until N leaves the band
     thick = hc.Flow(K=1e4, n=2.0, b=100.0)
-    assert hc.push_outcomes(Y, thick) == ("limit cycle", "limit cycle")
-    (cycle,) = hc.limit_cycles(Y, thick)
+    assert hc.theory.push_outcomes(Y, thick) == ("limit cycle", "limit cycle")
+    (cycle,) = hc.theory.limit_cycles(Y, thick)
     assert cycle.kind == "limit cycle" and cycle.damping > 3900.0
 
 
 def test_cycles_of_a_scenario_are_those_of_its_loop():
-    flow, cut = hc.Flow(Fy=5.0), hc.constant_cut(shaping=True, gain=(1.0, 1.0))
-    assert hc.limit_cycles(cut, "y", flow) == hc.limit_cycles(hc.Loop.of(cut, "y"), flow)
-    assert hc.limit_cycles("y", flow, 1.0) == hc.limit_cycles(Y, flow=flow)
+    flow, cut = hc.Flow(Fy=5.0), hc.constant_cut(inertia_shaping=True, gain=(1.0, 1.0))
+    assert hc.theory.limit_cycles(cut, "y", flow) == hc.theory.limit_cycles(
+        hc.theory.Loop.of(cut, "y"), flow
+    )
+    assert hc.theory.limit_cycles("y", flow, 1.0) == hc.theory.limit_cycles(Y, flow=flow)
 
 
-@pytest.mark.parametrize("ask", [hc.limit_cycles, hc.push_outcomes, hc.exact_cycles])
+@pytest.mark.parametrize(
+    "ask", [hc.theory.limit_cycles, hc.theory.push_outcomes, hc.theory.exact_cycles]
+)
 def test_what_is_no_law_is_refused(ask):
     with pytest.raises(hc.ParameterError, match="must be a Flow"):
         ask(Y, 5.0)
@@ -182,7 +186,7 @@ def last_period(t, z):
 @pytest.mark.parametrize("hand", [None, hc.Operator(2.0, 5.0, 0.0)])
 def test_a_push_ends_in_the_exact_limit_cycle(hand):
     loop, flow = replace(Y, operator=hand), hc.Flow(Fy=5.0, b=10.0)
-    cycle = [x for x in hc.exact_cycles(loop, flow) if x.stable][0]
+    cycle = [x for x in hc.theory.exact_cycles(loop, flow) if x.stable][0]
     A, B = relay(loop, flow)
     start = np.zeros(len(A))
     start[1] = cycle.speed
@@ -194,14 +198,14 @@ def test_a_push_ends_in_the_exact_limit_cycle(hand):
     assert np.max(np.abs(v)) == pytest.approx(cycle.speed, rel=1e-2)
     assert amplitude == pytest.approx(cycle.amplitude, rel=1e-3)
     spectrum = np.abs(np.fft.rfft(v))
-    predicted = next(x for x in hc.limit_cycles(loop, flow) if x.kind == "limit cycle")
+    predicted = next(x for x in hc.theory.limit_cycles(loop, flow) if x.kind == "limit cycle")
     # to first order; and interpolation
     assert spectrum[3] / spectrum[1] == pytest.approx(predicted.third, rel=0.25)
 
 
 def test_the_exact_threshold_parts_sticking_from_buzzing():
     flow = hc.Flow(Fy=1.0)
-    threshold, cycle = hc.exact_cycles(Y, flow)
+    threshold, cycle = hc.theory.exact_cycles(Y, flow)
     assert not threshold.stable and threshold.stuck > 0.0 and cycle.stable and cycle.stuck == 0.0
     A, B = relay(Y, flow)
 
@@ -230,10 +234,10 @@ def test_the_exact_threshold_parts_sticking_from_buzzing():
 @given(st.floats(0.7, 8.0), st.floats(0.0, 0.95), HANDS)
 @settings(max_examples=15, deadline=None)
 def test_a_trusted_prediction_keeps_its_word(K, share, hand):
-    loop = hc.Loop("y", K=K, operator=hand)
-    flow = hc.Flow(Fy=1.0, b=share * hc.unstable_dampings(loop)[0][0])
-    exact = [x for x in hc.exact_cycles(loop, flow) if x.stable]
-    for cycle in hc.limit_cycles(loop, flow):
+    loop = hc.theory.Loop("y", K=K, operator=hand)
+    flow = hc.Flow(Fy=1.0, b=share * hc.theory.unstable_dampings(loop)[0][0])
+    exact = [x for x in hc.theory.exact_cycles(loop, flow) if x.stable]
+    for cycle in hc.theory.limit_cycles(loop, flow):
         if cycle.kind != "limit cycle" or not cycle.trusted:
             continue
         speed, omega = exact[0].speed / cycle.speed - 1.0, exact[0].omega / cycle.omega - 1.0
@@ -244,23 +248,23 @@ def test_a_trusted_prediction_keeps_its_word(K, share, hand):
 
 
 def test_exact_cycles_scale_with_the_yield_force():
-    one, ten = (hc.exact_cycles(Y, hc.Flow(Fy=x, b=20.0)) for x in (1.0, 10.0))
+    one, ten = (hc.theory.exact_cycles(Y, hc.Flow(Fy=x, b=20.0)) for x in (1.0, 10.0))
     for a, b in zip(one, ten, strict=True):
         assert (10.0 * a.speed, 10.0 * a.amplitude) == pytest.approx((b.speed, b.amplitude))
         assert (a.omega, a.multiplier) == pytest.approx((b.omega, b.multiplier))
-    same = hc.exact_cycles(Y, hc.Flow(Fy=1.0, K=20.0))
+    same = hc.theory.exact_cycles(Y, hc.Flow(Fy=1.0, K=20.0))
     assert [x.speed for x in same] == pytest.approx([x.speed for x in one], rel=1e-12)
 
 
 def test_exact_cycles_are_of_coulomb_and_bingham_clay():
     for flow in (hc.Flow(b=10.0), hc.Flow(Fy=1.0, K=2.0, n=0.5)):
         with pytest.raises(hc.ParameterError, match="Coulomb or Bingham"):
-            hc.exact_cycles(Y, flow)
+            hc.theory.exact_cycles(Y, flow)
 
 
 @pytest.mark.parametrize("flow", [hc.Flow(K=5.0, n=0.5, b=10.0), hc.Flow(K=9.0, n=0.2)])
 def test_a_push_in_a_power_law_ends_in_the_predicted_cycle(flow):
-    cycle = next(x for x in hc.limit_cycles(Y, flow) if x.kind == "limit cycle")
+    cycle = next(x for x in hc.theory.limit_cycles(Y, flow) if x.kind == "limit cycle")
     A, B = linear_loop.state_space(replace(Y, b=0.0))
 
     def rate(_, z):

@@ -26,11 +26,11 @@ MARGINS = [
 @pytest.mark.parametrize("asked,left", MARGINS)
 def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):
     th = hc.Operator() if on else None
-    K = hc.design_gain(axis, b, th, **asked)
-    assert left(hc.margins(axis, K, b, th)) >= 0.0
-    assert left(hc.margins(axis, K * (1 + 1e-9), b, th)) < 1e-8
+    K = hc.theory.design_gain(axis, b, th, **asked)
+    assert left(hc.theory.margins(axis, K, b, th)) >= 0.0
+    assert left(hc.theory.margins(axis, K * (1 + 1e-9), b, th)) < 1e-8
     for factor in (0.1, 0.5, 0.9):  # every lower gain has it too
-        assert left(hc.margins(axis, factor * K, b, th)) >= 0.0
+        assert left(hc.theory.margins(axis, factor * K, b, th)) >= 0.0
 
 
 @pytest.mark.parametrize(
@@ -38,25 +38,25 @@ def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):
 )
 def test_gain_margin_divides_the_gain_limit(kw):
     for axis in "xy":
-        assert hc.design_gain(axis, 90.0, gain_margin=2.5, **kw) == pytest.approx(
-            hc.gain_limit(axis, 90.0, **kw) / 2.5, rel=1e-9
+        assert hc.theory.design_gain(axis, 90.0, gain_margin=2.5, **kw) == pytest.approx(
+            hc.theory.gain_limit(axis, 90.0, **kw) / 2.5, rel=1e-9
         )
 
 
 def test_without_clay_and_hand_any_gain_will_do():
-    assert hc.design_gain("x", 0.0, gain_margin=2.0) == math.inf
+    assert hc.theory.design_gain("x", 0.0, gain_margin=2.0) == math.inf
 
 
 def test_transparency_error_is_its_integral():
     low, high = DESIGN_BAND
 
     def miss(x):
-        return abs(1 - hc.transparency("x", 1.0, 90.0, np.array([math.exp(x)]))[0]) ** 2
+        return abs(1 - hc.theory.transparency("x", 1.0, 90.0, np.array([math.exp(x)]))[0]) ** 2
 
     exact = math.sqrt(
         quad(miss, math.log(low), math.log(high), epsabs=1e-12)[0] / math.log(high / low)
     )
-    assert hc.transparency_error("x", 1.0, 90.0) == pytest.approx(
+    assert hc.theory.transparency_error("x", 1.0, 90.0) == pytest.approx(
         exact, rel=1e-6
     )  # Simpson, steps of 1 %: h^4
 
@@ -69,7 +69,9 @@ def test_shapes_are_compared_at_equal_margin_the_best_first():
         hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)),
     ]
     for axis in "xy":
-        found = hc.compare(axis, 90.0, shapes, hc.Operator(), disk_margin=0.5, delay_margin=0.005)
+        found = hc.theory.compare(
+            axis, 90.0, shapes, hc.Operator(), disk_margin=0.5, delay_margin=0.005
+        )
         assert {d.compensator for d in found} == set(shapes)
         assert np.all(np.diff([d.error for d in found]) > 0)
         assert found[0].compensator == hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0))  # a lead pays
@@ -78,13 +80,13 @@ def test_shapes_are_compared_at_equal_margin_the_best_first():
                 0.0, abs=1e-9
             )
             assert d.margins.stable
-            assert linear_loop.stable(hc.Loop(axis, 90.0, compensator=d.compensator, K=d.K))
+            assert linear_loop.stable(hc.theory.Loop(axis, 90.0, compensator=d.compensator, K=d.K))
 
 
 def test_a_shape_without_a_largest_gain_is_refused():
     with pytest.raises(ParameterError, match="largest K"):
         lead = hc.Compensator((1.0, 5.0), (1.0, 40.0, 0.0))
-        hc.compare("x", 90.0, [lead], hc.Operator(), disk_margin=0.5)
+        hc.theory.compare("x", 90.0, [lead], hc.Operator(), disk_margin=0.5)
 
 
 @pytest.mark.parametrize(
@@ -99,5 +101,5 @@ def test_a_shape_without_a_largest_gain_is_refused():
 )
 def test_bad_input_is_refused(kw, field):
     with pytest.raises(ParameterError) as e:
-        hc.design_gain("x", 90.0, **kw)
+        hc.theory.design_gain("x", 90.0, **kw)
     assert field in (None, e.value.field)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import gain_limit, linear_loop
+from hapticclay.theory import gain_crossings, linear_loop
 from tests.oracles import G0, G1, S0, S1, SG
 
 HANDS = {"hand": (0.25, 2.0, 6.0), "none": (0.0, 0.0, 0.0), "stiff": (1.0, 5.0, 400.0)}
@@ -38,7 +38,7 @@ def operator(hand):
 
 
 def limit(axis, b, hand=(0.25, 2.0, 6.0), **kw):
-    return hc.gain_limit(axis, b, operator(hand), **kw)
+    return hc.theory.gain_limit(axis, b, operator(hand), **kw)
 
 
 def polynomial(axis, K, b, hand, now=1.0, then=1.0):
@@ -66,7 +66,7 @@ def worst(poly):
 @pytest.mark.parametrize("axis,on,j", list(itertools.product("xy", [True, False], [0, 1, 2])))
 def test_continuous_limits(axis, on, j):
     b = (50.0, 90.0, 100.0)[j]
-    found = hc.gain_limit(axis, b, Operator() if on else None)
+    found = hc.theory.gain_limit(axis, b, Operator() if on else None)
     assert found == pytest.approx(
         PRINTED[axis, on][j], abs=0.0051
     )  # half the last digit, and a hair
@@ -76,7 +76,7 @@ def test_continuous_limits(axis, on, j):
         lambda K: worst(polynomial(axis, K, b, hand)), 0.5 * found, 1.5 * found, xtol=1e-13
     )
     assert found == pytest.approx(root, rel=1e-9)  # eps times the condition of the roots, 1e4
-    K, omega = gain_limit.critical_gain(hc.Loop(axis, b, operator(hand)))
+    K, omega = gain_crossings.critical_gain(hc.theory.Loop(axis, b, operator(hand)))
     assert abs(np.polyval(polynomial(axis, K, b, hand), 1j * omega)) < 1e-8 * np.polyval(
         np.abs(polynomial(axis, K, b, hand)), omega
     )
@@ -116,7 +116,7 @@ def period(  # noqa: PLR0913  # one loop, in floats or in Decimals
     g0, g1, s0, s1, sg = (number(float(x["xy".index(axis)])) for x in (G0, G1, S0, S1, SG))
     K, b, Ts, delay, m, d, k = (number(x) for x in (K, b, Ts, delay, *hand))
     mass = 1 / sg + m
-    physical = b if render == "implicit" else 0
+    physical = b if render == "physical" else 0
     blocks = exponential(
         Ts
         * np.array(
@@ -164,7 +164,7 @@ CASES = list(
 
 
 @pytest.mark.parametrize("axis,hand,timing", CASES)
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_limits_against_the_period_map(axis, hand, timing, render):
     Ts, delay = timing
     hand = HANDS[hand]
@@ -193,7 +193,7 @@ def test_sampled_limits_of_random_loops():
             for x in ((-2.0, 1.5), (-1.0, 2.5), (-1.0, 5.0))
         ]
         delay = float(rng.choice([0.0, Ts * rng.uniform(0.0, 4.0), Ts * rng.integers(0, 4)]))
-        axis, render = "xy"[rng.integers(2)], ("held", "implicit")[rng.integers(2)]
+        axis, render = "xy"[rng.integers(2)], ("held", "physical")[rng.integers(2)]
         found = limit(axis, b, hand, Ts=Ts, delay=delay, render=render)
 
         def beyond(K):
@@ -264,21 +264,21 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
 
     Judged with 150 digits, by another criterion.
     """
-    found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="implicit")
+    found = limit(axis, b, HANDS[hand], Ts=Ts, delay=delay, render="physical")
     assert 0.0 < found < np.inf
     for share in (1e-12, 1e-3, 0.5, 1 - 1e-7, 1 + 1e-7):
-        stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "implicit")
+        stable = is_inside(axis, share * found, b, HANDS[hand], Ts, delay, "physical")
         assert stable == (share < 1.0)
         assert (
-            gain_limit.is_stable(
-                hc.Loop(
+            gain_crossings.is_stable(
+                hc.theory.Loop(
                     axis,
                     b,
                     operator(HANDS[hand]),
                     K=share * found,
                     Ts=Ts,
                     delay=delay,
-                    render="implicit",
+                    render="physical",
                 )
             )
             == stable
@@ -287,7 +287,7 @@ def test_sampled_limits_where_poles_crowd_at_one(digits, axis, hand, b, Ts, dela
 
 @pytest.mark.parametrize("axis,hand", list(itertools.product("xy", HANDS)))
 @pytest.mark.parametrize("Ts,delay", [(1e-6, 0.0), (3.6e-4, 0.0), (3.6e-4, 6e-4)])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, delay, render):
     """The pole that K moves is at -K k/10.
 
@@ -295,8 +295,10 @@ def test_tiny_gains_are_stable_where_the_limit_says_so(digits, axis, hand, Ts, d
     """
     for K in (1e-6, 1e-12, 1e-30, 5e-324):
         assert K < 1e-30 or is_inside(axis, K, 90.0, HANDS[hand], Ts, delay, render)
-        assert gain_limit.is_stable(
-            hc.Loop(axis, 90.0, operator(HANDS[hand]), K=K, Ts=Ts, delay=delay, render=render)
+        assert gain_crossings.is_stable(
+            hc.theory.Loop(
+                axis, 90.0, operator(HANDS[hand]), K=K, Ts=Ts, delay=delay, render=render
+            )
         )
 
 
@@ -307,7 +309,7 @@ def test_sampled_limit_against_the_frequency_response_of_python_control(axis, n)
     The loop broken at the sampled net force, from python-control's own discretisations.
     """
     Ts, b, i = 1e-3, 90.0, "xy".index(axis)
-    K, omega = gain_limit.critical_gain(hc.Loop(axis, b, Ts=Ts, delay=n * Ts))
+    K, omega = gain_crossings.critical_gain(hc.theory.Loop(axis, b, Ts=Ts, delay=n * Ts))
     s, z = control.tf("s"), np.exp(1j * omega * Ts)
     G = G0[i] / (s**2 + G1[i] * s + G0[i])
     C = K / (s**2 + 10 * s)
@@ -350,7 +352,7 @@ def test_late_limit_against_pade(axis, hand, delay):
     assert all(beyond(K) < 0 for K in np.geomspace(0.01, 0.999, 25) * found)
 
 
-@pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "implicit"])))
+@pytest.mark.parametrize("axis,render", list(itertools.product("xy", ["held", "physical"])))
 def test_sampled_limit_with_a_delay_tends_to_the_late_one(axis, render):
     exact = limit(axis, 90.0, delay=2e-3, render=render)
     gap = [exact - limit(axis, 90.0, delay=2e-3, Ts=Ts, render=render) for Ts in (4e-4, 2e-4, 1e-4)]
@@ -371,10 +373,10 @@ def test_limits_fall_with_delay_and_sample():
 
 def test_limits_at_the_ends():
     for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
-        assert hc.gain_limit("x", 0.0, **kw) == float("inf")  # nothing to feel
+        assert hc.theory.gain_limit("x", 0.0, **kw) == float("inf")  # nothing to feel
     for kw in (dict(Ts=1e-3), dict(delay=1e-3), dict(Ts=1e-4, delay=2e-3), dict(delay=1.0)):
         assert limit("x", 1e5, **kw) == 0.0  # held clay overshoots by itself
-    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="implicit") < float("inf")
+    assert 0.0 < limit("x", 1e5, Ts=1e-4, render="physical") < float("inf")
 
 
 def test_a_narrow_unstable_window_is_not_missed():
@@ -387,15 +389,15 @@ def test_a_narrow_unstable_window_is_not_missed():
         return (1.0 - 0.1 * x) * (1.0 + 1j * (x**2 - 1e-8))
 
     edges = 1.0 / (1.0 + 1e-5), 1.0 / (1.0 - 1e-5)
-    loop = gain_limit.LoopFamily(
+    loop = gain_crossings.LoopFamily(
         h, np.exp(np.linspace(0.0, 3.0, 5)), lambda K: not edges[0] < K < edges[1]
     )
-    found = sorted(gain_limit.gain_crossings(loop))
+    found = sorted(gain_crossings.gain_crossings(loop))
     np.testing.assert_allclose(
         [K for K, _ in found], edges, rtol=1e-9
     )  # a root beside its extreme: sqrt(eps) of 1e-4
     np.testing.assert_allclose(np.log([w for _, w in found]), [1.2344, 1.2346], atol=1e-9)
-    assert gain_limit.first_instability(loop)[0] == pytest.approx(edges[0], rel=1e-9)
+    assert gain_crossings.first_instability(loop)[0] == pytest.approx(edges[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("axis,hand", [("x", "none"), ("y", "hand")])
@@ -404,7 +406,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
     """Small swings about the nominal pose, 2 % inside and outside the limit, at Ts = 2 ms."""
     Ts, b, i = 2e-3, 90.0, "xy".index(axis)
     th = operator(HANDS[hand])
-    K = factor * hc.gain_limit(axis, b, th, Ts=Ts)
+    K = factor * hc.theory.gain_limit(axis, b, th, Ts=Ts)
     gain = [0.1, 0.1]
     gain[i] = K
     force = [0.0, 0.0]
@@ -415,7 +417,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
             tuple(gain),
             tuple(force),
             operator=th,
-            shaping=True,
+            inertia_shaping=True,
             dt=Ts / 8,
             Ts=Ts,
             control="sampled",
@@ -425,7 +427,7 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
             t_max=4.0,
         )
     )
-    less, beta, gamma = linear_loop.sampled_differences(hc.Loop(axis, b, th, Ts=Ts))
+    less, beta, gamma = linear_loop.sampled_differences(hc.theory.Loop(axis, b, th, Ts=Ts))
     z = 1.0 + np.linalg.eigvals(less + K * np.outer(beta, gamma))
     z = z[np.abs(np.angle(z)) > 10.0 * Ts]  # what swings, at 30 rad/s or more
     rate = np.log(np.abs(z).max()) / Ts
@@ -444,36 +446,36 @@ def test_simulator_decays_and_grows_as_the_sampled_model_says(axis, hand, factor
 
 def test_no_operator_is_no_hand():
     for kw in (dict(), dict(Ts=1e-3), dict(delay=1e-3)):
-        none = hc.gain_limit("x", 90.0, **kw)
-        assert none == hc.gain_limit("x", 90.0, operator=None, **kw)
+        none = hc.theory.gain_limit("x", 90.0, **kw)
+        assert none == hc.theory.gain_limit("x", 90.0, operator=None, **kw)
         assert none == pytest.approx(
-            hc.gain_limit("x", 90.0, Operator(0.0, 0.0, 0.0), **kw), rel=1e-12
+            hc.theory.gain_limit("x", 90.0, Operator(0.0, 0.0, 0.0), **kw), rel=1e-12
         )
-        assert abs(hc.gain_limit("x", 90.0, Operator(), **kw) / none - 1.0) > 0.1
+        assert abs(hc.theory.gain_limit("x", 90.0, Operator(), **kw) / none - 1.0) > 0.1
 
 
 @pytest.mark.parametrize(
     "call,field",
     [
-        (lambda: hc.gain_limit("z", 90.0), "axis"),
-        (lambda: hc.gain_limit("x", -1.0), "b"),
-        (lambda: hc.gain_limit("x", 90.0, Ts=0.0), "Ts"),
-        (lambda: hc.gain_limit("x", 90.0, delay=-1.0), "delay"),
-        (lambda: hc.gain_limit("x", 90.0, Ts=1e-4, delay=1.0), "delay"),
-        (lambda: hc.gain_limit("x", 90.0, render="hold"), "render"),
-        (lambda: hc.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
-        (lambda: hc.gain_limit("x", 90.0, operator=True, Ts=1e-3), "operator"),
-        (lambda: hc.gain_limit("x", 90.0, operator=True, delay=1e-3), "operator"),
-        (lambda: hc.gain_limit("x", 90.0, Ts=1e-3, compensator=5.0), "compensator"),
-        (lambda: hc.gain_limit("x", 90.0, servo=(1.0, 2.0)), "servo"),
-        (lambda: hc.gain_limit("x", 90.0, mobility=0.0), "mobility"),
-        (lambda: hc.gain_limit(hc.Loop(), b=90.0), "b"),
-        (lambda: hc.gain_limit(hc.Loop(), servo=hc.Loop().servo), "servo"),
-        (lambda: hc.margins(hc.Loop(b=90.0)), "K"),
-        (lambda: hc.small_gain(hc.Loop(b=90.0, K=1.0, Ts=1e-3)), "Ts"),
-        (lambda: hc.margins("x", 1.0, 90.0, Ts=1e-3, at="force"), "at"),
-        (lambda: hc.passivity("x", 1.0, 90.0, delay=1e-3), "delay"),
-        (lambda: hc.Loop.of("x", "x"), "scenario"),
+        (lambda: hc.theory.gain_limit("z", 90.0), "axis"),
+        (lambda: hc.theory.gain_limit("x", -1.0), "b"),
+        (lambda: hc.theory.gain_limit("x", 90.0, Ts=0.0), "Ts"),
+        (lambda: hc.theory.gain_limit("x", 90.0, delay=-1.0), "delay"),
+        (lambda: hc.theory.gain_limit("x", 90.0, Ts=1e-4, delay=1.0), "delay"),
+        (lambda: hc.theory.gain_limit("x", 90.0, render="hold"), "render"),
+        (lambda: hc.theory.gain_limit("x", 90.0, operator=(1, 2, 3)), "operator"),
+        (lambda: hc.theory.gain_limit("x", 90.0, operator=True, Ts=1e-3), "operator"),
+        (lambda: hc.theory.gain_limit("x", 90.0, operator=True, delay=1e-3), "operator"),
+        (lambda: hc.theory.gain_limit("x", 90.0, Ts=1e-3, compensator=5.0), "compensator"),
+        (lambda: hc.theory.gain_limit("x", 90.0, servo=(1.0, 2.0)), "servo"),
+        (lambda: hc.theory.gain_limit("x", 90.0, mobility=0.0), "mobility"),
+        (lambda: hc.theory.gain_limit(hc.theory.Loop(), b=90.0), "b"),
+        (lambda: hc.theory.gain_limit(hc.theory.Loop(), servo=hc.theory.Loop().servo), "servo"),
+        (lambda: hc.theory.margins(hc.theory.Loop(b=90.0)), "K"),
+        (lambda: hc.theory.small_gain(hc.theory.Loop(b=90.0, K=1.0, Ts=1e-3)), "Ts"),
+        (lambda: hc.theory.margins("x", 1.0, 90.0, Ts=1e-3, at="force"), "at"),
+        (lambda: hc.theory.passivity("x", 1.0, 90.0, delay=1e-3), "delay"),
+        (lambda: hc.theory.Loop.of("x", "x"), "scenario"),
     ],
 )
 def test_bad_input_is_refused(call, field):

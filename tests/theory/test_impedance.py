@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.controller import SERVO
-from hapticclay.theory import impedance, margins
+from hapticclay.theory import impedance, stability_margins
 from hapticclay.theory.impedance import Impedance, loop_impedance, loop_response, wall_response
 from tests.oracles.multirate import fundamental
 
@@ -31,23 +31,25 @@ def test_continuous_impedance_is_that_of_python_control(axis, K, b, k, held):
     device = G * K / (s**2 + 10 * s) + S
     s = 1j * OMEGA
     Z = 1.0 / (s * device(s)) + b + k / s
-    loop = hc.Loop(axis, b, TH, K=K, k=k, render="held" if held else "implicit")
+    loop = hc.theory.Loop(axis, b, TH, K=K, k=k, render="held" if held else "physical")
     found = loop_response(loop, OMEGA)
     np.testing.assert_allclose(found.Z, Z, rtol=1e-10)  # a ratio of polynomials of degree 6
-    np.testing.assert_allclose(found.felt, margins.transparency(loop, OMEGA), rtol=1e-10)
-    np.testing.assert_allclose(found.felt, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
+    np.testing.assert_allclose(
+        found.transparency, stability_margins.transparency(loop, OMEGA), rtol=1e-10
+    )
+    np.testing.assert_allclose(found.transparency, (b + k / s) / Z, rtol=1e-10, atol=1e-300)
 
 
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
     """The servo's law written out with every motor force late (docs/equations.md, section 3)."""
-    loop = hc.Loop("x", 90.0, None, K=2.0, delay=4e-3, k=300.0, render=render, mobility=1.3)
+    loop = hc.theory.Loop("x", 90.0, None, K=2.0, delay=4e-3, k=300.0, render=render, mobility=1.3)
     s = 1j * OMEGA
     G, S = loop.servo.G, loop.servo.S
     late, e = np.exp(-s * loop.delay), loop.b * s + loop.k
     net_to_y = G.gain / (s**2 + G.damping * s + G.stiffness) * loop.gain / (s**2 + 10.0 * s)
     # p = X fh solves s^2 p = W (fh - now) + late (asked + (Wn/W - 1) W f - held), f = fh - e p
-    W, now, held = 1.3, (e if render == "implicit" else 0.0), (e if render == "held" else 0.0)
+    W, now, held = 1.3, (e if render == "physical" else 0.0), (e if render == "held" else 0.0)
     servo = s**2 + S.damping * s + S.stiffness
     pull = S.damping * s + S.stiffness
     right = W + late * (S.gain - W + servo * net_to_y)
@@ -56,16 +58,16 @@ def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
 
 
 @pytest.mark.parametrize("operator", [None, TH, hc.Operator(2.0, 1.0, 0.0)])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 @pytest.mark.parametrize("delay", [0.0, 1.7e-3, 5e-3])
 def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
     """Ts = 5 ms, where the hold costs a third of the damping at 20 Hz."""
     Ts, b, k, K, W = 5e-3, 30.0, 80.0, 0.6, 0.9
-    loop = hc.Loop(
+    loop = hc.theory.Loop(
         "x", b, operator, K=K, k=k, Ts=Ts, delay=delay, render=render, mobility=W
     )  # fmt: skip
     G, S, hand = SERVO[0].G, SERVO[0].S, loop.hand
-    implicit = render == "implicit"
+    implicit = render == "physical"
     A = np.zeros((5, 5))  # delta, delta', y, y', f
     A[0, 1] = A[2, 3] = 1.0
     A[1] = [0.0, -10.0, 0.0, 0.0, K]
@@ -102,7 +104,9 @@ def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
         hc.VirtualWall(K=300.0, B=2.0),
         hc.VirtualWall(K=300.0, B=2.0, M=0.03, operator=TH),
         hc.VirtualWall(K=100.0, B=1.0, M=-0.02, delay=3e-3, velocity="exact"),
-        hc.VirtualWall(K=100.0, B=2.0, M=0.02, delay=3.7e-3, window=3, velocity_filter=40.0),
+        hc.VirtualWall(
+            K=100.0, B=2.0, M=0.02, delay=3.7e-3, velocity_window=3, velocity_filter=40.0
+        ),
     ],
 )
 def test_wall_impedance_is_that_of_a_march_in_time(wall):
@@ -113,11 +117,13 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     keep = math.exp(-2.0 * math.pi * cutoff * Ts) if cutoff else 0.0
 
     def law(p, v, muscle, acted, z):
-        past, smooth, before = z or ([p] * wall.window, 0.0, 0.0)
-        smooth = keep * smooth + (1.0 - keep) * (p - past[-wall.window]) / (wall.window * Ts)
+        past, smooth, before = z or ([p] * wall.velocity_window, 0.0, 0.0)
+        smooth = keep * smooth + (1.0 - keep) * (p - past[-wall.velocity_window]) / (
+            wall.velocity_window * Ts
+        )
         rate = v if wall.velocity == "exact" else smooth
         force = -(wall.K * p + wall.B * rate + wall.M * (rate - before) / Ts)
-        return force, ([*past, p][-wall.window :], smooth, rate)
+        return force, ([*past, p][-wall.velocity_window :], smooth, rate)
 
     mass, damper = d.mass + hand.mass, d.damper + hand.damper
     omega = 2.0 * np.pi * np.array([2.0, 10.0, 25.0])
@@ -127,7 +133,7 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
         s = 1j * w
         fh = 1.0 - (hand.mass * s + hand.damper + hand.spring / s) * v
         assert found.Z[i] == pytest.approx(fh / v, rel=1e-7)  # as above
-        assert found.felt[i] == pytest.approx(-u / fh, rel=1e-7)
+        assert found.transparency[i] == pytest.approx(-u / fh, rel=1e-7)
 
 
 @given(
@@ -135,24 +141,28 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     B=st.floats(-1.0, 20.0),
     M=st.floats(-0.05, 0.1),
     delay=st.floats(0.0, 4e-3),
-    window=st.integers(1, 5),
+    velocity_window=st.integers(1, 5),
 )
 @settings(max_examples=25)
-def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, window):
+def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, velocity_window):
     """Two derivations of one number; the hand's sidebands are none without its arm."""
-    wall = hc.VirtualWall(K, B, M, hc.Device(0.2, 0.7), delay=delay, window=window)
+    wall = hc.VirtualWall(
+        K, B, M, hc.Device(0.2, 0.7), delay=delay, velocity_window=velocity_window
+    )
     found = wall_response(wall, OMEGA)
-    np.testing.assert_allclose(found.Z, hc.wall_impedance(wall, OMEGA), rtol=1e-8)
+    np.testing.assert_allclose(found.Z, hc.walls.wall_impedance(wall, OMEGA), rtol=1e-8)
     # the device itself is left: fh = (m s + b) v + fe
     s = 1j * OMEGA
     own = (0.2 * s + 0.7) / found.Z
-    np.testing.assert_allclose(found.felt + own, 1.0, atol=1e-9 * np.abs(own).max())
+    np.testing.assert_allclose(found.transparency + own, 1.0, atol=1e-9 * np.abs(own).max())
 
 
 def test_a_fast_sampled_loop_is_the_continuous_one():
-    exact = loop_impedance(hc.Loop("x", 90.0, TH, K=1.0), OMEGA)
+    exact = loop_impedance(hc.theory.Loop("x", 90.0, TH, K=1.0), OMEGA)
     gaps = [
-        np.abs(loop_impedance(hc.Loop("x", 90.0, TH, K=1.0, Ts=Ts), OMEGA) / exact - 1.0).max()
+        np.abs(
+            loop_impedance(hc.theory.Loop("x", 90.0, TH, K=1.0, Ts=Ts), OMEGA) / exact - 1.0
+        ).max()
         for Ts in (1e-5, 1e-6)
     ]
     assert gaps[0] == pytest.approx(10.0 * gaps[1], rel=0.02)  # first order in Ts
@@ -166,7 +176,7 @@ def test_low_frequencies_feel_the_steady_values():
     assert found.stiffness[0] == pytest.approx(500.0, rel=1e-6)
     # the difference is late by Ts/2, which at rest costs nothing more
     assert found.damping[0] == pytest.approx(0.5 + 3.0 - 500.0 * 0.5e-3, rel=1e-6)
-    loop = hc.Loop("x", 90.0, None, K=1.0)
+    loop = hc.theory.Loop("x", 90.0, None, K=1.0)
     slow = loop_response(loop, np.array([1e-4]))
     assert slow.damping[0] == pytest.approx(90.0 + 10.0, rel=1e-6)  # K f = (10 + K b) v
 
@@ -188,4 +198,4 @@ def test_effective_values_are_those_of_a_spring_a_damper_and_a_mass():
 @pytest.mark.parametrize("omega", [[0.0], [-1.0], [math.nan], [[1.0]], [math.inf]])
 def test_frequencies_are_above_zero(omega):
     with pytest.raises(ParameterError, match="omega"):
-        impedance.loop_response(hc.Loop("x", 90.0, K=1.0), np.array(omega))
+        impedance.loop_response(hc.theory.Loop("x", 90.0, K=1.0), np.array(omega))

@@ -13,7 +13,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model import controller
 from hapticclay.model.controller import SERVO
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop
+from hapticclay.theory import linear_loop, loops
 from tests.oracles import Linear, laws, piecewise_linear
 
 TH = Operator()
@@ -36,7 +36,7 @@ def test_characteristic_polynomial_is_one_plus_the_loop(axis, operator, K, b, om
     s = 1j * omega
     den = np.prod([np.polyval(np.atleast_1d(x.den[0][0]), s) for x in (C, G, S)])
     expected = (1 + (G(s) * C(s) + S(s)) * T(s)) * den
-    found = linear_loop.characteristic(hc.Loop(axis, b, operator, K=K))(s)
+    found = linear_loop.characteristic(hc.theory.Loop(axis, b, operator, K=K))(s)
     assert found == pytest.approx(
         expected, rel=1e-11
     )  # cancellation between the terms costs up to 4 digits
@@ -48,7 +48,7 @@ def test_poles_are_those_of_the_state_space_model(axis):
         m = Linear("xy".index(axis), b, K, 1.0, (0.25, 2, 6) if th else (0, 0, 0))
         # the state space has p, v beside the servo's states: same loop, order 6 in both
         np.testing.assert_allclose(
-            np.sort_complex(linear_loop.closed_loop_poles(axis, K, b, th)),
+            np.sort_complex(loops.closed_loop_poles(axis, K, b, th)),
             np.sort_complex(m.poles()),
             atol=1e-6,
         )
@@ -72,7 +72,7 @@ def test_poles_are_those_of_the_state_space_model(axis):
     ],
 )
 def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, printed):
-    limit = hc.gain_limit(axis, b, TH if on else None)
+    limit = hc.theory.gain_limit(axis, b, TH if on else None)
     G, S, C, T = blocks(axis, 1.0, b, on)
     loop = control.minreal(G * C * T / (1 + S * T), tol=1e-8, verbose=False)
     margins = control.stability_margins(loop, returnall=True)[0]
@@ -81,22 +81,18 @@ def test_gain_limit_against_the_gain_margin_of_python_control(axis, b, on, print
 
 
 def test_y_axis_is_unstable_at_unit_gain():
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(
-        2.36, abs=0.005
-    )
-    assert linear_loop.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(
-        1.56, abs=0.005
-    )
+    assert loops.closed_loop_poles("y", 1.0, 100.0).real.max() == pytest.approx(2.36, abs=0.005)
+    assert loops.closed_loop_poles("y", 1.0, 100.0, TH).real.max() == pytest.approx(1.56, abs=0.005)
 
     def stable(b):
-        return linear_loop.stable(hc.Loop("y", b, K=1.0))
+        return linear_loop.stable(hc.theory.Loop("y", b, K=1.0))
 
     assert stable(61.0) and not stable(63.0)
     assert not stable(3800.0) and stable(4000.0)
 
 
 def test_gain_limit_without_clay_and_hand_is_infinite():
-    assert hc.gain_limit("x", 0.0) == float("inf")
+    assert hc.theory.gain_limit("x", 0.0) == float("inf")
 
 
 def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
@@ -105,10 +101,10 @@ def test_gain_limit_where_a_resonance_of_the_hand_sits_on_the_axis():
     No K puts a pole there.
     """
     for th in (Operator(1.0, 0.0, 6.0), Operator(0.25, 0.0, 100.0)):
-        limit = hc.gain_limit("y", 0.0, th)
+        limit = hc.theory.gain_limit("y", 0.0, th)
         assert limit > 0.0
         assert limit == float("inf") or not linear_loop.stable(
-            hc.Loop("y", 0.0, th, K=1.001 * limit)
+            hc.theory.Loop("y", 0.0, th, K=1.001 * limit)
         )
 
 
@@ -124,9 +120,9 @@ def test_steady_speed_is_the_static_gain_of_the_loop(K, f, b):
 @pytest.mark.parametrize(
     "call,field",
     [
-        (lambda: hc.closed_loop_poles("z", 1, 1), "axis"),
-        (lambda: hc.closed_loop_poles("x", -1, 1), "K"),
-        (lambda: hc.closed_loop_poles("x", 1, float("nan")), "b"),
+        (lambda: hc.theory.closed_loop_poles("z", 1, 1), "axis"),
+        (lambda: hc.theory.closed_loop_poles("x", -1, 1), "K"),
+        (lambda: hc.theory.closed_loop_poles("x", 1, float("nan")), "b"),
     ],
 )
 def test_bad_input_is_refused(call, field):
@@ -138,8 +134,8 @@ def test_bad_input_is_refused(call, field):
 @pytest.mark.parametrize("axis", "xy")
 @pytest.mark.parametrize("th", [None, Operator(), Operator(5.0, 0.0, 100.0)])
 def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
-    A, B = linear_loop.state_space(hc.Loop(axis, 90.0, th, K=0.7))
-    poles = np.sort_complex(linear_loop.closed_loop_poles(axis, 0.7, 90.0, th))
+    A, B = linear_loop.state_space(hc.theory.Loop(axis, 90.0, th, K=0.7))
+    poles = np.sort_complex(loops.closed_loop_poles(axis, 0.7, 90.0, th))
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(A)), poles, atol=1e-5
     )  # a double pole near 0
@@ -151,9 +147,9 @@ def test_state_space_has_the_poles_and_the_oracles_matrix(axis, th):
 def test_crossing_times_beside_the_oracle():
     exact, _ = piecewise_linear((0.05, 0.15, 0.2), (0.0, 90.0, 0.0), 1.0, 1.0)
     assert linear_loop.crossing_times(
-        hc.Loop(K=1.0), 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
+        hc.theory.Loop(K=1.0), 1.0, (0.05, 0.15, 0.2), (0.0, 90.0, 0.0)
     ) == pytest.approx(exact, abs=1e-10)  # eleven thousand products
-    assert linear_loop.crossing_times(hc.Loop(K=1.0), -1.0, (0.05,), (0.0,), t_max=0.5) == []
+    assert linear_loop.crossing_times(hc.theory.Loop(K=1.0), -1.0, (0.05,), (0.0,), t_max=0.5) == []
 
 
 @pytest.mark.parametrize("axis", "xy")
@@ -173,16 +169,16 @@ def test_law_of_the_loop_and_feedback_vector_agree(axis, state, H):
     assert law == pytest.approx(
         controller.feedback_vector(servo) @ state, abs=1e-14 * (size + 4.0 / H)
     )
-    A = linear_loop.state_space(hc.Loop(axis, K=1.0))[
+    A = linear_loop.state_space(hc.theory.Loop(axis, K=1.0))[
         0
     ]  # without clay and hand the law is all there is
     assert np.array_equal(A[1], controller.feedback_vector(servo))
 
 
 @pytest.mark.parametrize("delay", [0.0, 4e-4, 1e-3, 2.3e-3])
-@pytest.mark.parametrize("render", ["held", "implicit"])
+@pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(delay, render):
-    loops = [hc.Loop(axis, 90.0, TH, Ts=1e-3, delay=delay, render=render) for axis in "xy"]
+    loops = [hc.theory.Loop(axis, 90.0, TH, Ts=1e-3, delay=delay, render=render) for axis in "xy"]
     less, beta, gamma = linear_loop.sampled_differences(*loops)
     n = len(less) // 2
     for j in range(2):
@@ -198,7 +194,7 @@ def test_sampled_loop_of_both_axes_is_that_of_each_where_nothing_couples_them(de
 def test_sampled_loop_tends_to_the_continuous_one_at_any_mobility():
     """Both axes coupled: (M - 1)/Ts of slow states is A, to first order in Ts."""
     W = np.array([[0.6, 0.2], [0.2, 0.3]])
-    loops = [hc.Loop(axis, 20.0, TH, K=K) for axis, K in (("x", 0.7), ("y", 0.3))]
+    loops = [hc.theory.Loop(axis, 20.0, TH, K=K) for axis, K in (("x", 0.7), ("y", 0.3))]
     A = linear_loop.state_space(*loops, mobility=W)[0]
     poles = np.linalg.eigvals(A)
     gaps = []

@@ -14,8 +14,8 @@ from numpy.polynomial import Polynomial
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop, margins, roots
-from hapticclay.theory.margins import BREAKS
+from hapticclay.theory import linear_loop, roots, stability_margins
+from hapticclay.theory.stability_margins import BREAKS
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)
 LOOPS = dict(
@@ -56,9 +56,9 @@ def largest(f):
 @settings(max_examples=300)
 @given(**LOOPS)
 def test_nyquist_count_of_the_loop_is_that_of_its_poles(axis, K, b, th, at):
-    right, nearest = roots_right(linear_loop.characteristic(hc.Loop(axis, b, th, K=K)))
+    right, nearest = roots_right(linear_loop.characteristic(hc.theory.Loop(axis, b, th, K=K)))
     assume(nearest > 1e-6)  # the curve then passes -1 as near: nothing to count
-    found = hc.nyquist(axis, K, b, at=at, operator=th)
+    found = hc.theory.nyquist(axis, K, b, at=at, operator=th)
     assert found.Z == right and found.P == 0
     assert found.Z == found.N + found.P
 
@@ -92,7 +92,7 @@ def test_nyquist_count_of_500_random_loops():
         right, nearest = roots_right(Polynomial(n[::-1]) + Polynomial(d[::-1]))
         if nearest < 1e-4 or (len(n) == len(d) and abs(1.0 + n[0] / d[0]) < 1e-3):
             continue
-        N, P = margins.encirclements(Polynomial(n[::-1]), Polynomial(d[::-1]))
+        N, P = stability_margins.encirclements(Polynomial(n[::-1]), Polynomial(d[::-1]))
         assert N + P == right, (n, d)
         seen.add((P, N))
     assert len(seen) > 10 and any(P for P, _ in seen) and any(N < 0 for _, N in seen)
@@ -101,9 +101,9 @@ def test_nyquist_count_of_500_random_loops():
 @settings(max_examples=60)
 @given(**LOOPS)
 def test_margins_against_python_control(axis, K, b, th, at):
-    n, d = margins.open_loop(axis, K, b, at=at, operator=th)
-    m = hc.margins(axis, K, b, at=at, operator=th)
-    assert m.stable == linear_loop.stable(hc.Loop(axis, b, th, K=K))
+    n, d = stability_margins.open_loop(axis, K, b, at=at, operator=th)
+    m = hc.theory.margins(axis, K, b, at=at, operator=th)
+    assert m.stable == linear_loop.stable(hc.theory.Loop(axis, b, th, K=K))
     if not m.stable:
         assert m.gain == (1.0, 1.0) and m.phase == m.delay == m.disk == 0.0
         return
@@ -129,9 +129,9 @@ def test_margins_against_python_control(axis, K, b, th, at):
     "axis,K,at", [("x", 1.0, "compensator"), ("x", 2.0, "force"), ("y", 0.5, "force")]
 )
 def test_disk_margin_against_python_control(axis, K, at):
-    n, d = margins.open_loop(axis, K, 90.0, at=at)
+    n, d = stability_margins.open_loop(axis, K, 90.0, at=at)
     alpha, down, turn = control.disk_margins(transfer_function(n, d), OMEGA[OMEGA < 1e3])
-    m = hc.margins(axis, K, 90.0, at=at)
+    m = hc.theory.margins(axis, K, 90.0, at=at)
     assert m.disk == pytest.approx(
         float(alpha), rel=1e-5
     )  # its grid: 2e-4 in omega, squared, times the curvature
@@ -144,9 +144,9 @@ def test_disk_margin_against_python_control(axis, K, at):
 @settings(max_examples=40)
 @given(**LOOPS, turn=st.floats(-1, 1), size=st.floats(0.0, 0.999))
 def test_what_the_margins_allow_is_stable(axis, K, b, th, at, turn, size):
-    m = hc.margins(axis, K, b, at=at, operator=th)
+    m = hc.theory.margins(axis, K, b, at=at, operator=th)
     assume(m.stable and 0.01 < m.disk < 1.99)
-    n, d = margins.open_loop(axis, K, b, at=at, operator=th)
+    n, d = stability_margins.open_loop(axis, K, b, at=at, operator=th)
     z = size * m.disk / 2 * np.exp(1j * np.pi * turn)
     factor = (1 + z) / (1 - z)
     L = factor * n(1j * OMEGA) / d(1j * OMEGA)
@@ -163,9 +163,9 @@ def test_what_the_margins_allow_is_stable(axis, K, b, th, at, turn, size):
 @given(**{k: v for k, v in LOOPS.items() if k != "at"})
 @settings(max_examples=60)
 def test_gain_margin_at_the_compensator_is_the_gain_limit(axis, K, b, th):
-    limit = hc.gain_limit(axis, b, operator=th)
+    limit = hc.theory.gain_limit(axis, b, operator=th)
     assume(K < 0.99 * limit)
-    assert hc.margins(axis, K, b, operator=th).gain[1] * K == pytest.approx(limit, rel=1e-9)
+    assert hc.theory.margins(axis, K, b, operator=th).gain[1] * K == pytest.approx(limit, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -174,9 +174,9 @@ def test_gain_margin_at_the_compensator_is_the_gain_limit(axis, K, b, th):
 )
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_coupled_stability(axis, kw):
-    limit = hc.gain_limit(axis, 90.0, **kw)
+    limit = hc.theory.gain_limit(axis, 90.0, **kw)
     for factor in (0.999, 1.001):
-        v = hc.coupled_stability(axis, factor * limit, 90.0, **kw)
+        v = hc.theory.coupled_stability(axis, factor * limit, 90.0, **kw)
         assert bool(v) == v.verdict == (factor < 1.0)
         assert v.margin == pytest.approx(1.0 / factor, rel=1e-12)
         assert 30.0 < v.omega < 80.0 and v.method.endswith("exact") and v.assumptions
@@ -185,9 +185,9 @@ def test_coupled_stability(axis, kw):
 @settings(max_examples=60)
 @given(**{k: v for k, v in LOOPS.items() if k != "at"}, equation=st.sampled_from([11, 13]))
 def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, th, equation):
-    v = hc.small_gain(axis, K, b, equation=equation, operator=th)
+    v = hc.theory.small_gain(axis, K, b, equation=equation, operator=th)
     s = 1j * OMEGA
-    T = hc.Loop(axis, b, th).environment(s)
+    T = hc.theory.Loop(axis, b, th).environment(s)
     i = "xy".index(axis)
     g, g1, w, kd, kp = ((910.19, 41.8, 0.7919, 41.1, 432.0), (765.5, 30.3, 0.131, 32.4, 492.46))[i]
     GC, Sh = g / (s**2 + g1 * s + g) * K / (s**2 + 10 * s), w / (s**2 + kd * s + kp)
@@ -203,7 +203,7 @@ def test_small_gain_against_dense_frequencies_and_what_it_promises(axis, K, b, t
     assert np.all((bad == inside) | edge)
     assert v.verdict == (not v.fails)
     if v.verdict:
-        assert linear_loop.stable(hc.Loop(axis, b, th, K=K))  # sufficient
+        assert linear_loop.stable(hc.theory.Loop(axis, b, th, K=K))  # sufficient
 
 
 def test_the_papers_condition_fails_near_zero_for_every_gain():
@@ -212,24 +212,24 @@ def test_the_papers_condition_fails_near_zero_for_every_gain():
     Not 5C, not any).
     """
     for K in (1e-3, 1.0):
-        v = hc.small_gain("x", K, 50.0, Operator())
+        v = hc.theory.small_gain("x", K, 50.0, Operator())
         assert not v and v.margin == 0.0 and v.omega == 0.0 and v.fails[0][0] == 0.0
-        assert hc.coupled_stability("x", K, 50.0, Operator())
-    assert hc.small_gain("y", 5.0, 90.0, Operator(), equation=9)
-    assert not hc.coupled_stability("y", 5.0, 90.0, Operator())
+        assert hc.theory.coupled_stability("x", K, 50.0, Operator())
+    assert hc.theory.small_gain("y", 5.0, 90.0, Operator(), equation=9)
+    assert not hc.theory.coupled_stability("y", 5.0, 90.0, Operator())
 
 
 def test_equation_9_is_the_distance_from_minus_one():
-    n, d = margins.open_loop("x", 2.0, 90.0)
+    n, d = stability_margins.open_loop("x", 2.0, 90.0)
     z = n(1j * OMEGA) / d(1j * OMEGA)
-    assert hc.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(
+    assert hc.theory.small_gain("x", 2.0, 90.0, equation=9).margin == pytest.approx(
         np.min(np.abs(1 + z)), rel=1e-5
     )  # grid
 
 
 @given(K=st.floats(0.1, 10.0), b=st.floats(1.0, 500.0), axis=st.sampled_from("xy"))
 def test_transparency_is_equation_7(K, b, axis):
-    found = hc.transparency(axis, K, b, np.array([0.0, 3.0, 40.0]))
+    found = hc.theory.transparency(axis, K, b, np.array([0.0, 3.0, 40.0]))
     assert found[0] == pytest.approx(
         K * b / (10.0 + K * b), rel=1e-12
     )  # the clay's share of 10/K + b
@@ -252,11 +252,11 @@ def test_least_finds_the_ends_and_the_middle():
 @pytest.mark.parametrize(
     "call,field",
     [
-        (lambda: hc.margins("z", 1.0, 90.0), "axis"),
-        (lambda: hc.margins("x", -1.0, 90.0), "K"),
-        (lambda: hc.nyquist("x", 1.0, 90.0, at="motor"), "at"),
-        (lambda: hc.small_gain("x", 1.0, 90.0, equation=8), "equation"),
-        (lambda: hc.coupled_stability("x", 0.0, 90.0), "K"),
+        (lambda: hc.theory.margins("z", 1.0, 90.0), "axis"),
+        (lambda: hc.theory.margins("x", -1.0, 90.0), "K"),
+        (lambda: hc.theory.nyquist("x", 1.0, 90.0, at="motor"), "at"),
+        (lambda: hc.theory.small_gain("x", 1.0, 90.0, equation=8), "equation"),
+        (lambda: hc.theory.coupled_stability("x", 0.0, 90.0), "K"),
         (lambda: hc.Compensator((1.0,), (0.0,)), "compensator.den"),
     ],
 )

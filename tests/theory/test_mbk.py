@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.theory import gain_limit, mbk
+from hapticclay.theory import gain_crossings, gain_limits, mbk
 
 WALL = hc.VirtualWall(device=hc.Device(0.1, 0.5))
 
@@ -20,7 +20,7 @@ WALL = hc.VirtualWall(device=hc.Device(0.1, 0.5))
 def test_the_band_of_springs_is_that_of_the_exact_crossings(B, M, delay):
     """`stiffness_band` has the crossings of the unit circle, `stable_band` eigenvalues."""
     wall = replace(WALL, B=B, M=M, delay=delay)
-    low, high = hc.stiffness_band(wall)
+    low, high = hc.walls.stiffness_band(wall)
     found = mbk.stable_band(wall, "K")
     if high == 0.0 or high < 1e-6 / wall.Ts**2 or low > 0.5 * high:
         return  # nothing, or less than a step of the grid
@@ -36,7 +36,7 @@ def test_the_ends_of_a_band_are_where_stability_ends(part, K):
     span = high - low
     for at, expected in ((low, False), (high, True)):
         below, above = (
-            hc.stable_wall(replace(wall, **{part: at + x * span})) for x in (-1e-6, 1e-6)
+            hc.walls.stable_wall(replace(wall, **{part: at + x * span})) for x in (-1e-6, 1e-6)
         )
         assert (below, above) == (expected, not expected)
 
@@ -56,8 +56,8 @@ def test_a_region_is_stable_inside_and_unstable_outside():
         region = mbk.renderable(wall, plane, 9)
         for x, low, high in zip(region.x[1:-1], region.low[1:-1], region.high[1:-1], strict=True):
             at = replace(wall, **{across: float(x)})
-            assert hc.stable_wall(replace(at, **{up: 0.5 * (low + high)}))
-            assert not hc.stable_wall(replace(at, **{up: high + 1e-6 * (high - low)}))
+            assert hc.walls.stable_wall(replace(at, **{up: 0.5 * (low + high)}))
+            assert not hc.walls.stable_wall(replace(at, **{up: high + 1e-6 * (high - low)}))
         for beyond in (-0.02, 1.02):
             x = region.x[0] + beyond * (region.x[-1] - region.x[0])
             low, high = mbk.stable_band(replace(wall, **{across: float(x)}), up)
@@ -78,19 +78,19 @@ def test_negative_mass_takes_away_that_of_the_device_and_no_more():
 
 @pytest.mark.parametrize("Ts", [None, 1e-3])
 def test_least_mass_of_the_arm_is_the_border(Ts):
-    loop = hc.Loop("y", 40.0, hc.Operator(), Ts=Ts)
+    loop = hc.theory.Loop("y", 40.0, hc.Operator(), Ts=Ts)
     for decay in (2.0, 10.0, 60.0):
         M, B = mbk.least_mass(loop, decay)
         assert B == pytest.approx(decay * M)
-        assert gain_limit.is_stable(mbk.rendering(loop, 1.001 * M, 1.001 * B))
-        assert not gain_limit.is_stable(mbk.rendering(loop, 0.999 * M, 0.999 * B))
+        assert gain_crossings.is_stable(mbk.rendering(loop, 1.001 * M, 1.001 * B))
+        assert not gain_crossings.is_stable(mbk.rendering(loop, 0.999 * M, 0.999 * B))
     printed = mbk.least_mass(loop, 10.0)[0]
-    assert printed == pytest.approx(1.0 / gain_limit.gain_limit(loop), rel=1e-12)
+    assert printed == pytest.approx(1.0 / gain_limits.gain_limit(loop), rel=1e-12)
 
 
 def test_least_mass_over_a_box_is_that_of_its_worst_hand():
-    loop = hc.Loop("x", 0.0, hc.Operator())
-    box = hc.Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))
+    loop = hc.theory.Loop("x", 0.0, hc.Operator())
+    box = hc.theory.Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))
     M, B = mbk.least_mass(loop, 10.0, box)
     members = [*box.corners(), *box.sample(60)]
     each = [mbk.least_mass(replace(loop, operator=th), 10.0)[0] for th in members]
@@ -99,12 +99,12 @@ def test_least_mass_over_a_box_is_that_of_its_worst_hand():
 
 
 def test_rendering_is_the_admittance():
-    loop = mbk.rendering(hc.Loop("x"), 2.0, 6.0, 50.0)
+    loop = mbk.rendering(hc.theory.Loop("x"), 2.0, 6.0, 50.0)
     s = np.array([1j, 5j])
     num, den = loop.compensator.fraction
     np.testing.assert_allclose(loop.gain * num(s) / den(s), 1.0 / (2.0 * s**2 + 6.0 * s + 50.0))
     with pytest.raises(ParameterError, match="M"):
-        mbk.rendering(hc.Loop("x"), 0.0, 1.0)
+        mbk.rendering(hc.theory.Loop("x"), 0.0, 1.0)
 
 
 def test_dynamic_range_is_between_free_motion_and_the_stiffest_wall():
@@ -112,10 +112,12 @@ def test_dynamic_range_is_between_free_motion_and_the_stiffest_wall():
     r = mbk.dynamic_range(WALL, omega)
     s = 1j * omega
     np.testing.assert_allclose(r.free, np.abs(0.1 * s + 0.5), rtol=1e-9)
-    np.testing.assert_allclose(r.most, np.abs(hc.wall_impedance(r.stiffest, omega)), rtol=1e-9)
-    assert hc.stable_wall(r.stiffest)
+    np.testing.assert_allclose(
+        r.most, np.abs(hc.walls.wall_impedance(r.stiffest, omega)), rtol=1e-9
+    )
+    assert hc.walls.stable_wall(r.stiffest)
     # no other B has a stiffer wall: a search by the exact crossings
-    most = max(hc.stiffness_band(replace(WALL, B=B))[1] for B in np.linspace(40.0, 130.0, 31))
+    most = max(hc.walls.stiffness_band(replace(WALL, B=B))[1] for B in np.linspace(40.0, 130.0, 31))
     assert r.stiffest.K / r.share == pytest.approx(most, rel=1e-3)
     assert r.stiffest.K / r.share >= most * (1.0 - 1e-6)
     assert np.all(r.least <= r.free) and 0.0 < r.mean < r.decibels[0]
@@ -131,4 +133,4 @@ def test_what_is_refused():
     with pytest.raises(ParameterError, match="share"):
         mbk.dynamic_range(WALL, [1.0], 1.0)
     with pytest.raises(ParameterError, match="decay"):
-        mbk.least_mass(hc.Loop("x"), -1.0)
+        mbk.least_mass(hc.theory.Loop("x"), -1.0)

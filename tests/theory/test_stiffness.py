@@ -10,15 +10,16 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.simulation.simulate import simulate
-from hapticclay.studies.boundary import PushedLoop, growth_rate, pose_matrix
-from hapticclay.theory import gain_limit, linear_loop
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.studies.boundary import PushedLoop, pose_matrix
+from hapticclay.studies.growth import growth_rate
+from hapticclay.theory import gain_limits, linear_loop
+from hapticclay.theory.loops import Loop
 
 TIMINGS = [
     dict(),
-    dict(delay=3e-3, render="implicit"),
-    dict(Ts=1e-3, render="implicit"),
-    dict(Ts=1e-3, delay=1.3e-3, render="implicit"),
+    dict(delay=3e-3, render="physical"),
+    dict(Ts=1e-3, render="physical"),
+    dict(Ts=1e-3, delay=1.3e-3, render="physical"),
 ]
 
 
@@ -43,13 +44,13 @@ def test_a_physical_stiffness_is_one_with_the_hands_spring(k, spring, timing):
         a, b = linear_loop.characteristic(one), linear_loop.characteristic(other)
         assert a.coef == pytest.approx(b.coef, rel=1e-12)
     if k + spring:
-        assert gain_limit.gain_limit(one) == pytest.approx(gain_limit.gain_limit(other), rel=1e-7)
+        assert gain_limits.gain_limit(one) == pytest.approx(gain_limits.gain_limit(other), rel=1e-7)
 
 
 def test_a_late_stiffness_is_the_loop_of_the_definition():
     # s = j omega at the limit solves 1 + (G C + Sh)(Te + Th) with all that the motors do late
     loop = Loop(b=20.0, K=1.0, delay=4e-3, operator=hc.Operator())
-    k = hc.stiffness_limit(loop)
+    k = hc.theory.stiffness_limit(loop)
     at = replace(loop, k=k)
     physical, motors, driven = linear_loop.delayed_polynomials(at)
     omega = np.linspace(1.0, 300.0, 300_001)
@@ -65,12 +66,12 @@ def test_a_late_stiffness_is_the_loop_of_the_definition():
         dict(),
         dict(Ts=1e-3),
         dict(Ts=1e-3, delay=1.5e-3),
-        dict(Ts=1e-3, delay=1.5e-3, render="implicit"),
+        dict(Ts=1e-3, delay=1.5e-3, render="physical"),
     ],
 )
 def test_runs_grow_beyond_the_limit_of_k_and_decay_below(timing):
     loop = PushedLoop(K=1.0, b=20.0, operator=hc.Operator(), **timing)
-    limit = hc.stiffness_limit(loop.linear)
+    limit = hc.theory.stiffness_limit(loop.linear)
     rates = [
         growth_rate(simulate(replace(loop, k=x * limit).scenario()), "x") for x in (0.995, 1.005)
     ]
@@ -88,12 +89,12 @@ def test_the_clay_of_a_spring_shows_in_transparency():
     z, e = linear_loop.device_impedance(loop)
     s = 1j * np.array([0.5, 5.0, 50.0])
     te = 30.0 + 200.0 / s  # force over velocity
-    assert hc.transparency(loop, s.imag) == pytest.approx(te / (te + z(s) / e(s)), rel=1e-12)
+    assert hc.theory.transparency(loop, s.imag) == pytest.approx(te / (te + z(s) / e(s)), rel=1e-12)
 
 
 def test_yielding_clay_is_refused_beside_a_stiffness():
     loop = Loop(K=1.0, k=10.0)
-    for ask in (hc.limit_cycles, hc.push_outcomes, hc.exact_cycles):
+    for ask in (hc.theory.limit_cycles, hc.theory.push_outcomes, hc.theory.exact_cycles):
         with pytest.raises(ParameterError, match="k = 10"):
             ask(loop, flow=hc.Flow(Fy=1.0, b=10.0))
     with pytest.raises(ParameterError, match="^k"):

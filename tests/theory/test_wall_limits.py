@@ -11,9 +11,9 @@ from scipy.linalg import expm
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.studies.boundary import growth_rate
+from hapticclay.studies.growth import growth_rate
 from hapticclay.theory import wall_limits
-from hapticclay.theory.passivity import colgate_schenkel
+from hapticclay.theory.loop_passivity import colgate_schenkel
 
 DEVICE = hc.Device(mass=0.1, damper=1.0)
 
@@ -34,7 +34,7 @@ def walls(draw, whole=False):
         Ts=Ts,
         delay=delay * Ts,
         velocity="exact" if exact else "difference",
-        window=1 if exact else draw(st.integers(1, 4)),
+        velocity_window=1 if exact else draw(st.integers(1, 4)),
         velocity_filter=None if exact else draw(st.sampled_from([None, 0.05 / Ts])),
     )
 
@@ -52,7 +52,7 @@ class Stepped:
         self.a[3, 3] = 1j * omega
         self.z = np.array([x, v, 0.0, 1.0], dtype=complex)
         self.wall, self.past, self.w, self.last, self.queue = wall, [], 0.0, 0.0, []
-        self.past = [0.0] * (wall.window + 1)
+        self.past = [0.0] * (wall.velocity_window + 1)
 
     def sample(self):
         """One sample; yields the pieces of the hold as (state before, length)."""
@@ -61,7 +61,7 @@ class Stepped:
         self.past = [*self.past[1:], x]
         v = self.z[1]
         if w.velocity == "difference":
-            v = (x - self.past[0]) / (w.window * T)
+            v = (x - self.past[0]) / (w.velocity_window * T)
             if w.velocity_filter is not None:
                 keep = math.exp(-2.0 * math.pi * w.velocity_filter * T)
                 v = keep * self.w + (1.0 - keep) * v
@@ -101,19 +101,19 @@ def test_the_map_makes_the_samples_of_a_stepped_wall(wall):
 @settings(max_examples=30, deadline=None)
 @given(walls())
 def test_the_band_ends_where_the_wall_becomes_unstable(wall):
-    low, high = hc.stiffness_band(wall)
+    low, high = hc.walls.stiffness_band(wall)
     if 0.0 < high < math.inf:
         for K, stable in (
             (0.5 * (low + high), True),
             (0.9999 * high, True),
             (1.0001 * high, False),
         ):
-            assert hc.stable_wall(replace(wall, K=K)) == stable
+            assert hc.walls.stable_wall(replace(wall, K=K)) == stable
     if low:
-        assert not hc.stable_wall(replace(wall, K=0.999 * low))
+        assert not hc.walls.stable_wall(replace(wall, K=0.999 * low))
     if not high:
         scale = (wall.device.mass + wall.hand.mass) / wall.Ts**2
-        assert not any(hc.stable_wall(replace(wall, K=K * scale)) for K in (1e-4, 1e-2, 1.0))
+        assert not any(hc.walls.stable_wall(replace(wall, K=K * scale)) for K in (1e-4, 1e-2, 1.0))
 
 
 @settings(max_examples=40, deadline=None)
@@ -127,8 +127,8 @@ def test_jury_in_closed_form_is_the_band(beta, b, samples, hand):
         Ts=Ts,
         delay=samples * Ts,
     )
-    high = hc.stiffness_band(wall)[1]
-    assert hc.jury_limit(wall) == pytest.approx(high, rel=1e-6, abs=1e-9 * m / Ts**2)
+    high = hc.walls.stiffness_band(wall)[1]
+    assert hc.walls.jury_limit(wall) == pytest.approx(high, rel=1e-6, abs=1e-9 * m / Ts**2)
 
 
 def test_without_damper_the_closed_form_is_that_of_two_samples():
@@ -137,17 +137,17 @@ def test_without_damper_the_closed_form_is_that_of_two_samples():
     c = 0.7
     wall = hc.VirtualWall(device=hc.Device(mass=0.1), B=c * 0.1 / 1e-3)
     asked = (4.0 * c - 2.0 * c * c) / (2.0 + c) * 0.1 / 1e-6
-    assert hc.jury_limit(wall) == pytest.approx(asked, rel=1e-9)
+    assert hc.walls.jury_limit(wall) == pytest.approx(asked, rel=1e-9)
 
 
 @pytest.mark.parametrize("samples", [0.0, 0.5, 1.0, 2.0])
 @pytest.mark.parametrize("damper", [0.0, 1.0, 2000.0])
 def test_the_boundary_of_hulin_is_that_of_the_bands(samples, damper):
-    B, K = hc.hulin_boundary(0.1, damper, 1e-3, samples, 21)
+    B, K = hc.walls.hulin_boundary(0.1, damper, 1e-3, samples, 21)
     assert B[0] == -damper and K[0] == 0.0
     for b, k in list(zip(B, K, strict=True))[1:-1]:
         wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=damper), B=b, delay=samples * 1e-3)
-        ends = hc.stiffness_band(wall)
+        ends = hc.walls.stiffness_band(wall)
         assert min(abs(end - k) for end in ends) < 1e-7 * K.max()
 
 
@@ -162,7 +162,7 @@ def test_the_linear_rule_holds_in_its_range(samples, one, five):
                 device=hc.Device(mass=1.0, damper=b * x / 1e-3), B=(1.0 - b) * x / 1e-3,
                 delay=samples * 1e-3,
             )  # fmt: skip
-            error = hc.hulin_limit(wall) / hc.stiffness_band(wall)[1] - 1.0
+            error = hc.walls.hulin_limit(wall) / hc.walls.stiffness_band(wall)[1] - 1.0
             assert abs(error) < share
 
 
@@ -176,12 +176,12 @@ def test_the_linear_rule_holds_in_its_range(samples, one, five):
         dict(delay=5e-4),
         dict(delay=1e-3),
         dict(delay=2e-3),
-        dict(delay=3e-4, window=3),
+        dict(delay=3e-4, velocity_window=3),
     ],
 )
 def test_runs_grow_beyond_the_band_and_decay_within_it(parts):
     wall = hc.VirtualWall(B=5.0, device=DEVICE, **parts)
-    limit = hc.stiffness_band(wall)[1]
+    limit = hc.walls.stiffness_band(wall)[1]
     rates = [
         growth_rate(hc.simulate(replace(wall, K=x * limit).scenario(1.2, push=1e-4)), "x")
         for x in (0.998, 1.002)
@@ -195,25 +195,32 @@ def test_runs_grow_beyond_the_band_and_decay_within_it(parts):
 @given(st.floats(0.1, 50.0), st.floats(-60.0, 60.0), st.sampled_from([1e-4, 1e-3]))
 def test_the_passive_stiffness_is_that_of_colgate_and_schenkel(b, B, Ts):
     wall = hc.VirtualWall(B=B, device=hc.Device(damper=b), Ts=Ts)
-    K = hc.colgate_schenkel_limit(wall)
+    K = hc.walls.colgate_schenkel_limit(wall)
     assert K == pytest.approx(max(0.0, 2.0 * (b - abs(B)) / Ts), rel=1e-12)
     if K:
-        least = hc.passivity_index(replace(wall, K=K), np.linspace(1e-3, 1.0, 999) * math.pi / Ts)
+        least = hc.walls.passivity_index(
+            replace(wall, K=K), np.linspace(1e-3, 1.0, 999) * math.pi / Ts
+        )
         assert least.min() == pytest.approx(0.0, abs=2e-5 * b)
 
 
 @settings(max_examples=25, deadline=None)
 @given(walls(whole=True))
 def test_with_window_filter_and_delay_the_condition_decides(wall):
-    wall = replace(wall, velocity="difference", window=wall.window, operator=None)
-    K, Ts = hc.colgate_schenkel_limit(wall), wall.Ts
+    wall = replace(wall, velocity="difference", velocity_window=wall.velocity_window, operator=None)
+    K, Ts = hc.walls.colgate_schenkel_limit(wall), wall.Ts
     whole = round(wall.delay / Ts)
     keep = (
         0.0 if wall.velocity_filter is None else math.exp(-2 * math.pi * wall.velocity_filter * Ts)
     )
 
     def H(z, K):
-        D = (1.0 - z**-wall.window) / (wall.window * Ts) * (1.0 - keep) / (1.0 - keep / z)
+        D = (
+            (1.0 - z**-wall.velocity_window)
+            / (wall.velocity_window * Ts)
+            * (1.0 - keep)
+            / (1.0 - keep / z)
+        )
         return (K + (wall.B + wall.M * (1.0 - 1.0 / z) / Ts) * D) / z**whole
 
     def passive(K):
@@ -244,7 +251,7 @@ def test_a_fraction_of_delay_asks_for_what_the_worst_middle_does(part, turn, who
         lost = b * (abs(Q - 1.0) ** 2 / part + abs(z - Q) ** 2 / (1.0 - part)) / Ts
         return lost + (np.conj(H) * (z - 1.0) * Q).real
 
-    asked = b - hc.passivity_index(wall, a / Ts)[0]
+    asked = b - hc.walls.passivity_index(wall, a / Ts)[0]
     at_limit = replace(wall, device=hc.Device(damper=asked))
     worst = wall_limits.worst_middle(at_limit, a)
     scale = abs(H) + asked / Ts
@@ -256,7 +263,7 @@ def test_a_fraction_of_delay_asks_for_what_the_worst_middle_does(part, turn, who
 def test_a_fraction_of_delay_lies_between_whole_ones():
     def limit(samples):
         wall = hc.VirtualWall(B=0.1, device=DEVICE, delay=samples * 1e-3)
-        return hc.colgate_schenkel_limit(wall)
+        return hc.walls.colgate_schenkel_limit(wall)
 
     found = [limit(x) for x in (0.0, 1e-6, 0.3, 0.7, 1.0 - 1e-6, 1.0)]
     assert found[0] == pytest.approx(found[1], rel=1e-2)  # sqrt of the fraction
@@ -266,19 +273,19 @@ def test_a_fraction_of_delay_lies_between_whole_ones():
 
 def test_an_exact_velocity_is_not_passive():
     wall = hc.VirtualWall(B=0.1, device=DEVICE, velocity="exact")
-    assert hc.colgate_schenkel_limit(wall) == 0.0
-    assert hc.passivity_index(wall, 10.0)[0] == -math.inf
-    assert hc.colgate_schenkel_limit(replace(wall, B=0.0)) == pytest.approx(2000.0)
+    assert hc.walls.colgate_schenkel_limit(wall) == 0.0
+    assert hc.walls.passivity_index(wall, 10.0)[0] == -math.inf
+    assert hc.walls.colgate_schenkel_limit(replace(wall, B=0.0)) == pytest.approx(2000.0)
 
 
 def test_friction_and_quantum():
     wall = hc.VirtualWall(device=hc.Device(0.1, 5.0, friction=0.02, quantum=1e-5))
-    assert hc.abbott_okamura_limit(wall) == pytest.approx(2.0 * 0.02 / 1e-5)
-    assert hc.abbott_okamura_limit(replace(wall, Ts=5e-3)) == pytest.approx(2.0 * 5.0 / 5e-3)
-    assert hc.abbott_okamura_limit(replace(wall, device=DEVICE)) == pytest.approx(2000.0)
+    assert hc.walls.abbott_okamura_limit(wall) == pytest.approx(2.0 * 0.02 / 1e-5)
+    assert hc.walls.abbott_okamura_limit(replace(wall, Ts=5e-3)) == pytest.approx(2.0 * 5.0 / 5e-3)
+    assert hc.walls.abbott_okamura_limit(replace(wall, device=DEVICE)) == pytest.approx(2000.0)
     for field in ("B", "M", "delay"):
         with pytest.raises(ParameterError, match=f"wall.{field}"):
-            hc.abbott_okamura_limit(replace(wall, **{field: 1e-3}))
+            hc.walls.abbott_okamura_limit(replace(wall, **{field: 1e-3}))
 
 
 # ---- what the hand feels -------------------------------------------------------------------------
@@ -289,7 +296,7 @@ def test_friction_and_quantum():
     "parts",
     [
         dict(),
-        dict(delay=0.4e-3, window=3, velocity_filter=80.0),
+        dict(delay=0.4e-3, velocity_window=3, velocity_filter=80.0),
         dict(delay=2e-3, M=0.02),
         dict(velocity="exact", delay=1e-3),
     ],
@@ -298,7 +305,7 @@ def test_the_impedance_is_that_of_the_steady_motion(turn, parts):
     wall = hc.VirtualWall(K=400.0, B=2.0, device=hc.Device(0.1, 3.0), **parts)
     p, q = turn  # omega Ts = pi p/q: the motion repeats itself after 2 q samples
     omega = math.pi * p / (q * wall.Ts)
-    assert hc.stable_wall(wall)
+    assert hc.walls.stable_wall(wall)
     stepped = Stepped(wall, omega=omega, push=1.0)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     total, t = 0.0, 0.0
@@ -312,15 +319,15 @@ def test_the_impedance_is_that_of_the_steady_motion(turn, parts):
             t += h
     # the hand's force at t is exp(j omega t)
     V = total / (2 * q * wall.Ts)
-    assert hc.wall_impedance(wall, omega)[0] == pytest.approx(1.0 / V, rel=1e-7)
+    assert hc.walls.wall_impedance(wall, omega)[0] == pytest.approx(1.0 / V, rel=1e-7)
 
 
 def test_a_slow_hand_feels_spring_and_dampers():
     wall = hc.VirtualWall(K=800.0, B=2.0, device=hc.Device(0.1, 3.0))
     omega = np.array([1e-3, 1e-2])
     asked = 800.0 / (1j * omega) + 5.0 - 800.0 * 0.5e-3
-    assert hc.wall_impedance(wall, omega) == pytest.approx(asked, rel=1e-6)
-    assert hc.wall_impedance(replace(wall, K=0.0, B=0.0), omega) == pytest.approx(
+    assert hc.walls.wall_impedance(wall, omega) == pytest.approx(asked, rel=1e-6)
+    assert hc.walls.wall_impedance(replace(wall, K=0.0, B=0.0), omega) == pytest.approx(
         0.1j * omega + 3.0, rel=1e-12
     )
 
@@ -330,31 +337,31 @@ def test_a_slow_hand_feels_spring_and_dampers():
 
 def test_no_hand_of_the_box_is_worse_than_its_limit():
     wall = hc.VirtualWall(B=5.0, device=DEVICE, delay=1e-3, velocity_filter=100.0)
-    box = hc.Box(mass=(0.0, 1.0), damper=(0.0, 8.0), spring=(0.0, 500.0))
-    limit = hc.hand_box_limit(wall, box)
+    box = hc.theory.Box(mass=(0.0, 1.0), damper=(0.0, 8.0), spring=(0.0, 500.0))
+    limit = hc.walls.hand_box_limit(wall, box)
     for hand in [*box.corners(), *box.sample(40)]:
-        assert hc.stiffness_band(replace(wall, operator=hand))[1] >= (1.0 - 1e-6) * limit
-    one = hc.Box(mass=(0.2, 0.2), damper=(1.0, 1.0), spring=(5.0, 5.0))
-    alone = hc.stiffness_band(replace(wall, operator=hc.Operator(0.2, 1.0, 5.0)))[1]
-    assert hc.hand_box_limit(wall, one) == alone
+        assert hc.walls.stiffness_band(replace(wall, operator=hand))[1] >= (1.0 - 1e-6) * limit
+    one = hc.theory.Box(mass=(0.2, 0.2), damper=(1.0, 1.0), spring=(5.0, 5.0))
+    alone = hc.walls.stiffness_band(replace(wall, operator=hc.Operator(0.2, 1.0, 5.0)))[1]
+    assert hc.walls.hand_box_limit(wall, one) == alone
 
 
 def test_a_free_device_is_stable_if_it_is_damped():
-    assert hc.stable_wall(hc.VirtualWall(device=DEVICE))
-    assert not hc.stable_wall(hc.VirtualWall())
-    assert hc.stiffness_band(hc.VirtualWall()) == (0.0, 0.0)
+    assert hc.walls.stable_wall(hc.VirtualWall(device=DEVICE))
+    assert not hc.walls.stable_wall(hc.VirtualWall())
+    assert hc.walls.stiffness_band(hc.VirtualWall()) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
     ("ask", "field"),
     [
-        (lambda w: hc.hand_box_limit(w, 1.0), "box"),
-        (lambda w: hc.wall_impedance(w, [0.0]), "omega"),
-        (lambda w: hc.passivity_index(w, [[1.0]]), "omega"),
-        (lambda w: hc.jury_limit(replace(w, delay=5e-4)), "wall.delay"),
-        (lambda w: hc.jury_limit(replace(w, window=2)), "wall.window"),
-        (lambda w: hc.stable_wall(replace(w, window=700)), "wall.window"),
-        (lambda w: hc.hulin_boundary(0.1, 1.0, 1e-3, 101.0), "samples"),
+        (lambda w: hc.walls.hand_box_limit(w, 1.0), "box"),
+        (lambda w: hc.walls.wall_impedance(w, [0.0]), "omega"),
+        (lambda w: hc.walls.passivity_index(w, [[1.0]]), "omega"),
+        (lambda w: hc.walls.jury_limit(replace(w, delay=5e-4)), "wall.delay"),
+        (lambda w: hc.walls.jury_limit(replace(w, velocity_window=2)), "wall.velocity_window"),
+        (lambda w: hc.walls.stable_wall(replace(w, velocity_window=700)), "wall.velocity_window"),
+        (lambda w: hc.walls.hulin_boundary(0.1, 1.0, 1e-3, 101.0), "samples"),
     ],
 )
 def test_what_is_refused(ask, field):

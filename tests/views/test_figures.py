@@ -18,15 +18,15 @@ from hapticclay.studies.accuracy import Ladder, Setting
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.impedance import MeasuredImpedance, computed_impedance
 from hapticclay.studies.mbk import ArmMBK, Border, DeviceMBK, arm_mbk, device_mbk
-from hapticclay.studies.monte_carlo import Instability
 from hapticclay.studies.population import Draw, gain_band
+from hapticclay.studies.robustness import Instability
 from hapticclay.studies.sampling import Range
 from hapticclay.studies.stability_map import MapCell, StabilityMap
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
 from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, Limit, ZRegion, ZWidth
-from hapticclay.theory.linear_loop import Loop
-from hapticclay.theory.margins import Box
+from hapticclay.theory.loops import Loop
+from hapticclay.theory.stability_margins import Box
 from hapticclay.views import (
     compare_plots,
     fit_plots,
@@ -54,7 +54,7 @@ def record(name):
     return hc.simulate(
         {
             "constant": hc.constant_cut(t_max=4.0),
-            "variable": hc.variable_cut(operator=HAND, shaping=True, t_max=3.0),
+            "variable": hc.variable_cut(operator=HAND, inertia_shaping=True, t_max=3.0),
             "driven": hc.stability_test(25.0, t_max=3.0),
             "yields": hc.Scenario(clay=yields, force=(5.0, 0.0), t_max=3.0),
             "ground": hc.Scenario(clay=across, force=(5.0, 0.0), t_max=2.0),
@@ -64,7 +64,7 @@ def record(name):
 
 @functools.cache
 def fitted():
-    return hc.fit_flow(fit_coverage.measured("Bingham", 3, fit_coverage.SENSORS["fine"]))
+    return hc.studies.fit_flow(fit_coverage.measured("Bingham", 3, fit_coverage.SENSORS["fine"]))
 
 
 def stability_chart(kind):
@@ -124,7 +124,7 @@ def ladder():
 
 @functools.cache
 def identified(what, axis):
-    return hc.identify(axis, what, periods=1, lines=12, period=2.5, band=(0.5, 20.0))
+    return hc.studies.identify(axis, what, periods=1, lines=12, period=2.5, band=(0.5, 20.0))
 
 
 def swept():
@@ -147,10 +147,10 @@ def passive(what):
     wall = hc.VirtualWall(K=500.0, B=0.2, device=hc.Device(0.1, 1.0), delay=5e-4)
     if what == "energy":
         stiff = hc.constant_cut(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=0.012)
-        return passivity_runs.energy_over_time(dataclasses.replace(stiff, stop=False))
+        return passivity_runs.energy_over_time(dataclasses.replace(stiff, stop_when_unstable=False))
     if what == "index":
         omega = np.geomspace(3.0, 3000.0, 50)
-        index, some = hc.passivity_index(wall, omega), omega[::9]
+        index, some = hc.walls.passivity_index(wall, omega), omega[::9]
         return passivity_runs.IndexOverFrequency(
             "wall of K = 500 N/m, B = 0.2 N.s/m", omega, index + 0.1, index, some,
             index[::9] + 0.1, some, index[::9],
@@ -164,7 +164,7 @@ def z_region(name, wall, rest=False, box=False):
     """A region with every line that a region may have; its runs are made up."""
     b, Ts = wall.device.damper, wall.Ts
     B = (0.0, *np.geomspace(0.25, 100.0, 8).tolist(), 144.0, 176.0, 194.0)
-    exact = [hc.stiffness_band(dataclasses.replace(wall, B=x))[1] for x in B]
+    exact = [hc.walls.stiffness_band(dataclasses.replace(wall, B=x))[1] for x in B]
     K = [1.004 * x * (0.6 if rest and x > 1e4 else 1.0) for x in exact]
     boxed = (Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0)), tuple(K), tuple(exact)) if box else ()
     passive = tuple(max(0.0, 2.0 * (b - x) / Ts) for x in B)
@@ -188,7 +188,9 @@ def z_width(kind):
         return ZWidth((z_region("", wall, box=True),))
     if kind == "rest":
         device = hc.Device(0.1, 0.5, friction=0.02, quantum=2e-5)
-        wall = dataclasses.replace(wall, device=device, surface=True, operator=HAND, window=4)
+        wall = dataclasses.replace(
+            wall, device=device, unilateral=True, operator=HAND, velocity_window=4
+        )
         return ZWidth((z_region("", wall, rest=True, box=True),))
     dampers = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
     walls = [dataclasses.replace(wall, device=hc.Device(0.1, b)) for b in dampers]
@@ -197,13 +199,13 @@ def z_width(kind):
 
 
 @functools.cache
-def felt(kind):
+def measured(kind):
     """Impedances of the arm, and of a wall, as if measured with an error."""
     wall = hc.VirtualWall(300.0, 2.0, 0.05, hc.Device(0.1, 0.5), HAND, delay=5e-4)
     subject = wall if kind == "wall" else PushedLoop("x", b=90.0, k=40.0, operator=HAND, Ts=1e-3)
     there = computed_impedance(subject, 2.0 * math.pi * np.geomspace(0.5, 30.0, 24))
     off = np.linspace(0.99, 1.01, 24)
-    seen = dataclasses.replace(there, Z=off * there.Z, felt=off * there.felt)
+    seen = dataclasses.replace(there, Z=off * there.Z, transparency=off * there.transparency)
     return MeasuredImpedance(subject, seen, there, np.zeros(24), hc.constant_cut())
 
 
@@ -232,7 +234,7 @@ def least_masses():
 
 @functools.cache
 def hands_band():
-    hands = hc.POPULATIONS["published range"]
+    hands = hc.studies.POPULATIONS["published range"]
     return gain_band(Loop("x"), hands, np.geomspace(1.0, 3000.0, 9).tolist(), Draw(40))
 
 
@@ -243,9 +245,9 @@ def risk(kind):
     given = {
         "map": dict(grid={"K": K, "b": b}, runs=100),
         "line": dict(grid={"K": K}, runs=100),
-        "parameters": dict(vary={"K": hc.Distribution("log-normal", 4.0, 1.0)}, runs=2000),
+        "parameters": dict(vary={"K": hc.studies.Distribution("log-normal", 4.0, 1.0)}, runs=2000),
     }
-    trials = hc.Trials(PushedLoop("x", b=90.0, operator=None), hands="published range",
+    trials = hc.studies.Trials(PushedLoop("x", b=90.0, operator=None), hands="published range",
                        **given[kind])  # fmt: skip
     points = np.concatenate([trials.points(n) for n in range(trials.chunks)])
     gain = points[:, trials.names.index("K")]
@@ -270,9 +272,8 @@ def compared(kind):
         loops = [Loop.of(x, "x") for x in scenes]
         found = zip(names, scenes, loops, [hc.simulate(x) for x in scenes], strict=True)
     region = z_region("", hc.VirtualWall(device=hc.Device(0.1, 1.0)))
-    return tuple(
-        comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found
-    )
+    files = (comparison.Compared(n, w, o, {}, {}, r, None if o else region) for n, w, o, r in found)
+    return comparison.Comparison(tuple(files))
 
 
 def run_case(name, figure):
@@ -322,7 +323,7 @@ CASES = {
         for kind in ("region", "rest", "family")
     },
     **{
-        f"{name} of {kind}": lambda kind=kind, plot=plot: plot(felt(kind))
+        f"{name} of {kind}": lambda kind=kind, plot=plot: plot(measured(kind))
         for kind in ("arm", "wall")
         for name, plot in {
             "impedance": impedance_plots.impedance_plot,

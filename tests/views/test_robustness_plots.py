@@ -7,19 +7,19 @@ from matplotlib.text import Text
 
 import hapticclay as hc
 from hapticclay.studies.boundary import PushedLoop
-from hapticclay.studies.monte_carlo import Instability
+from hapticclay.studies.robustness import Instability
 from hapticclay.studies.sampling import Range
-from hapticclay.theory.linear_loop import Loop
+from hapticclay.theory.loops import Loop
 from hapticclay.views.figure import Figure
 from hapticclay.views.robustness_plots import band_plot, instability_plot
 
-HANDS = hc.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
-GAIN = hc.Distribution("log-normal", 4.0, 1.0)
+HANDS = hc.studies.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
+GAIN = hc.studies.Distribution("log-normal", 4.0, 1.0)
 
 
 def judged(**kw):
     """Runs with made-up verdicts: unstable where K is large, or by chance."""
-    trials = hc.Trials(PushedLoop("x"), **{"hands": HANDS, **kw})
+    trials = hc.studies.Trials(PushedLoop("x"), **{"hands": HANDS, **kw})
     points = np.concatenate([trials.points(n) for n in range(trials.chunks)])
     rng = np.random.default_rng(0)
     K = points[:, trials.names.index("K")]
@@ -30,7 +30,9 @@ def judged(**kw):
 PLANE = {"K": Range(1.0, 8.0, 9), "b": Range(10.0, 1000.0, 5, log=True)}
 CASES = {
     "band": lambda: band_plot(
-        hc.gain_band(Loop("x"), HANDS, np.geomspace(1.0, 3000.0, 7).tolist(), hc.Draw(20))
+        hc.studies.gain_band(
+            Loop("x"), HANDS, np.geomspace(1.0, 3000.0, 7).tolist(), hc.studies.Draw(20)
+        )
     ),
     "plane": lambda: instability_plot(judged(grid=PLANE, runs=250)),
     "turned plane": lambda: instability_plot(judged(grid=dict(reversed(PLANE.items())), runs=20)),

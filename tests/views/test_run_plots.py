@@ -54,7 +54,7 @@ def test_any_record_can_be_drawn(scenario, axis, tmp_path):
         assert (tmp_path / "p.png").stat().st_size > 5000
 
 
-LONG = dict(operator=hc.Operator(), shaping=True, gain=(1.234, 0.5678), t_max=3.0)
+LONG = dict(operator=hc.Operator(), inertia_shaping=True, gain=(1.234, 0.5678), t_max=3.0)
 
 
 SCENARIOS = {
@@ -62,7 +62,7 @@ SCENARIOS = {
     "long": hc.variable_cut(**LONG),
     "long constant": hc.constant_cut(**LONG, force=(1.234, -0.5678)),
     "long free": hc.free(**LONG),
-    "driven": hc.stability_test(25.0, shaping=True, t_max=3.0),
+    "driven": hc.stability_test(25.0, inertia_shaping=True, t_max=3.0),
     "short": hc.constant_cut(t_max=0.1),
     "unstable": hc.constant_cut(gain=(1.0, 1.0)),
     "other parts": hc.with_fields(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation.simulate import has_numba
+from hapticclay.simulation.engines import has_numba
 from hapticclay.stepping.run import PLAIN
 from hapticclay.views.session import (
     FRAME_TIME,
@@ -162,7 +162,7 @@ def test_clay_is_removed_while_recording_is_off_too():
     record = session.record()
     assert np.diff(record.t).max() == pytest.approx(3.0, abs=2 * FRAME_TIME)
     assert stage.removal.volume == pytest.approx(record.extra["removed"][-1], rel=5e-3)
-    straight_on = hc.removed(record)[0][-1]
+    straight_on = hc.studies.removed(record)[0][-1]
     assert record.extra["removed"][-1] > 1.1 * straight_on
 
 
@@ -269,7 +269,7 @@ def test_verdict_follows_the_monitor_and_the_gain():
     session.push((0.0, 0.2))
     drag(session, 3.0, lambda t: (0.1, 0.0))
     assert session.b == (90.0, 90.0)
-    limit = hc.gain_limit("y", 90.0, operator=session.scenario.operator)
+    limit = hc.theory.gain_limit("y", 90.0, operator=session.scenario.operator)
     assert session.verdict().text.startswith("stable; limit of K here: ")
     assert session.verdict().text.endswith(f"{limit:.3g}") and not session.verdict().unstable
     session.change(gain=(1.0, 3.0 * limit))

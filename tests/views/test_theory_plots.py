@@ -19,7 +19,7 @@ def texts(figure):
 
 def test_bode_marks_the_margins():
     figure = plots.bode_plot("x", 1.0, 90.0, operator=HAND)
-    m = hc.margins("x", 1.0, 90.0, operator=HAND)
+    m = hc.theory.margins("x", 1.0, 90.0, operator=HAND)
     assert f"gain margin {m.gain[1]:.3g}" in texts(figure)
     assert f"phase margin {math.degrees(m.phase):.3g}\u00b0" in texts(figure)
     top, low = figure.axes
@@ -48,7 +48,7 @@ def test_nyquist_shows_one_curve_for_each_gain():
         "K = 1",
         "K = 6",
     ] and "2 poles on the right" in labels[1]
-    m = hc.margins("x", 1.0, 90.0, operator=HAND)
+    m = hc.theory.margins("x", 1.0, 90.0, operator=HAND)
     points = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
     assert points[0].get_xdata()[0] == pytest.approx(-1 / m.gain[1])
     assert math.hypot(points[1].get_xdata()[0], points[1].get_ydata()[0]) == pytest.approx(1.0)
@@ -58,7 +58,7 @@ def test_small_gain_shades_where_it_fails():
     figure = plots.small_gain_plot("x", 1.0, 50.0, operator=HAND)
     spans = [p for p in figure.axes[0].patches if p.get_label() == "fails"]
     assert spans[0].get_x() + spans[0].get_width() == pytest.approx(
-        hc.small_gain("x", 1.0, 50.0, operator=HAND).fails[0][1]
+        hc.theory.small_gain("x", 1.0, 50.0, operator=HAND).fails[0][1]
     )
     left, right = (line.get_ydata() for line in figure.axes[0].lines)
     w = figure.axes[0].lines[0].get_xdata()

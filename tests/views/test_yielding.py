@@ -178,7 +178,7 @@ def test_expected_speed_is_that_of_the_run(flow, force, isotropic):
 def test_film_and_window_show_isotropic_clay_on_its_law():
     """Along the motion, and nothing of free air, from which no line leads into the clay."""
     scenario = dataclasses.replace(
-        hc.constant_cut(t_max=1.5), clay=hc.slab(hc.material("stiff clay"), 0.05, 0.15)
+        hc.constant_cut(t_max=1.5), clay=hc.slab(hc.materials.material("stiff clay"), 0.05, 0.15)
     )
     run = hc.simulate(scenario)
     figure, curves = run_plots.running_figure(run, 480, 720)
@@ -186,7 +186,7 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
     (x, y) = next((x, y) for at, x, y, _ in curves if at is ax)
     inside = (run.p[:, 0] > 0.05) & ~run.held()[:, 0]
     np.testing.assert_array_equal(np.isfinite(x), run.p[:, 0] >= 0.05)
-    flow = hc.material("stiff clay")
+    flow = hc.materials.material("stiff clay")
     # but for the kick that begins in free air, and the one in which it stops
     np.testing.assert_allclose(y[inside][1:-1], flow.force(x[inside])[1:-1], rtol=1e-6)
     assert "along the motion" in ax.get_xlabel()
@@ -203,11 +203,11 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
 
 
 def test_table_advises_physical_clay_where_motors_would_have_to_hold_the_handle():
-    clay = hc.slab(hc.material("soft clay"), 0.05, 0.15)
+    clay = hc.slab(hc.materials.material("soft clay"), 0.05, 0.15)
     s = dataclasses.replace(hc.constant_cut(t_max=1.0), clay=clay, control="sampled")
-    assert "advice: --render implicit" in run_table(hc.simulate(s))
+    assert "advice: --render physical" in run_table(hc.simulate(s))
     for other in (
-        dataclasses.replace(s, render="implicit"),
+        dataclasses.replace(s, render="physical"),
         dataclasses.replace(s, clay=hc.slab(hc.Flow(Fy=0.5, b=40.0), 0.05, 0.15)),
     ):
         assert "advice" not in run_table(hc.simulate(other))
@@ -338,7 +338,7 @@ def led(stops, speed=0.2):
         gain=FREE,
         clay=hc.Clay.of_groove(BLOCK),
         length=None,
-        shaping=True,
+        inertia_shaping=True,
         command=hc.Samples(tuple(t), tuple(stops)),
     )
 

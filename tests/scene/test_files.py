@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors, files, units
 from hapticclay.errors import Bound, ParameterError, field_types
-from hapticclay.model import fields, scenario_file
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
-from hapticclay.model.experiments import EXPERIMENTS, from_words, parameter_unit
-from hapticclay.model.fields import make_part, named_values, nested, plain_data, with_fields
+from hapticclay.scene import fields
+from hapticclay.scene import files as scene_files
+from hapticclay.scene.experiments import EXPERIMENTS, parameter_unit
+from hapticclay.scene.fields import make_part, named_values, nested, plain_data, with_fields
 
 
 def floats(low, high):
@@ -62,11 +63,11 @@ def profiles(draw):
 
 
 @st.composite
-def interfaces(draw):
+def hardwares(draw):
     difference = draw(st.booleans())
-    more = dict(window=draw(st.integers(1, 9))) if difference else {}
-    return hc.Interface(
-        lost=draw(floats(0.0, 0.9)),
+    more = dict(velocity_window=draw(st.integers(1, 9))) if difference else {}
+    return hc.Hardware(
+        dropout_probability=draw(floats(0.0, 0.9)),
         encoder=draw(st.none() | st.integers(4, 2**40)),
         velocity="difference" if difference else "exact",
         dac_range=draw(st.none() | pairs(0.1, 9.0)),
@@ -88,14 +89,14 @@ def scenarios(draw):
     dt = draw(floats(1e-5, 0.0099))  # below 1 over the fastest mode of SERVOS
     loop = dict(control="sampled", Ts=draw(st.none() | st.just(3 * dt))) if sampled else {}
     if sampled:
-        loop["interface"] = draw(st.none() | interfaces())
+        loop["hardware"] = draw(st.none() | hardwares())
     return hc.Scenario(
         name=draw(st.text(st.characters(exclude_categories=["Cs"]), min_size=1)),
         clay=draw(st.none() | st.builds(hc.Clay, profiles(), profiles())),
         gain=draw(pairs(0.0, 1e6)),
         force=draw(pairs(-1e6, 1e6)),
         operator=draw(each(OPERATORS)),
-        shaping=draw(st.booleans()),
+        inertia_shaping=draw(st.booleans()),
         dt=dt,
         t_max=draw(floats(1e-3, 1e5)),
         length=None,
@@ -104,7 +105,7 @@ def scenarios(draw):
         torque_limit=draw(pairs(1e-3, 1e6)),
         muscle=draw(st.none() | MULTISINES),
         command=draw(st.none() | MULTISINES),
-        stop=draw(st.booleans()),
+        stop_when_unstable=draw(st.booleans()),
         arm=arm,
         servo=draw(st.tuples(SERVOS, SERVOS)),
         compensator=draw(each(COMPENSATORS)),
@@ -174,7 +175,7 @@ def test_pairs_defaults_and_nothing_come_back(tmp_path, changes):
     ).map(lambda x: {"a": x, "b c": [{"d": x}]})
 )
 def test_the_toml_we_write_is_what_tomllib_reads(data):
-    again = tomllib.loads(scenario_file.toml_text(data))
+    again = tomllib.loads(scene_files.toml_text(data))
     assert _sorted(again) == _sorted(data)  # values stand before tables
 
 
@@ -189,7 +190,7 @@ def test_a_file_is_short_and_has_units(tmp_path):
     changes["operator.y"] = hc.Operator(0.5)
     scenario = with_fields(hc.free(), {**changes, "operator.x": None, "length": None})
     assert scenario.save(tmp_path / "s.toml").read_text() == (
-        'schema = "hapticclay-scenario-1"\n'
+        'schema = "hapticclay-scenario-2"\n'
         'name = "free"\n'
         "gain = [2.0, 0.5]  # 1/kg\n"
         'length = "none"  # m\n'
@@ -297,7 +298,7 @@ def test_a_pair_may_be_a_list_of_tables(tmp_path):
         ("experiment = 'constant'\nbb = 3", "bb = 3: no such field; did you mean 'b'?"),
         ("experiment = 'constant'\nb = -3", "b = -3: must be a finite number >= 0"),
         ("b = 3", "b = 3: no such field"),
-        ("schema = 'hapticclay-record-1'", "must be one of hapticclay-scenario-1"),
+        ("schema = 'hapticclay-record-1'", "must be one of hapticclay-scenario-2"),
         ("dt.x = 3", "dt.x = 3: no such field: dt has no parts"),
         ("'' = 3", " = 3: no such field"),
         ("x.''.'y.z' = 3", "no such field"),
@@ -423,7 +424,7 @@ def test_any_number_of_any_part_is_changed_by_name(scenario, data):
         ({"muscle.rms.y": 1.0}, dict(muscle=hc.Multisine((1.0, 1.0)))),
         ({"servo": hc.Scenario().servo[1]}, dict(servo=(hc.Scenario().servo[1],) * 2)),
         ({"length": "None"}, dict(length=None)),
-        ({"shaping": 1.0}, dict(shaping=True)),
+        ({"inertia_shaping": 1.0}, dict(inertia_shaping=True)),
     ],
 )
 def test_changes_by_name(changes, expected):
@@ -442,16 +443,16 @@ def test_one_part_for_both_axes_changes_both_of_a_pair():
 def test_an_experiment_takes_parameters_and_fields_at_once():
     kind = EXPERIMENTS["constant"]
     small = {"arm.l1": 0.05, "arm.l2": 0.05, "origin": [0.05, 0.03], "length": "2 cm"}
-    s = from_words(kind, {"b": 50.0}, {**small, "clay.x.values.1": 7.0})  # no reach without
+    s = kind.of({"b": 50.0}, {**small, "clay.x.values.1": 7.0})  # no reach without
     assert s.arm == hc.Arm(0.05, 0.05) and s.length == 0.02
     assert (s.clay.x.values, s.clay.y.values) == ((0.0, 7.0, 0.0), (0.0, 50.0, 0.0))
-    s = from_words(kind, {}, {"clay.begin": 0.06, "impedance": True, "operator.mass": 1.0})
+    s = kind.of({}, {"clay.begin": 0.06, "operator": True, "operator.mass": 1.0})
     assert s.clay.x.edges == (0.06, 0.15) and s.operator == hc.Operator(1.0)
-    s = from_words(EXPERIMENTS["stability"], {}, {"gain": 3.0, "gain.y": 0.2, "muscle.seed": 5.0})
+    s = EXPERIMENTS["stability"].of({}, {"gain": 3.0, "gain.y": 0.2, "muscle.seed": 5.0})
     assert s.gain == (3.0, 0.2) and s.muscle.seed == 5
-    s = from_words(kind, {}, {"gain": 3.0, "gain.y": 0.2}, {"gain": 1.0})
+    s = kind.of({}, {"gain": 3.0, "gain.y": 0.2}, {"gain": 1.0})
     assert s.gain == (1.0, 1.0)  # the later goes before
-    s = from_words(EXPERIMENTS["variable"], {}, {"growth": "none", "name": "mine"})
+    s = EXPERIMENTS["variable"].of({}, {"growth": "none", "name": "mine"})
     assert s == dataclasses.replace(hc.variable_cut("none"), name="mine")
 
 
@@ -463,7 +464,7 @@ def test_units_of_names():
         ("operator.y.mass", "kg"),
         ("servo.x.G.damping", "1/s"),
         ("clay.x.values.1", "N.s/m"),
-        ("interface.friction.x", "N.m"),
+        ("hardware.friction.x", "N.m"),
         ("muscle.low", "Hz"),
         ("nothing.at.all", ""),
     ):
@@ -530,7 +531,7 @@ def test_a_part_of_several_classes_names_its_kind(wave, data):
     drum = Drum(wave)
     assert make_part(Drum, {"wave": data}) == drum
     for full in (True, False):
-        text = scenario_file.toml_text(plain_data(drum, full), {})
+        text = scene_files.toml_text(plain_data(drum, full), {})
         assert make_part(Drum, tomllib.loads(text)) == drum, text
         assert make_part(Drum, json.loads(json.dumps(plain_data(drum, full)))) == drum
 
@@ -633,11 +634,18 @@ def test_every_unit_of_a_bound_is_known():
 
 
 def test_words():
-    words = ["arm.l1=0.3", "gain=1,0.5", "shaping=TRUE", "dt=0.1ms", "growth=30/s", "clay=4cm,6cm"]
+    words = [
+        "arm.l1=0.3",
+        "gain=1,0.5",
+        "inertia_shaping=TRUE",
+        "dt=0.1ms",
+        "growth=30/s",
+        "clay=4cm,6cm",
+    ]
     assert named_values("--set", words) == {
         "arm.l1": 0.3,
         "gain": [1.0, 0.5],
-        "shaping": True,
+        "inertia_shaping": True,
         "dt": "0.1ms",
         "growth": "30/s",
         "clay": ["4cm", "6cm"],
@@ -654,7 +662,7 @@ def test_nested_names():
     }
 
 
-NOT_GIVEN = ("muscle.", "command.", "interface.", "controller.", "clay.groove.")
+NOT_GIVEN = ("muscle.", "command.", "hardware.", "controller.", "clay.groove.")
 
 
 def test_the_fields_of_a_scenario_are_all_there():
@@ -710,7 +718,7 @@ def test_a_step_that_is_not_given_divides_the_sample(Ts, tmp_path):
     words = {"control": "sampled", "Ts": Ts}
     made = (
         hc.Scenario.load(file), hc.constant_cut(**words), with_fields(hc.Scenario(), words),
-        from_words(EXPERIMENTS["free"], words), dataclasses.replace(hc.Scenario(), **words),
+        EXPERIMENTS["free"].of(words), dataclasses.replace(hc.Scenario(), **words),
     )  # fmt: skip
     assert [x.dt for x in made] == [s.dt] * len(made)
     s.save(tmp_path / "b.toml")
@@ -738,8 +746,8 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     file.write_text('experiment = "constant"\n')
     for make in (
         lambda: with_fields(hc.constant_cut(), given),
-        lambda: from_words(EXPERIMENTS["constant"], {}, given),
-        lambda: scenario_file.load_scenario(file, given),
+        lambda: EXPERIMENTS["constant"].of({}, given),
+        lambda: hc.Scenario.load(file, given),
     ):
         with pytest.raises(hc.ParameterError, match="adds a hand") as caught:
             make()
@@ -748,7 +756,7 @@ def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):
     whole = {"operator.mass": 0.3, "operator.damper": 0.0, "operator.spring": 4.0}
     assert with_fields(hc.constant_cut(), whole).operator == hand
     mass = {"operator.mass": whole.pop("operator.mass")}
-    assert scenario_file.load_scenario(file, mass, whole).operator == hand
+    assert hc.Scenario.load(file, mass, whole).operator == hand
     s = dataclasses.replace(hc.constant_cut(), operator=hc.Operator())
     assert with_fields(s, {"operator.mass": 0.3}).operator == hc.Operator(0.3)
 

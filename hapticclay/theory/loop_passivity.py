@@ -14,8 +14,8 @@ from numpy.polynomial import Polynomial
 from ..arguments import checked
 from ..errors import number
 from . import linear_loop, roots
-from .linear_loop import Loop, of_loop
-from .margins import LINEAR, Verdict
+from .loops import Loop, of_loop
+from .stability_margins import LINEAR, Verdict
 
 
 @of_loop("K", "b")
@@ -95,7 +95,7 @@ def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float =
 
     Servo and compensator are left out. In closed form: damping > stiffness Ts/2 + b, the second
     term at the Nyquist frequency (Colgate, Schenkel 1997). The handle has no physical damper of its
-    own, so held clay is never passive by itself; clay with render="implicit" is.
+    own, so held clay is never passive by itself; clay with render="physical" is.
 
     Args:
         b: clay [N.s/m].

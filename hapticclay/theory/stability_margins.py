@@ -27,8 +27,8 @@ from ..errors import (
     numbers_of,
 )
 from ..model.operator import Operator
-from . import gain_limit, linear_loop, roots
-from .linear_loop import Loop, of_loop
+from . import gain_crossings, linear_loop, roots
+from .loops import Loop, of_loop
 from .roots import first_failure
 
 BREAKS = ("force", "compensator")
@@ -174,10 +174,10 @@ def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
         ParameterError: a value is out of its bounds.
     """
     if _is_timed(loop, at):
-        return _response_nyquist(gain_limit.loop_family(loop), loop.gain)
+        return _response_nyquist(gain_crossings.loop_family(loop), loop.gain)
     n, d = open_loop(loop, at=at)
     size = np.abs(np.concatenate((roots.nonzero_roots(n), roots.nonzero_roots(d))))
-    omega = gain_limit.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
+    omega = gain_crossings.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
     return Nyquist(omega, n(1j * omega) / d(1j * omega), *encirclements(n, d))
 
 
@@ -213,7 +213,7 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
         low *= 0.1
     while n.degree() < d.degree() and magnitude(1j * high) > 1e-3:
         high *= 10.0
-    omega = gain_limit.frequency_grid(low, high, np.concatenate((poles, zeros)))
+    omega = gain_crossings.frequency_grid(low, high, np.concatenate((poles, zeros)))
     if order <= 0:
         omega = np.concatenate(([1e-9 * low], omega))
     arcs = np.sort(np.abs(poles[on & (poles.imag > 0.0)]))
@@ -221,7 +221,7 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
     for start, end in itertools.pairwise((0.0, *arcs.tolist(), math.inf)):
         gap = ARC if start < math.inf else 0.0
         piece = omega[(omega > start * (1.0 + gap)) & (omega < end * (1.0 - gap))]
-        turned += gain_limit.phase_change(lambda w: 1.0 + n(1j * w) / d(1j * w), piece)
+        turned += gain_crossings.phase_change(lambda w: 1.0 + n(1j * w) / d(1j * w), piece)
     return round((max(order, 0) * math.pi - 2.0 * turned) / (2.0 * math.pi)), P
 
 
@@ -241,7 +241,7 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
         ParameterError: a value is out of its bounds.
     """
     if _is_timed(loop, at):
-        return _response_margins(gain_limit.loop_family(loop), loop.gain)
+        return _response_margins(gain_crossings.loop_family(loop), loop.gain)
     n, d = (p.trim() for p in open_loop(loop, at=at))
     if not roots.hurwitz(n + d):
         return NO_MARGINS
@@ -280,7 +280,7 @@ def _is_timed(loop: Loop, at: str) -> bool:
     return timed
 
 
-def _response_nyquist(family: gain_limit.LoopFamily, K: float) -> Nyquist:
+def _response_nyquist(family: gain_crossings.LoopFamily, K: float) -> Nyquist:
     """The curve of L = -K h, counted as in `encirclements`."""
     if K >= family.most:
         bound = f"must be < {family.most:g}: above, poles without number lie on the right"
@@ -299,24 +299,24 @@ def _response_nyquist(family: gain_limit.LoopFamily, K: float) -> Nyquist:
             top *= 2.0
         omega = np.append(omega, top) if top > omega[-1] else omega
     path = np.concatenate(([low] if low < omega[0] else [], omega, last))
-    turned = gain_limit.phase_change(back, path)
+    turned = gain_crossings.phase_change(back, path)
     if not last:
         turned -= np.angle(back(path[-1:])[0])
     N = round((family.order * (K > 0.0) * math.pi - 2.0 * turned) / (2.0 * math.pi))
     return Nyquist(family.grid, -K * family.h(family.grid), N, family.right())
 
 
-def _response_margins(family: gain_limit.LoopFamily, K: float) -> Margins:
+def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     """Margins of L = -K h."""
     from scipy.optimize import minimize_scalar
 
     if not family.stable(K):
         return NO_MARGINS
-    found = [*gain_limit.gain_crossings(family), (family.most, math.inf)]
+    found = [*gain_crossings.gain_crossings(family), (family.most, math.inf)]
     factor, omega = np.array(found).T / [[K or 1e-300], [1.0]]
     more, more_at = _extreme(factor, omega, (factor > 1.0) & (factor < np.inf), np.argmin, math.inf)
     less, less_at = _extreme(factor, omega, factor < 1.0, np.argmax, 0.0)
-    omega = np.array(gain_limit.unit_crossings(family, K) if K else [])
+    omega = np.array(gain_crossings.unit_crossings(family, K) if K else [])
     lag = np.angle(-family.h(omega)) + np.pi if len(omega) else omega
     every = lag > -1.0
     turn = np.minimum(lag, 2.0 * np.pi - lag)
@@ -363,8 +363,8 @@ def coupled_stability(loop: Loop) -> Verdict:
     Args:
         loop: the loop with its K > 0; or axis, K, b, operator, and other parts by name.
     """
-    good = gain_limit.is_stable(loop)
-    limit, omega = gain_limit.critical_gain(loop)
+    good = gain_crossings.is_stable(loop)
+    limit, omega = gain_crossings.critical_gain(loop)
     if loop.Ts:
         how = "eigenvalues of the exact sampled model"
     elif loop.delay:
@@ -427,10 +427,10 @@ def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
     """
     z, e = linear_loop.device_impedance(loop)
     s = 1j * array_of("omega", omega)
-    felt, device = loop.b * e(s), z(s)
+    clay, device = loop.b * e(s), z(s)
     if loop.k:
-        felt, device = (loop.b * s + loop.k) * e(s), s * device
-    return felt / (felt + device)
+        clay, device = (loop.b * s + loop.k) * e(s), s * device
+    return clay / (clay + device)
 
 
 # ---- the worst case over hands -------------------------------------------------------------------
@@ -586,7 +586,7 @@ def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
     timed = loop.Ts is not None or loop.delay > 0.0
     if timed:
         members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))
-        found = [(*gain_limit.critical_gain(replace(loop, operator=th)), th) for th in members]
+        found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in members]
         limit, omega, hand = min(found, key=lambda x: x[0])
         how = f"sampled: the corners and {samples} random members, no proof for those between"
     else:
@@ -610,7 +610,7 @@ def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | No
         tried = replace(loop, operator=corners[0], K=K)
         return linear_loop.stable(tried) and not critical_hand(tried, box)
 
-    found = [(*gain_limit.critical_gain(replace(loop, operator=th)), th) for th in corners]
+    found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in corners]
     limit, omega, worst = min(found, key=lambda x: x[0])
     top = min(limit, 1e6)
     if limit == 0.0 or (limit == math.inf and stable(top)):

@@ -26,9 +26,10 @@ from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, number
 from ..files import versions
 from ..model.constants import AXES
-from ..model.fields import nested, with_fields
-from ..model.scenario import Scenario
-from ..model.virtual_wall import VirtualWall
+from ..results import Result
+from ..scene.fields import nested, with_fields
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
 from . import boundary, growth, sweep, zwidth
@@ -61,7 +62,7 @@ class Trials:
 
     Parameters have dotted names: those of the base ("b", "K", "delay", "pose.x", "operator.mass",
     "servo.G.damping"; of a wall "K", "B", "device.damper"), else those of the scenario of its runs
-    ("interface.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
+    ("hardware.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
 
     Attributes:
         base: what does not vary: a PushedLoop or a VirtualWall. Its own push does not matter.
@@ -189,16 +190,18 @@ class Trials:
         own, others = self._split(values)
         base = with_fields(self.base, own)
         if isinstance(base, PushedLoop):
-            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(t_max, stop=False)
+            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(
+                t_max, stop_when_unstable=False
+            )
         else:
             push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
             scenario = base.scenario(t_max, push=push, steps=zwidth.growth_steps(base))
         made = with_fields(scenario, others) if others else scenario
         if isinstance(base, VirtualWall):
-            hardware = made.interface
+            hardware = made.hardware
             rough = hardware and (hardware.encoder or any(hardware.friction))
-            if base.surface or rough:
-                bound = "must be a wall without surface, friction and encoder; see hc.zwidth"
+            if base.unilateral or rough:
+                bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
                 raise ParameterError("base", base, bound)
         return made
 
@@ -253,7 +256,7 @@ def judge(
     """Makes runs and tells which are unstable.
 
     A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
-    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `boundary.growth_rate`. That
+    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. That
     of a wall is as long, and is read, as `zwidth.growth_rates` does, at the wall's own samples;
     where it hardly changes in size it is repeated, four times as long. A run that ends early, or
     drives the motors into their limits from so small a push, is unstable.
@@ -277,7 +280,7 @@ def judge(
         with contextlib.suppress(ParameterError):
             made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
             # Odd, so that half the sampling frequency does not fold onto zero.
-            steps[i] = 2 * round(0.5 * boundary.GROWTH_SAMPLE / made.dt) + 1
+            steps[i] = 2 * round(0.5 * growth.GROWTH_SAMPLE / made.dt) + 1
             short[i] = replace(
                 made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
             )
@@ -304,7 +307,7 @@ def judge(
     runs = [replace(short[i], t_max=t) for i, t in zip(again, spans, strict=True)]
     for i, record in zip(again, simulate_batch(runs, threads=threads), strict=True):
         ended = record.outcome.code in ENDED
-        unstable[i] = ended or boundary.growth_rate(record, trials.axis) > 0.0
+        unstable[i] = ended or growth.growth_rate(record, trials.axis) > 0.0
     return unstable, longer
 
 
@@ -336,7 +339,7 @@ def _judge_walls(
                     if record.outcome.code in (*ENDED, *LOST):
                         unstable[i] = True
                         continue
-                    rate = zwidth.growth_of_run(record, *read[i][1:])
+                    rate = growth.growth_of_run(record, *read[i][1:])
                     unstable[i] = rate > 0.0
                     if abs(rate) * job.t_max < WALL_TOLD:
                         undecided.append(i)
@@ -373,6 +376,7 @@ def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.nd
     return low, high
 
 
+@named
 @dataclass(frozen=True)
 class Probability:
     """A probability that was counted.
@@ -398,6 +402,7 @@ class Probability:
         return f"{share} {100.0 * self.high:.3g} %, {100.0 * self.level:g} % interval)"
 
 
+@named
 @dataclass(frozen=True)
 class RiskMap:
     """The probability of instability over two parameters, or over one.
@@ -434,8 +439,8 @@ class RiskMap:
 
 
 @named
-@dataclass(frozen=True)
-class Instability:
+@dataclass(frozen=True, repr=False)
+class Instability(Result):
     """Runs that were judged.
 
     Attributes:
@@ -449,6 +454,10 @@ class Instability:
     points: np.ndarray
     unstable: np.ndarray
     longer: np.ndarray
+
+    def headline(self) -> str:
+        """Probability of instability, in one line."""
+        return f"{self.total} of {self.total.runs} runs unstable"
 
     @property
     def refused(self) -> int:
@@ -573,13 +582,14 @@ def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
     """Largest stable K of the linear loop."""
     if isinstance(loop, VirtualWall):
         return wall_limits.stiffness_band(loop)[1]
-    placed = loop.pose != (0.0, 0.0) and not loop.shaping
+    placed = loop.pose != (0.0, 0.0) and not loop.inertia_shaping
     return boundary.pose_limit(loop) if placed else boundary.nominal_limit(loop)
 
 
 # ---- making the runs -----------------------------------------------------------------------------
 
 
+@named
 @dataclass(frozen=True)
 class Cost:
     """What the runs that are left will take, measured on a few of them.

@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ..arguments import named
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, check_fields, number, quantity
-from . import samples, shapes  # noqa: F401  # so that files and options know every Signal
-from .arm import PAPER, Arm
-from .clay import Clay, Smooth
-from .compensator import PRINTED, Compensator
-from .constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
-from .controller import SERVO, Servo
-from .hardware import JOINTS, Interface
-from .operator import Operator, mobility_with
-from .sampled_controller import Controller
-from .scenario_text import scenario_rows
-from .signals import Signal
+from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
+from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
+from ..model.arm import PAPER, Arm
+from ..model.clay import Clay, Smooth
+from ..model.compensator import PRINTED, Compensator
+from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
+from ..model.controller import SERVO, Servo
+from ..model.hardware import JOINTS, Hardware
+from ..model.operator import Operator, mobility_with
+from ..model.sampled_controller import Controller
+from ..model.signals import Signal
+from ..model.support import check_scene
+from .fields import (
+    check_added_hand,
+    dotted_names,
+    merged_values,
+    nested,
+    no_field,
+    values_of,
+)
+from .files import read_settings, write_part
+from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
 WHOLE = 1e-6  # by which Ts/dt may differ from a whole number
@@ -39,7 +50,10 @@ TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, 
 SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
-Render = Literal["held", "implicit"]
+Render = Literal["held", "physical"]
+
+SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
+EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by the name that files give them
 
 
 @named
@@ -57,7 +71,8 @@ class Scenario:
         force: constant part of the operator's muscle force uh on each axis [N].
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
             pure force (Th = 0).
-        shaping: whether the servo shapes the handle's inertia, so that Sh holds at every pose.
+        inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
+            pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, 0.36 ms, or the
             longest whole part of Ts that is no longer.
         t_max: the run ends at this time [s], > 0, at most 1e5 ...
@@ -73,13 +88,13 @@ class Scenario:
             equation; or "sampled", the paper's hardware: measured, computed and held every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
         render: where control is sampled, the clay is "held" (the motors hold its force, computed
-            from the sample) or "implicit" (physical, there all the time).
+            from the sample) or "physical" (physical, there all the time).
         muscle: variable part of uh [N], any signal or sum of signals; None for none.
         command: displacement added to the compensator's output [m]: the signal less its value at
             t = 0, so that the run starts without a jump; None for none.
-        stop: whether the run ends when an axis is judged unstable; False lets it go on against
-            the torque limits.
-        interface: hardware of a sampled loop; None for an ideal one.
+        stop_when_unstable: whether the run ends when an axis is judged unstable; False lets it go
+            on against the torque limits.
+        hardware: hardware of a sampled loop; None for an ideal one.
         arm: the two-link arm.
         servo: G and Sh of each axis, (x, y).
         compensator: shape of C, of both axes or a pair (x, y); K/(s^2 + 10 s) as printed. Systems
@@ -93,7 +108,7 @@ class Scenario:
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
     force: Force = (1.0, 0.0)
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
-    shaping: bool = False
+    inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     length: Annotated[float | None, Bound(-10.0, 10.0, "m")] = PATH_LENGTH
@@ -107,8 +122,8 @@ class Scenario:
     render: Render = "held"
     muscle: Signal | None = None
     command: Signal | None = None
-    stop: bool = True
-    interface: Interface | None = None
+    stop_when_unstable: bool = True
+    hardware: Hardware | None = None
     arm: Arm = PAPER
     servo: tuple[Servo, Servo] = SERVO
     compensator: Compensator | tuple[Compensator, Compensator] = PRINTED
@@ -119,10 +134,7 @@ class Scenario:
             object.__setattr__(self, "compensator", _compensators(self.compensator))
         choose_step(self)
         check_fields(self)
-        if self.control == "sampled" and self.integrator != "fast":
-            raise ParameterError(
-                "integrator", self.integrator, "must be 'fast' where control is 'sampled'"
-            )
+        check_scene(self)
         if self.Ts is not None:
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
@@ -133,19 +145,10 @@ class Scenario:
                     f"{round(n) * self.dt:.10g} s; or dt = {self.Ts / round(n):.10g} s"
                 )
                 raise ParameterError("Ts", self.Ts, bound)
-        if self.controller is not None and self.control != "sampled":
-            raise ParameterError(
-                "control", self.control, "must be 'sampled' with a controller of one's own"
-            )
-        if self.controller is not None and self.shaping:
-            raise ParameterError(
-                "shaping", self.shaping, "must be False with a controller, which replaces the servo"
-            )
         self._check_servo()
         self._check_interface()
-        self._check_turned_clay()
+        self._check_rotated_axes()
         self._check_smooth_clay()
-        self._check_springs()
         self._check_groove()
         self._check_reach("start", self.start)
         if self.length is not None:
@@ -162,19 +165,54 @@ class Scenario:
     def _repr_html_(self) -> str:
         return html_table(f"Scenario {self.name}", scenario_rows(self))
 
-    @staticmethod
-    def load(path: str | os.PathLike[str]) -> Scenario:
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
+        """The scenario of plain data: its fields; or an experiment, its parameters and fields.
+
+        Args:
+            settings: the data, as in a file (docs/scenarios.md).
+            *changes: values by dotted name, the later ones on top.
+
+        Raises:
+            ParameterError: there is no such field, or a value was refused.
+        """
+        data = nested(settings)
+        given = data.pop("schema", SCENARIO_SCHEMA)
+        choice("schema", given, (SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2))
+        if "experiment" in data:
+            name = choice("experiment", data.pop("experiment"), tuple(EXPERIMENTS))
+            return EXPERIMENTS[name].of({}, data, *changes)
+        values = values_of(cls())
+        for name in data:
+            if name not in values:
+                raise no_field(name, data[name], [*dotted_names(cls), "experiment", "schema"])
+        values = merged_values(cls, data, values)
+        later = [nested(x) for x in changes]
+        check_added_hand(values["operator"], *later)
+        for given in later:
+            values = merged_values(cls, given, values)
+        return cls(**values)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
         """Reads a scenario from a file (docs/scenarios.md).
 
         Args:
             path: the file, .toml or .json.
+            *changes: values by dotted name that go before those of the file, the later ones on
+                top.
 
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .scenario_file import load_scenario
-
-        return load_scenario(path)
+        try:
+            settings = read_settings(path)
+            cls.of(settings)
+        except ParameterError as error:
+            if error.field != "scenario":
+                error = ParameterError(error.field, error.value, f"{error.bound} (in {Path(path)})")
+            raise error from None
+        return cls.of(settings, *changes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the fields that differ from the defaults, whole or not at all.
@@ -188,9 +226,7 @@ class Scenario:
         Raises:
             ParameterError: the file cannot be written, or a part is no data, as a function.
         """
-        from .scenario_file import save_scenario
-
-        return save_scenario(self, path)
+        return write_part(path, {"schema": SCENARIO_SCHEMA, "name": self.name}, self)
 
     @property
     def operators(self) -> tuple[Operator | None, Operator | None]:
@@ -225,34 +261,22 @@ class Scenario:
             raise ParameterError("dt", self.dt, bound)
 
     def _check_interface(self) -> None:
-        given, Ts = self.interface, self.Ts or self.dt
+        given, Ts = self.hardware, self.Ts or self.dt
         if given is None:
             return
-        if self.control != "sampled":
-            raise ParameterError("interface", given, "must be None unless control is 'sampled'")
-        if (given.passivity or given.coupling) and self.render != "held":
-            raise ParameterError(
-                "render", self.render, "must be 'held' for a passivity controller or a coupling"
-            )
-        if self.controller and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling where the law is one's own"
-            raise ParameterError("interface", given, bound)
-        number("interface.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
-        number("interface.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
+        number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
+        number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
 
     @property
-    def turned(self) -> bool:
+    def rotated(self) -> bool:
         """Whether clay ties the axes together, its own not being x and y."""
         return self.clay is not None and self.clay.angle != 0.0
 
-    def _check_turned_clay(self) -> None:
-        """Refuses turned clay where no law of it is known: see docs/equations.md, section 4."""
-        given, clay = self.interface, self.clay
-        if clay is None or not self.turned:
+    def _check_rotated_axes(self) -> None:
+        """Refuses rotated axes where clay is stiff: see docs/equations.md, section 4."""
+        clay = self.clay
+        if clay is None or not self.rotated:
             return
-        if given and (given.passivity or given.coupling):
-            bound = "must be 0 for a passivity controller or a coupling, which act along x and y"
-            raise ParameterError("clay.angle", clay.angle, bound)
         b, most = clay.largest + self.t_max * clay.fastest, self._soft_damping()
         if b > most:
             bound = (
@@ -281,32 +305,11 @@ class Scenario:
             )
             raise ParameterError("dt", self.dt, bound)
 
-    def _check_springs(self) -> None:
-        """Refuses springs where no law of them is known."""
-        if self.clay is None or not self.clay.springs:
-            return
-        given = self.interface
-        if given and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling in clay that springs back"
-            raise ParameterError("interface", given, bound)
-        if self.integrator != "fast":
-            bound = "must be 'fast' in clay that springs back"
-            raise ParameterError("integrator", self.integrator, bound)
-        if self.clay.angle:
-            raise ParameterError("clay.angle", self.clay.angle, "must be 0 for springs")
-
     def _check_groove(self) -> None:
-        """Refuses clay that stays cut where no step takes it away, or where it is stiff."""
-        given = self.interface
+        """Refuses clay that stays cut where it is stiff."""
         clay = self.clay
         if clay is None or clay.groove is None:
             return
-        if self.integrator != "fast":
-            bound = "must be 'fast' in clay that stays cut"
-            raise ParameterError("integrator", self.integrator, bound)
-        if given and (given.passivity or given.coupling):
-            bound = "must be without passivity controller and coupling in clay that stays cut"
-            raise ParameterError("interface", given, bound)
         b, most = clay.largest, self._soft_damping()
         if b > most:
             bound = (

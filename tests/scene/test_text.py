@@ -48,7 +48,7 @@ def objects(record):
         operator=(hc.Operator(), None),
         muscle=hc.Step((0.5, 0.0), 0.1),
         control="sampled",
-        interface=hc.Interface(delay=1e-4),
+        hardware=hc.Hardware(delay=1e-4),
         arm=hc.Arm(l1=0.3),
     )
     law = hc.Profile((), (0.0,), springs=(hc.Spring(k=1e3),))
@@ -76,9 +76,9 @@ def objects(record):
         "yields": yields,
         "groove": groove,
         "own controller": own,
-        "passive": hc.passivity("x", 1.0, 90.0),
-        "not passive": hc.passivity("y", 0.5, 90.0),
-        "coupled": hc.coupled_stability("y", 1.0, 90.0, hc.Operator()),
+        "passive": hc.theory.passivity("x", 1.0, 90.0),
+        "not passive": hc.theory.passivity("y", 0.5, 90.0),
+        "coupled": hc.theory.coupled_stability("y", 1.0, 90.0, hc.Operator()),
         "observed": hc.observed_passivity(record),
     }
 
@@ -102,7 +102,7 @@ def test_what_the_lines_say(record):
     assert "clay: b = 90 N.s/m, control: continuous, fast" in repr(record.scenario)
     assert "b = 1 to 70 N.s/m" in repr(every["parts"])
     assert "muscle: Step" in repr(every["parts"]) and "y: none" in repr(every["parts"])
-    assert "of its own: arm, interface" in repr(every["parts"])
+    assert "of its own: arm, hardware" in repr(every["parts"])
     assert "Fy = 5 N, K = 2 N/(m/s)^n, n = 0.5, b = 20 N.s/m" in repr(every["yields"])
     assert "stays cut, up to" in repr(every["groove"])
     assert "springs back" in repr(every["springs"])

@@ -17,9 +17,9 @@ from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, field_types, flag
-from .clay import Clay, Profile, slab
-from .constants import (
+from ..errors import Bound, ParameterError, check_fields, field_types
+from ..model.clay import Clay, Profile, slab
+from ..model.constants import (
     AXES,
     B_CONSTANT,
     B_MAX,
@@ -39,6 +39,9 @@ from .constants import (
     TORQUE_LIMIT,
     TS,
 )
+from ..model.flow import Flow
+from ..model.operator import Operator
+from ..model.signals import Multisine
 from .fields import (
     ENTIRE,
     Field,
@@ -47,16 +50,14 @@ from .fields import (
     dotted_names,
     field_descriptions,
     function_of,
-    laid_over,
     make_part,
     merged_values,
     nested,
     no_field,
     values_of,
 )
-from .flow import Flow
-from .operator import Operator
 from .scenario import (
+    EXPERIMENTS,
     Control,
     Duration,
     Force,
@@ -70,7 +71,6 @@ from .scenario import (
     TorqueLimit,
     choose_step,
 )
-from .signals import Multisine
 
 GROWTHS = {  # readings of the growth [N.s/m per s]
     "30/s": GROWTH,
@@ -91,7 +91,8 @@ class Experiment:
 
     Attributes:
         operator: the operator's arm Th in the loop (Eq. 19); None for a pure force.
-        shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every pose.
+        inertia_shaping: let the servo shape the inertia, so that Sh (Eqs. 17, 18) holds at every
+            pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, a part of Ts.
         t_max: longest simulated time [s], > 0, at most 1e5.
         origin: world position of p = 0 [m].
@@ -99,11 +100,11 @@ class Experiment:
         control: "continuous", part of the differential equation, or "sampled": measured and held
             every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
-        render: clay of a sampled loop: its force "held" by the motors, or "implicit" (physical).
+        render: clay of a sampled loop: its force "held" by the motors, or "physical" (physical).
     """
 
     operator: Operator | None = None
-    shaping: bool = False
+    inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     origin: Position = ORIGIN
@@ -125,6 +126,29 @@ class Experiment:
         """
         raise NotImplementedError
 
+    @classmethod
+    def of(cls, words: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
+        """The scenario of an experiment whose parameters are given as in `parameters`.
+
+        Args:
+            words: parameters by name; those left out keep their defaults.
+            *changes: parameters, and fields of the scenario, by dotted name; the later ones on top.
+
+        Raises:
+            ParameterError: as `scenario`; or there is no such parameter or field.
+        """
+        values, others = dict(words), []
+        if "operator" in values:
+            values["operator"] = _operator(values["operator"])
+        split = [_split_names(cls, nested(given)) for given in changes]
+        before = values.get("operator", parameters(cls)["operator"].default or None)
+        check_added_hand(before, *(own for own, _ in split))
+        for own, other in split:
+            values = merged_values(cls, own, values)
+            others += [other] if other else []
+        experiment = cls(**values)
+        return experiment.changed(*others) if others else experiment.scenario()
+
     def build_scenario(self, name: str, **own: Any) -> Scenario:
         """A scenario that takes its fields from the parameters of the same names.
 
@@ -145,7 +169,7 @@ class Experiment:
         The changes are made before the scenario is checked, so that another arm may go another way.
 
         Args:
-            *changes: plain data of the fields (`model/fields.py`), the later ones on top.
+            *changes: plain data of the fields (`scene/fields.py`), the later ones on top.
 
         Raises:
             ParameterError: as `scenario`; or there is no such field.
@@ -209,7 +233,7 @@ class ConstantCut(PathExperiment):
             return self.b
         if self.b != B_CONSTANT:
             raise ParameterError("material", self.material, "sets b: give one of the two")
-        from .materials import material
+        from ..model.materials import material
 
         return material(self.material)
 
@@ -296,7 +320,7 @@ class StabilityTest(Experiment):
             force=(0.0, 0.0),
             muscle=Multisine((self.rms, 0.0) if i == 0 else (0.0, self.rms), seed=self.seed),
             length=None,
-            stop=False,
+            stop_when_unstable=False,
         )
 
 
@@ -317,7 +341,7 @@ class Free(PathExperiment):
         return self.build_scenario("free")
 
 
-EXPERIMENTS: dict[str, type[Experiment]] = {
+EXPERIMENTS |= {
     "constant": ConstantCut,
     "variable": VariableCut,
     "stability": StabilityTest,
@@ -343,7 +367,7 @@ class Parameter(NamedTuple):
 
 @functools.cache
 def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
-    """Parameters of an experiment by name; `impedance`, a bool, stands for the nominal operator.
+    """Parameters of an experiment by name; `operator` is a bool, true for the arm of the paper.
 
     Args:
         kind: the experiment.
@@ -354,41 +378,17 @@ def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
         if name == "operator":
             nominal = given.default is not None
             about = "put the operator's arm Th (Eq. 19) in the loop."
-            out["impedance"] = Parameter(bool, nominal, "", about)
+            out[name] = Parameter(bool, nominal, "", about)
         else:
             out[name] = Parameter(hint, given.default, bound.unit if bound else "", told[name])
     return out
 
 
-def from_words(
-    kind: type[Experiment], words: Mapping[str, Any], *changes: Mapping[str, Any]
-) -> Scenario:
-    """The scenario of an experiment whose parameters are given as in `parameters`.
-
-    Args:
-        kind: the experiment.
-        words: parameters by name; those left out keep their defaults.
-        *changes: parameters, and fields of the scenario, by dotted name; the later ones on top.
-
-    Raises:
-        ParameterError: as `Experiment.scenario`; or there is no such parameter or field.
-    """
-    values, others = dict(words), []
-    if "impedance" in values:
-        values["operator"] = _impedance(values.pop("impedance"))
-    split = [_split_names(kind, nested(given)) for given in changes]
-    before = values.get("operator", parameters(kind)["impedance"].default or None)
-    check_added_hand(before, *(own for own, _ in split))
-    for own, other in split:
-        values = merged_values(kind, own, values)
-        others += [other] if other else []
-    experiment = kind(**values)
-    return experiment.changed(*others) if others else experiment.scenario()
-
-
-def _impedance(given: Any) -> Operator | None:
-    on = bool(given) if given in (0.0, 1.0) and isinstance(given, float) else given
-    return Operator() if flag("impedance", on) else None
+def _operator(given: Any) -> Any:
+    """The arm of the paper, or none, where a flag stands for it; a sweep gives flags as floats."""
+    if isinstance(given, bool) or (isinstance(given, float) and given in (0.0, 1.0)):
+        return Operator() if given else None
+    return given
 
 
 def _split_names(
@@ -397,9 +397,13 @@ def _split_names(
     """Plain data of the parameters of an experiment, and of other fields of the scenario."""
     types, known = field_types(kind), field_types(Scenario)
     data, own, other = dict(data), {}, {}
-    if "impedance" in data:
-        hand = _impedance(data.pop("impedance"))
-        data["operator"] = laid_over({ENTIRE: hand}, data.get("operator", {}))
+    if "operator" in data:
+        hand = (
+            data["operator"]
+            if isinstance(data["operator"], Mapping)
+            else {ENTIRE: data["operator"]}
+        )
+        data["operator"] = {k: _operator(v) if k is ENTIRE else v for k, v in hand.items()}
     for name, value in data.items():
         if name in types and (name not in known or _reaches(types[name], value)):
             own[name] = value

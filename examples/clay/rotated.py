@@ -23,7 +23,7 @@ for degrees in (-30, 0, 30, 60):
     scenario = hc.Scenario(
         clay=hc.Clay(grain, hard, angle=float(angle)),
         gain=K,
-        shaping=True,
+        inertia_shaping=True,
         length=0.08,
         force=(1.0, 0.0),
     )

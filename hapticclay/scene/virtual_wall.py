@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from dataclasses import dataclass
@@ -11,19 +10,21 @@ from typing import Annotated, Literal
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
-from .arm import Arm
-from .constants import B_MAX
-from .hardware import Interface
-from .operator import NO_HAND, Operator
-from .sampled_controller import Controller
+from ..model.arm import Arm
+from ..model.constants import B_MAX
+from ..model.hardware import Hardware
+from ..model.operator import NO_HAND, Operator
+from ..model.sampled_controller import Controller
+from ..model.signals import Signal
+from ..model.spring import STIFFNESS_MAX
+from .fields import make_part, nested
+from .files import read_settings, write_part
 from .scenario import Scenario
-from .signals import Signal
-from .spring import STIFFNESS_MAX
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
 STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
 UPRIGHT = 0.5 * math.pi  # [rad] joint 1 where x = 0
-WALL_SCHEMA = "hapticclay-wall-1"
+WALL_SCHEMA, WALL_SCHEMA_0_2 = "hapticclay-wall-2", "hapticclay-wall-1"
 SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
 MASS_MAX = 1e6  # [kg]
 
@@ -67,10 +68,10 @@ class VirtualWall:
         Ts: control sample [s], 1e-6 to 1.
         delay: from a sample to the force computed from it [s], 0 to 100 Ts.
         velocity: "difference" of measured positions, or "exact" (a tachometer).
-        window: samples that the difference spans, 1 to 10000.
+        velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
-        surface: whether the wall has a surface at x = 0, pushes where x > 0 and never pulls; else
-            it acts everywhere and the loop is linear.
+        unilateral: whether the wall has a surface at x = 0, pushes where x > 0 and never pulls;
+            else it acts everywhere and the loop is linear.
     """
 
     K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
@@ -81,14 +82,16 @@ class VirtualWall:
     Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
     delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
     velocity: Literal["difference", "exact"] = "difference"
-    window: Annotated[int, Bound(1, 10_000)] = 1
+    velocity_window: Annotated[int, Bound(1, 10_000)] = 1
     velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
-    surface: bool = False
+    unilateral: bool = False
 
     def __post_init__(self):
         check_fields(self, "wall.")
         number("wall.delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
-        if self.velocity == "exact" and (self.velocity_filter is not None or self.window != 1):
+        if self.velocity == "exact" and (
+            self.velocity_filter is not None or self.velocity_window != 1
+        ):
             bound = "must be 'difference' for a window or a filter"
             raise ParameterError("wall.velocity", self.velocity, bound)
 
@@ -102,13 +105,10 @@ class VirtualWall:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        from .fields import make_part, nested
-        from .scenario_file import read_settings
-
         try:
             data = read_settings(path)
             del data["name"]
-            choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA,))
+            choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA, WALL_SCHEMA_0_2))
             return make_part(cls, nested(data))
         except ParameterError as error:
             field = "wall" if error.field == "scenario" else error.field
@@ -127,20 +127,7 @@ class VirtualWall:
         Raises:
             ParameterError: it cannot be written.
         """
-        from ..files import atomic
-        from .fields import plain_data
-        from .scenario_file import is_scenario_file, toml_text
-
-        file, units = Path(path), {}
-        if not is_scenario_file(file.name):
-            raise ParameterError("wall", str(file), "must be a .toml or a .json file")
-        data = {"schema": WALL_SCHEMA, **plain_data(self, False, units)}
-        toml = file.suffix.lower() == ".toml"
-        with atomic(file) as f:
-            f.write(
-                (toml_text(data, units) if toml else json.dumps(data, indent=2) + "\n").encode()
-            )
-        return file
+        return write_part(path, {"schema": WALL_SCHEMA}, self, "wall")
 
     @property
     def hand(self) -> Operator:
@@ -189,11 +176,11 @@ class VirtualWall:
             torque_limit=STRONG,
             control="sampled",
             muscle=muscle,
-            stop=False,
-            interface=Interface(
+            stop_when_unstable=False,
+            hardware=Hardware(
                 encoder=counts,
                 velocity=self.velocity,
-                window=self.window if differs else 1,
+                velocity_window=self.velocity_window if differs else 1,
                 velocity_filter=self.velocity_filter if differs else None,
                 delay=self.delay,
                 friction=(d.friction * lever, 0.0),
@@ -202,7 +189,7 @@ class VirtualWall:
             controller=Controller(
                 wall_law,
                 state=(0.0, 0.0),
-                params=(self.K, self.B, self.M, lever, self.Ts, float(self.surface)),
+                params=(self.K, self.B, self.M, lever, self.Ts, float(self.unilateral)),
             ),
         )
 

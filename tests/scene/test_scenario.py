@@ -33,7 +33,7 @@ from hapticclay.model import operator
         (dict(force=(1.0, 2.0, 3.0)), "force"),
         (dict(force=(math.inf, 0.0)), "force[x]"),
         (dict(operator=1), "operator"),
-        (dict(shaping="yes"), "shaping"),
+        (dict(inertia_shaping="yes"), "inertia_shaping"),
         (dict(dt=0.0), "dt"),
         (dict(dt=-1e-3), "dt"),
         (dict(dt=1.0), "dt"),

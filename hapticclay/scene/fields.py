@@ -12,12 +12,10 @@ of several classes, the key "kind" holds the name of the class in lower case. No
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import difflib
 import functools
 import inspect
-import pkgutil
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import UnionType
@@ -35,10 +33,10 @@ from typing import (
 
 import numpy as np
 
-from ..arguments import checked, known_names
+from ..arguments import checked, function_name, known_names
 from ..errors import Bound, ParameterError, choice, field_types, quantity
-from .constants import AXES, each_axis
-from .hardware import JOINTS
+from ..model.constants import AXES, each_axis
+from ..model.hardware import JOINTS
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -209,7 +207,7 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
 
 
 def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "shaping=true", "dt=0.1ms".
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms".
 
     Args:
         field: name for the error.
@@ -729,19 +727,6 @@ def _value_as_data(hint: Any, value: Any, old: Any, path: str, units: dict[str, 
         if name:
             return name
     raise ParameterError(path, value, "cannot be written to a file")
-
-
-def function_name(function: Any) -> str:
-    """The name "package.module:name" by which others find a function; "" if they do not.
-
-    Args:
-        function: the function.
-    """
-    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
-    with contextlib.suppress(ImportError, AttributeError, ValueError):
-        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
-            return name
-    return ""
 
 
 def _default(kind: type, name: str) -> Any:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import Warning
-from .clay import Clay
-from .constants import AXES
-from .operator import Operator
+from ..model.clay import Clay
+from ..model.constants import AXES
+from ..model.operator import Operator
 from .scenario import Scenario
 
 # The most that a hand and arm at a handle may plausibly have: measured are up to 3 kg, 50 N.s/m and

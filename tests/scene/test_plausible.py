@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.model.plausible import implausible
+from hapticclay.scene.plausible import implausible
 from hapticclay.simulation.batch import _checked
 
 FAR = dataclasses.replace(hc.constant_cut(t_max=0.01), clay=hc.slab(90.0, 5.0, 15.0))

@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import experiments
+from hapticclay.scene import experiments
 from tests.oracles import Linear, piecewise_linear
 
 F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis
@@ -31,7 +31,7 @@ def test_variable_cut_without_growth(axis, K, time, before, after):
     assert exact[0] == pytest.approx(time, abs=5e-6)  # half the last digit
     name = "xy"[axis]
     for shaping in (True, False):
-        r = hc.simulate(hc.variable_cut("none", shaping=shaping))
+        r = hc.simulate(hc.variable_cut("none", inertia_shaping=shaping))
         assert r.outcome.code == "finished"
         c = crossings(r, name)[0]
         # without shaping the axes couple through Lambda(q): both numbers within 0.1 %
@@ -62,7 +62,7 @@ def test_growth_readings(reading, rate):
 
 
 def test_with_growth_the_speed_falls_monotonically_and_follows_the_clay():
-    r = hc.simulate(hc.variable_cut(shaping=True))
+    r = hc.simulate(hc.variable_cut(inertia_shaping=True))
     c = crossings(r, "x")[0]
     late = np.flatnonzero(
         r.t > c.time + 2.0
@@ -91,7 +91,7 @@ def test_stability_test(K, settles, seed):
     stable = Linear(0, 100.0, K, 0.0, (0.25, 2.0, 6.0)).poles().real.max() < 0.0
     assert stable == settles
     assert (r.outcome.code == "time limit") == settles, r.status
-    irregular = hc.irregularity(r)
+    irregular = hc.out_of_band_ratio(r)
     assert irregular < 0.02 if settles else irregular > 0.5
     if settles:
         # the force is the answer of the linear loop to the muscle, line by line
@@ -101,12 +101,12 @@ def test_stability_test(K, settles, seed):
         assert np.sqrt(np.mean(r.fh[:, 0] ** 2)) > 5.0
 
 
-def test_irregularity_of_made_up_forces():
+def test_out_of_band_ratio_of_made_up_forces():
     r = hc.simulate(hc.stability_test(t_max=4.0))
     rng = np.random.default_rng(0)
 
     def of(f):
-        return hc.irregularity(dataclasses.replace(r, fh=np.column_stack((f, 0.0 * f))))
+        return hc.out_of_band_ratio(dataclasses.replace(r, fh=np.column_stack((f, 0.0 * f))))
 
     assert of(np.sin(2 * np.pi * 1.0 * r.t)) < 1e-2
     assert of(np.sin(2 * np.pi * 20.0 * r.t)) > 0.99
@@ -115,7 +115,7 @@ def test_irregularity_of_made_up_forces():
     )
     assert of(rng.normal(size=len(r.t))) > 0.9
     with pytest.raises(ParameterError):
-        hc.irregularity(hc.simulate(hc.free(t_max=0.1)))
+        hc.out_of_band_ratio(hc.simulate(hc.free(t_max=0.1)))
 
 
 @pytest.mark.parametrize(
@@ -175,11 +175,9 @@ def test_the_first_parameters_are_positional():
 
 
 @pytest.mark.parametrize("name", experiments.EXPERIMENTS)
-def test_the_word_impedance_is_the_nominal_operator(name):
+def test_a_flag_is_the_nominal_operator(name):
     kind = experiments.EXPERIMENTS[name]
     for on, operator in ((True, hc.Operator()), (False, None)):
-        assert experiments.from_words(kind, {"impedance": on}) == hc.SCENARIOS[name](
-            operator=operator
-        )
-    with pytest.raises(ParameterError, match="impedance = 1: must be True or False"):
-        experiments.from_words(kind, {"impedance": 1})
+        assert kind.of({"operator": on}) == hc.SCENARIOS[name](operator=operator)
+    with pytest.raises(ParameterError, match="operator = 1: must be"):
+        kind.of({"operator": 1})

@@ -1,4 +1,4 @@
-"""Scenarios as files, TOML or JSON: plain data of a scenario, or of an experiment and changes."""
+"""Files of scenarios and walls, TOML or JSON: plain data read and written."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError, choice
+from ..errors import ParameterError
 from ..files import atomic
-from .experiments import EXPERIMENTS, from_words, parameter_names
-from .fields import check_added_hand, merged_values, nested, no_field, plain_data, values_of
-from .scenario import Scenario
+from .earlier_names import with_present_names
+from .fields import plain_data
 
-SCENARIO_SCHEMA = "hapticclay-scenario-1"
 SCENARIO_FILES = (".toml", ".json")
 
 
@@ -27,26 +25,6 @@ def is_scenario_file(word: str) -> bool:
         word: the word.
     """
     return Path(word).suffix.lower() in SCENARIO_FILES
-
-
-def load_scenario(path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
-    """The scenario of a file.
-
-    Args:
-        path: the file, .toml or .json.
-        *changes: values by dotted name that go before those of the file, the later ones on top.
-
-    Raises:
-        ParameterError: the file cannot be read, or a field was refused.
-    """
-    try:
-        settings = read_settings(path)
-        scenario_of(settings)
-    except ParameterError as error:
-        if error.field != "scenario":
-            error = ParameterError(error.field, error.value, f"{error.bound} (in {Path(path)})")
-        raise error from None
-    return scenario_of(settings, *changes)
 
 
 def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -76,7 +54,7 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
             fault = f"byte {error.start} is no UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError("scenario", str(path), bound) from None
-    return {"name": file.stem, **data}
+    return {"name": file.stem, **with_present_names(data)}
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -88,60 +66,37 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def _file_kind(file: Path) -> str:
+def _file_kind(file: Path, name: str = "scenario") -> str:
     if not is_scenario_file(file.name):
-        raise ParameterError("scenario", str(file), "must be a .toml or a .json file")
+        raise ParameterError(name, str(file), "must be a .toml or a .json file")
     return file.suffix[1:].upper()
 
 
-def scenario_of(settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
-    """The scenario of plain data: its fields; or an experiment, its parameters and other fields.
+def write_part(
+    path: str | os.PathLike[str], head: Mapping[str, Any], part: Any, name: str = "scenario"
+) -> Path:
+    """Writes the fields of a part that differ from the defaults, whole or not at all.
 
     Args:
-        settings: from `read_settings`.
-        *changes: values by dotted name, the later ones on top.
-
-    Raises:
-        ParameterError: there is no such field, or a value was refused.
-    """
-    data = nested(settings)
-    choice("schema", data.pop("schema", SCENARIO_SCHEMA), (SCENARIO_SCHEMA,))
-    if "experiment" in data:
-        kind = EXPERIMENTS[choice("experiment", data.pop("experiment"), tuple(EXPERIMENTS))]
-        return from_words(kind, {}, data, *changes)
-    values = values_of(Scenario())
-    for name in data:
-        if name not in values:
-            raise no_field(name, data[name], [*parameter_names(None), "experiment", "schema"])
-    values = merged_values(Scenario, data, values)
-    later = [nested(x) for x in changes]
-    check_added_hand(values["operator"], *later)
-    for given in later:
-        values = merged_values(Scenario, given, values)
-    return Scenario(**values)
-
-
-def save_scenario(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
-    """Writes the fields of a scenario that differ from the defaults, and its name.
-
-    Args:
-        scenario: the scenario.
         path: the file, .toml or .json.
+        head: values before those of the part.
+        part: the part.
+        name: the field that an error is about.
 
     Returns:
         The file.
 
     Raises:
-        ParameterError: the file cannot be written, or the scenario holds what is no data.
+        ParameterError: the file cannot be written, or the part holds what is no data.
     """
     file, units = Path(path), {}
-    kind = _file_kind(file)
-    data = {"schema": SCENARIO_SCHEMA, "name": scenario.name, **plain_data(scenario, False, units)}
+    kind = _file_kind(file, name)
+    data = {**head, **plain_data(part, False, units)}
     text = toml_text(data, units) if kind == "TOML" else json.dumps(data, indent=2) + "\n"
     try:
         raw = text.encode()
     except UnicodeEncodeError:
-        raise ParameterError("name", scenario.name, "must be text that UTF-8 can hold") from None
+        raise ParameterError("name", data["name"], "must be text that UTF-8 can hold") from None
     with atomic(file) as f:
         f.write(raw)
     return file

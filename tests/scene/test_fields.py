@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors
 from hapticclay.errors import Bound, ParameterError, check_fields, field_types
-from hapticclay.model import fields
-from hapticclay.model.experiments import EXPERIMENTS, Experiment, parameters
+from hapticclay.scene import fields
+from hapticclay.scene.experiments import EXPERIMENTS, Experiment, parameters
 
 CLAY = hc.Clay(hc.Profile((0.0,), (0.0, 9.0)), hc.Profile((0.0,), (0.0, 9.0)))
 PARTS = {  # a valid one of each, and what its errors put before the field
@@ -27,7 +27,7 @@ PARTS = {  # a valid one of each, and what its errors put before the field
     "pulse.": (hc.Pulse((1.0, 0.0), 1.0, 5e-4, 1.0),),
     "chirp.": (hc.Chirp((1.0, 0.0), 1.0, 2.0, 3.0),),
     "coupling.": (hc.Coupling(100.0, 1.0),),
-    "interface.": (hc.Interface(),),
+    "hardware.": (hc.Hardware(),),
     "arm.": (hc.Arm(),),
     "servo.": (
         hc.SecondOrder(910.19, 41.8, 910.19),
@@ -170,6 +170,6 @@ def test_docstrings_name_the_unit_of_every_bound(kind):
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_parameters_of_an_experiment_make_its_scenario(name):
     known = parameters(EXPERIMENTS[name])
-    assert "operator" not in known and known["impedance"].default is (name == "stability")
+    assert "impedance" not in known and known["operator"].default is (name == "stability")
     assert all(p.about for p in known.values())
     assert issubclass(EXPERIMENTS[name], Experiment) and EXPERIMENTS[name]().scenario().name == name

@@ -21,11 +21,8 @@ from numpy.polynomial import Polynomial
 
 from ..errors import number
 from ..model.compensator import Compensator
-from ..model.constants import AXES
-from ..model.scenario import Scenario
-from ..model.spring import STIFFNESS_MAX
 from . import linear_loop, roots
-from .linear_loop import Loop, of_loop
+from .linear_loop import LinearLoop
 
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
@@ -33,91 +30,7 @@ LEAST_GAIN = 1e-60  # nothing crosses at a lower gain, and products of such numb
 SMALL_ANGLE = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
 
 
-@of_loop("b", "operator", timing=True)
-def gain_limit(loop: Loop) -> float:
-    """Largest compensator gain K up to which the loop of one axis is stable at the nominal pose.
-
-    Every gain between 0 and the limit is stable. In continuous time without delay the limit is the
-    first crossing of the closed-loop polynomial (Eq. 8); otherwise see `sampled_loop` (sampled) and
-    `delayed_loop` (continuous, the motors late).
-
-    Args:
-        loop: the loop, whose own K does not matter; or axis, b, operator, and other parts by name.
-
-    Returns:
-        K; inf if there is no limit, 0 if the loop is unstable at any small gain.
-
-    Raises:
-        ParameterError: a value is out of its bounds.
-    """
-    return critical_gain(loop)[0]
-
-
-@of_loop("K", "b", "operator", timing=True)
-def stiffness_limit(loop: Loop) -> float:
-    """Largest stiffness k of the clay up to which the loop of one axis is stable [N/m].
-
-    In continuous time without delay it is the first crossing of the closed-loop polynomial, which
-    is linear in k: exact. Otherwise k rises over 20 values a decade, from 1e-3 N/m, until the loop
-    is unstable, and the limit is bisected: a window of k narrower than that may be missed.
-
-    Args:
-        loop: the loop with its K > 0, whose own k does not matter; or axis, K, b, operator, and
-            other parts by name.
-
-    Returns:
-        k; inf if there is no limit up to 1e9 N/m, 0 if the loop is unstable at any small k.
-    """
-    soft = replace(loop, k=0.0)
-    if loop.Ts is None and not loop.delay:
-        per_place = linear_loop.device_admittance(soft)[0]
-        return roots.first_crossing(linear_loop.characteristic(soft), per_place)[0]
-    grid = np.geomspace(1e-3, STIFFNESS_MAX, 241).tolist()
-    low, high = roots.first_failure(lambda k: is_stable(replace(loop, k=k)), grid, rtol=1e-10)
-    return high if low else 0.0
-
-
-def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
-    """Gain limit of the loop of a scenario as if its control were continuous and without delay.
-
-    Args:
-        scenario: the run.
-        axis: "x" or "y".
-        b: clay [N.s/m].
-
-    Returns:
-        K; inf if there is no limit, or where the controller is the user's own.
-    """
-    if scenario.controller is not None:
-        return math.inf
-    return gain_limit(replace(Loop.of(scenario, axis, b), **linear_loop.TIMING))
-
-
-def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
-    """Highest frequency at which a spring has a loop gain of 1, beyond which it moves no pole.
-
-    At k |P| = 1, P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the hand.
-    Without shaping Sh has the gain trace W, which no pose and no direction exceeds.
-
-    Args:
-        scenario: the run, with continuous control.
-        i: axis, 0 for x, 1 for y.
-        k: stiffness [N/m].
-
-    Returns:
-        [rad/s]; 0 for none.
-    """
-    loop = Loop.of(scenario, AXES[i], 0.0)
-    if not scenario.shaping:
-        S = replace(loop.servo.S, gain=scenario.arm.links[4])
-        loop = replace(loop, servo=replace(loop.servo, S=S))
-    num, den = linear_loop.device_admittance(loop)
-    num, den = num * k, den + num * Polynomial([0.0, 0.0, loop.hand.mass])
-    found = roots.positive_roots(roots.squared_magnitude(num) - roots.squared_magnitude(den))
-    return math.sqrt(max(found, default=0.0))
-
-
-def critical_gain(loop: Loop) -> tuple[float, float]:
+def critical_gain(loop: LinearLoop) -> tuple[float, float]:
     """The gain limit and the frequency at which the loop then rings.
 
     Args:
@@ -132,7 +45,7 @@ def critical_gain(loop: Loop) -> tuple[float, float]:
     return roots.first_crossing(denominator + passive, driven)
 
 
-def is_stable(loop: Loop) -> bool:
+def is_stable(loop: LinearLoop) -> bool:
     """Whether the loop is stable at this very K, whatever it is below.
 
     Args:
@@ -146,13 +59,18 @@ def is_stable(loop: Loop) -> bool:
     return linear_loop.stable(loop)
 
 
-def loop_family(loop: Loop) -> LoopFamily:
+def loop_family(loop: LinearLoop) -> LoopFamily:
     """The sampled or late loop for every gain.
 
     Args:
         loop: the loop, sampled or late, whose own K does not matter.
     """
     return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
+
+
+def no_poles() -> int:
+    """Number of poles right of the axis, of an h without any."""
+    return 0
 
 
 @dataclass(frozen=True)
@@ -176,7 +94,7 @@ class LoopFamily:
     ends: tuple[float, ...] = ()
     most: float = math.inf
     order: int = 0
-    right: Callable[[], int] = lambda: 0
+    right: Callable[[], int] = no_poles
 
 
 def first_instability(loop: LoopFamily) -> tuple[float, float]:
@@ -283,7 +201,7 @@ def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarra
     return np.unique(np.concatenate((base, near[(near > low) & (near < high)])))
 
 
-def delayed_loop(loop: Loop) -> LoopFamily:
+def delayed_loop(loop: LinearLoop) -> LoopFamily:
     """The continuous loop in which everything the motors do is late.
 
     Where Th has a mass, and a force passes straight through C (numerator and denominator of one
@@ -371,7 +289,7 @@ def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
     return math.nan
 
 
-def sampled_loop(loop: Loop) -> LoopFamily:
+def sampled_loop(loop: LinearLoop) -> LoopFamily:
     """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma) x(k), exact at samples.
 
     See `linear_loop.sampled_differences`. A loop is stable if every eigenvalue lies within the unit
@@ -418,7 +336,9 @@ def _within_circle(less: np.ndarray, beta: np.ndarray, gamma: np.ndarray, K: flo
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))  # |1 + z1| < 1
 
 
-def _acting_map(loop: Loop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int, int]:
+def _acting_map(
+    loop: LinearLoop,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int, int]:
     """The sampled loop without the states that nothing of the force tells of.
 
     Returns:
@@ -441,7 +361,7 @@ def _integrators(compensator: Compensator) -> int:
 
 
 def _from_rest(
-    loop: Loop, less: np.ndarray, beta: np.ndarray, gamma: np.ndarray
+    loop: LinearLoop, less: np.ndarray, beta: np.ndarray, gamma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The map with the other states counted from where they rest under C's integrators.
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..display import one_line
 
 if TYPE_CHECKING:
-    from .clay import Clay
-    from .operator import Operator
-    from .scenario import Scenario
+    from ..model.clay import Clay
+    from ..model.operator import Operator
 
 
-def scenario_rows(scenario: Scenario) -> list[tuple[str, str]]:
+def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     """Name and value, with unit, of what tells a scenario from others.
 
     Args:
@@ -40,7 +39,7 @@ def scenario_rows(scenario: Scenario) -> list[tuple[str, str]]:
     rows.append(("ends at", f"{goal}{s.t_max:g} s"))
     plain = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
     own = [name for name, default in plain.items() if getattr(s, name) != default]
-    own += ["interface"] * (s.interface is not None)
+    own += ["hardware"] * (s.hardware is not None)
     if own:
         rows.append(("of its own", ", ".join(own)))
     return rows
@@ -64,7 +63,7 @@ def clay_text(clay: Clay) -> str:
     told = _range(v for law in clay.laws for v in law.damping.ravel().tolist())
     parts += [f"b = {told or '0'} N.s/m"] * bool(told or not parts)
     parts += ["grows"] * clay.grows + ["springs back"] * bool(clay.springs)
-    parts += [f"turned by {math.degrees(clay.angle):.4g} degrees"] * bool(clay.angle)
+    parts += [f"axes rotated by {math.degrees(clay.angle):.4g} degrees"] * bool(clay.angle)
     return ", ".join(parts)
 
 
@@ -86,7 +85,7 @@ def _hand(th: Operator | None) -> str:
     return f"{th.mass:.4g} kg, {th.damper:.4g} N.s/m, {th.spring:.4g} N/m"
 
 
-def _control(s: Scenario) -> str:
+def _control(s: Any) -> str:
     if s.control == "continuous":
         return f"continuous, {s.integrator}, dt = {s.dt:g} s"
     return f"sampled, {s.render}, Ts = {s.Ts or s.dt:g} s, dt = {s.dt:g} s"

@@ -1,0 +1,96 @@
+"""What can be combined: one table of parts and methods, of what each part says of itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import (
+    controller,
+    hardware,
+    operator,
+    sampled_controller,
+    signals,
+)
+from .clay import LAWS
+from .traits import Refusal, Trait, check_traits, present
+
+METHODS = (
+    Trait("fast", "method", lambda s: s.control == "continuous" and s.integrator == "fast"),
+    Trait(
+        "accurate", "method", lambda s: s.integrator == "accurate",
+        refuses={
+            "held": Refusal("integrator", "must be 'fast' where control is 'sampled'"),
+            "physical": Refusal("integrator", "must be 'fast' where control is 'sampled'"),
+        },
+    ),
+    Trait("held", "method", lambda s: s.control == "sampled" and s.render == "held"),
+    Trait("physical", "method", lambda s: s.control == "sampled" and s.render == "physical"),
+)  # fmt: skip
+PARTS = (
+    *operator.TRAITS, *controller.TRAITS, *signals.TRAITS, *sampled_controller.TRAITS,
+    *hardware.TRAITS,
+)  # fmt: skip
+TRAITS = {x.name: x for x in (*METHODS, *LAWS, *PARTS)}
+
+
+def refusal(a: str, b: str) -> Refusal | None:
+    """Why two parts cannot be combined; None if they can.
+
+    Args:
+        a: name of one.
+        b: name of the other.
+    """
+    return TRAITS[a].refuses.get(b) or TRAITS[b].refuses.get(a)
+
+
+def check_scene(s: Any) -> None:
+    """Refuses parts and methods that cannot be combined.
+
+    Args:
+        s: the scenario.
+
+    Raises:
+        ParameterError: there are two such.
+    """
+    own = [] if s.clay is None else present(s.clay, LAWS)
+    check_traits([*present(s, METHODS), *own, *present(s, PARTS)], s)
+
+
+# ---- the page ------------------------------------------------------------------------------------
+
+HEAD = """# What can be combined
+
+Each part says what it cannot be combined with; all else can. Table and list are made of these
+answers, by `python -m hapticclay.model.support docs/support.md`. Each cell is tested: one that says
+yes runs, another is refused with the words below.
+
+Methods: **fast** and **accurate** integration of continuous control; sampled control with clay
+**held** by the motors, or **physical**. Linear theory (gain limits, margins, poles, impedance)
+knows a part, leaves it out (its limit is that of the scene without the part), or refuses the scene.
+Bounds that depend on numbers, as that of stiff clay, are on the page of the part.
+"""
+
+
+def page() -> str:
+    """The page of the documents, in Markdown."""
+    names = [x.name for x in METHODS]
+    rows = [[x.name, *(_cell(x.name, m) for m in names), x.theory] for x in (*LAWS, *PARTS)]
+    table = [["", *names, "linear theory"], ["---"] * (len(names) + 2), *rows]
+    whys = [
+        f"- {a} and {b}: `{why.field}` {why.bound}"
+        for a in TRAITS
+        for b, why in TRAITS[a].refuses.items()
+    ]
+    lines = (f"| {' | '.join(row)} |" for row in table)
+    return "\n".join([HEAD, *lines, "", "## Refused", "", *whys, ""])
+
+
+def _cell(part: str, method: str) -> str:
+    return "no" if refusal(part, method) else "yes"
+
+
+if __name__ == "__main__":
+    import sys
+    from pathlib import Path
+
+    Path(sys.argv[1]).write_text(page())

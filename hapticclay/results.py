@@ -1,0 +1,220 @@
+"""What results of theory and studies share: a line, a table, a frame, a figure, a file."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from .arguments import function_name
+from .display import html_table, one_line
+from .errors import ParameterError, choice, needing
+from .files import atomic, versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+RESULT_SCHEMA = "hapticclay-result-1"
+ROOMS = (
+    "model",
+    "scene",
+    "stepping",
+    "theory",
+    "simulation",
+    "studies",
+)  # of classes that a file may name
+VIEWS = "hapticclay.views.result_plots"  # draws; looked up when a figure is asked for
+SHOWN_ROWS = 10  # of a table in a notebook
+Tables = Mapping[str, Mapping[str, Sequence[Any]]]
+
+
+class Result:
+    """What a question was answered with; a subclass is a frozen dataclass."""
+
+    def headline(self) -> str:
+        """What was found, in one line."""
+        raise NotImplementedError
+
+    def tables(self) -> Tables:
+        """What was found, by table: columns headed with their units."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {one_line(self.headline(), 200)}>"
+
+    def _repr_html_(self) -> str:
+        name, table = next(iter(self.tables().items()))
+        rows = [(one_line(k), _row(v)) for k, v in table.items()]
+        return html_table(f"{type(self).__name__}: {self.headline()}; {name}", rows)
+
+    def to_frame(self, table: str = "") -> DataFrame:
+        """One of its tables as a pandas DataFrame.
+
+        Args:
+            table: name of the table; the first by default.
+
+        Raises:
+            ParameterError: there is no such table, or pandas is not installed.
+        """
+        found = self.tables()
+        name = choice("table", table, tuple(found)) if table else next(iter(found))
+        with needing("to_frame", "pandas"):
+            import pandas as pd
+        out = pd.DataFrame({k: list(v) for k, v in found[name].items()})
+        out.attrs["title"] = f"{self.headline()}; {name}"
+        return out
+
+    def plot(self) -> Figure:
+        """Draws it, as the command does."""
+        return importlib.import_module(VIEWS).plot_of(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes all of it, to the last bit, whole or not at all.
+
+        Args:
+            path: the file, .json.
+
+        Returns:
+            The file.
+
+        Raises:
+            ParameterError: the file cannot be written, or holds what is no data, as a function.
+        """
+        file = Path(path)
+        if file.suffix.lower() != ".json":
+            raise ParameterError("path", str(path), "must be a .json file")
+        data = {"schema": RESULT_SCHEMA, "versions": versions(), "result": plain(self)}
+        with atomic(file) as f:
+            f.write((json.dumps(data, indent=1) + "\n").encode())
+        return file
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Reads what `save` wrote. Nothing is run, and no module but the package's is imported.
+
+        Args:
+            path: the file.
+
+        Raises:
+            ParameterError: the file cannot be read, or holds another result.
+        """
+        try:
+            data = json.loads(Path(path).read_text())
+            choice("schema", data["schema"], (RESULT_SCHEMA,))
+            found = of_plain(data["result"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            if isinstance(error, ParameterError):
+                raise
+            what = " ".join(str(error).split()) or type(error).__name__
+            raise ParameterError("path", str(path), f"must be a saved result ({what})") from None
+        if not isinstance(found, cls):
+            bound = f"must hold a {cls.__name__}, has a {type(found).__name__}"
+            raise ParameterError("path", str(path), bound)
+        return found
+
+
+def _shown(x: Any) -> str:
+    return f"{x:.5g}" if isinstance(x, float) else one_line(x)
+
+
+def _row(values: Sequence[Any]) -> str:
+    more = f", ... ({len(values)})" if len(values) > SHOWN_ROWS else ""
+    return ", ".join(map(_shown, values[:SHOWN_ROWS])) + more
+
+
+# ---- plain data ----------------------------------------------------------------------------------
+
+
+def plain(value: Any) -> Any:
+    """A part or a result as plain data that tell it to the last bit.
+
+    Args:
+        value: a number, a text, an array, a dataclass of this package, or tuples, lists and
+            dictionaries of them.
+
+    Raises:
+        ParameterError: it is none of these.
+    """
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else {"float": str(float(value))}
+    if isinstance(value, np.ndarray):
+        return _array(value)
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, list):
+        return [plain(x) for x in value]
+    if isinstance(value, dict):
+        return {"pairs": [[plain(k), plain(v)] for k, v in value.items()]}
+    if _is_part(type(value)):
+        names = getattr(value, "_fields", None) or [f.name for f in dataclasses.fields(value)]
+        fields = {name: plain(getattr(value, name)) for name in names}
+        return {"part": f"{type(value).__module__}:{type(value).__qualname__}", "fields": fields}
+    if isinstance(value, tuple):
+        return {"tuple": [plain(x) for x in value]}
+    if callable(value) and (name := function_name(value)):
+        return name
+    raise ParameterError("value", value, "must be data, to be written to a file")
+
+
+def _array(value: np.ndarray) -> dict[str, Any]:
+    if np.iscomplexobj(value):
+        return {"real": _array(value.real), "imaginary": _array(value.imag)}
+    values = [plain(x) for x in value.ravel().tolist()]
+    return {"array": value.dtype.str, "shape": list(value.shape), "values": values}
+
+
+def of_plain(data: Any) -> Any:
+    """What `plain` made plain data of.
+
+    Args:
+        data: the data.
+
+    Raises:
+        ValueError, KeyError, TypeError: they are no such data.
+    """
+    if isinstance(data, list):
+        return [of_plain(x) for x in data]
+    if not isinstance(data, dict):
+        return data
+    if "part" in data:
+        return _made(data["part"], {k: of_plain(v) for k, v in data["fields"].items()})
+    if "tuple" in data:
+        return tuple(map(of_plain, data["tuple"]))
+    if "pairs" in data:
+        return {of_plain(k): of_plain(v) for k, v in data["pairs"]}
+    if "float" in data:
+        return float(data["float"])
+    if "real" in data:
+        return of_plain(data["real"]) + 1j * of_plain(data["imaginary"])
+    values = np.array(list(map(of_plain, data["values"])), data["array"])
+    return values.reshape(data["shape"])
+
+
+def _made(name: str, fields: Mapping[str, Any]) -> Any:
+    """A part of the package, of its fields."""
+    module, _, kind = name.partition(":")
+    found = getattr(importlib.import_module(module), kind) if _is_own(module) else None
+    if found is None or not _is_part(found):
+        raise ValueError(f"{one_line(name)} is no part of this package")
+    return found(**fields)
+
+
+def _is_own(module: str) -> bool:
+    package, *rooms = module.split(".")
+    return package == __package__ and rooms[:1] != [] and rooms[0] in ROOMS
+
+
+def _is_part(kind: type) -> bool:
+    """Whether a class is a dataclass or a named tuple of the rooms that hold data."""
+    data = dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")
+    return isinstance(kind, type) and _is_own(kind.__module__) and data

@@ -1,0 +1,149 @@
+"""Which engine makes the steps of a run: CPython, machine code, or the one and then the other."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from typing import Any
+
+from ..errors import ParameterError
+from ..scene.scenario import Scenario
+from ..stepping import scene
+from ..stepping.machine_code import compile_time, is_kept, kind_of
+from ..stepping.run import PLAIN, Kernel, Run, plainly
+
+ENGINES = ("auto", "python", "native")
+# measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
+SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
+LOADING = 0.8
+TRIED = 128  # rows made in CPython between two looks at whether machine code repays itself
+saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
+
+
+def kernel_for(scenario: Scenario, engine: str) -> Kernel:
+    """How the steps of a run are made.
+
+    Args:
+        scenario: what to run.
+        engine: as in `simulate`.
+
+    Raises:
+        ParameterError: numba is not installed.
+    """
+    if engine == "native" and not has_numba():
+        raise ParameterError("engine", engine, NUMBA)
+    if engine == "python" or not has_numba():
+        return PLAIN
+    kind = kind_of(scene.parts_of(scenario))
+    if engine == "auto" and not repays(kind, time_ahead(scenario, 0) + saved.get(kind, 0.0)):
+        return AUTO
+    compiled = load_compiled()
+    return compiled.KERNEL if compiled else PLAIN
+
+
+def time_ahead(scenario: Scenario, i: int) -> float:
+    """Time that machine code may save in the rest of a run [s]: half of it, as runs tend to end
+    before t_max.
+
+    Args:
+        scenario: what to run.
+        i: index of the sample at which the run is.
+    """
+    return 0.5 * saved_in_a_step(scenario) * max(scenario.t_max / scenario.dt - i, 0.0)
+
+
+def repays(kind: Any, time: float) -> bool:
+    """Whether machine code that saves some time repays loading or compiling it.
+
+    Args:
+        kind: of scene.
+        time: in this process, so far and ahead [s].
+    """
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
+    if compiled is not None and kind in compiled.ready:
+        return has_numba()
+    if time < LOADING or not has_numba():
+        return False
+    return is_kept(kind) or time >= compile_time(kind)
+
+
+def pays(scenario: Scenario, steps: float) -> bool:
+    """Whether machine code repays loading or compiling it: for what this process has run of a kind
+    of scene so far, and is about to run.
+
+    Args:
+        scenario: what to run.
+        steps: how many steps of its kind are about to be made.
+    """
+    kind = kind_of(scene.parts_of(scenario))
+    saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(scenario) * steps
+    return repays(kind, saved[kind])
+
+
+def as_it_pays(run: Run, room: int) -> None:
+    """Makes steps in CPython, and from where machine code repays itself, compiled.
+
+    Args:
+        run: the run.
+        room: rows that it may have.
+    """
+    kind, s = run.kind, run.scenario
+    while True:
+        made = run.state.filled
+        substeps = max(1.0, (run.steps + made.steps) / max(run.i, 1))
+        if repays(kind, time_ahead(s, run.i) * substeps + saved.get(kind, 0.0)):
+            if compiled := load_compiled():
+                run.kernel = compiled.KERNEL
+                run.kernel.advance(run, room)
+                return
+        plainly(run, min(room, made.rows + TRIED))
+        steps = run.state.filled.steps - made.steps
+        saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * steps
+        if run.state.filled.rows < made.rows + TRIED:  # it is over, or has no room
+            return
+
+
+AUTO = PLAIN._replace(advance=as_it_pays)
+
+
+def saved_in_a_step(scenario: Scenario) -> float:
+    """Time that machine code saves in a step [s].
+
+    Args:
+        scenario: what to run.
+    """
+    method = "accurate" if scenario.integrator == "accurate" else "continuous"
+    each = SAVED["sampled" if scenario.control == "sampled" else method]
+    grooved = scenario.clay is not None and scenario.clay.groove is not None
+    return each + (SAVED_IN_GROOVE if grooved else 0.0)
+
+
+def load_compiled() -> Any:
+    """Imports the compiled steps; prints a line that says why, where this fails.
+
+    Returns:
+        The module stepping.compiled; None where it fails.
+    """
+    try:
+        from ..stepping import compiled
+
+        return compiled
+    except (
+        ImportError,
+        OSError,
+        StopIteration,
+        AttributeError,
+    ) as error:  # of numba, or the engine's library
+        print(
+            f"hapticclay: Python runs what native cannot: {error or type(error).__name__}",
+            file=sys.stderr,
+        )
+        return None
+
+
+NUMBA = "needs numba: pip install hapticclay[fast]"
+
+
+def has_numba() -> bool:
+    """Whether compiled steps are available."""
+    return importlib.util.find_spec("numba") is not None

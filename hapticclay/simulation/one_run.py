@@ -1,0 +1,68 @@
+"""One run as the scenario says, without a search for the step that keeps an error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ..errors import ParameterError, choice
+from ..scene.scenario import Scenario
+from ..stepping.engine import warnings_caught
+from ..stepping.run import borrowed_store, completed
+from .engines import ENGINES, kernel_for
+from .memory import memory_left
+from .record import Record
+
+SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
+SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
+
+
+def run_once(
+    scenario: Scenario,
+    every: int,
+    engine: str,
+    progress: Callable[[float, float], bool | None] | None = None,
+) -> Record:
+    """Runs a scenario to its end, with its own integrator and dt.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+        engine: a name in ENGINES.
+        progress: as in `simulate`.
+
+    Raises:
+        ParameterError: as in `simulate`.
+    """
+    check_memory(scenario, every)
+    if scenario.controller is not None:
+        scenario.controller.function()  # refused before anything is compiled
+    with warnings_caught():
+        kernel = kernel_for(scenario, choice("engine", engine, ENGINES))
+        with borrowed_store() as store:
+            return Record.of(*completed(scenario, every, kernel, store, progress))
+
+
+def check_memory(scenario: Scenario, every: int) -> None:
+    """Refuses a run whose record would not fit into memory if it lasted for t_max.
+
+    Args:
+        scenario: what to run.
+        every: it keeps each every-th sample.
+
+    Raises:
+        ParameterError: it would not.
+    """
+    steps = scenario.t_max / scenario.dt
+    samples = math.floor(steps / every) + 2
+    if SAMPLE * samples < SMALL_MEMORY or SAMPLE * samples < (room := memory_left()):
+        return
+    took, left = SAMPLE * samples / 1e9, max(room, 0.0) / 1e9
+    need = f"{took:.3g} GB of memory, and {left:.3g} GB are left"
+    more = math.ceil(1.1 * SAMPLE * steps / room) if room > 0.0 else math.inf
+    if more <= 1_000_000:
+        bound = f"up to {samples} samples take {need}: keep fewer (--every {more}), or lower t_max"
+        raise ParameterError("every", every, bound)
+    raise ParameterError(
+        "t_max", scenario.t_max, f"up to {math.floor(steps)} steps take {need}: lower it"
+    )

@@ -1,0 +1,306 @@
+"""All engines make the same run, to the last bit: CPython, machine code, batches.
+
+An entry of KINDS is one kind of scene, whose machine code takes 5 to 20 s to compile, and the
+scenes of it that differ in numbers, which cost next to nothing. `present` finds every trait of
+`model.support` under every method that takes it. Plain scenes are in test_compiled.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.model import support
+from hapticclay.model.clay import LAWS, Clay, Profile
+from hapticclay.model.constants import TS
+from hapticclay.simulation import record
+from hapticclay.stepping.machine_code import kind_of
+from hapticclay.stepping.run import EngineStore, Run, completed
+from hapticclay.stepping.scene import parts_of
+from tests.oracles import paper_law
+from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast
+from tests.stepping.test_kick import HANDS, OTHER, ZEROS
+from tests.stepping.test_signals_in_runs import CASES as SIGNALS
+
+PHYSICAL = dict(
+    jitter=5e-5, dropout_probability=0.05, encoder=65536, velocity="difference",
+    velocity_window=5, velocity_filter=200.0,
+    adc_bits=12, force_noise=0.05, force_filter=400.0, dac_bits=14, dac_range=(30.0, 20.0),
+    delay=1.7 * TS, friction=(0.02, 0.01), seed=4,
+)  # fmt: skip
+ALL = PHYSICAL | dict(passivity=True, coupling=hc.Coupling(3000.0, 300.0))
+HAND = hc.Operator()
+METHODS = {
+    "fast": {},
+    "accurate": dict(integrator="accurate", dt=1e-3),
+    "held": dict(control="sampled"),
+    "physical": dict(control="sampled", render="physical"),
+}
+
+
+def run(method, clay, **more):
+    """A slanted path of 0.3 s through clay."""
+    kw = dict(t_max=0.3, force=(2.0, 0.7), length=None, stop_when_unstable=False) | METHODS[method]
+    hardware = more.pop("hardware", None)
+    more["hardware"] = hc.Hardware(**hardware) if hardware else None
+    return dataclasses.replace(hc.free(), clay=clay, **(kw | more))
+
+
+def variants(method, clay, common, **changes):
+    """Scenes of one kind by name: what they have in common, and what each changes."""
+    return {
+        name: run(method, **({"clay": clay} | common | change)) for name, change in changes.items()
+    }
+
+
+def signals(method, clay, **common):
+    """Driven by each signal, both ways."""
+    dt = {} if "Ts" in common else dict(dt=1e-3)
+    common = dict(force=(0.0, 0.0), t_max=0.75) | dt | common
+    return {
+        name: run(method, clay, muscle=2.0 * signal, command=1e-4 * signal, **common)
+        for name, (signal, *_) in SIGNALS.items()
+        if signal.varies
+    }
+
+
+RANDOM = np.random.default_rng(3)
+SMOOTH = hc.Smooth((0.0, 0.04), (-0.01, 0.02), np.round(RANDOM.uniform(0.0, 120.0, (7, 6)), 1))
+CELLS = hc.Grid(
+    tuple(0.002 * i for i in range(1, 9)), tuple(0.001 * i for i in range(-2, 9)),
+    np.round(RANDOM.uniform(0.0, 120.0, (9, 12)), 1), growth=RANDOM.uniform(0.0, 9.0, (9, 12)),
+)  # fmt: skip
+TURNED, OTHERWISE = Clay(SMOOTH, CELLS, 0.5), Clay(SMOOTH, CELLS, -2.0)
+GROWTH = Profile((0.001, 0.005, 0.01, 0.02), (0.0, 50.0, 5.0, 90.0, 10.0), growth=(0, 9, 0, 200, 0))
+GROWS = Clay(GROWTH, GROWTH)
+STIFF, SOFT = (
+    Clay(Profile((0.003, 0.02), (0.0, x, 20.0)), Profile((0.001,), (10.0, y), "y"))
+    for x, y in ((1e5, 90.0), (1e3, 1e5))
+)
+BLOCK = hc.Groove(x=(-0.03, 0.07), y=(-0.03, 0.03), pressure=20e3)
+WEAK = dict(torque_limit=(0.3, 0.2))
+SHAKEN = dict(operator=HAND, muscle=WAVE)
+LED = dataclasses.replace(WAVE, rms=(1e-3, 2e-3))
+
+
+def yields(Fy, K, n, b, along=False, angle=0.0):
+    """Clay that yields, behind 3 mm; y has half of each but n."""
+    laws = [
+        Profile((0.003, 0.03), (0.0, x * b, 1.0), Fy=(0.0, x * Fy, 0.1), K=(0.0, x * K, 0.0),
+                n=(1.0, n, 1.0))
+        for x in ((1.0, 1.0) if along else (1.0, 0.5))
+    ]  # fmt: skip
+    return Clay(*laws, angle, isotropic=along)
+
+
+COULOMB, BINGHAM = (0.5, 0.0, 1.0, 0.0), (0.6, 0.0, 1.0, 20.0)
+THINS, THICKENS, HELD = (0.5, 2.0, 0.4, 10.0), (0.3, 30.0, 1.5, 2.0), (6.0, 0.0, 1.0, 0.0)
+FLOWS = dict(coulomb=COULOMB, bingham=BINGHAM, thins=THINS, thickens=THICKENS, holds=HELD)
+PULSE = hc.Step((2.0, 0.5), 0.0) + hc.Step((-3.5, -0.9), 0.1) + hc.Ramp((9.0, 4.0), 0.2, 0.3)
+
+
+def flows(method, along=False, angles=(0.0,), b=1.0, **common):
+    """A handle pushed to rest and on again in clay of each law."""
+    common = dict(operator=HAND, muscle=PULSE, force=(1.0, 0.2)) | common
+    return {
+        f"{name}, {angle:g}": run(
+            method, yields(*law[:3], b * (law[3] or 1.0), along, angle), **common
+        )
+        for name, law in FLOWS.items()
+        for angle in angles
+    } | {"weak": run(method, yields(*BINGHAM[:3], b * 20.0, along, angles[0]), **common, **WEAK)}
+
+
+def springs(**common):
+    """Walls that spring back, yield and relax."""
+    out = {}
+    for name, spring in {
+        "gives way": hc.Spring(k=2e3, limit=1.0, k1=500.0, tau=0.1),
+        "surface": hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, unilateral=True),
+        "lasts": hc.Spring(k=800.0),
+    }.items():
+        law = Profile(
+            (0.003, 0.02), (0.0, 20.0, 5.0), Fy=(0.0, 0.5, 0.2),
+            springs=(hc.Spring(), spring, hc.Spring()),
+        )  # fmt: skip
+        out[name] = run(clay=Clay(law, Profile((), (3.0,))), **common)
+    return out
+
+
+def grooves(method, damping=0.0, **common):
+    """Clay that stays cut, fresh and cut, soft and hard, beneath layers and turned."""
+    law = Profile((0.005, 0.02), (0.0, 40.0, 10.0))
+    hard = dataclasses.replace(BLOCK, gradient=1e6, damping=damping)
+    block = dataclasses.replace(BLOCK, damping=damping)
+    common = dict(force=(3.0, 1.0)) | common
+    return variants(
+        method, Clay(law, law, angle=0.3, groove=block), common,
+        cut={}, hard=dict(clay=Clay(law, law, angle=0.3, groove=hard)), weak=WEAK,
+        steep=dict(force=(0.5, 3.0), length=0.004),
+    )  # fmt: skip
+
+
+def own(gain=(1.0, 0.2), Ts=TS):
+    """The paper's controller as a law of one's own."""
+    params = [0.01, 0.02, 90.0, *paper_law.memory(gain, Ts)]
+    return hc.Controller(paper_law.paper, [0.0] * 8, params)
+
+
+FORMED = dict(compensator=ZEROS, operator=HANDS, **OTHER)
+FILTERED = dict(
+    jitter=8e-5, dropout_probability=0.1, delay=0.4 * TS, force_filter=500.0, filter_order=1
+)
+KINDS = {
+    "fast: signals, growth": signals("fast", GROWS, inertia_shaping=True, operator=HAND)
+    | variants(
+        "fast", GROWS, dict(inertia_shaping=True, operator=HAND, muscle=WAVE, command=LED),
+        weak=WEAK, unstable=dict(gain=(25.0, 0.5), t_max=1.0), growing=dict(clay=GROWING),
+    ),
+    "fast: form, stiff": variants(
+        "fast", STIFF, dict(compensator=ZEROS, inertia_shaping=True, **OTHER),
+        strong=dict(torque_limit=(1e5, 1e5)), weak=WEAK, soft=dict(clay=SOFT),
+        coarse=dict(dt=5e-3, t_max=1.0),
+    ),
+    "fast: cells, smooth, rotated": variants(
+        "fast", TURNED, dict(operator=HAND, force=(4.0, 1.0)),
+        turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK, elsewhere=dict(origin=(0.1, 0.2)),
+    ),
+    "fast: yield by axis": flows("fast", angles=(0.5, -1.0), inertia_shaping=True),
+    "fast: yield along the motion": flows("fast", True, b=1e4, operator=None, command=LED),
+    "fast: springs": springs(method="fast", operator=HAND, force=(4.0, 1.0)),
+    "fast: groove": grooves("fast", **SHAKEN, inertia_shaping=True, damping=1e5),
+    "accurate: signals, growth": signals("accurate", GROWS, inertia_shaping=True, operator=HAND)
+    | variants(
+        "accurate", GROWS, dict(inertia_shaping=True, operator=HAND, muscle=WAVE, command=LED),
+        weak=WEAK, growing=dict(clay=GROWING, dt=2e-3),
+    ),
+    "accurate: form, cells, smooth, rotated": variants(
+        "accurate", TURNED, dict(FORMED), turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
+    ),
+    "accurate: yield by axis": flows("accurate", operator=None),
+    "accurate: yield by axis, rotated": flows("accurate", angles=(0.5, -1.0), inertia_shaping=True),
+    "accurate: yield along the motion": flows("accurate", True, compensator=ZEROS),
+    "held: plain": variants(
+        "held", LAYERS, {}, plain={}, steps=dict(dt=1e-4, Ts=4e-4), odd=dict(t_max=0.1001),
+        weak=WEAK, unstable=dict(clay=hc.slab(8e3, 0.003, 0.1), gain=(1.0, 0.1), t_max=1.0),
+    ),
+    "held: all hardware, signals": signals(
+        "held", GROWS, inertia_shaping=True, operator=HAND, hardware=ALL, dt=7.2e-4, Ts=1.44e-3
+    )
+    | variants(
+        "held", GROWS,
+        dict(hardware=ALL, operator=HAND, inertia_shaping=True, muscle=WAVE, command=LED),
+        all={}, slow=dict(hardware=ALL | dict(delay=0.01), dt=1e-4, Ts=0.05), weak=WEAK,
+    ),
+    "held: form, growth, filter of first order": variants(
+        "held", GROWS, dict(hardware=FILTERED) | FORMED, all={}, weak=WEAK,
+    ),
+    "held: cells, smooth, rotated": variants(
+        "held", TURNED, dict(operator=HAND, force=(4.0, 1.0)),
+        turned={}, otherwise=dict(clay=OTHERWISE), steps=dict(dt=1e-4, Ts=4e-4),
+    ),
+    "held: yield by axis, springs": springs(
+        method="held", operator=HAND, dt=1e-4, Ts=5e-4,
+        hardware=dict(encoder=4096, friction=(0.02, 0.01)),
+    ),
+    "held: yield along the motion": flows("held", True, hardware=ALL),
+    "held: groove": grooves("held"),
+    "held: own controller": variants(
+        "held", LAYERS, dict(controller=own(), hardware=PHYSICAL, operator=HAND, muscle=WAVE),
+        own={}, weak=WEAK,
+    ),
+    "physical: growth, signals": variants(
+        "physical", GROWS, dict(operator=HAND, muscle=WAVE, command=LED, inertia_shaping=True),
+        grows={}, weak=WEAK, steps=dict(dt=1e-4, Ts=4e-4),
+    ),
+    "physical: form, stiff, all hardware": variants(
+        "physical", STIFF, dict(hardware=PHYSICAL) | FORMED,
+        all={}, soft=dict(clay=SOFT), weak=WEAK,
+    ),
+    # with hardware these would take minutes to compile
+    "physical: yield by axis, springs": springs(
+        method="physical", dt=2e-5, Ts=2e-4, t_max=0.05, velocity=(0.1, 0.0)
+    ),
+    "physical: yield along the motion": flows("physical", True, hardware=dict(delay=3e-4)),
+    "physical: cells, smooth, rotated": variants(
+        "physical", TURNED, dict(hardware=dict(delay=2e-4), force=(4.0, 1.0)),
+        turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
+    ),
+    "physical: groove": grooves(
+        "physical", damping=2e5, hardware=dict(delay=2e-4, encoder=8192), force=(2.5, 0.5)
+    ),
+    "physical: own controller": variants(
+        "physical", LAYERS, dict(controller=own(), operator=HAND), own={}, weak=WEAK,
+    ),
+}  # fmt: skip
+WHOLE = (  # of these, steps that may cross borders are compiled as well
+    "fast: yield by axis",
+    "accurate: form, cells, smooth, rotated",
+    "held: plain",
+)
+
+
+def same(a, b, what):
+    for name in record.ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), f"{what}: {name}")
+    assert a.extra.keys() == b.extra.keys()
+    for name in a.extra:
+        np.testing.assert_array_equal(a.extra[name], b.extra[name], f"{what}: {name}")
+    np.testing.assert_array_equal(a.ground, b.ground, what)
+    for name in ("outcome", "crossings", "stops", "energy", "steps"):
+        assert getattr(a, name) == getattr(b, name), (what, name)
+
+
+def plain_end(brief):
+    """How a run ended, as plain numbers."""
+    outcome, *counts, last, energy = brief
+    return outcome, counts, [tuple(map(float, x)) for x in last], energy
+
+
+@fast
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_engines_make_the_same_run(kind, monkeypatch):
+    from hapticclay.stepping import compiled
+
+    scenes = KINDS[kind]
+    assert len({kind_of(parts_of(s)) for s in scenes.values()}) == 1
+    monkeypatch.setattr(compiled, "enough", lambda kind: np.inf)  # whole steps alone
+    plain = [hc.simulate(s, engine="python") for s in scenes.values()]
+    native = [hc.simulate(s, engine="native") for s in scenes.values()]
+    batch = hc.simulate_batch(scenes.values(), threads=2)
+    for name, *runs in zip(scenes, plain, native, batch, strict=True):
+        for r in runs[1:]:
+            same(r, runs[0], name)
+    for (name, s), r in zip(scenes.items(), plain, strict=True):
+        last, _ = completed(s, 10**9, compiled.KERNEL, EngineStore(), brief=True)
+        assert plain_end(last.brief()) == plain_end(record.brief(r)), name
+    if kind in WHOLE:
+        monkeypatch.setattr(compiled, "enough", lambda kind: -1.0)
+        for (name, s), r in zip(scenes.items(), plain, strict=True):
+            same(hc.simulate(s, engine="native"), r, name)
+
+
+def test_the_kinds_have_every_part_with_every_method_that_takes_it():
+    has = set()
+    for scenes in KINDS.values():
+        for s in scenes.values():
+            (method,) = support.present(s, support.METHODS)
+            found = (*support.present(s.clay, LAWS), *support.present(s, support.PARTS))
+            has |= {(method.name, x.name) for x in found}
+    parts = [x.name for x in (*LAWS, *support.PARTS)]
+    for method in support.METHODS:
+        takes = {x for x in parts if not support.refusal(method.name, x)}
+        assert takes == {x for name, x in has if name == method.name}
+
+
+def test_a_run_paused_at_every_sample_is_the_run():
+    s = dataclasses.replace(KINDS["held: all hardware, signals"]["all"], t_max=0.05)
+    whole, parts = Run(s, 1), Run(s, 1)
+    whole.go(None)
+    while parts.outcome is None:
+        parts.advance(parts.filled + 1)
+    parts.flush()
+    for name, x in whole.arrays().items():
+        assert (x == parts.arrays()[name]).all(), name
+    assert whole.balance() == parts.balance()

@@ -1,0 +1,131 @@
+"""What all results share: one line, a table, a frame, a figure, a file that tells them exactly."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import hapticclay as hc
+from hapticclay.errors import ParameterError
+from hapticclay.results import Result, of_plain, plain
+
+HAND = hc.Operator()
+WALL = hc.VirtualWall(300.0, 2.0, device=hc.Device(0.1, 0.5), Ts=1e-3)
+
+
+def columns():
+    """A mass against Bingham resistance, pushed to and fro."""
+    t = 1e-3 * np.arange(4000)
+    v = 0.2 * np.sin(2.0 * np.pi * t) + 1e-9
+    return hc.studies.Measurement(t, 3.0 * np.sign(v) + 5.0 * v, np.cumsum(v) * 1e-3)
+
+
+@functools.cache
+def result(name):
+    loop = hc.studies.PushedLoop("x", b=0.0, operator=HAND, Ts=3.6e-4)
+    trials = hc.studies.Trials(WALL, {"K": hc.studies.Distribution("uniform", 1.0, 9e3)}, runs=20)
+    return {
+        "ZWidth": lambda: hc.walls.zwidth(WALL, B=(0.0, 5.0)),
+        "Impedance": lambda: hc.theory.loop_response(
+            hc.theory.Loop("x", 90.0, HAND, K=1.0), [1.0, 9.0, 80.0]
+        ),
+        "MeasuredImpedance": lambda: hc.studies.measure_impedance(WALL, band=(20.0, 60.0), lines=3),
+        "DeviceMBK": lambda: hc.walls.device_mbk(WALL, columns=0, points=7),
+        "ArmMBK": lambda: hc.walls.arm_mbk(loop, columns=0, points=3, samples=0),
+        "Identified": lambda: hc.studies.identify(
+            "x", "G", realisations=2, periods=1, lines=8, period=1.5, band=(0.6, 15.0)
+        ),
+        "Fitted": lambda: hc.studies.fit_flow(columns()),
+        "Band": lambda: hc.studies.gain_band(
+            hc.theory.Loop("x"), hc.studies.Hands.around(HAND, 0.5), [10.0, 90.0],
+            hc.studies.Draw(5),
+        ),
+        "Instability": lambda: hc.studies.monte_carlo(trials),
+        "Design": lambda: hc.theory.compare(
+            "x", 90.0, [hc.Compensator()], HAND, disk_margin=0.5
+        )[0],
+    }[name]()  # fmt: skip
+
+
+NAMES = (
+    "ZWidth", "Impedance", "MeasuredImpedance", "DeviceMBK", "ArmMBK", "Identified", "Fitted",
+    "Band", "Instability", "Design",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_result_has_a_line_a_table_a_frame_a_figure_and_a_file(name, tmp_path):
+    found = result(name)
+    assert isinstance(found, Result) and type(found).__name__ == name
+    assert (
+        repr(found).startswith(f"<{name}: ") and "\n" not in repr(found) and len(repr(found)) < 230
+    )
+    page = found._repr_html_()
+    assert page.startswith("<table") and page.endswith("</table>")
+    for table, told in found.tables().items():
+        frame = found.to_frame(table)
+        assert list(frame.columns) == list(told) and len({len(x) for x in told.values()}) == 1
+    assert found.to_frame().equals(found.to_frame(next(iter(found.tables()))))
+    assert isinstance(found.plot(), Figure)
+    again = type(found).load(found.save(tmp_path / "found.json"))
+    assert plain(again) == plain(found) and repr(again) == repr(found)
+    assert Result.load(tmp_path / "found.json").headline() == found.headline()
+
+
+def test_a_comparison_is_a_result_too(tmp_path):
+    for name, K in (("a", 100.0), ("b", 200.0)):
+        hc.VirtualWall(K, 1.0, device=hc.Device(0.1, 1.0)).save(tmp_path / f"{name}.toml")
+    from hapticclay.studies.comparison import compare_files
+
+    found = compare_files([tmp_path / "a.toml", tmp_path / "b.toml"])
+    assert len(found) == 2 and [x.name for x in found] == ["a", "b"]
+    assert list(found.to_frame().file) == ["a", "b"] and isinstance(found.plot(), Figure)
+    again = type(found).load(found.save(tmp_path / "found.json"))
+    assert plain(again) == plain(found)
+
+
+def test_numbers_keep_every_bit():
+    some = {
+        "none": None, "inf": [np.inf, -np.inf], "tuple": (1, 2.5, "x", True), 3: 0.1 + 0.2,
+        "whole": np.arange(6).reshape(2, 3), "complex": np.array([1 + 2j, 3 - 1e-300j]),
+        "empty": np.zeros((0, 2)), "flags": np.array([True, False]),
+    }  # fmt: skip
+    back = of_plain(json.loads(json.dumps(plain(some))))
+    assert list(back) == list(some)
+    for name, value in some.items():
+        if isinstance(value, np.ndarray):
+            assert back[name].dtype == value.dtype and back[name].shape == value.shape
+            assert np.array_equal(back[name], value)
+        else:
+            assert back[name] == value and type(back[name]) is type(value)
+    assert np.isnan(of_plain(plain(float("nan"))))
+
+
+def test_a_file_names_no_class_but_those_of_data_and_runs_nothing(tmp_path):
+    file = result("Design").save(tmp_path / "found.json")
+    text = file.read_text()
+    for name in (
+        "os:system",
+        "hapticclay.cli.app:main",
+        "hapticclay.views.page:Page",
+        "x",
+        "hapticclay:simulate",
+    ):
+        file.write_text(text.replace("hapticclay.theory.design:Design", name))
+        with pytest.raises(ParameterError, match="must be a saved result"):
+            Result.load(file)
+    file.write_text(text)
+    with pytest.raises(ParameterError, match="must hold a Fitted, has a Design"):
+        hc.studies.Fitted.load(file)
+    for bad in ("", "[]", "{}", '{"schema": "other"}', text[: len(text) // 2]):
+        file.write_text(bad)
+        with pytest.raises(ParameterError):
+            Result.load(file)
+    with pytest.raises(ParameterError, match=r"must be a \.json file"):
+        result("Design").save(tmp_path / "found.txt")
+    with pytest.raises(ParameterError, match="did you mean 'design'"):
+        result("Design").to_frame("desing")
+    with pytest.raises(ParameterError, match="must be data"):
+        plain(lambda: 0)
