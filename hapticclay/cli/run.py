@@ -16,6 +16,7 @@ from ..model.constants import AXES
 from . import console
 
 if TYPE_CHECKING:
+    from ..model.clay import Clay
     from ..scene.scenario import Scenario
     from ..simulation.record import Record
 
@@ -65,7 +66,7 @@ class RunCommand:
 def unstable_axes(scenario: Scenario) -> list[str]:
     """A line if the linear loop of an axis, in continuous time, is unstable in some of the clay.
 
-    Springs and yielding clay are left out: the linear limit does not apply to them.
+    Clay that is not viscous is left out: the linear limit does not apply to it.
 
     Args:
         scenario: the run.
@@ -73,7 +74,7 @@ def unstable_axes(scenario: Scenario) -> list[str]:
     from ..theory import gain_limits
 
     clay = scenario.clay
-    if clay is None or clay.yields or clay.springs:
+    if clay is None or not clay.viscous:
         return []
     told = []
     for i, axis in enumerate(AXES):
@@ -154,15 +155,9 @@ def run_table(record: Record) -> str:
     if not s.clay and abs(s.force[1]) > abs(s.force[0]):
         ways = "y"
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
-    head = ("path\n[cm]", "b\n[N.s/m]", "fe/v\n[N.s/m]", "fh/v\n[N.s/m]", "steady v\n[m/s]",
-            "expected v\n[m/s]")  # fmt: skip
-    row = _table_row
-    if s.clay and s.clay.yields:
-        head = ("path\n[cm]", "Fy\n[N]", "K\n[N/(m/s)^n]", "n", "b\n[N.s/m]", "steady fe\n[N]",
-                "held\n[% of time]", "steady v\n[m/s]", "expected v\n[m/s]")  # fmt: skip
-        row = _yielding_row
-    rows = [row(way, r) for way, r in pieces[:MOST_ROWS]]
-    lines = [console.text_table(rows, head, "r" * len(head)), ""]
+    shown = _columns(s.clay)
+    rows = [[text(way, r) for text in shown.values()] for way, r in pieces[:MOST_ROWS]]
+    lines = [console.text_table(rows, list(shown), "r" * len(shown)), ""]
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     lines += _crossing_lines(record) + _stop_lines(record)
@@ -213,33 +208,42 @@ def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:
     return any(r.get("Fy") and r["expected_speed"] == 0.0 for r in stretches)
 
 
+def _columns(clay: Clay | None) -> dict[str, Callable[[str, dict[str, Any]], str]]:
+    """Head of each column of the table, and its text for an axis and a stretch."""
+
+    def value(name: str) -> Callable[[str, dict[str, Any]], str]:
+        return lambda _, r: f"{r[name]:.4g}"
+
+    def mean(name: str) -> Callable[[str, dict[str, Any]], str]:
+        return lambda _, r: f"{r[name]['mean']:.5g}" if r[name] else "-"
+
+    own = clay.columns if clay else []
+    out = {"path\n[cm]": _stretch}
+    out |= {f"{c.name}\n[{c.unit}]" if c.unit else c.name: value(c.name) for c in own}
+    out["b\n[N.s/m]"] = _damping
+    if clay and clay.holding:
+        out["steady fe\n[N]"] = lambda _, r: (
+            "-" if r["steady_fe"] is None else f"{r['steady_fe']:.5g}"
+        )
+        out["held\n[% of time]"] = lambda _, r: f"{100 * r['held']:.1f}"
+    else:
+        out["fe/v\n[N.s/m]"] = lambda way, r: "-" if _grows(r) else mean("fe_over_v")(way, r)
+        out["fh/v\n[N.s/m]"] = mean("steady_fh_over_v")
+    for name in ("steady", "expected"):
+        out[f"{name} v\n[m/s]"] = lambda _, r, name=name: console.fixed(r[f"{name}_speed"], 6)
+    return out
+
+
 def _stretch(way: str, r: dict[str, Any]) -> str:
     return f"{way}: {console.fixed(100 * r['from_m'], 2)} - {console.fixed(100 * r['to_m'], 2)}"
 
 
-def _yielding_row(way: str, r: dict[str, Any]) -> list[str]:
-    grows = r["b"] != r["b_end"]
-    return [
-        _stretch(way, r),
-        *(f"{r[name]:.4g}" if name in r else "-" for name in ("Fy", "K", "n")),
-        f"{r['b']:.4g} - {r['b_end']:.4g}" if grows else f"{r['b']:.4g}",
-        "-" if r["steady_fe"] is None else f"{r['steady_fe']:.5g}",
-        f"{100 * r['held']:.1f}",
-        console.fixed(r["steady_speed"], 6),
-        console.fixed(r["expected_speed"], 6),
-    ]
+def _grows(r: dict[str, Any]) -> bool:
+    return r["b"] != r["b_end"]
 
 
-def _table_row(way: str, r: dict[str, Any]) -> list[str]:
-    fe, fh, grows = r["fe_over_v"], r["steady_fh_over_v"], r["b"] != r["b_end"]
-    return [
-        _stretch(way, r),
-        f"{r['b']:.4g} - {r['b_end']:.4g}" if grows else f"{r['b']:g}",
-        f"{fe['mean']:.5g}" if fe and not grows else "-",
-        f"{fh['mean']:.5g}" if fh else "-",
-        console.fixed(r["steady_speed"], 6),
-        console.fixed(r["expected_speed"], 6),
-    ]
+def _damping(_: str, r: dict[str, Any]) -> str:
+    return f"{r['b']:.4g} - {r['b_end']:.4g}" if _grows(r) else f"{r['b']:g}"
 
 
 def _maneuver_line(record: Record, axis: str) -> str:

@@ -18,7 +18,19 @@ from .constants import AXES, B_MAX
 from .flow import Consistency, Flow, FlowIndex, YieldForce
 from .groove import Groove
 from .spring import Spring
-from .traits import LEFT_OUT, Refusal, Trait, check_traits, present
+from .traits import (
+    LEFT_OUT,
+    Block,
+    Column,
+    Hold,
+    Law,
+    Refusal,
+    Told,
+    check_traits,
+    present,
+    told_pair,
+    told_values,
+)
 
 
 def halved_damping(b0, b1, L, R):
@@ -320,6 +332,27 @@ class CellLaw:
         at = zip(self.lines, (x, y), strict=True)
         i, j = (np.searchsorted(edges, place, side="right") for edges, place in at)
         return i, j
+
+    def forces(self: Any, speed: float, dent: float) -> np.ndarray:
+        """Force of each cell on a tool, growth aside [N], shape (n, m).
+
+        Args:
+            speed: of the tool [m/s].
+            dent: how far the tool has gone into the cell [m].
+        """
+        some = dict.fromkeys(x.force for x in LAWS if x.force)
+        return functools.reduce(np.add, [force(self, speed, dent) for force in some])
+
+    def forces_at(self: Any, x: Any, y: Any, speed: float, dent: float) -> np.ndarray:
+        """As `forces`, at some places.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+            speed: of the tool [m/s].
+            dent: how far the tool has gone into the cell [m].
+        """
+        return self.forces(speed, dent)[self.index(x, y)]
 
     def within(self: Any, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
         """Damping of the cells in a box [N.s/m].
@@ -644,6 +677,17 @@ class Smooth(CellLaw):
         table = memoryview(numbers)
         return np.vectorize(lambda x, y: smooth_damping(table, 0, x, y), otypes=[float])(x, y)
 
+    def forces_at(self, x: Any, y: Any, speed: float, dent: float) -> np.ndarray:
+        """As `Grid.forces_at`: it is damping alone.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+            speed: of the tool [m/s].
+            dent: has no effect.
+        """
+        return speed * self.at(x, y)
+
     def within(self, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
         """Control points of the damping in a box [N.s/m].
 
@@ -870,6 +914,86 @@ class Clay:
         """Whether it springs back anywhere."""
         return any(getattr(law, "springs", ()) for law in self.laws)
 
+    @functools.cached_property
+    def kinds(self) -> tuple[Law, ...]:
+        """The laws of LAWS that it has."""
+        return tuple(present(self, LAWS))
+
+    @property
+    def viscous(self) -> bool:
+        """Whether its force is damping times velocity, so that linear theory holds."""
+        return all(x.viscous for x in self.kinds)
+
+    def viscous_at(self, place: tuple[float, float]) -> bool:
+        """Whether its force at a place is damping times velocity.
+
+        Args:
+            place: (x, y) [m].
+        """
+        return not any(x.here(self, place) for x in self.kinds if not x.viscous)
+
+    @property
+    def of_velocity(self) -> bool:
+        """Whether its force follows from the velocity alone."""
+        return all(x.of_velocity for x in self.kinds)
+
+    @property
+    def seen_in_b(self) -> bool:
+        """Whether its damping tells its regions apart."""
+        return all(x.seen_in_b for x in self.kinds)
+
+    @property
+    def holding(self) -> bool:
+        """Whether it can hold a tool at rest somewhere."""
+        return any(x.holds for x in self.kinds)
+
+    def hold(self, i: int) -> Hold:
+        """The strongest of what holds a tool at rest along an axis.
+
+        Args:
+            i: axis, 0 for x, 1 for y.
+        """
+        found = [x.holds(self, i) for x in self.kinds if x.holds]
+        return max((x for x in found if x), key=lambda x: x.force, default=Hold(0.0))
+
+    @property
+    def blocks(self) -> list[Block]:
+        """Rectangles of clay beside the laws of the axes."""
+        return [block for x in self.kinds for block in x.blocks(self)]
+
+    @property
+    def columns(self) -> list[Column]:
+        """Quantities that tables show of a stretch beside its damping."""
+        return list(dict.fromkeys(c for x in self.kinds for c in x.columns))
+
+    def values_at(self, i: int, place: Any) -> dict[str, float]:
+        """Values of `columns` at a place.
+
+        Args:
+            i: axis, 0 for x, 1 for y.
+            place: (x, y) [m].
+        """
+        out: dict[str, float] = {}
+        for kind in self.kinds:
+            values = map(float, kind.at(self.laws[i], place))
+            out |= dict(zip((c.name for c in kind.columns), values, strict=True))
+        return out
+
+    @property
+    def words(self) -> list[Told]:
+        """What it resists with over the whole scene."""
+        return [x for kind in self.kinds for x in kind.words(self)] or [Told("b = {}", (0.0,))]
+
+    def here(self, place: tuple[float, float], b: Any = None) -> list[Told]:
+        """What it resists with at a place; empty where nothing resists.
+
+        Args:
+            place: (x, y) [m].
+            b: damping there, along x and y [N.s/m]; None for that of `at`.
+        """
+        told = [x for kind in self.kinds for x in kind.here(self, place)]
+        return [*told, *told_pair("b = {}", self.at(*place).tolist() if b is None else b, "N.s/m")]
+
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Damping of both axes at some places, growth aside.
 
@@ -887,14 +1011,33 @@ class Clay:
 _ACROSS = Refusal(
     "clay.angle", "must be 0 for a passivity controller or a coupling, which act along x and y"
 )
+
+
+def _damping_values(clay: Clay) -> list[float]:
+    return [v for law in clay.laws for v in law.damping.ravel().tolist()]
+
+
+def _rates(clay: Clay) -> list[float]:
+    return [v for law in clay.laws for v in law.rates.ravel().tolist()]
+
+
 TRAITS = (
-    Trait("viscous", "clay", lambda c: any(x.damping.any() for x in c.laws)),
-    Trait("growth", "clay", lambda c: c.grows, LEFT_OUT),
-    Trait("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
-    Trait("smooth", "clay", lambda c: bool(c.smooth)),
-    Trait(
+    Law(
+        "viscous", "clay", lambda c: any(x.damping.any() for x in c.laws),
+        words=lambda c: told_values("b = {}", _damping_values(c), "N.s/m"),
+        force=lambda law, speed, _: law.damping * speed,
+    ),
+    Law(
+        "growth", "clay", lambda c: c.grows, LEFT_OUT, seen_in_b=False,
+        words=lambda c: told_values("grows by {}", _rates(c), "N.s/m per s"),
+    ),
+    Law("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
+    Law("smooth", "clay", lambda c: bool(c.smooth), seen_in_b=False),
+    Law(
         "rotated axes", "clay", lambda c: c.angle != 0.0,
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
+        words=lambda c: told_values("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
     ),
 )  # fmt: skip
-LAWS = (*TRAITS, *flow.TRAITS, *spring.TRAITS, *groove.TRAITS)
+LAWS: tuple[Law, ...] = (*groove.TRAITS, *flow.TRAITS, *TRAITS, *spring.TRAITS)
+"""In the order in which texts tell them."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
-from .traits import LEFT_OUT, Trait
+from .traits import LEFT_OUT, Column, Hold, Law, Told, told_pair, told_values
 
 KICK_PARTS = 6  # of a kick, at most; two stops and what lies between and around, and one to spare
 AXIS_ROUNDS = 60  # from axis to axis until both forces agree
@@ -57,6 +57,12 @@ class Flow:
         if not self.K or self.n == 1.0:
             return ("Bingham" if self.b or self.K else "Coulomb") if self.Fy else "viscous"
         return "Herschel-Bulkley" if self.Fy or self.b else "power law"
+
+    @property
+    def words(self) -> list[Told]:
+        """What it resists with."""
+        b = told_values("b = {}", [self.b], "N.s/m")
+        return [*_told_flow([self.Fy], [self.K], [self.n]), *b]
 
     def force(self, v: Any) -> np.ndarray:
         """Resisting force of a tool that moves; 0 at rest, where any force up to Fy may act.
@@ -434,10 +440,47 @@ def slowed(B, qx, qy, k, Fy, K, n):
     return s * x, s * y
 
 
+COLUMNS = (Column("Fy", "N"), Column("K", "N/(m/s)^n"), Column("n"))
+
+
+def _words(clay: Any) -> list[Told]:
+    """Yield force, consistency and flow index over a scene."""
+    cells = zip(*(law.flows for law in clay.laws), strict=True)
+    return _told_flow(*(np.concatenate([x.ravel() for x in both]).tolist() for both in cells))
+
+
+def _told_flow(Fy: list[float], K: list[float], n: list[float]) -> list[Told]:
+    """Yield force, consistency, and flow index where there is a consistency."""
+    index = [x for x, consistency in zip(n, K, strict=True) if consistency]
+    return [
+        *told_values("Fy = {}", Fy, "N"),
+        *told_values("K = {}", K, "N/(m/s)^n"),
+        *told_values("n = {}", index),
+    ]
+
+
+def _here(clay: Any, place: tuple[float, float]) -> list[Told]:
+    """Yield force, consistency and flow index of both axes at a place."""
+    Fy, K, n = zip(*(law.flows_at(*place) for law in clay.laws), strict=True)
+    index = told_pair("n = {}", n) if any(K) else ()
+    return [*told_pair("Fy = {}", Fy, "N"), *told_pair("K = {}", K, "N/(m/s)^n"), *index]
+
+
+def _cell_force(law: Any, speed: float, _: float) -> np.ndarray:
+    Fy, K, n = law.flows
+    return Fy + K * speed**n
+
+
+def _holds(clay: Any, i: int) -> Hold:
+    return Hold(float(clay.laws[i].flows[0].max()), "Fy", clay.isotropic)
+
+
 TRAITS = tuple(
-    Trait(
+    Law(
         name, "clay",
         lambda c, along=along: any(x.yields for x in c.laws) and c.isotropic == along, LEFT_OUT,
+        viscous=False, seen_in_b=False, columns=COLUMNS, words=_words, here=_here,
+        at=lambda law, place: law.flows_at(*place), force=_cell_force, holds=_holds,
     )
     for name, along in (("yield by axis", False), ("yield along the motion", True))
 )  # fmt: skip

@@ -15,7 +15,7 @@ from .constants import AXES, B_MAX
 from .flow import FY_MAX
 from .materials import SMALL_TOOL, material
 from .tool import Tool
-from .traits import LEFT_OUT, Refusal, Trait
+from .traits import LEFT_OUT, Block, Hold, Law, Refusal, Told
 
 CELLS = 20  # in the width of the tool, where none are asked for
 COARSEST = 8  # cells in it, at least
@@ -348,8 +348,24 @@ _UNCUT = Refusal(
 _BESIDE = Refusal(
     "clay.groove", "must be None beside laws that yield, grow, spring back or are smooth"
 )
+
+
+def _words(clay: Any) -> tuple[Told, ...]:
+    return (Told("permanent cut, up to {}", (clay.groove.hardest,), "N"),)
+
+
+def _here(clay: Any, place: tuple[float, float]) -> tuple[Told, ...]:
+    """Its force, where the tool touches it."""
+    touched = _block(clay.groove).holds(*place, 0.5 * clay.groove.tool.width)
+    return (Told("holds with up to {}", (clay.groove.hardest,), "N"),) * bool(touched)
+
+
+def _block(groove: Groove) -> Block:
+    return Block(groove.x, groove.y, groove.hardest, groove.thickest, groove.tool)
+
+
 TRAITS = (
-    Trait(
+    Law(
         "groove", "clay", lambda c: c.groove is not None, LEFT_OUT,
         {
             **dict.fromkeys(
@@ -359,5 +375,8 @@ TRAITS = (
             "passivity controller": _UNCUT,
             "virtual coupling": _UNCUT,
         },
+        viscous=False, of_velocity=False, seen_in_b=False, words=_words, here=_here,
+        holds=lambda c, _: Hold(c.groove.hardest, "the pressure", True),
+        blocks=lambda c: (_block(c.groove),),
     ),
 )  # fmt: skip

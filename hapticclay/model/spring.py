@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
+
+import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
-from .traits import LEFT_OUT, Refusal, Trait
+from .traits import LEFT_OUT, Law, Refusal, Told, told_pair, told_values
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
@@ -112,8 +115,43 @@ def relaxing_step(k, tau, way, z, dp, h):
 _UNGUARDED = Refusal(
     "hardware", "must be without passivity controller and coupling in clay that springs back"
 )
+
+
+def _words(clay: Any) -> list[Told]:
+    """Stiffness, limit and relaxing stiffness over a scene."""
+    rows = np.concatenate([law.elastic.reshape(-1, 5) for law in clay.laws])
+    return _told(*(told_values(form, _finite(rows[:, j]), unit) for form, unit, j in _QUANTITIES))
+
+
+def _here(clay: Any, place: tuple[float, float]) -> list[Told]:
+    """Stiffness, limit and relaxing stiffness of both axes at a place."""
+    x, y = (law.elastic[law.index(*place)] for law in clay.laws)
+    return _told(*(told_pair(form, _finite((x[j], y[j])), unit) for form, unit, j in _QUANTITIES))
+
+
+_QUANTITIES = (  # words, unit, and place in `Spring.numbers`
+    ("spring k = {}", "N/m", 0),
+    ("yielding at {}", "N", 1),
+    ("relaxing k1 = {}", "N/m", 2),
+)
+
+
+def _told(*quantities: Sequence[Told]) -> list[Told]:
+    return [x for some in quantities for x in some]
+
+
+def _finite(values: Any) -> list[float]:
+    """The values, 0 for a limit that is none."""
+    return np.where(np.isfinite(values), values, 0.0).tolist()
+
+
+def _cell_force(law: Any, _: float, dent: float) -> Any:
+    k, limit, k1 = np.moveaxis(law.elastic, -1, 0)[:3]
+    return np.minimum(k * dent, limit) + k1 * dent
+
+
 TRAITS = (
-    Trait(
+    Law(
         "springs", "clay", lambda c: bool(c.springs), LEFT_OUT,
         {
             "passivity controller": _UNGUARDED,
@@ -121,5 +159,6 @@ TRAITS = (
             "accurate": Refusal("integrator", "must be 'fast' in clay that springs back"),
             "rotated axes": Refusal("clay.angle", "must be 0 for springs"),
         },
+        viscous=False, of_velocity=False, words=_words, here=_here, force=_cell_force,
     ),
 )  # fmt: skip

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from ..errors import ParameterError
 
+T = TypeVar("T", bound="Trait")
 YES, LEFT_OUT, NO = "yes", "left out", "no"  # what linear theory makes of a part
 
 
@@ -45,7 +46,159 @@ class Trait:
     refuses: Mapping[str, Refusal] = field(default_factory=dict)
 
 
-def present(scene: Any, traits: Iterable[Trait]) -> list[Trait]:
+class Told(NamedTuple):
+    """A quantity of a part, for tables, titles and texts.
+
+    Attributes:
+        form: words, with {} in place of the values.
+        values: they, as different places or axes have them; empty for words alone.
+        unit: of the values; "" for none.
+    """
+
+    form: str
+    values: tuple[float, ...] = ()
+    unit: str = ""
+
+    def text(self, most: int = 1) -> str:
+        """Words, values and unit; no value stands twice.
+
+        Args:
+            most: how many values are listed; of more, the least and the largest are shown.
+        """
+        some = sorted(set(self.values))
+        shown = ", ".join(f"{v:.4g}" for v in some)
+        if len(some) > most:
+            shown = f"{some[0]:.4g} to {some[-1]:.4g}"
+        return f"{self.form.format(shown)} {self.unit}".rstrip()
+
+
+class Column(NamedTuple):
+    """A column of a table of stretches.
+
+    Attributes:
+        name: of the quantity, as in `Record.regions`.
+        unit: of it; "" for none.
+    """
+
+    name: str
+    unit: str = ""
+
+
+class Hold(NamedTuple):
+    """What holds a tool at rest.
+
+    Attributes:
+        force: up to which it holds [N].
+        field: what makes it, as a scenario names it.
+        together: whether the pushes along both axes act on it together.
+    """
+
+    force: float
+    field: str = ""
+    together: bool = False
+
+
+class Block(NamedTuple):
+    """A rectangle of clay beside the laws of the axes.
+
+    Attributes:
+        x: where it begins and ends along x [m].
+        y: the same along y.
+        force: of a tool that cuts it slowly [N].
+        damping: force per speed, beside it [N.s/m].
+        tool: that cuts it; None for any.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    force: float
+    damping: float
+    tool: Any = None
+
+    def at_speed(self, speed: float) -> float:
+        """Force of a tool that cuts it [N].
+
+        Args:
+            speed: of the tool [m/s].
+        """
+        return self.force + speed * self.damping
+
+    def holds(self, x: Any, y: Any, margin: float = 0.0) -> Any:
+        """Whether places lie in it.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+            margin: around it, which counts as in it [m].
+        """
+        (x0, x1), (y0, y1), m = self.x, self.y, margin
+        return (x >= x0 - m) & (x <= x1 + m) & (y >= y0 - m) & (y <= y1 + m)
+
+
+def _none(*_: Any) -> tuple[Any, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Law(Trait):
+    """A law of clay: what tables, figures, texts and theory show or assume of it.
+
+    Attributes:
+        viscous: whether its force is damping times velocity, so that linear theory holds.
+        of_velocity: whether its force follows from the velocity alone, by the damping and by Fy, K
+            and n of `Grid.flows_at`, so that theory knows the speed under a constant push.
+        seen_in_b: whether the damping tells its regions apart.
+        columns: quantities of a stretch beside its damping, which `at` returns.
+        words: of clay, its quantities over the whole scene.
+        at: of the law of one axis and a place (x, y) [m], values of `columns`.
+        here: of clay and a place (x, y) [m], quantities of both axes there.
+        force: of the law of one axis, a speed [m/s] and an indentation [m], force of each cell at
+            them [N]; None where it has none beside those of others.
+        holds: of clay and an axis, 0 or 1, what holds a tool at rest; None where nothing does.
+        blocks: of clay, its rectangles.
+    """
+
+    viscous: bool = True
+    of_velocity: bool = True
+    seen_in_b: bool = True
+    columns: tuple[Column, ...] = ()
+    words: Callable[[Any], Sequence[Told]] = _none
+    at: Callable[[Any, Any], Sequence[float]] = _none
+    here: Callable[[Any, Any], Sequence[Told]] = _none
+    force: Callable[[Any, float, float], Any] | None = None
+    holds: Callable[[Any, int], Hold | None] | None = None
+    blocks: Callable[[Any], Sequence[Block]] = _none
+
+
+def told_values(form: str, values: Iterable[float], unit: str = "") -> tuple[Told, ...]:
+    """A quantity over a scene, or nothing where all its values are 0.
+
+    Args:
+        form: as `Told.form`.
+        values: they.
+        unit: of them.
+    """
+    some = tuple(v for v in dict.fromkeys(values) if v)
+    return (Told(form, some, unit),) * bool(some)
+
+
+def told_pair(form: str, values: Sequence[float], unit: str = "") -> tuple[Told, ...]:
+    """A quantity of both axes at a place, one number where they agree, nothing where both are 0.
+
+    Args:
+        form: as `Told.form`.
+        values: along x and along y.
+        unit: of them.
+    """
+    x, y = map(float, values)
+    if not (x or y):
+        return ()
+    if x == y:
+        return (Told(form, (x,), unit),)
+    return (Told(form.format(f"({x:.4g}, {y:.4g})"), (), unit),)
+
+
+def present(scene: Any, traits: Iterable[T]) -> list[T]:
     """The traits that a scene has.
 
     Args:

@@ -69,10 +69,9 @@ def _hand_parts(field: str, hand: Operator | None) -> Iterator[str]:
 def _within(scenario: Scenario, clay: Clay) -> bool:
     """Whether the handle can come to any point of the clay."""
     laws = [(*law.lines, law.some) for law in clay.laws if law.some.any()]
-    if clay.groove:
-        block = np.zeros((3, 3), dtype=bool)
-        block[1, 1] = True
-        laws.append((clay.groove.x, clay.groove.y, block))
+    inside = np.zeros((3, 3), dtype=bool)
+    inside[1, 1] = True
+    laws += [(block.x, block.y, inside) for block in clay.blocks]
     return not laws or any(_meets(scenario, *law) for law in laws)
 
 

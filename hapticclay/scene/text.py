@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from ..display import one_line
@@ -30,7 +28,7 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
         for name, x in (("muscle", s.muscle), ("command", s.command))
         if x is not None
     ]
-    rows.append(("clay", "none" if s.clay is None else clay_text(s.clay)))
+    rows.append(("clay", clay_text(s.clay)))
     if any(s.operators):
         x, y = map(_hand, s.operators)
         rows.append(("operator", x if x == y else f"x: {x}; y: {y}"))
@@ -45,38 +43,17 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     return rows
 
 
-def clay_text(clay: Clay) -> str:
-    """The ranges of what clay resists with.
+def clay_text(clay: Clay | None) -> str:
+    """What clay resists with, the ranges of its quantities.
 
     Args:
-        clay: the clay.
+        clay: the clay; None for none.
     """
-    parts = []
-    if clay.groove:
-        parts.append(f"stays cut, up to {clay.groove.hardest:.4g} N")
-    flows = [[x.ravel().tolist() for x in law.flows] for law in clay.laws]
-    for name, unit, k in (("Fy", " N", 0), ("K", " N/(m/s)^n", 1)):
-        told = _range(v for law in flows for v in law[k])
-        parts += [f"{name} = {told}{unit}"] * bool(told)
-    told = _range(n for law in flows for K, n in zip(*law[1:], strict=True) if K)
-    parts += [f"n = {told}"] * bool(told)
-    told = _range(v for law in clay.laws for v in law.damping.ravel().tolist())
-    parts += [f"b = {told or '0'} N.s/m"] * bool(told or not parts)
-    parts += ["grows"] * clay.grows + ["springs back"] * bool(clay.springs)
-    parts += [f"axes rotated by {math.degrees(clay.angle):.4g} degrees"] * bool(clay.angle)
-    return ", ".join(parts)
+    return "none" if clay is None else ", ".join(x.text() for x in clay.words)
 
 
 def _pair(x: tuple[float, float]) -> str:
     return f"({x[0]:.4g}, {x[1]:.4g})"
-
-
-def _range(values: Iterable[float]) -> str:
-    """The values but zero: their range where they are several, "" for none."""
-    some = sorted({v for v in values if v})
-    if not some:
-        return ""
-    return f"{some[0]:.4g}" if len(some) == 1 else f"{some[0]:.4g} to {some[-1]:.4g}"
 
 
 def _hand(th: Operator | None) -> str:

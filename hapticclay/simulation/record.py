@@ -18,6 +18,7 @@ from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
 from ..files import atomic, versions
+from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..scene.earlier_names import with_present_names
@@ -240,7 +241,7 @@ class Record:
             Arrays of indices, in order.
         """
         s = self.scenario
-        if s.clay and (s.clay.grows or s.clay.smooth or s.clay.yields):
+        if s.clay and not s.clay.seen_in_b:
             along = "".join(getattr(s.clay, a).along for a in ([axis] if axis else AXES))
             cuts = np.searchsorted(self.t, [c.time for c in self.crossings if c.axis in along])
             change = np.unique(cuts[(cuts > 0) & (cuts < len(self.t) - 1)])
@@ -253,8 +254,9 @@ class Record:
         """Means over each of the `stretches`, in order of time.
 
         For each axis: fe/v against b over the stretch (mean and deviation); where the speed is
-        steady, the speed, fe/v and fh/v, beside `expected_speed`. In clay that yields also its law,
-        fe where the speed is steady, and the share of the time for which it held the handle.
+        steady, the speed, fe/v and fh/v, beside `expected_speed`. Also the other quantities of the
+        clay (`Clay.columns`) in the middle of the stretch; and of clay that can hold the handle, fe
+        where the speed is steady, and the share of the time for which it did.
 
         Args:
             axis: "x" or "y" for that axis and its stretches alone; None for both.
@@ -266,7 +268,6 @@ class Record:
             return []
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
         still, clay = self.held(), self.scenario.clay
-        grooved = clay is not None and clay.groove is not None
         out = []
         for piece in self.stretches(axis):
             entry: dict[str, Any] = {
@@ -288,13 +289,12 @@ class Record:
                     "steady_fe_over_v": _mean_and_std(fe_v[s, i]),
                     "steady_fh_over_v": _mean_and_std(fh_v[s, i]),
                 }
-                if self._yields:
+                if clay and clay.holding:
                     held = float(np.mean(still[piece, i]))
                     fe = float(np.mean(self.fe[s, i])) if len(s) else None
                     entry[name] |= {"steady_fe": fe, "held": held}
-                    if not grooved:
-                        Fy, K, n = self._flows(i, piece)
-                        entry[name] |= {"Fy": Fy, "K": K, "n": n}
+                if clay:
+                    entry[name] |= clay.values_at(i, self.p[piece[len(piece) // 2]])
             out.append(entry)
         return out
 
@@ -313,9 +313,9 @@ class Record:
             stretch, stays cut, springs back or has rotated axes, or the controller is your own.
         """
         i, s = AXES.index(axis), self.scenario
-        if s.clay and (s.clay.groove or s.clay.springs):
+        if s.clay and not s.clay.of_velocity:
             return None
-        together = bool(self._yields and s.clay and s.clay.isotropic)
+        together = bool(s.clay and s.clay.hold(i).together)
         axes = [0, 1] if together else [i]
         alone = not any(s.operators[j] for j in axes) and s.muscle is None and not s.driven
         b = self.b[piece[0]]
@@ -326,7 +326,7 @@ class Record:
             or np.any(self.b[piece][:, axes] != b[axes])
         ):
             return None
-        Fy, K, n = self._flows(i, piece)
+        Fy, K, n = _flow_at(s.clay, i, self.p[piece[len(piece) // 2]])
         if not Fy and not K:
             return linear_loop.steady_speed(
                 s.gain[i], s.force[i], float(b[i]), s.compensators[i], s.servo[i]
@@ -346,18 +346,6 @@ class Record:
             for name in stop.axis:
                 out[during, AXES.index(name)] = True
         return out
-
-    @property
-    def _yields(self) -> bool:
-        return self.scenario.clay is not None and self.scenario.clay.yields
-
-    def _flows(self, i: int, piece: np.ndarray) -> tuple[float, float, float]:
-        """Fy, K and n of an axis in the middle of a stretch."""
-        clay = self.scenario.clay
-        if clay is None or not clay.yields:
-            return 0.0, 0.0, 1.0
-        Fy, K, n = clay.laws[i].flows_at(*self.p[piece[len(piece) // 2]])
-        return float(Fy), float(K), float(n)
 
     def summary(self) -> dict[str, Any]:
         """Everything about the run but its arrays, ready for JSON."""
@@ -502,6 +490,14 @@ def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
     shape, got = block.shape if block else None, None if ground is None else ground.shape
     if shape != got or (ground is not None and not np.isfinite(ground).all()):
         raise ValueError(f"array ground must be finite and of shape {shape}, has {got}")
+
+
+def _flow_at(clay: Clay | None, i: int, place: np.ndarray) -> tuple[float, float, float]:
+    """Fy, K and n of an axis at a place."""
+    if clay is None:
+        return 0.0, 0.0, 1.0
+    Fy, K, n = map(float, clay.laws[i].flows_at(*place))
+    return Fy, K, n
 
 
 def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:

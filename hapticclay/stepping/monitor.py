@@ -12,6 +12,7 @@ from ..arguments import named
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
+from ..model.traits import Hold
 from ..scene.scenario import Scenario
 from ..theory import gain_limits
 
@@ -174,16 +175,11 @@ class StabilityMonitor:
         if not any(s.force):
             return "give a force"
         way = int(abs(s.force[1]) > abs(s.force[0]))
-        Fy, push, lower = 0.0, abs(s.force[way]), "Fy"
-        if s.clay:
-            Fy = float(s.clay.laws[way].flows[0].max())
-            if s.clay.isotropic or s.clay.groove:
-                push = math.hypot(*s.force)
-            if s.clay.groove:
-                Fy, lower = s.clay.groove.hardest, "the pressure"
-        if push > Fy:
+        hold = s.clay.hold(way) if s.clay else Hold(0.0)
+        push = math.hypot(*s.force) if hold.together else abs(s.force[way])
+        if push > hold.force:
             return "raise force, or lower b"
-        return f"raise the force above the yield force, {Fy:.6g} N, or lower {lower}"
+        return f"raise the force above the yield force, {hold.force:.6g} N, or lower {hold.field}"
 
     def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
         """Notes when the handle last moved, and when the motors were at their limits."""

@@ -334,7 +334,7 @@ def _of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, An
     clay = r.scenario.clay
     if clay is None:
         raise ParameterError("data", r.scenario.name, "must be a record with clay")
-    if clay.groove:
+    if clay.blocks:
         bound = "must be a record without a groove: a groove has no law of speed"
         raise ParameterError("data", r.scenario.name, bound)
     axis = choice("axis", axis or ("path" if clay.isotropic else "x"), (*AXES, "path"))

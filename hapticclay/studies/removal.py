@@ -50,8 +50,8 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
         if across:
             low[1] = start[1] - MAP_MARGIN
             high[1] = start[1] + 2.1 * (length - start[0]) + MAP_MARGIN
-    if scenario.clay and scenario.clay.groove:
-        (x0, x1), (y0, y1) = scenario.clay.groove.x, scenario.clay.groove.y
+    for block in scenario.clay.blocks if scenario.clay else ():
+        (x0, x1), (y0, y1) = block.x, block.y
         return np.array((x0, y0)), np.array((x1, y1))
     for i in (0, 1):
         spans = extent(scenario.clay, i)

@@ -148,7 +148,7 @@ def result_row(
         }
         margin = nan
         clay = r and r.scenario.clay
-        linear = not (clay and (clay.yields or clay.springs))  # the loop has b alone
+        linear = not clay or clay.viscous
         if r and linear and r.scenario.gain[i] > 0.0:
             limit = gain_limits.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
             margin = limit / r.scenario.gain[i]

@@ -21,24 +21,33 @@ import numpy as np
 
 from ..errors import ParameterError, integer
 from ..model.constants import AXES
-from .session import Frame, Player, Session, flow_text
+from .session import Frame, Player, Session, clay_here
 from .stage import (
     ARROW_WIDTH,
     GROUND,
     THICKNESS,
     Stage,
-    breaking_force,
     hardest,
     held_words,
     plotted_axes,
     room_scale,
 )
-from .style import CLAY_DEEP, FORCE_COLORS, GRID, PART_COLORS, SKY, TABLE, rgb_bytes, verdict_color
+from .style import (
+    CLAY_DEEP,
+    FORCE_COLORS,
+    GRID,
+    PART_COLORS,
+    SKY,
+    TABLE,
+    cutting_force,
+    rgb_bytes,
+    verdict_color,
+)
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
 CLAY_TIME, PLOT_TIME = 0.2, 0.5  # [s] between two updates of the clay, and of the plots
 PLOT_POINTS = 400
-MOST_FORCE = 5.0  # [N] of the slider, or twice what breaks clay that yields
+MOST_FORCE = 5.0  # [N] of the slider, or twice what cuts harder clay
 TAB_TITLE = "hapticclay"
 CENTRE = (0.22, 0.12)  # of the table [m]
 BANNER_STYLE = (
@@ -152,7 +161,7 @@ class Page:
             look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
             self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
         self._arrow: Any = None
-        if self.session.scenario.clay and self.session.scenario.clay.yields:
+        if self.session.scenario.clay and self.session.scenario.clay.holding:
             look = dict(shaft_radius=0.5 * ARROW_WIDTH, head_radius=1.2 * ARROW_WIDTH)
             look.update(head_length=3.0 * ARROW_WIDTH, visible=False)
             self._arrow = add.add_arrows("/force", np.zeros((1, 2, 3)), (0, 0, 0), **look)
@@ -200,9 +209,9 @@ class Page:
         self.hold = gui.add_checkbox("Hand holds", False, hint=hint)
         top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N.s/m]", 1.0
         clay, most = session.given.clay, MOST_FORCE
-        if clay and clay.yields:
-            top, name, step = 1.0, "Clay Fy, K, b [times]", 0.05
-            most = max(most, float(math.ceil(min(2.0 * breaking_force(clay), 1e3))))
+        if clay and not clay.viscous:
+            top, name, step = 1.0, "Clay strength [times]", 0.05
+            most = max(most, float(math.ceil(min(2.0 * cutting_force(clay), 1e3))))
         limit = max(3.0 * top, 1.0)
         self.b = gui.add_slider(name, 0.0, limit, step, top, disabled=not top)
         self.gain = gui.add_slider("Gain K", 0.1, 5.0, 0.05, min(max(gain, 0.1), 5.0))
@@ -340,9 +349,7 @@ class Page:
         slow = ", this machine is too slow" if session.clock.slow else ""
         if still := held_words(frame.held):
             state += f", {still},"
-        b = session.b
-        clay = f"b = {b[0]:.4g}, {b[1]:.4g} N.s/m here"
-        clay = flow_text(session.scenario, frame.p, b) or clay
+        clay = clay_here(session.scenario, frame.p, session.b)
         return (
             f"**{state}** {frame.t:.1f} s, {session.clock.factor:.2f} x real "
             f"time{slow}  \n{clay}, hand {math.hypot(*frame.fh):.2f} N"

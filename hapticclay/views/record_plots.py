@@ -71,8 +71,8 @@ class RecordPlots:
     def force(self, axis: str | None = None, over: str | None = None) -> Figure:
         """The forces of hand and clay: their ratio to the velocity over position (Fig. 8, bottom).
 
-        In a maneuver, in clay that yields, and where `over` is given, the operator's force itself,
-        and that of clay that yields (Fig. 11).
+        In a maneuver, in clay that is not viscous, and where `over` is given, the forces themselves
+        (Fig. 11).
 
         Args:
             axis: "x" or "y"; None for the one along which the operator pushes.
@@ -84,7 +84,7 @@ class RecordPlots:
         record = self._sampled()
         s = record.scenario
         axis = choice("axis", axis, AXES) if axis else run_plots.main_axis(s)
-        if over or s.muscle is not None or (s.clay and s.clay.yields):
+        if over or s.muscle is not None or (s.clay and not s.clay.viscous):
             over = choice("over", over or "time", OVER_CHOICES)
             return _with_picture(run_plots.maneuver_plot([record], axis, over))
         return _with_picture(run_plots.force_ratio_plot(record, axis))

@@ -20,6 +20,7 @@ from ..model.compensator import PRINTED
 from ..model.constants import AXES
 from ..model.controller import SERVO
 from ..model.flow import Flow
+from ..model.groove import Groove
 from ..model.signals import Multisine
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -35,6 +36,7 @@ from .style import (
     GREY,
     ORANGE,
     PURPLE,
+    SHADED,
     SKY_BLUE,
     VERMILION,
     WHITE,
@@ -81,7 +83,7 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
             v = record.v[:, i]
             ax.plot(100.0 * record.p[:, i], v, color=BLUE, label="measured")
             built_in = s.controller is None
-            if s.clay and (s.clay.yields or s.clay.springs):
+            if s.clay and not s.clay.viscous:
                 _expected_speeds(ax, record, name)
                 _mark_held(ax, record, i, v)
             elif built_in and s.operators[i] is None and s.muscle is None and not s.rotated:
@@ -172,9 +174,9 @@ def path_plot(record: Record) -> Figure:
 
 
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades each region of the clay and names its damping on entry [N.s/m], or its flow."""
-    if clay.groove:
-        (x0, x1), (y0, y1) = clay.groove.x, clay.groove.y
+    """Shades each region of the clay and names what it resists with."""
+    for block in clay.blocks:
+        (x0, x1), (y0, y1) = block.x, block.y
         size = 100.0 * (x1 - x0), 100.0 * (y1 - y0)
         look: Any = dict(color=clay_color(1.0), alpha=CLAY_ALPHA, lw=0)
         ax.add_patch(Rectangle((100.0 * x0, 100.0 * y0), *size, **look))
@@ -195,21 +197,8 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
             if shown[0] > 0.12 and shown[1] > 0.08:
                 place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
                 text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
-                ax.text(place[0], place[1], _clay_text(clay, middle), **text)
-
-
-def _clay_text(clay: Clay, place: tuple[float, float]) -> str:
-    """Damping along x and y at a place [m], and what else resists there."""
-    b = clay.at(*place).tolist()
-    x, y = (tuple(map(float, law.flows_at(*place))) for law in clay.laws)
-    lines = []
-    for i, (letter, plain) in enumerate((("F$_y$", 0.0), ("K$_c$", 0.0), ("n", 1.0))):
-        if x[i] != plain or y[i] != plain:
-            both = f"{x[i]:.4g}" if x[i] == y[i] else f"({x[i]:.4g}, {y[i]:.4g})"
-            lines.append(f"{letter} = {both}")
-    if max(b) or not lines:
-        lines.append(f"b = ({b[0]:g}, {b[1]:g})")
-    return "\n".join(lines)
+                told = "\n".join(in_math(x.text()) for x in clay.here(middle))
+                ax.text(place[0], place[1], told, **text)
 
 
 def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
@@ -241,7 +230,7 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
             if r.scenario.clay is not None:
                 hand = GREEN
                 ax.plot(where, r.fe[:, i], color=BLUE, lw=stroke(0.9), label="clay, f$_e$")
-            if _yields(r.scenario):
+            if r.stops:
                 if over == "time":
                     shade_held(ax, _held_spans(r, axis))
                 else:
@@ -287,9 +276,9 @@ def ground_plot(record: Record) -> Figure:
     """
     from matplotlib.colors import LinearSegmentedColormap
 
-    clay, ground, p = record.scenario.clay, record.ground, 100.0 * record.p
-    assert clay is not None and clay.groove is not None and ground is not None
-    x, y = (100.0 * e for e in clay.groove.edges)
+    ground, p, block = record.ground, 100.0 * record.p, _groove(record)
+    assert ground is not None
+    x, y = (100.0 * e for e in block.edges)
     corners = np.array(((x[0], y[0]), (x[-1], y[-1])))
     low = np.minimum(corners[0], p.min(axis=0)) - 0.3
     high = np.maximum(corners[1], p.max(axis=0)) + 0.3
@@ -298,7 +287,7 @@ def ground_plot(record: Record) -> Figure:
     with figure_style():
         figure = Figure(figsize=map_size(4.7, 1.2, depth / breadth))
         ax = figure.add_subplot()
-        top = 1e3 * clay.groove.highest or 1.0
+        top = 1e3 * block.highest or 1.0
         look: Any = dict(cmap=colors, vmin=0.0, vmax=top, rasterized=True)
         image = ax.pcolormesh(x, y, 1e3 * ground.T, **look)
         ax.plot(p[:, 0], p[:, 1], color=BLUE, lw=stroke(1.0), label="path of the tool")
@@ -355,7 +344,8 @@ def force_velocity_plot(record: Record) -> Figure:
         figure = Figure(figsize=figure_size(columns, 4.4 * rows))
         several = figure.subplots(rows, columns, squeeze=False).ravel()
         for flow, color in colors.items():
-            label = f"measured, {', '.join(_flow_parts([flow]))}"
+            told = ", ".join(in_math(x.text()) for x in flow.words)
+            label = f"measured, {told}"
             several[0].plot([], [], ".", color=color, ms=stroke(9), label=label)
         if any(held[:, x[0]].any() for x in panels.values()):
             several[0].plot([], [], **HELD_LOOK, label="held still")
@@ -418,26 +408,24 @@ def _spread(where: np.ndarray, most: int) -> np.ndarray:
     return where[:: -(-len(where) // most) or 1]
 
 
-def _flow_parts(flows: Sequence[Flow]) -> list[str]:
-    """Phrases that name yield force, consistency, flow index and damping; K is the gain's."""
-    out = []
-    for letter, unit, values in (
-        ("F$_y$", " N", [x.Fy for x in flows]),
-        ("K$_c$", " N/(m/s)$^n$", [x.K for x in flows]),
-        ("n", "", [x.n for x in flows if x.K]),
-        ("b", " N$\\cdot$s/m", [x.b for x in flows]),
-    ):
-        told = _values_text([v for v in values if v])
-        out += [f"{letter} = {told}{unit}"] * bool(told)
-    return out
+def in_math(text: str) -> str:
+    """A text on clay, its letters and units as formulas; the consistency K is not the gain.
+
+    Args:
+        text: such as "Fy = 2 N".
+    """
+    for plain, formula in _FORMULAS.items():
+        text = text.replace(plain, formula)
+    return text
 
 
-def _values_text(values: list[float]) -> str:
-    """Different values, or their range where there are many."""
-    values = list(dict.fromkeys(values))
-    if len(values) > MOST_TITLED:
-        return f"{min(values):.4g} to {max(values):.4g}"
-    return ", ".join(f"{v:.4g}" for v in values)
+_FORMULAS = {
+    "Fy =": "F$_y$ =",
+    "K =": "K$_c$ =",
+    "k1 =": "k$_1$ =",
+    "N.s/m": "N$\\cdot$s/m",
+    "(m/s)^n": "(m/s)$^n$",
+}
 
 
 def _expected_speeds(ax: Axes, record: Record, axis: str) -> None:
@@ -467,8 +455,14 @@ def _held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
     return [(x.start, end if x.end is None else x.end) for x in stops]
 
 
-def _yields(s: Scenario) -> bool:
-    return s.clay is not None and s.clay.yields
+def _viscous(s: Scenario) -> bool:
+    return s.clay is None or s.clay.viscous
+
+
+def _groove(record: Record) -> Groove:
+    clay = record.scenario.clay
+    assert clay is not None and clay.groove is not None
+    return clay.groove
 
 
 def _clay_along_both_axes(s: Scenario) -> bool:
@@ -508,7 +502,7 @@ def _velocity(record: Record) -> Figure | None:
 
 def _force(record: Record) -> Figure | None:
     s = record.scenario
-    if s.muscle is not None or _yields(s):
+    if s.muscle is not None or not _viscous(s):
         return maneuver_plot([record], main_axis(s))
     return None if _clay_along_both_axes(s) else force_ratio_plot(record, main_axis(s))
 
@@ -516,7 +510,7 @@ def _force(record: Record) -> Figure | None:
 def _path(record: Record) -> Figure | None:
     """Where the handle may leave the line of one experiment: driven, or in clay of an image."""
     s = record.scenario
-    if s.clay is None or s.clay.groove is not None:  # whose ground shows the path
+    if s.clay is None or record.ground is not None:  # which shows the path
         return None
     image = any(not isinstance(law, Profile) for law in s.clay.laws)
     return path_plot(record) if s.driven or image or _clay_along_both_axes(s) else None
@@ -530,7 +524,7 @@ def _force_position(record: Record) -> Figure | None:
 
 def _force_velocity(record: Record) -> Figure | None:
     clay = record.scenario.clay
-    told = clay is not None and clay.yields and not clay.groove and not clay.springs
+    told = clay is not None and clay.of_velocity and not clay.viscous
     return force_velocity_plot(record) if told and len(record.t) else None
 
 
@@ -597,9 +591,8 @@ def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
             "steady speed [m/s]": [r["steady_speed"] for _, r in rows],
             "expected speed [m/s]": [r["expected_speed"] for _, r in rows],
         }
-    clay = record.scenario.clay
-    if name == "ground" and record.ground is not None and clay and clay.groove:
-        x, y = (0.5 * (e[1:] + e[:-1]) for e in clay.groove.edges)
+    if name == "ground" and record.ground is not None:
+        x, y = (0.5 * (e[1:] + e[:-1]) for e in _groove(record).edges)
         i, j = (a.ravel() for a in np.indices(record.ground.shape))
         out["cells"] = {"x [m]": x[i], "y [m]": y[j], "left [m]": record.ground.ravel()}
     return out
@@ -637,31 +630,30 @@ def _position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
         x = 100.0 * record.p[:, AXES.index(name)]
         low, high = float(x.min()), float(x.max())
         margin = 0.02 * ((high - low) or 1.0)
-        shade_clay(ax, _profile(record, name), name)
+        shade_clay(ax, *_shades(record, name))
         ax.set(xlabel=f"position {name} [cm]", xlim=(low - margin, high + margin))
     return figure, panels
 
 
-def _profile(record: Record, axis: str) -> Profile | None:
-    """The clay of an axis; of a grid or smooth clay, what the path met along that axis."""
+def _shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
+    """Borders [m] and force of a slow cut [N] along an axis; of a grid, as the path met them."""
     clay, i = record.scenario.clay, AXES.index(axis)
-    law: Any = getattr(clay, axis) if clay else None
-    if clay and clay.groove and not law.some.any():
-        span: Any = getattr(clay.groove, axis), axis
-        return Profile(span[0], (0.0, 1.0, 0.0), span[1])  # where there is any
-    if law is None or isinstance(law, Profile):
-        return law
+    if clay is None:
+        return [], []
+    law, spans = clay.laws[i], [getattr(block, axis) for block in clay.blocks]
+    if spans and not law.some.any():
+        return list(spans[0]), [0.0, 1.0, 0.0]
+    if isinstance(law, Profile):
+        seen = law.along == axis
+        return list(law.edges) * seen, law.forces(*SHADED).ravel().tolist() * seen
     x, first = np.unique(record.p[:, i], return_index=True)
     if isinstance(law, Smooth) and len(x) > SHADES:
         near = np.searchsorted(x, np.linspace(x[0], x[-1], SHADES))
         x, first = x[near], first[near]
-    b = record.b[first, i]
-    rows = np.column_stack((b, *law.flows_at(*record.p[first].T))) if law.yields else b[:, None]
-    change = np.flatnonzero(np.diff(rows, axis=0).any(axis=1))
-    edges = 0.5 * (x[change] + x[change + 1])
-    values, *flow = rows[[*change, -1]].T.tolist()
-    along = "x" if i == 0 else "y"
-    return Profile(tuple(edges.tolist()), tuple(values), along, (), *map(tuple, flow))
+    x_met, y_met = record.p[first].T
+    force = law.forces_at(x_met, y_met, *SHADED)
+    change = np.flatnonzero(np.diff(force))
+    return (0.5 * (x[change] + x[change + 1])).tolist(), force[[*change, -1]].tolist()
 
 
 def _steps(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
@@ -687,21 +679,8 @@ def _scenario_parts(s: Scenario) -> list[str]:
     out = [f"{s.name}: {how}"]
     if s.muscle is None:
         out.append(f"u$_h$ = {pair(s.force)} N")
-    if s.clay and s.clay.groove:
-        out.append(f"clay that stays cut, up to {s.clay.groove.hardest:.4g} N")
     if s.clay:
-        values = [v for f in s.clay.laws for v in dict.fromkeys(f.damping.ravel().tolist()) if v]
-        if s.clay.yields:
-            cells = [np.stack(f.flows, axis=-1).reshape(-1, 3) for f in s.clay.laws]
-            out += _flow_parts([Flow(*x) for x in np.unique(np.concatenate(cells), axis=0)])
-        values = list(dict.fromkeys(values))
-        told = ", ".join(f"{v:g}" for v in values) or "0"
-        if len(values) > MOST_TITLED:
-            told = f"{min(values):g} to {max(values):g}"
-        out += [f"b = {told} N$\\cdot$s/m"] * bool(values or not s.clay.yields)
-        rates = [g for f in s.clay.laws for g in f.rates.ravel().tolist() if g]
-        out += [f"growing {g:g} a second" for g in rates][:1]
-        out += [f"axes rotated by {math.degrees(s.clay.angle):.3g} degrees"] * bool(s.clay.angle)
+        out += [in_math(x.text(MOST_TITLED)) for x in s.clay.words]
     printed = {"arm": PAPER, "servo": SERVO, "compensator": (PRINTED, PRINTED)}
     own = {"arm": s.arm, "servo": s.servo, "compensator": s.compensators}
     out += [f"another {name}" for name, part in own.items() if part != printed[name]]
@@ -809,16 +788,15 @@ def running_figure(
             ax.set_ylabel(plan.labels[1] if roomy else "", labelpad=2)
             title = plan.title if roomy else plan.short
             ax.set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
-        yields = _yields(record.scenario)
-        for ax in panels[: 1 if yields else 2]:
-            shade_clay(ax, _profile(record, AXES[i]), AXES[i])
-        if yields:
-            for ax in panels[1:2]:
-                _running_laws(ax, record, i)
-            for ax in panels[2:]:
-                shade_held(ax, _held_spans(record, AXES[i]))
+        viscous = _viscous(record.scenario)
+        for ax in panels[: 2 if viscous else 1]:
+            shade_clay(ax, *_shades(record, AXES[i]))
+        for ax in panels[1:2]:
+            _running_laws(ax, record, i)
+        for ax in panels[2:]:
+            shade_held(ax, _held_spans(record, AXES[i]))
         b = np.unique(record.b[:, i])
-        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 and not yields else ():
+        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 and viscous else ():
             panels[1].axhline(value, color=VERMILION, ls="--", lw=stroke(0.9))
             at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
             panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
@@ -840,12 +818,13 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
     force_curves = ((fh, GREEN), (fe, BLUE))
     second = Panel(x, np.array((0.0, 1.25 * top)), (where, share), "", share, ((ratio, BLUE),))
     told = "clay f$_e$ [N]"
-    if r.ground is not None:
+    clay = r.scenario.clay
+    if clay and not clay.of_velocity:
         second = Panel(x, np.append(fe, 0.0), (where, told), "", told, ((fe, BLUE),))
-    elif _yields(r.scenario):
+    elif clay and not clay.viscous:
         u, along = _over_velocity(r, i)
         over = speed
-        if r.scenario.clay is not None and r.scenario.clay.isotropic:
+        if clay.isotropic:
             over = "v along the motion [m/s]" if roomy else "v [m/s]"
         second = Panel(u, np.append(along, 0.0), (over, told), "", told, ((along, BLUE),))
     return (
@@ -867,8 +846,8 @@ def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
     clay = r.scenario.clay
     assert clay is not None
     v, fe = along_motion(r.v, r.fe, i) if clay.isotropic else (r.v[:, i], r.fe[:, i])
-    Fy, K, _ = clay.laws[i].flows_at(*r.p.T)
-    return np.where((Fy > 0.0) | (K > 0.0) | (r.b[:, i] > 0.0), v, np.nan), fe
+    law = clay.laws[i]
+    return np.where(law.some[law.index(*r.p.T)], v, np.nan), fe
 
 
 def _running_laws(ax: Axes, r: Record, i: int) -> None:
@@ -876,10 +855,11 @@ def _running_laws(ax: Axes, r: Record, i: int) -> None:
     clay = r.scenario.clay
     if (
         clay is None
+        or clay.viscous
+        or not clay.of_velocity
         or clay.grows
         or clay.smooth
         or clay.angle
-        or clay.groove
         or (clay.isotropic and not np.array_equal(r.b[:, 0], r.b[:, 1]))
         or len(_flows_met(r, i)) > 4
     ):

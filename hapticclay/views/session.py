@@ -369,7 +369,7 @@ class Session:
     def verdict(self) -> LiveVerdict:
         """Says whether the loop is stable, by the monitor of the run and its gain limit."""
         s, onset = self.scenario, self.run.watch.onset
-        limit = None if yields_at(s, self.frames[-1].p) else live_gain_limits(s, self.b)
+        limit = live_gain_limits(s, self.b) if is_viscous(s, self.frames[-1].p) else None
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
@@ -557,42 +557,26 @@ def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
     )
 
 
-def yields_at(scenario: Scenario, p: tuple[float, float]) -> bool:
-    """Whether the clay at a place yields: the linear loop then has no limit of K to tell.
+def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
+    """Whether the clay at a place is viscous: elsewhere the linear loop's limit of K does not hold.
 
     Args:
         scenario: of the run.
         p: the place [m].
     """
-    clay = scenario.clay
-    if clay is not None and clay.groove:
-        return all(a <= x <= b for x, (a, b) in zip(p, (clay.groove.x, clay.groove.y), strict=True))
-    return clay is not None and any(float(x) > 0.0 for f in clay.laws for x in f.flows_at(*p)[:2])
+    return scenario.clay is None or scenario.clay.viscous_at(p)
 
 
-def flow_text(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
-    """Names the law of clay that yields at a place, in a window; empty where no clay yields.
+def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
+    """What the clay at a place resists with, in a window.
 
     Args:
         scenario: of the run.
         p: the place [m].
         b: damping there [N.s/m].
     """
-    clay = scenario.clay
-    if clay is None or not clay.yields:
-        return ""
-    if clay.groove:
-        return f"holds with up to {clay.groove.hardest:.4g} N"
-    rows = zip(*(map(float, f.flows_at(*p)) for f in clay.laws), strict=True)
-    (Fy, K, n), parts = rows, []
-    for name, values, unit in (("Fy", Fy, " N"), ("K", K, ""), ("b", b, " N.s/m")):
-        if any(values):
-            alike = values[0] == values[1]
-            both = f"{values[0]:.4g}" if alike else f"{values[0]:.4g}, {values[1]:.4g}"
-            parts.append(f"{name} {both}{unit}")
-        if name == "K" and any(K):
-            parts[-1] += f", n {n[0]:.3g}" if n[0] == n[1] else f", n {n[0]:.3g}, {n[1]:.3g}"
-    return f"{'; '.join(parts) or 'none'} here"
+    told = scenario.clay.here(p, b) if scenario.clay else ()
+    return f"{', '.join(x.text() for x in told) or 'none'} here"
 
 
 class Replay:
@@ -673,7 +657,7 @@ class Replay:
         """As of a session; the monitor's finding is the outcome of the record."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
-        known = s.control == "continuous" and not yields_at(s, self.frames[-1].p)
+        known = s.control == "continuous" and is_viscous(s, self.frames[-1].p)
         limit = live_gain_limits(s, self.b) if known else None
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 

@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model.arm import PAPER, Arm
-from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
-from .style import BLUE, PART_COLORS, SHADED_SPEED, SKY_BLUE, clay_color, clay_share, rgb
+from .style import BLUE, PART_COLORS, SKY_BLUE, clay_color, clay_share, cutting_force, rgb
 
 CAMERAS = ("room", "top", "close")
 HIDDEN = (0.0, 0.0, -5.0)  # place of the hand's target while nobody pulls [m]
@@ -47,17 +46,6 @@ def hardest(scenario: Scenario) -> float:
         scenario: that holds the clay.
     """
     return scenario.clay.largest if scenario.clay else 0.0
-
-
-def breaking_force(clay: Clay) -> float:
-    """Force at which a tool moves slowly through the hardest clay that yields [N].
-
-    Args:
-        clay: of the scene.
-    """
-    flows = [law.flows for law in clay.laws]
-    most = float(max((Fy + K * SHADED_SPEED**n).max() for Fy, K, n in flows))
-    return max(most, clay.groove.hardest) if clay.groove else most
 
 
 def held_words(held: Sequence[bool]) -> str:
@@ -109,10 +97,10 @@ class Stage:
 
         Args:
             scenario: what to show.
-            tool: at the handle; clay that stays cut has its own.
+            tool: at the handle; a block of clay may have its own.
         """
-        if scenario.clay and scenario.clay.groove:
-            tool = scenario.clay.groove.tool
+        blocks = scenario.clay.blocks if scenario.clay else ()
+        tool = next((block.tool for block in blocks if block.tool), tool)
         self.scenario, self.tool = scenario, tool
         self.removal = Removal(scenario, tool)
         grid, origin = self.removal, np.array(scenario.origin)
@@ -128,7 +116,7 @@ class Stage:
         self.place: tuple[float, float] | None = None
         self.stale = True
         clay = scenario.clay
-        self._breaking = breaking_force(clay) if clay and clay.yields else 0.0
+        self._breaking = cutting_force(clay) if clay and clay.holding else 0.0
         self.arrow: Arrow | None = None
         self._target = self.model.body("target").mocapid[0]
 

@@ -8,14 +8,14 @@ palette alone.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import choice
-from ..model.clay import Clay, Grid, Profile, Smooth
+from ..model.clay import Clay
 from ..model.operator import Operator
 
 if TYPE_CHECKING:
@@ -86,8 +86,7 @@ TITLE_SIZE = 9.0  # [points] on a screen
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
 CLAY_ALPHA = 0.35  # of clay behind curves
 HELD_COLOR, HELD_ALPHA = SKY_BLUE, 0.35  # time for which clay that yields holds the handle
-SHADED_SPEED = 0.01  # [m/s] at which clays that yield are compared, about that of the paper's cut
-SHADED_DENT = 1e-3  # [m] at which clays that spring back are
+SHADED = 0.01, 1e-3  # speed [m/s], about that of the paper's cut, and indentation [m] of shades
 
 
 class Look(NamedTuple):
@@ -236,8 +235,7 @@ def clay_color(share: Any) -> np.ndarray:
     """Shades clay by how hard it is to cut.
 
     Args:
-        share: damping over the largest damping of the scene, or as `clay_share` in clay that
-            yields, 0 to 1, any shape.
+        share: as `clay_share`, 0 to 1, any shape.
 
     Returns:
         Red, green and blue from 0 to 1, shape (..., 3).
@@ -269,8 +267,7 @@ def along_motion(v: np.ndarray, fe: np.ndarray, main: int) -> tuple[np.ndarray, 
 def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
     """How hard clay is to cut at some places, over the hardest of the scene, growth aside.
 
-    Along the harder axis: the damping, or in a scene with clay that yields or springs back the
-    force at SHADED_SPEED and SHADED_DENT.
+    Its force along the harder axis, at a speed and an indentation that are the same for all clay.
 
     Args:
         clay: of the scene.
@@ -280,38 +277,20 @@ def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
     Returns:
         0 to 1, of the shape of x and y together.
     """
-    if not (clay.yields or clay.springs):
-        return clay.at(x, y).max(axis=0) / (clay.largest or 1.0)
-    here, most = [], 0.0
-    for law in clay.laws:
-        if isinstance(law, Smooth):
-            most = max(most, SHADED_SPEED * float(law.damping.max()))
-            here.append(SHADED_SPEED * law.at(x, y))
-        else:
-            force = law_force(law)
-            most = max(most, float(force.max()))
-            here.append(force[law.index(x, y)])
-    if clay.groove:
-        (x0, x1), (y0, y1) = clay.groove.x, clay.groove.y
-        inside = (np.asarray(x) >= x0) & (x <= x1) & (np.asarray(y) >= y0) & (y <= y1)
-        force = clay.groove.hardest + SHADED_SPEED * clay.groove.thickest
-        most = max(most, force)
-        here.append(force * inside)
-    return np.maximum.reduce(np.broadcast_arrays(*here)) / (most or 1.0)
+    x, y = np.asarray(x), np.asarray(y)
+    here = [law.forces_at(x, y, *SHADED) for law in clay.laws]
+    here += [block.at_speed(SHADED[0]) * block.holds(x, y) for block in clay.blocks]
+    return np.maximum.reduce(np.broadcast_arrays(*here)) / (cutting_force(clay) or 1.0)
 
 
-def law_force(law: Profile | Grid) -> np.ndarray:
-    """Force of each cell of a law at SHADED_SPEED and SHADED_DENT, growth aside [N].
+def cutting_force(clay: Clay) -> float:
+    """Force on a tool that moves slowly through the hardest clay, growth aside [N].
 
     Args:
-        law: of one axis.
-
-    Returns:
-        As `Grid.damping`.
+        clay: of the scene.
     """
-    (Fy, K, n), (k, limit, k1) = law.flows, np.moveaxis(law.elastic, -1, 0)[:3]
-    springs = np.minimum(k * SHADED_DENT, limit) + k1 * SHADED_DENT
-    return Fy + K * SHADED_SPEED**n + law.damping * SHADED_SPEED + springs
+    laws = [float(law.forces(*SHADED).max()) for law in clay.laws]
+    return max(*laws, *(block.at_speed(SHADED[0]) for block in clay.blocks))
 
 
 def verdict_color(text: str, unstable: bool) -> str:
@@ -429,23 +408,18 @@ def unit_text(text: str) -> str:
     return text.replace("N.", "N$\\cdot$").replace("^2", "$^2$")
 
 
-def shade_clay(ax: Axes, profile: Profile | None, axis: str) -> None:
+def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> None:
     """Shades the intervals of the x axis that hold clay, darker where it is harder to cut.
 
     Args:
-        ax: axes over the position along `axis` [cm].
-        profile: of the clay; None for no clay.
-        axis: "x" or "y"; a profile along the other axis is not shown.
+        ax: axes over the position [cm].
+        edges: between the intervals [m], ascending, shape (n,).
+        forces: of a tool that cuts slowly in each interval [N], shape (n + 1,); empty for no clay.
     """
-    if profile is None or profile.along != axis:
-        return
-    hard = profile.values
-    if profile.yields or profile.springs:
-        hard = tuple(law_force(profile).ravel().tolist())
-    label, edges = "clay", (-1.0, *profile.edges, 1.0)
-    for low, high, force in zip(edges, edges[1:], hard, strict=False):
+    label, edges = "clay", (-1.0, *edges, 1.0)
+    for low, high, force in zip(edges, edges[1:], forces, strict=False):
         if force > 0.0:
-            color = clay_color(force / max(hard))
+            color = clay_color(force / max(forces))
             ax.axvspan(100.0 * low, 100.0 * high, color=color, alpha=CLAY_ALPHA, lw=0, label=label)
             label = "_"
 

@@ -7,6 +7,7 @@ the process. In a process of its own either costs a picture, not the session.
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import pickle
@@ -15,12 +16,13 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..stepping.engine import mujoco
@@ -100,9 +102,7 @@ class Pane:
             tool: at the handle.
         """
         self.stage = Stage(scenario, tool)
-        yields = scenario.clay is not None and scenario.clay.yields
-        isotropic = scenario.clay is not None and scenario.clay.isotropic
-        self.plots = _plots(plotted_axes(scenario), yields, isotropic)
+        self.plots = _plots(plotted_axes(scenario), scenario.clay)
         self.frames: list[Frame] = []
         self.banner = _banner()
         self.rows: Rows = ()
@@ -300,39 +300,53 @@ def _law_point(f: Frame, i: int, isotropic: bool) -> tuple[float, float]:
     return (100.0 * v, fe) if any(f.fe) else (math.nan, math.nan)
 
 
-def _plots(
-    axes: tuple[int, ...], yields: bool = False, isotropic: bool = False
-) -> tuple[LivePlot, ...]:
-    """Velocity and fe/v over position, and forces over time, along these axes.
+def _plots(axes: tuple[int, ...], clay: Clay | None = None) -> tuple[LivePlot, ...]:
+    """Velocity over position, the clay's law, and forces over time, along these axes.
 
-    Of clay that yields, fe over velocity in place of fe/v; of isotropic clay along the motion.
+    Of viscous clay the law is fe/v over position; else fe, over velocity where it follows from
+    that, of isotropic clay along the motion.
     """
-    hand, clay = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
+    hands, clays = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
     place, named = f"{AXES[axes[0]]} [cm]", ""
     if len(axes) > 1:
         place = "position [cm]"
-        named = ": " + ", ".join(f"{AXES[i]} {COLOR_NAMES[clay[i]]}" for i in axes)
-    velocities, dampings, laws, forces = [], [], [], []
+        named = ": " + ", ".join(f"{AXES[i]} {COLOR_NAMES[clays[i]]}" for i in axes)
+    velocities, forces = [], []
     for i in axes:
-        velocities.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], 100 * f.v[i])))
-        dampings.append(LiveCurve(clay[i], lambda f, i=i: (100 * f.p[i], _ratio(f.fe[i], f.v[i]))))
-        if not (isotropic and laws):
-            laws.append(LiveCurve(clay[i], lambda f, i=i: _law_point(f, i, isotropic)))
-        forces.append(LiveCurve(hand[i], lambda f, i=i: (f.t, f.fh[i])))
-        forces.append(LiveCurve(clay[i], lambda f, i=i: (f.t, f.fe[i])))
+        velocities.append(LiveCurve(clays[i], lambda f, i=i: (100 * f.p[i], 100 * f.v[i])))
+        forces.append(LiveCurve(hands[i], lambda f, i=i: (f.t, f.fh[i])))
+        forces.append(LiveCurve(clays[i], lambda f, i=i: (f.t, f.fe[i])))
     both = (
         f"{who} {', '.join(COLOR_NAMES[color] for color in colors.values())}"
-        for who, colors in (("hand", hand), ("clay", clay))
+        for who, colors in (("hand", hands), ("clay", clays))
     )
-    second = LivePlot(f"clay, fe/v [N.s/m]{named}", place, tuple(dampings), 10.0)
-    if yields:
-        told = " along the motion" if isotropic else named
-        second = LivePlot(f"clay, fe [N]{told}", "velocity [cm/s]", tuple(laws), 0.1)
     return (
         LivePlot(f"velocity [cm/s]{named}", place, tuple(velocities), 0.1),
-        second,
+        _law_plot(clays, clay, place, named),
         LivePlot(f"force [N]: {'; '.join(both)}", "time [s]", tuple(forces), 0.1),
     )
+
+
+def _law_plot(colors: dict[int, str], clay: Clay | None, place: str, named: str) -> LivePlot:
+    """What the clay resists with: see `_plots`."""
+
+    def plot(title: str, over: str, point: Any, span: float, axes: Iterable[int]) -> LivePlot:
+        curves = [LiveCurve(colors[i], lambda f, i=i: point(f, i)) for i in axes]
+        return LivePlot(title, over, tuple(curves), span)
+
+    if clay is None or clay.viscous:
+
+        def ratio(f: Frame, i: int) -> tuple[float, float]:
+            return 100.0 * f.p[i], _ratio(f.fe[i], f.v[i])
+
+        return plot(f"clay, fe/v [N.s/m]{named}", place, ratio, 10.0, colors)
+    if not clay.of_velocity:
+        return plot(
+            f"clay, fe [N]{named}", place, lambda f, i: (100.0 * f.p[i], f.fe[i]), 0.1, colors
+        )
+    axes, told = (list(colors)[:1], " along the motion") if clay.isotropic else (colors, named)
+    law = functools.partial(_law_point, isotropic=clay.isotropic)
+    return plot(f"clay, fe [N]{told}", "velocity [cm/s]", law, 0.1, axes)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..scene.experiments import SCENARIOS
-from .session import Player, Replay, Session, flow_text
-from .stage import hardest, held_words
+from .session import Player, Replay, Session, clay_here
+from .stage import held_words
 from .viewer import Rows, Sight, Writing
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
@@ -180,15 +180,12 @@ class Window:
         if isinstance(play, Session) and not (play.paused or play.ended):
             state = "recording" if play.recording else "not recording"
         slow = ", machine too slow" if clock.slow else ""
-        gain, b, still = play.gain, play.b, held_words(frame.held)
-        clay = "b", f"{b[0]:.4g}, {b[1]:.4g} N.s/m here; clay {hardest(play.scenario):.4g}"
-        if flow := flow_text(play.scenario, frame.p, b):
-            clay = "clay", flow
+        gain, still = play.gain, held_words(frame.held)
         rows: Rows = (
             ("time", f"{frame.t:.1f} s, {clock.factor:.2f} x real time{slow}"),
             ("state", f"{state}, {still}" if still else state),
             ("K", f"{gain[0]:.3g}, {gain[1]:.3g}"),
-            clay,
+            ("clay", clay_here(play.scenario, frame.p, play.b)),
             ("fh", f"{math.hypot(*frame.fh):.2f} N"),
         )
         keys, verdict = LIVE_KEYS if isinstance(play, Session) else REPLAY_KEYS, play.verdict()

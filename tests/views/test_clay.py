@@ -81,7 +81,7 @@ def test_any_clay_is_drawn(angle):
         drawn = run_plots.figures(record)
         assert set(drawn) == {"velocity", "path"}
         told = " ".join(x.get_text() for x in drawn["path"].findobj(Text))
-        assert ("axes rotated by 22.9 degrees" in told) == bool(angle)
+        assert ("axes rotated by 22.92 degrees" in told) == bool(angle)
 
 
 def test_a_velocity_plot_shades_the_cells_that_the_path_met():

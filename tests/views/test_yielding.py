@@ -226,7 +226,7 @@ def test_title_and_map_name_the_flow(layers):
     for part in ("F$_y$ = 1, 3 N", "K$_c$ = 4 N/(m/s)$^n$", "n = 0.4", "b = 20 N"):
         assert part in said
     texts = [t.get_text() for t in run_plots.path_plot(layers).axes[0].texts]
-    assert texts == ["F$_y$ = 1\nb = (20, 20)", "F$_y$ = 3\nK$_c$ = 4\nn = 0.4"]
+    assert texts == UNITS
     only = dataclasses.replace(hc.constant_cut(), clay=hc.slab(hc.Flow(Fy=3.0), 0.05, 0.15))
     assert not any(x.startswith("b =") for x in run_plots._scenario_parts(only))
 
@@ -289,7 +289,7 @@ def test_session_holds_and_lets_go():
     assert session.verdict().text == "stable"  # the linear loop knows no limit here
     window = Window(session)
     rows = dict(window.look([], None).writing.rows)
-    assert rows["state"] == "recording, held" and rows["clay"] == "Fy 4 N here" and "b" not in rows
+    assert rows["state"] == "recording, held" and rows["clay"] == "Fy = 4 N here" and "b" not in rows
     session.change(b=0.5)  # all of the clay's force
     assert session.scenario.clay.x.Fy == (0.0, 2.0, 0.0)
     push(session, (3.0, 0.0), 0.2)
@@ -361,7 +361,7 @@ def test_ground_of_a_groove_is_drawn_with_the_path(twice):
     drawn["ground"].draw_without_rendering()
     low, high = ax.get_xlim()
     assert low < 0.0 and high > 10.0
-    assert "clay that stays cut, up to 1 N" in " ".join(ax.get_title(loc="left").split())
+    assert "permanent cut, up to 1 N" in " ".join(ax.get_title(loc="left").split())
     patches = drawn["velocity"].axes[0].patches
     assert [p.get_label() for p in patches] == ["clay"]
     assert patches[0].get_x() == pytest.approx(2.0)
@@ -402,7 +402,7 @@ def test_session_cuts_a_groove_and_changes_its_pressure():
     assert frame.held == (True, True) and 0.015 < frame.p[0] < 0.03
     assert frame.fe[0] == pytest.approx(0.8, abs=0.01)
     window = Window(session)
-    assert dict(window.look([], None).writing.rows)["clay"] == "holds with up to 1 N"
+    assert dict(window.look([], None).writing.rows)["clay"] == "holds with up to 1 N here"
     session.change(b=0.5)
     assert session.scenario.clay.groove.pressure == 10e3
     push(session, (0.8, 0.0), 1.5)
