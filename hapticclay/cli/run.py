@@ -130,12 +130,12 @@ def deliver(record: Record, folder: Path, figures: console.FigureOptions | None)
         earlier = (folder / "record.npz").exists()
         record.save(folder)
         if figures or earlier:
-            from ..views import run_plots
+            from ..views import run_figures
 
-            drawn = run_plots.record_figures(record) if figures else {}
+            drawn = run_figures.record_figures(record) if figures else {}
             written = console.save_figures(drawn, folder, figures)
             kept = {path for files in written.values() for path in files}
-            for path in run_plots.figure_files(folder) - kept if earlier else ():
+            for path in run_figures.figure_files(folder) - kept if earlier else ():
                 path.unlink(missing_ok=True)
     finally:  # a full disk must not hide the results
         print(run_table(record))

@@ -219,7 +219,7 @@ def frames(
     width, height = options.size
     beside, running = 0, None
     if options.plots:
-        from .run_plots import RunningPlots, plots_fit
+        from .running_plots import RunningPlots, plots_fit
 
         share = 2 * round(0.5 * PLOTS_SHARE * width)
         if plots_fit(share, height):

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
 from ..simulation.record import Record, port_energy
-from . import run_plots
+from . import path_plots, run_axes, run_figures, run_plots
 from .style import (
     BLUE,
     GREEN,
@@ -52,7 +52,7 @@ class RecordPlots:
 
     def all(self) -> dict[str, Figure]:
         """The figures that `hapticclay run` draws, by file name."""
-        figures = run_plots.figures(self._sampled())
+        figures = run_figures.figures(self._sampled())
         return {name: _with_picture(figure) for name, figure in figures.items()}
 
     def velocity(self, axis: str | None = None) -> Figure:
@@ -65,7 +65,9 @@ class RecordPlots:
             ParameterError: there is no such axis, or the record has no samples.
         """
         record = self._sampled()
-        axis = choice("axis", axis, AXIS_CHOICES) if axis else run_plots.shown_axes(record.scenario)
+        axis = (
+            choice("axis", axis, AXIS_CHOICES) if axis else run_figures.shown_axes(record.scenario)
+        )
         return _with_picture(run_plots.velocity_plot(record, axis))
 
     def force(self, axis: str | None = None, over: str | None = None) -> Figure:
@@ -83,7 +85,7 @@ class RecordPlots:
         """
         record = self._sampled()
         s = record.scenario
-        axis = choice("axis", axis, AXES) if axis else run_plots.main_axis(s)
+        axis = choice("axis", axis, AXES) if axis else run_axes.main_axis(s)
         if over or s.muscle is not None or (s.clay and not s.clay.viscous):
             over = choice("over", over or "time", OVER_CHOICES)
             return _with_picture(run_plots.maneuver_plot([record], axis, over))
@@ -95,7 +97,7 @@ class RecordPlots:
         Raises:
             ParameterError: the record has no samples.
         """
-        return _with_picture(run_plots.path_plot(self._sampled()))
+        return _with_picture(path_plots.path_plot(self._sampled()))
 
     def energy(self) -> Figure:
         """Energy over time: what hand and motors have put in, what the clay took, what moves.

@@ -15,7 +15,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app, console
 from hapticclay.simulation import record, simulate
-from hapticclay.views import run_plots
+from hapticclay.views import run_figures
 
 
 def run(capsys, *args):
@@ -393,7 +393,7 @@ def test_a_run_that_ends_at_once_is_still_drawn(capsys, tmp_path):
     ids=lambda s: s.name,
 )
 def test_names_of_figures_are_known(scenario):
-    assert set(run_plots.figures(hc.simulate(scenario))) <= set(run_plots.FIGURES)
+    assert set(run_figures.figures(hc.simulate(scenario))) <= set(run_figures.FIGURES)
 
 
 def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.removal import removed
-from hapticclay.views import run_plots, session, stage
+from hapticclay.views import run_figures, run_plots, session, stage
 from hapticclay.views.style import clay_color
 
 DOCS = Path(__file__).parents[2] / "docs" / "clay.md"
@@ -78,7 +78,7 @@ def test_any_clay_is_drawn(angle):
     smooth = hc.Smooth((0.02, 0.15), (-0.05, 0.05), fine)
     for law in (grid([[90.0, 30.0], [0.0, 60.0]]), hc.Grid(*edges, np.pad(fine, 1)), smooth):
         record = cut(law, angle, force=(1.0, 0.3))
-        drawn = run_plots.figures(record)
+        drawn = run_figures.figures(record)
         assert set(drawn) == {"velocity", "path"}
         told = " ".join(x.get_text() for x in drawn["path"].findobj(Text))
         assert ("axes rotated by 22.92 degrees" in told) == bool(angle)

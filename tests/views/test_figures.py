@@ -32,8 +32,10 @@ from hapticclay.views import (
     fit_plots,
     impedance_plots,
     passivity_plots,
+    path_plots,
     record_plots,
     robustness_plots,
+    run_figures,
     run_plots,
     study_plots,
     theory_plots,
@@ -277,7 +279,7 @@ def compared(kind):
 
 
 def run_case(name, figure):
-    return lambda: run_plots.FIGURES[figure](record(name))
+    return lambda: run_figures.FIGURES[figure].draw(record(name))
 
 
 CASES = {
@@ -296,7 +298,7 @@ CASES = {
     "readings": lambda: run_plots.readings_plot(
         {n: record("variable") for n in ("none", "0.15/s", "30/s", "0.15/sample")}
     ),
-    "path of the cut": lambda: run_plots.path_plot(record("constant")),
+    "path of the cut": lambda: path_plots.path_plot(record("constant")),
     "fit": lambda: fit_plots.fit_plot(fitted()),
     **{
         f"map {kind}": lambda kind=kind: study_plots.stability_map_plot(stability_chart(kind))

@@ -13,7 +13,7 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.views import film
 from hapticclay.views.film import FilmOptions
-from hapticclay.views.run_plots import RunningPlots, plots_fit, running_figure
+from hapticclay.views.running_plots import RunningPlots, plots_fit, running_figure
 from hapticclay.views.stage import Stage
 
 

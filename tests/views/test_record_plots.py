@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.views import record_plots, run_plots
+from hapticclay.views import path_plots, record_plots, run_figures, run_plots
 from hapticclay.views.record_plots import RecordPlots
 
 
@@ -35,7 +35,7 @@ def test_each_figure_is_that_of_run_plots(cut, maneuver):
         (cut.plot.force(), run_plots.force_ratio_plot(cut)),
         (cut.plot.force("y"), run_plots.force_ratio_plot(cut, "y")),
         (cut.plot.force(over="position"), run_plots.maneuver_plot([cut], over="position")),
-        (cut.plot.path(), run_plots.path_plot(cut)),
+        (cut.plot.path(), path_plots.path_plot(cut)),
         (cut.plot(), run_plots.velocity_plot(cut)),
         (maneuver.plot(), run_plots.maneuver_plot([maneuver])),
         (maneuver.plot.force(), run_plots.maneuver_plot([maneuver])),
@@ -43,7 +43,7 @@ def test_each_figure_is_that_of_run_plots(cut, maneuver):
     for ours, theirs in same:
         assert [ax.get_ylabel() for ax in ours.axes] == [ax.get_ylabel() for ax in theirs.axes]
         np.testing.assert_array_equal(curve(ours), curve(theirs))
-    assert set(cut.plot.all()) == set(run_plots.figures(cut))
+    assert set(cut.plot.all()) == set(run_figures.figures(cut))
     assert len(hc.simulate(hc.variable_cut(t_max=0.1)).plot.velocity().axes) == 2
 
 

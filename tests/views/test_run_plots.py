@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.views import run_plots
+from hapticclay.views import captions, path_plots, run_figures, run_plots
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,10 @@ SCENARIOS = {
 @pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS.keys())
 def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
     record = hc.simulate(scenario)
-    for name, figure in {**run_plots.figures(record), "map": run_plots.path_plot(record)}.items():
+    for name, figure in {
+        **run_figures.figures(record),
+        "map": path_plots.path_plot(record),
+    }.items():
         figure.draw_without_rendering()
         (legend,) = figure.legends
         key, whole = legend.get_window_extent(), figure.bbox
@@ -95,10 +98,10 @@ def test_no_title_is_clipped_or_runs_into_the_legend(scenario):
 
 def test_a_title_names_the_parts_that_are_not_the_papers():
     record = hc.simulate(SCENARIOS["other parts"])
-    for figure in run_plots.figures(record).values():
+    for figure in run_figures.figures(record).values():
         said = " ".join(figure.axes[0].get_title(loc="left").split())
         assert "another arm, another servo, another compensator" in said
-    own = run_plots._scenario_parts(SCENARIOS["long"])
+    own = captions.scenario_parts(SCENARIOS["long"])
     assert not any("another" in x for x in own)
 
 
@@ -110,7 +113,7 @@ def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
         figure.add_subplot().plot(record.t, (record.fh * record.v).sum(axis=1))
         return figure
 
-    monkeypatch.setitem(run_plots.FIGURES, "power", power)
+    monkeypatch.setitem(run_figures.FIGURES, "power", run_figures.RunFigure(power, ("v", "fh")))
     args = ["run", "constant", "--t-max", "0.1", "--out", str(tmp_path)]
     assert app.main(args) == 0
     plots = {"velocity.png", "force.png", "power.png"}
@@ -121,9 +124,9 @@ def test_a_plot_is_one_entry_of_the_registry(tmp_path, monkeypatch):
 
 
 def test_a_figure_that_does_not_apply_is_not_drawn(run, monkeypatch):
-    assert set(run_plots.figures(run)) == {"velocity", "force"}
-    monkeypatch.setitem(run_plots.FIGURES, "velocity", lambda record: None)
-    assert set(run_plots.figures(run)) == {"force"}
+    assert set(run_figures.figures(run)) == {"velocity", "force"}
+    monkeypatch.setitem(run_figures.FIGURES, "velocity", run_figures.RunFigure(lambda _: None, ()))
+    assert set(run_figures.figures(run)) == {"force"}
 
 
 OTHER = {  # compensator, static gain of G, and what C adds to the clay, f = (c/K + b) v
@@ -177,10 +180,10 @@ def test_a_driven_run_in_clay_keeps_its_figures():
     clay = hc.slab(90.0, 0.02, 0.1)
     push = hc.Multisine((1.0, 0.5), 0.5, 8.0, 2.0)
     s = dataclasses.replace(hc.free(), clay=clay, muscle=push, t_max=0.5, length=None)
-    driven = run_plots.figures(hc.simulate(s))
+    driven = run_figures.figures(hc.simulate(s))
     assert {"velocity", "force", "path", "force_position"} <= set(driven)
     assert any("clay" in x.get_label() for x in driven["force"].axes[0].get_lines())
-    away = run_plots.figures(hc.simulate(dataclasses.replace(s, clay=None)))
+    away = run_figures.figures(hc.simulate(dataclasses.replace(s, clay=None)))
     assert "path" not in away and "velocity" not in away
     still = dataclasses.replace(s, muscle=None, clay=hc.Clay(hc.Grid((), (), ((9.0,),)), clay.y))
-    assert "path" in run_plots.figures(hc.simulate(still))
+    assert "path" in run_figures.figures(hc.simulate(still))

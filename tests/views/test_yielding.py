@@ -10,7 +10,15 @@ from scipy.optimize import brentq, fsolve
 import hapticclay as hc
 from hapticclay.cli.run import run_table
 from hapticclay.theory import linear_loop
-from hapticclay.views import run_plots, style
+from hapticclay.views import (
+    captions,
+    flow_plots,
+    path_plots,
+    run_figures,
+    run_plots,
+    running_plots,
+    style,
+)
 from hapticclay.views.session import FRAME_TIME, Frame, Replay, Session, scaled
 from hapticclay.views.stage import Stage, held_words
 from hapticclay.views.viewer import _law_point
@@ -48,7 +56,7 @@ def found(ax, label):
 
 
 def test_force_over_velocity_shows_measured_held_and_law(held):
-    figure = run_plots.figures(held)["force_velocity"]
+    figure = run_figures.figures(held)["force_velocity"]
     ax = figure.axes[0]
     assert "v$_x$" in ax.get_xlabel() and "[m/s]" in ax.get_xlabel() and "[N]" in ax.get_ylabel()
     dots = [x for x in ax.lines if x.get_marker() == "." and len(x.get_xdata())]
@@ -69,7 +77,7 @@ def test_force_over_velocity_shows_measured_held_and_law(held):
 
 def test_measured_forces_lie_on_the_laws_of_their_regions(layers):
     """Away from borders, to the coupling of the axes where one of them stops within a kick."""
-    met = run_plots._flows_met(layers, 0)
+    met = flow_plots.flows_met(layers, 0)
     assert set(met) == {hc.Flow(1.0, 0.0, 1.0, 20.0), hc.Flow(3.0, 4.0, 0.4, 0.0)}
     for flow, where in met.items():
         some = where[5:-5]
@@ -77,7 +85,7 @@ def test_measured_forces_lie_on_the_laws_of_their_regions(layers):
         np.testing.assert_allclose(layers.fe[some, 0], flow.force(layers.v[some, 0]), rtol=1e-4)
         away = np.abs(layers.fe[some, 0] - flow.force(layers.v[some, 0]))
         assert np.median(away) < 1e-12  # [N], rounding of a few sums
-    figure = run_plots.force_velocity_plot(layers)
+    figure = flow_plots.force_velocity_plot(layers)
     laws = [x for x in figure.axes[0].lines if x.get_linestyle() == "--"]
     assert len(laws) == 2
     dots = [x for x in figure.axes[0].lines if x.get_marker() == "." and len(x.get_xdata())]
@@ -86,7 +94,7 @@ def test_measured_forces_lie_on_the_laws_of_their_regions(layers):
 
 def test_clay_that_resists_along_the_motion_has_one_panel():
     run = hc.simulate(cut(hc.Flow(0.4, 2.0, 0.3, 10.0), (1.0, 0.2), isotropic=True, t_max=4.0))
-    (ax,) = run_plots.force_velocity_plot(run).axes
+    (ax,) = flow_plots.force_velocity_plot(run).axes
     assert "along the motion" in ax.get_xlabel()
     (dots,) = [x for x in ax.lines if x.get_marker() == "." and len(x.get_xdata())]
     v, f = dots.get_data()
@@ -99,14 +107,14 @@ def test_b_that_is_not_one_number_is_left_out_of_forces_and_laws():
     growing = dataclasses.replace(LAYERS, growth=(0.0, 30.0, 0.0, 0.0))
     clay = hc.Clay(growing, growing)
     s = dataclasses.replace(hc.constant_cut(t_max=1.0), clay=clay, force=(5.0, 0.0))
-    figure = run_plots.force_velocity_plot(hc.simulate(s))
+    figure = flow_plots.force_velocity_plot(hc.simulate(s))
     assert "less b v" in figure.axes[0].get_ylabel()
     assert not any("b =" in x.get_text() for x in figure.legends[0].get_texts())
 
 
 def test_held_time_is_shaded_and_marked(held):
     assert len(held.stops) > 3 and held.stops[-1].end is None
-    (ax,) = run_plots.figures(held)["force"].axes
+    (ax,) = run_figures.figures(held)["force"].axes
     (bars,) = [c for c in ax.collections if c.get_label() == "held still"]
     spans = sorted((p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in bars.get_paths())
     stops = [x for x in held.stops if x.axis == "x"]
@@ -181,7 +189,7 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
         hc.constant_cut(t_max=1.5), clay=hc.slab(hc.materials.material("stiff clay"), 0.05, 0.15)
     )
     run = hc.simulate(scenario)
-    figure, curves = run_plots.running_figure(run, 480, 720)
+    figure, curves = running_plots.running_figure(run, 480, 720)
     ax = figure.axes[1]
     (x, y) = next((x, y) for at, x, y, _ in curves if at is ax)
     inside = (run.p[:, 0] > 0.05) & ~run.held()[:, 0]
@@ -225,10 +233,13 @@ def test_title_and_map_name_the_flow(layers):
     said = " ".join(figure.axes[0].get_title(loc="left").split())
     for part in ("F$_y$ = 1, 3 N", "K$_c$ = 4 N/(m/s)$^n$", "n = 0.4", "b = 20 N"):
         assert part in said
-    texts = [t.get_text() for t in run_plots.path_plot(layers).axes[0].texts]
-    assert texts == UNITS
+    texts = [t.get_text() for t in path_plots.path_plot(layers).axes[0].texts]
+    assert texts == [
+        "F$_y$ = 1 N\nb = 20 N$\\cdot$s/m",
+        "F$_y$ = 3 N\nK$_c$ = 4 N/(m/s)$^n$\nn = 0.4",
+    ]
     only = dataclasses.replace(hc.constant_cut(), clay=hc.slab(hc.Flow(Fy=3.0), 0.05, 0.15))
-    assert not any(x.startswith("b =") for x in run_plots._scenario_parts(only))
+    assert not any(x.startswith("b =") for x in captions.scenario_parts(only))
 
 
 def test_clay_is_shaded_by_what_it_takes_to_cut_it(layers):
@@ -289,7 +300,9 @@ def test_session_holds_and_lets_go():
     assert session.verdict().text == "stable"  # the linear loop knows no limit here
     window = Window(session)
     rows = dict(window.look([], None).writing.rows)
-    assert rows["state"] == "recording, held" and rows["clay"] == "Fy = 4 N here" and "b" not in rows
+    assert (
+        rows["state"] == "recording, held" and rows["clay"] == "Fy = 4 N here" and "b" not in rows
+    )
     session.change(b=0.5)  # all of the clay's force
     assert session.scenario.clay.x.Fy == (0.0, 2.0, 0.0)
     push(session, (3.0, 0.0), 0.2)
@@ -350,7 +363,7 @@ def twice():
 
 
 def test_ground_of_a_groove_is_drawn_with_the_path(twice):
-    drawn = run_plots.figures(twice)
+    drawn = run_figures.figures(twice)
     assert set(drawn) == {"velocity", "force", "force_position", "ground"}
     ax = drawn["ground"].axes[0]
     (image,) = [c for c in ax.collections if c.get_array() is not None]

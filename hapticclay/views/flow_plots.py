@@ -1,0 +1,148 @@
+"""Force over velocity in clay that yields."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..model.constants import AXES
+from ..model.flow import Flow
+from ..simulation.record import Record
+from .captions import in_math, scenario_parts
+from .run_axes import MOST_DOTS, main_axis, spread
+from .style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    VERMILION,
+    add_legend,
+    along_motion,
+    figure_size,
+    figure_style,
+    panel_grid,
+    set_title,
+    stroke,
+)
+
+HELD_LOOK: Any = dict(color=ORANGE, ls="", marker="_", ms=9, mew=0.8)
+FLOW_COLORS = (BLUE, GREEN, PURPLE, SKY_BLUE)  # of the regions of clay that yields
+
+
+def force_velocity_plot(record: Record) -> Figure:
+    """Plots the force of clay that yields over the velocity, beside the law of each region.
+
+    Clay that resists along the motion has one panel: force and speed along the motion, negative
+    where the handle goes back. Otherwise each axis on which it yields has one, of the clay's own
+    axes where they are rotated. b v is left out of forces and laws where b is not one number a
+    region.
+
+    Args:
+        record: the run, in clay that yields somewhere.
+    """
+    clay, main = record.scenario.clay, AXES.index(main_axis(record.scenario))
+    assert clay is not None
+    c, s = math.cos(clay.angle), math.sin(clay.angle)
+    own = np.array(((c, -s), (s, c)))  # columns: the clay's axes
+    v, fe, held = record.v @ own, record.fe @ own, record.held()
+    across = clay.isotropic and not np.array_equal(record.b[:, 0], record.b[:, 1])
+    whole = not (clay.grows or clay.smooth or across)
+    if not whole:
+        fe = fe - record.b * v
+    if clay.isotropic:
+        named = "velocity along the motion [m/s]"
+        panels: dict[str, Any] = {named: (main, *along_motion(v, fe, main), held.all(axis=1))}
+    else:
+        names = [f"velocity v$_{a}$ [m/s]" for a in AXES]
+        if clay.angle:
+            names = [f"velocity along its {a} axis [m/s]" for a in ("first", "second")]
+        panels = {names[i]: (i, v[:, i], fe[:, i], held[:, i]) for i in (main, 1 - main)}
+        some = {n: x for n, x in panels.items() if clay.laws[x[0]].yields and x[1].any()}
+        panels = some or dict([next(iter(panels.items()))])
+    met = {name: flows_met(record, x[0], whole) for name, x in panels.items()}
+    shown = list(dict.fromkeys(flow for flows in met.values() for flow in flows))
+    colors = dict(zip(shown, FLOW_COLORS, strict=False))
+    with figure_style():
+        rows, columns = panel_grid(len(panels))
+        figure = Figure(figsize=figure_size(columns, 4.4 * rows))
+        several = figure.subplots(rows, columns, squeeze=False).ravel()
+        for flow, color in colors.items():
+            told = ", ".join(in_math(x.text()) for x in flow.words)
+            label = f"measured, {told}"
+            several[0].plot([], [], ".", color=color, ms=stroke(9), label=label)
+        if any(held[:, x[0]].any() for x in panels.values()):
+            several[0].plot([], [], **HELD_LOOK, label="held still")
+        for ax, (name, (_, *measured)) in zip(several, panels.items(), strict=True):
+            flows = {flow: where for flow, where in met[name].items() if flow in colors}
+            _forces_over_velocity(ax, flows, colors, *measured)
+            ax.set_xlabel(name)
+            ax.set_ylabel("force of the clay [N]" if whole else "force of the clay less b v [N]")
+        add_legend(figure, several[0], ncols=2)
+        set_title(several[0], *scenario_parts(record.scenario))
+    return figure
+
+
+def flows_met(record: Record, i: int, whole: bool = True) -> dict[Flow, np.ndarray]:
+    """Samples in each flow of an axis that yields, those with the most samples first.
+
+    Args:
+        record: the run, in clay.
+        i: axis, 0 for x, 1 for y.
+        whole: whether flows that differ in b alone are told apart.
+
+    Returns:
+        Indices by flow.
+    """
+    clay = record.scenario.clay
+    assert clay is not None
+    b = record.b[:, i] if whole else np.zeros(len(record.t))
+    rows = np.stack((*clay.laws[i].flows_at(*record.p.T), b), axis=-1)
+    some = np.flatnonzero((rows[:, 0] > 0.0) | (rows[:, 1] > 0.0))
+    kinds, which = np.unique(rows[some], axis=0, return_inverse=True)
+    met = {Flow(*x): some[which.ravel() == k] for k, x in enumerate(kinds.tolist())}
+    return dict(sorted(met.items(), key=lambda x: -len(x[1])))
+
+
+def _forces_over_velocity(
+    ax: Axes,
+    met: dict[Flow, np.ndarray],
+    colors: Mapping[Flow, str],
+    v: np.ndarray,
+    force: np.ndarray,
+    held: np.ndarray,
+) -> None:
+    """Draws measured forces, those of a handle that is held, and the laws."""
+    for flow, where in met.items():
+        some = spread(where[~held[where]], MOST_DOTS)
+        ax.plot(v[some], force[some], ".", color=colors[flow], ms=stroke(6), mew=0)
+    some = spread(np.flatnonzero(held), MOST_DOTS)
+    ax.plot(v[some], force[some], **HELD_LOOK)
+    label = "law of the clay"
+    for flow, where in met.items():
+        back = force[where].min() < -0.01 * flow.Fy
+        x, y = law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
+        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(1.3), label=label)
+        label = "_"
+
+
+def law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities [m/s] and forces [N] of a law, and at rest the forces that it can hold.
+
+    Args:
+        flow: the law.
+        low: least velocity [m/s].
+        high: largest velocity [m/s].
+        back: whether it held the handle against a push in either direction.
+    """
+    share = np.linspace(0.0, 1.0, 200)[1:] ** 3  # close together where |v|^n bends
+    up = share * high if high > 0.0 else np.zeros(0)
+    down = share[::-1] * low if low < 0.0 else np.zeros(0)
+    least = -flow.Fy if back or low < 0.0 else 0.0
+    x = np.concatenate((down, (0.0, 0.0), up))
+    return x, np.concatenate((flow.force(down), (least, flow.Fy), flow.force(up)))

@@ -1,0 +1,175 @@
+"""The figures of a run that `hapticclay run` writes, and the numbers that they show."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..model.clay import Profile
+from ..model.constants import AXES
+from ..scene.scenario import Scenario
+from ..simulation.record import Record
+from . import figure as shown
+from .flow_plots import force_velocity_plot
+from .ground_plots import groove_of, ground_plot
+from .path_plots import path_plot
+from .run_axes import is_viscous, main_axis
+from .run_plots import force_ratio_plot, maneuver_plot, velocity_plot
+
+
+def _clay_along_both_axes(s: Scenario) -> bool:
+    return s.clay is not None and s.clay.along == AXES[0] + AXES[1]
+
+
+def shown_axes(s: Scenario) -> str:
+    """The axes whose velocity is drawn: "xy" where the clay changes along both, or the main one.
+
+    Args:
+        s: the scenario.
+    """
+    return "xy" if _clay_along_both_axes(s) else main_axis(s)
+
+
+def _velocity(record: Record) -> Figure | None:
+    s = record.scenario
+    if s.muscle is not None and s.clay is None:
+        return None
+    return velocity_plot(record, shown_axes(s))
+
+
+def _force(record: Record) -> Figure | None:
+    s = record.scenario
+    if s.muscle is not None or not is_viscous(s):
+        return maneuver_plot([record], main_axis(s))
+    return None if _clay_along_both_axes(s) else force_ratio_plot(record, main_axis(s))
+
+
+def _path(record: Record) -> Figure | None:
+    """Where the handle may leave the line of one experiment: driven, or in clay of an image."""
+    s = record.scenario
+    if s.clay is None or record.ground is not None:  # which shows the path
+        return None
+    image = any(not isinstance(law, Profile) for law in s.clay.laws)
+    return path_plot(record) if s.driven or image or _clay_along_both_axes(s) else None
+
+
+def _force_position(record: Record) -> Figure | None:
+    s = record.scenario
+    some = s.muscle is not None or record.ground is not None
+    return maneuver_plot([record], main_axis(s), "position") if some else None
+
+
+def _force_velocity(record: Record) -> Figure | None:
+    clay = record.scenario.clay
+    told = clay is not None and clay.of_velocity and not clay.viscous
+    return force_velocity_plot(record) if told and len(record.t) else None
+
+
+def _ground(record: Record) -> Figure | None:
+    return ground_plot(record) if record.ground is not None and len(record.t) else None
+
+
+def _stretches(record: Record) -> dict[str, dict[str, Any]]:
+    """Steady and expected speed of each stretch."""
+    rows = [(axis, r[axis]) for axis in AXES for r in record.regions(axis)]
+    return {
+        "stretches": {
+            "axis": [axis for axis, _ in rows],
+            "from [m]": [r["from_m"] for _, r in rows],
+            "to [m]": [r["to_m"] for _, r in rows],
+            "steady speed [m/s]": [r["steady_speed"] for _, r in rows],
+            "expected speed [m/s]": [r["expected_speed"] for _, r in rows],
+        }
+    }
+
+
+def _cells(record: Record) -> dict[str, dict[str, Any]]:
+    """What is left of each cell of clay that stays cut."""
+    if record.ground is None:
+        return {}
+    x, y = (0.5 * (e[1:] + e[:-1]) for e in groove_of(record).edges)
+    i, j = (a.ravel() for a in np.indices(record.ground.shape))
+    return {"cells": {"x [m]": x[i], "y [m]": y[j], "left [m]": record.ground.ravel()}}
+
+
+class RunFigure(NamedTuple):
+    """A figure of a run.
+
+    Attributes:
+        draw: returns it for a record, or None where it does not apply.
+        columns: of the record, whose samples it shows.
+        tables: other numbers that it shows, by the name of their table and of their column.
+    """
+
+    draw: Callable[[Record], Figure | None]
+    columns: tuple[str, ...]
+    tables: Callable[[Record], dict[str, dict[str, Any]]] = lambda _: {}
+
+
+FIGURES = {
+    "velocity": RunFigure(_velocity, ("p", "v"), _stretches),
+    "force": RunFigure(_force, ("p", "v", "fh", "fe", "b")),
+    "path": RunFigure(_path, ("p",)),
+    "force_position": RunFigure(_force_position, ("p", "fh", "fe")),
+    "force_velocity": RunFigure(_force_velocity, ("v", "fe")),
+    "ground": RunFigure(_ground, ("p",), _cells),
+}
+"""The figures of a run by file name. To add a plot to `hapticclay run`, add an entry."""
+COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
+
+
+def record_figures(record: Record) -> dict[str, shown.Figure]:
+    """Returns every figure of FIGURES, to be drawn in any style; some may not apply to the run.
+
+    Args:
+        record: the run.
+    """
+    return {
+        name: shown.Figure(
+            functools.partial(kind.draw, record), functools.partial(run_tables, record, name)
+        )
+        for name, kind in FIGURES.items()
+    }
+
+
+def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
+    """Returns the numbers that a figure of FIGURES shows.
+
+    Args:
+        record: the run.
+        name: of the figure.
+    """
+    samples: dict[str, Any] = {"time [s]": record.t}
+    for part in FIGURES[name].columns:
+        for i, axis in enumerate(AXES):
+            word = axis if part == "p" else f"{part}_{axis}"
+            samples[f"{word} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
+    return {"samples": samples, **FIGURES[name].tables(record)}
+
+
+def figure_files(folder: Path) -> set[Path]:
+    """Lists the files that figures of FIGURES, in any format, and their numbers have in a folder.
+
+    Args:
+        folder: of a record.
+    """
+    ends = [f".{kind}" for kind in (*shown.FORMATS, "csv")] + ["-*.csv"]
+    return {path for name in FIGURES for end in ends for path in folder.glob(name + end)}
+
+
+def figures(record: Record) -> dict[str, Figure]:
+    """Draws the figures of FIGURES that apply to a run.
+
+    Args:
+        record: the run.
+
+    Returns:
+        Figures by file name.
+    """
+    drawn = {name: kind.draw(record) for name, kind in FIGURES.items()}
+    return {name: figure for name, figure in drawn.items() if figure is not None}
