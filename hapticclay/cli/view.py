@@ -19,7 +19,8 @@ from .run import deliver
 if TYPE_CHECKING:
     from ..simulation.record import Record
     from ..studies.removal import Tool
-    from ..views.session import Replay, Session
+    from ..views.replay import Replay
+    from ..views.session import Session
 
 
 def tool_size(name: str) -> Callable[[], float]:
@@ -101,7 +102,8 @@ class ViewCommand:
 
     def _session(self, tool: Tool) -> Record | None:
         """Plays a session until its window or page is closed; None if nothing was recorded."""
-        from ..views.session import Session, stoppable
+        from ..views.player import stoppable
+        from ..views.session import Session
 
         session = Session(self.scenario, self.stiffness, tool, self.every)
         with stoppable() as stop, streaming(session, self.stream):
@@ -150,7 +152,8 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
     """
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
-    from ..views.session import Replay, stoppable
+    from ..views.player import stoppable
+    from ..views.replay import Replay
     from ..views.window import Window
 
     play = Replay(record, tool)

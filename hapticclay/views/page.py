@@ -21,7 +21,10 @@ import numpy as np
 
 from ..errors import ParameterError, integer
 from ..model.constants import AXES
-from .session import Frame, Player, Session, clay_here
+from .frame import Frame
+from .live_verdict import clay_here
+from .player import Player
+from .session import Session
 from .stage import (
     ARROW_WIDTH,
     GROUND,

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
 from ..model.constants import AXES
-from .session import FRAME_TIME
+from .clock import FRAME_TIME
 
 if TYPE_CHECKING:
-    from .session import Frame, Replay, Session
+    from .frame import Frame
+    from .replay import Replay
+    from .session import Session
 
 ADDRESS_FORM = "must be HOST:PORT, as in localhost:9870"
 

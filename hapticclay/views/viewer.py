@@ -27,7 +27,8 @@ from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..stepping.engine import mujoco
 from ..studies.removal import Tool
-from .session import FRAME_TIME, Frame
+from .clock import FRAME_TIME
+from .frame import Frame
 from .stage import Stage, plotted_axes
 from .style import (
     BLACK,

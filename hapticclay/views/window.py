@@ -17,7 +17,10 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..scene.experiments import SCENARIOS
-from .session import Player, Replay, Session, clay_here
+from .live_verdict import clay_here
+from .player import Player
+from .replay import Replay
+from .session import Session
 from .stage import held_words
 from .viewer import Rows, Sight, Writing
 

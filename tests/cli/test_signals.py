@@ -62,7 +62,7 @@ def test_an_export_leaves_no_temporary_file(tmp_path, monkeypatch, capsys, how):
 
 
 def test_a_signal_goes_to_who_listens_for_ctrl_c():
-    from hapticclay.views.session import stoppable
+    from hapticclay.views.player import stoppable
 
     with console.ends() as received:
         with stoppable() as stop:  # of a session in a window or a page

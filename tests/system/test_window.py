@@ -19,7 +19,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.views import window
-from hapticclay.views.session import FRAME_TIME, Replay, Session
+from hapticclay.views.clock import FRAME_TIME
+from hapticclay.views.replay import Replay
+from hapticclay.views.session import Session
 from hapticclay.views.viewer import Pane
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]

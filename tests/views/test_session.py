@@ -9,15 +9,11 @@ import pytest
 import hapticclay as hc
 from hapticclay.simulation.engines import has_numba
 from hapticclay.stepping.run import PLAIN
-from hapticclay.views.session import (
-    FRAME_TIME,
-    LONGEST_SLICE,
-    Clock,
-    Player,
-    Replay,
-    Session,
-    played,
-)
+from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
+from hapticclay.views.live_run import played
+from hapticclay.views.player import Player
+from hapticclay.views.replay import Replay
+from hapticclay.views.session import Session
 from hapticclay.views.stage import Stage
 
 
@@ -306,7 +302,7 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
 
 
 def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
-    from hapticclay.views import session as module
+    from hapticclay.views import live_run as module
 
     fine, ends = hc.constant_cut(dt=5e-5), []
     for numba in (True, False):

@@ -15,7 +15,10 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app, view
 from hapticclay.errors import ParameterError
-from hapticclay.views.session import FRAME_TIME, Player, Replay, Session
+from hapticclay.views.clock import FRAME_TIME
+from hapticclay.views.player import Player
+from hapticclay.views.replay import Replay
+from hapticclay.views.session import Session
 from hapticclay.views.stream import UdpStream
 
 

@@ -19,7 +19,10 @@ from hapticclay.views import (
     running_plots,
     style,
 )
-from hapticclay.views.session import FRAME_TIME, Frame, Replay, Session, scaled
+from hapticclay.views.clock import FRAME_TIME
+from hapticclay.views.frame import Frame
+from hapticclay.views.replay import Replay
+from hapticclay.views.session import Session, scaled
 from hapticclay.views.stage import Stage, held_words
 from hapticclay.views.viewer import _law_point
 from hapticclay.views.window import Window

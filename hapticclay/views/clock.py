@@ -1,0 +1,65 @@
+"""Real time beside simulated time."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+FRAME_TIME = 1.0 / 60.0  # [s] between two slices
+LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
+LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
+RECENT_FRAMES = 60  # over which the real-time factor is averaged
+
+
+class Clock:
+    """Deals out simulated time as real time passes, and less of it on a machine that is too slow.
+
+    Attributes:
+        frames: number of slices dealt out.
+        late: histogram of how late they came, with edges LATE_EDGES.
+        slow: whether the machine is too slow now.
+        real: real time that has passed [s].
+        simulated: simulated time dealt out [s].
+    """
+
+    def __init__(self):
+        self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
+        self.real = self.simulated = 0.0  # [s] in all
+        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT_FRAMES)
+        self._then: float | None = None
+        self._owed = 0.0
+
+    def due(self, now: float) -> float:
+        """Returns the simulated time to make now [s], LONGEST_SLICE at most.
+
+        Args:
+            now: real time [s].
+        """
+        passed = FRAME_TIME if self._then is None else now - self._then
+        self._then = now
+        self._owed += passed
+        due = min(self._owed, LONGEST_SLICE)
+        self._owed -= due
+        self.slow = self._owed > 0.5 * LONGEST_SLICE
+        if self._owed > LONGEST_SLICE:  # the rest is lost
+            self._owed = LONGEST_SLICE
+        self.frames += 1
+        self.real += passed
+        self.simulated += due
+        late = min(max(1e3 * (passed - FRAME_TIME), 0.0), LATE_EDGES[-1] - 1e-9)
+        self.late[np.searchsorted(LATE_EDGES, late, "right") - 1] += 1
+        self._recent.append((passed, due))
+        return due
+
+    def rest(self) -> None:
+        """Lets time pass that is not made up for: a pause."""
+        self._then, self._owed = None, 0.0
+
+    @property
+    def factor(self) -> float:
+        """Simulated over real time, over the last frames."""
+        real, simulated = (
+            (sum(x) for x in zip(*self._recent, strict=True)) if self._recent else (1.0, 1.0)
+        )
+        return simulated / real

@@ -1,0 +1,203 @@
+"""The run of a session: a hand that pulls to a point, steps made in slices."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import number
+from ..model.operator import NO_HAND, Operator
+from ..model.signals import Multisine
+from ..scene.scenario import Scenario
+from ..simulation.engines import has_numba, load_compiled, saved_in_a_step
+from ..stepping import monitor, path
+from ..stepping.run import PLAIN, Kernel, Run
+
+LONGEST_SESSION = 3600.0  # [s]
+PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
+KEEPS_UP = 0.4  # of real time, that steps may take; the rest is for the picture
+
+
+class Pull:
+    """The muscle force of a hand that pulls to a point through the spring of its impedance.
+
+    The force is k times the position of the point. With the impedance of the hand, which the loop
+    holds against p itself, this makes fh = -Th applied to p - point.
+
+    Attributes:
+        spring: k of x and y [N/m], (2,).
+        force: steady force beside it [N], (2,).
+        knots: (t [s], x, y [m]) of the point's path so far.
+    """
+
+    def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
+        """Puts the point at the handle.
+
+        Args:
+            spring: k of x and y [N/m].
+            p: position of the handle [m].
+        """
+        self.spring, self.force = np.array(spring), (0.0, 0.0)
+        self.knots = [(0.0, *p)]
+        self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
+
+    def lead(self, t: float, to: tuple[float, float], span: float) -> None:
+        """Moves the point evenly to a place.
+
+        Args:
+            t: from when on [s].
+            to: the place [m].
+            span: time to get there [s].
+        """
+        now = self.at(t)
+        self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
+        self.knots += [(t, *now), (t + span, *to)]
+
+    def jump(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> None:
+        """Lets go: the point moves with the handle.
+
+        Args:
+            t: from when on [s].
+            p: position of the handle [m].
+            v: velocity of the handle [m/s].
+        """
+        self._from, self._rate, self._since = np.array(p), np.array(v), t
+        self.knots.append((t, *p))
+
+    def at(self, t: Any) -> np.ndarray:
+        """Returns the position of the point [m], shape (2,) or (n, 2).
+
+        Args:
+            t: time [s], a number or shape (n,).
+        """
+        return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
+
+    def steady(self) -> tuple[float, ...]:
+        """The force as parts.Push.steady: since [s], (x, y) [N], its rate [N/s]."""
+        (fx, fy), (px, py) = self.force, (self.spring * self._from).tolist()
+        return float(self._since), fx + px, fy + py, *(self.spring * self._rate).tolist()
+
+    def mean(self, t: Any, h: Any) -> np.ndarray:
+        """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`.
+
+        Args:
+            t: centre of the interval [s].
+            h: half its length [s]; the force changes evenly, and h does not matter.
+        """
+        return np.array(self.force) + self.spring * self.at(t)
+
+
+class LiveRun(Run):
+    """A run that goes on slice by slice, and whose muscle, gain and clay may change in between.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample.
+        kernel: how the steps are made.
+
+    Attributes:
+        pull: the muscle.
+        keeping: whether samples are kept.
+        gains: (index of the first sample with it, gain), one after the other.
+    """
+
+    def __init__(self, scenario: Scenario, every: int, kernel: Kernel = PLAIN):
+        super().__init__(scenario, every, kernel)
+        x, y = (th or NO_HAND for th in scenario.operators)
+        self.pull = Pull((x.spring, y.spring), scenario.start)
+        # motion is the person's: growing motion is no instability while the gain is below its limit
+        self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
+        self.keeping = True
+        self.gains = [(0, scenario.gain)]
+
+    def slice(self, steps: int) -> None:
+        """Makes this many steps, unless the run ends.
+
+        Args:
+            steps: number of steps.
+        """
+        self.pause = min(self.i + steps, self.parts.time.last)
+        self.push_evenly(self.pull.steady())
+        self.go(None)
+        if self.filled:
+            self.flush()
+
+    def change(self, scenario: Scenario) -> None:
+        """Goes on with another gain, or with other damping between the same borders.
+
+        Args:
+            scenario: with the new gain and clay.
+        """
+        if scenario.gain != self.scenario.gain:
+            self.gains.append((self.i, scenario.gain))
+        super().change(scenario)
+        self.watch.scenario = replace(scenario, muscle=Multisine())
+
+    @property
+    def held(self) -> tuple[bool, bool]:
+        """Whether clay that yields holds the handle still, along x and along y."""
+        reaction = self.state.clay.reaction
+        if reaction is None or reaction.contact is None:
+            return False, False
+        x, y = reaction.contact.stuck
+        return bool(x), bool(y)
+
+    def judge(self, made: np.ndarray) -> int:
+        """As Run.judge; forgets the samples while they are not to be kept.
+
+        Args:
+            made: as in Run.judge.
+        """
+        before = len(self.kept)
+        good = super().judge(made)
+        if not self.keeping:
+            del self.kept[before:]
+        return good
+
+    def end(self) -> None:
+        """Ends the run here, as one that reached its end."""
+        self.state = path.closed(self.state)
+        self.advance(self.filled + 1)
+        self.flush()
+
+
+def live_kernel(scenario: Scenario) -> Kernel:
+    """How the steps of a session are made: compiled where Python could not keep up with real time.
+
+    Args:
+        scenario: that is played.
+    """
+    if saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
+        return PLAIN
+    compiled = load_compiled()
+    if compiled is None:
+        return PLAIN
+    compiled.warm(scenario)
+    return compiled.KERNEL
+
+
+def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
+    """Returns the scenario as a session runs it: a person as the muscle, and no end of the path.
+
+    Args:
+        scenario: clay, gain and arm.
+        stiffness: factor on the spring of Th; its damper takes the square root.
+    """
+    stiffness = number("stiffness", stiffness, 1e-3, 1e4)
+    x, y = (
+        Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)
+        for th in (given or Operator() for given in scenario.operators)
+    )
+    return replace(
+        scenario,
+        operator=x if x == y else (x, y),
+        force=(0.0, 0.0),
+        muscle=None,
+        command=None,
+        length=None,
+        t_max=LONGEST_SESSION,
+        stop_when_unstable=False,
+    )

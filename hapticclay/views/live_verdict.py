@@ -1,0 +1,97 @@
+"""Whether the loop of a session is stable, and what its clay resists with."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+from ..model.constants import AXES
+from ..scene.scenario import Scenario
+from ..stepping.monitor import Outcome
+from ..theory import gain_limits
+
+CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
+
+
+def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
+    """Whether the clay at a place is viscous: elsewhere the linear loop's limit of K does not hold.
+
+    Args:
+        scenario: of the run.
+        p: the place [m].
+    """
+    return scenario.clay is None or scenario.clay.viscous_at(p)
+
+
+def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
+    """What the clay at a place resists with, in a window.
+
+    Args:
+        scenario: of the run.
+        p: the place [m].
+        b: damping there [N.s/m].
+    """
+    told = scenario.clay.here(p, b) if scenario.clay else ()
+    return f"{', '.join(x.text() for x in told) or 'none'} here"
+
+
+@dataclass(frozen=True)
+class LiveVerdict:
+    """A verdict on the loop at present.
+
+    Attributes:
+        text: one line.
+        unstable: whether the arm swings with growing amplitude.
+    """
+
+    text: str
+    unstable: bool
+
+
+def live_verdict(
+    gain: tuple[float, float],
+    limit: tuple[float, float] | None,
+    onset: Outcome | None,
+    swings: bool,
+) -> LiveVerdict:
+    """Combines the finding of the stability monitor with the gain's distance to its limit.
+
+    Args:
+        gain: K [1/kg].
+        limit: of K in the clay at the handle; None if unknown.
+        onset: instability that the monitor has found; None for none.
+        swings: whether the arm still swings.
+    """
+    far = limit or (math.inf, math.inf)
+    above = [
+        f"K{a} {k:.3g} > {most:.3g}" for a, k, most in zip(AXES, gain, far, strict=True) if k > most
+    ]
+    text = "stable"
+    if onset is not None and swings:
+        text = f"UNSTABLE since {onset.time:.1f} s: {onset.cause}" + (
+            f" of {onset.axis}" if onset.axis else ""
+        )
+    elif above:
+        text = "beyond the limit of K"
+    elif onset is not None:
+        text = f"calm again, was unstable at {onset.time:.1f} s"
+    if above:
+        text += f"; here {', '.join(above)}"
+    elif limit:
+        each = ("none" if most == math.inf else f"{most:.3g}" for most in limit)
+        text += f"; limit of K here: {'none' if limit == (math.inf, math.inf) else ', '.join(each)}"
+    return LiveVerdict(text, bool(onset and swings))
+
+
+def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float, float]:
+    """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
+
+    It is that of continuous time at the nominal pose.
+
+    Args:
+        scenario: the run.
+        b: damping of the clay at the handle [N.s/m].
+    """
+    x, y = map(functools.partial(gain_limits.continuous_limit, scenario), AXES, b)
+    return x, y

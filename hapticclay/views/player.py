@@ -1,0 +1,76 @@
+"""The thread that plays a session."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+import time
+from collections.abc import Iterator
+
+from .clock import FRAME_TIME
+from .replay import Replay
+from .session import Session
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[threading.Event]:
+    """Yields an event that Ctrl-C sets in place of raising; a second Ctrl-C raises."""
+    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def heard(*_) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, heard)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class Player(threading.Thread):
+    """A thread that advances a session or a replay in real time.
+
+    Attributes:
+        play: what is played.
+        lock: to be held by any other thread that reads or changes it.
+        error: that ended the thread, None if none did.
+    """
+
+    def __init__(self, play: Session | Replay):
+        """Does not play yet: call `start`.
+
+        Args:
+            play: what to play.
+        """
+        super().__init__(name="player", daemon=True)
+        self.play = play
+        self.lock = threading.RLock()  # a change of the page's controls calls back at once
+        self.error: Exception | None = None
+        self._stop_now = threading.Event()
+
+    def run(self) -> None:
+        """Plays until `stop`."""
+        at = time.perf_counter()
+        try:
+            while not self._stop_now.is_set():
+                with self.lock:
+                    play = self.play
+                    if play.paused or play.ended:
+                        play.clock.rest()
+                    else:
+                        play.advance(play.clock.due(time.perf_counter()))
+                        if play.stream is not None:
+                            play.stream.send(play)
+                at = max(at + FRAME_TIME, time.perf_counter())
+                self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
+        except Exception as error:  # raised again by stop()
+            self.error = error
+
+    def stop(self) -> None:
+        """Ends the thread; raises the error that ended it before, if any."""
+        self._stop_now.set()
+        self.join()
+        if self.error is not None:
+            raise self.error

@@ -1,0 +1,99 @@
+"""A record, played as a session is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..simulation.record import Record
+from ..studies.removal import TOOL, Tool
+from .clock import Clock
+from .frame import Frame, Listener
+from .live_verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
+
+
+class Replay:
+    """A record, played as if it were a session.
+
+    Attributes:
+        source: the record.
+        scenario: of the record.
+        tool: at the handle, as in the session that was recorded.
+        paused: whether it stands still.
+        clock: of real time.
+        t: time reached [s].
+        n: sample reached.
+        frames: states shown so far.
+        stream: as of a session.
+    """
+
+    stream: Listener | None = None
+
+    def __init__(self, record: Record, tool: Tool = TOOL):
+        """Begins at the first sample.
+
+        Args:
+            record: to be played.
+            tool: at the handle, if the record names none.
+        """
+        self.source, self.scenario = record, record.scenario
+        self._held = record.held()
+        self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
+        self.restart()
+
+    def restart(self) -> None:
+        """Begins again at the first sample."""
+        self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
+        self.frames = [self._frame(0)]
+
+    @property
+    def ended(self) -> str:
+        """How the record ended, once its end is reached; empty before."""
+        return self.source.status if self.n >= len(self.source.t) - 1 else ""
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Plays on; not while paused.
+
+        Args:
+            seconds: simulated time to play [s].
+
+        Returns:
+            Positions of the handle [m], shape (n, 2).
+        """
+        if self.paused or self.ended:
+            return np.empty((0, 2))
+        self.t += seconds
+        before = self.n
+        self.n = (
+            int(np.searchsorted(self.source.t, self.t, "right").clip(1, len(self.source.t))) - 1
+        )
+        self.frames.append(self._frame(self.n))
+        return self.source.p[before : self.n + 1]
+
+    @property
+    def gain(self) -> tuple[float, float]:
+        """K [1/kg] at present."""
+        x, y = (
+            self.source.extra["gain"][self.n].tolist()
+            if "gain" in self.source.extra
+            else self.scenario.gain
+        )
+        return x, y
+
+    @property
+    def b(self) -> tuple[float, float]:
+        """Damping of the clay at the handle [N.s/m]."""
+        x, y = self.source.b[self.n].tolist()
+        return x, y
+
+    def verdict(self) -> LiveVerdict:
+        """As of a session; the monitor's finding is the outcome of the record."""
+        r, n, s = self.source, self.n, self.scenario
+        found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
+        known = s.control == "continuous" and is_viscous(s, self.frames[-1].p)
+        limit = live_gain_limits(s, self.b) if known else None
+        return live_verdict(self.gain, limit, r.outcome if found else None, True)
+
+    def _frame(self, n: int) -> Frame:
+        r = self.source
+        p, v, fe, fh, held = (tuple(x[n].tolist()) for x in (r.p, r.v, r.fe, r.fh, self._held))
+        return Frame(float(r.t[n]), p, v, fe, fh, held)
