@@ -104,8 +104,8 @@ def test_what_the_lines_say(record):
     assert "muscle: Step" in repr(every["parts"]) and "y: none" in repr(every["parts"])
     assert "of its own: arm, hardware" in repr(every["parts"])
     assert "Fy = 5 N, K = 2 N/(m/s)^n, n = 0.5, b = 20 N.s/m" in repr(every["yields"])
-    assert "stays cut, up to" in repr(every["groove"])
-    assert "springs back" in repr(every["springs"])
+    assert "permanent cut, up to" in repr(every["groove"])
+    assert "spring k = 1000 N/m" in repr(every["springs"])
     assert "controller: <lambda>" in repr(every["own controller"])
     assert "clay: none" in repr(every["free"])
     verdict = every["not passive"]
