@@ -56,13 +56,13 @@ class AccuracyCommand:
         return 0
 
     def _save(self, found: Ladder, out: Path) -> None:
-        from ..views import study_plots
+        from ..views import accuracy_plots
         from ..views.figure import Figure
 
         console.save_json(found.summary(), out / "accuracy.json")
         with atomic(out / "accuracy.md") as f:
             f.write((accuracy_page(found) + "\n").encode())
-        figure = Figure(lambda: study_plots.accuracy_plot(found), found.tables)
+        figure = Figure(lambda: accuracy_plots.accuracy_plot(found), found.tables)
         console.save_figures({"accuracy": figure}, out, self.figures)
 
 

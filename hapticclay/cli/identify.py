@@ -136,7 +136,7 @@ class IdentifyCommand:
 
     def _save(self, results: Sequence[Identified], found: Drift | None) -> None:
         from ..studies.identification import IDENTIFICATION_SCHEMA, response_tables
-        from ..views import study_plots
+        from ..views import identification_plots, workspace_plots
         from ..views.figure import Figure
 
         data = {
@@ -147,13 +147,14 @@ class IdentifyCommand:
         console.save_json(data, self.out / "identify.json")
         figures = {
             block.figure: Figure(
-                partial(study_plots.identification_plot, same), partial(response_tables, same)
+                partial(identification_plots.identification_plot, same),
+                partial(response_tables, same),
             )
-            for what, block in study_plots.BLOCKS.items()
+            for what, block in identification_plots.BLOCKS.items()
             if (same := [r for r in results if r.what == what])
         }
         if found:
-            figures["map"] = Figure(partial(study_plots.workspace_plot, found), found.tables)
+            figures["map"] = Figure(partial(workspace_plots.workspace_plot, found), found.tables)
         console.save_figures(figures, self.out, self.figures)
 
 

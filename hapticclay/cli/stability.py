@@ -135,23 +135,23 @@ class StabilityCommand:
         if self.map == "gain-yield":
             return self._yield_map(loop)
         from ..studies.stability_map import stability_map
-        from ..views import study_plots
+        from ..views import stability_map_plots
 
         if self.map == "delay-damping":
             loop = replace(loop, delay=0.0)
         chart = stability_map(
             self.map, loop, self.quick, lambda columns: console.progress_bar(columns, desc="map")
         )
-        self._save(chart.kind, study_plots.stability_map_plot, chart)
+        self._save(chart.kind, stability_map_plots.stability_map_plot, chart)
         print(disagreements(chart))
         return chart
 
     def _yield_map(self, loop: PushedLoop) -> YieldMap:
         from ..studies.yield_map import yield_map
-        from ..views import study_plots
+        from ..views import yield_map_plots
 
         chart = yield_map(loop, self.quick, lambda gains: console.progress_bar(gains, desc="map"))
-        self._save(self.map, study_plots.yield_map_plot, chart)
+        self._save(self.map, yield_map_plots.yield_map_plot, chart)
         print(yield_differences(chart))
         return chart
 

@@ -145,16 +145,16 @@ class SweepCommand:
         )
 
     def _draw(self, table: Any) -> None:
-        from ..views import study_plots
+        from ..views import sweep_plots
         from ..views.figure import Figure
 
-        if len(study_plots.swept_parameters(table)) < 2:
+        if len(sweep_plots.swept_parameters(table)) < 2:
             return
         for value in MAPPED:
-            if not all(study_plots.missing_reasons(table, value)):
+            if not all(sweep_plots.missing_reasons(table, value)):
                 figure = Figure(
-                    partial(study_plots.sweep_plot, table, value),
-                    partial(study_plots.sweep_tables, table, value),
+                    partial(sweep_plots.sweep_plot, table, value),
+                    partial(sweep_plots.sweep_tables, table, value),
                 )
                 for files in console.save_figures({value: figure}, self.out, self.figures).values():
                     print(f"map: {', '.join(map(str, files))}")

@@ -49,7 +49,9 @@ class Picture:
 
 def _identified(runs: Runs, what: str) -> Any:
     axes = "x" if what == "Th" else "xy"
-    return views.study_plots.identification_plot([runs.identified(what, axis) for axis in axes])
+    return views.identification_plots.identification_plot(
+        [runs.identified(what, axis) for axis in axes]
+    )
 
 
 def _readings(runs: Runs) -> Any:
@@ -188,7 +190,7 @@ PICTURES = (
         "map",
         "Drift of Sh over the workspace",
         "Without inertia shaping the printed Sh holds at the nominal pose only.",
-        lambda r: views.study_plots.workspace_plot(workspace.drift_map()),
+        lambda r: views.workspace_plots.workspace_plot(workspace.drift_map()),
         quick=False,
     ),
 )

@@ -3,5 +3,15 @@
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__, submodules=["run_plots", "study_plots", "theory_plots"]
+    __name__,
+    submodules=[
+        "accuracy_plots",
+        "identification_plots",
+        "run_plots",
+        "stability_map_plots",
+        "sweep_plots",
+        "theory_plots",
+        "workspace_plots",
+        "yield_map_plots",
+    ],
 )

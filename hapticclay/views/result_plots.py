@@ -21,7 +21,7 @@ PLOTS = {  # by class of the result: module here, and function
     "MeasuredImpedance": "impedance_plots:impedance_plot",
     "DeviceMBK": "impedance_plots:mbk_plot",
     "ArmMBK": "impedance_plots:least_mass_plot",
-    "Identified": "study_plots:identified_plot",
+    "Identified": "identification_plots:identified_plot",
     "Fitted": "fit_plots:fit_plot",
     "Band": "robustness_plots:band_plot",
     "Instability": "robustness_plots:instability_plot",

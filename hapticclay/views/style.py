@@ -86,6 +86,9 @@ TITLE_SIZE = 9.0  # [points] on a screen
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
 CLAY_ALPHA = 0.35  # of clay behind curves
 HELD_COLOR, HELD_ALPHA = SKY_BLUE, 0.35  # time for which clay that yields holds the handle
+UNSTABLE: Any = dict(  # where the linear loop of a run is unstable
+    facecolor="none", hatch="\\\\\\", linewidth=0.0, edgecolor=BLACK, label="gain margin < 1"
+)
 SHADED = 0.01, 1e-3  # speed [m/s], about that of the paper's cut, and indentation [m] of shades
 
 

@@ -21,7 +21,7 @@ from hapticclay.scene.experiments import (
 )
 from hapticclay.studies.sampling import Sweep, parse_grid
 from hapticclay.studies.sweep import read_sweep
-from hapticclay.views import study_plots
+from hapticclay.views import sweep_plots
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,7 +137,7 @@ def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
     code, out, _ = said(capsys, *words, str(tmp_path))
     assert code == 0 and "8 runs in" in out and (tmp_path / "status.png").is_file()
     assert read_sweep(tmp_path)["steps"].to_pylist() == [1, 1, 2, 2] * 2
-    assert parameter_unit("depth") == "m" and study_plots._column_label("depth") == "depth [m]"
+    assert parameter_unit("depth") == "m" and sweep_plots._column_label("depth") == "depth [m]"
     with pytest.raises(ParameterError, match="did you mean 'depth'"):
         Sweep("staircase", parse_grid("deph=0.01:0.02:2"))
 

@@ -35,7 +35,7 @@ def test_a_map_of_a_sweep_hatches_margins_below_1(tmp_path):
     from matplotlib.patches import Rectangle
 
     from hapticclay.studies import sampling, sweep
-    from hapticclay.views import study_plots
+    from hapticclay.views import sweep_plots
 
     grid = sampling.parse_grid("b=90,150,300,600 gain.y=0.3,0.5,0.8")
     plan = sampling.Sweep("constant", grid, {"t_max": 0.1, "start": (0.06, 0.0)})
@@ -43,6 +43,6 @@ def test_a_map_of_a_sweep_hatches_margins_below_1(tmp_path):
     table = sweep.read_sweep(tmp_path)
     below = sum(m < 1.0 for m in table["gain_margin_y"].to_pylist())
     for value in ("status", "end_time"):
-        ax = study_plots.sweep_plot(table, value).axes[0]
+        ax = sweep_plots.sweep_plot(table, value).axes[0]
         hatched = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_hatch()]
         assert 0 < len(hatched) == below < len(table)

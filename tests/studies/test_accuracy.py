@@ -8,7 +8,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies import accuracy
-from hapticclay.views import study_plots
+from hapticclay.views import accuracy_plots
 from tests.oracles import piecewise_linear
 
 SHAPED = hc.constant_cut(b=90.0, clay=(0.01, 0.02), length=0.03, inertia_shaping=True)
@@ -80,7 +80,7 @@ def test_too_stiff_clay_has_no_accurate_settings():
 def test_without_borders_there_are_positions_alone():
     found = accuracy.accuracy_ladder(hc.stability_test(3.0, t_max=0.2), quick=True)
     assert found.units() == ["m"] and not found.notes
-    assert len(study_plots.accuracy_plot(found).axes) == 1
+    assert len(accuracy_plots.accuracy_plot(found).axes) == 1
 
 
 def test_an_unstable_loop_is_noted():
@@ -89,7 +89,7 @@ def test_an_unstable_loop_is_noted():
 
 
 def test_the_figure_has_a_curve_a_method_in_each_panel(ladder):
-    figure = study_plots.accuracy_plot(ladder)
+    figure = accuracy_plots.accuracy_plot(ladder)
     assert len(figure.axes) == 2
     for ax in figure.axes:
         names = ax.get_legend_handles_labels()[1]

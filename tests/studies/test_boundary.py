@@ -21,7 +21,7 @@ from hapticclay.model.constants import SecondOrder
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, growth, stability_map
 from hapticclay.theory import gain_crossings
-from hapticclay.views import study_plots
+from hapticclay.views import stability_map_plots
 from tests.oracles import Linear
 
 TH = Operator()
@@ -232,7 +232,7 @@ def test_map_of_poses_agrees_with_the_linear_loop_at_each_and_names_the_cause(po
 
 
 def test_picture_shows_the_map_with_units(poses, tmp_path):
-    figure = study_plots.stability_map_plot(poses)
+    figure = stability_map_plots.stability_map_plot(poses)
     ax = figure.axes[0]
     assert "[cm]" in ax.get_xlabel() and "[1/kg]" in ax.get_ylabel()
     shown = {line.get_label(): line for line in ax.lines}
@@ -250,7 +250,7 @@ def hatched(figure):
 @pytest.mark.parametrize("x,factor", [(-0.1, 0.9), (-0.1, 1.1), (0.1, 0.9), (0.1, 1.1)])
 def test_picture_hatches_gains_above_the_limit_of_the_loop_of_the_runs(poses, x, factor):
     """The limit at both ends of the path is worked out anew, for the loop that the runs are of."""
-    (area,) = hatched(study_plots.stability_map_plot(poses))
+    (area,) = hatched(stability_map_plots.stability_map_plot(poses))
     K = factor * boundary.pose_limit(replace(Loop(inertia_shaping=False), pose=(x, 0.0)))
     inside = 0.999 * 100.0 * x  # [cm], just within the edge
     assert area.get_paths()[0].contains_point((inside, K)) == (factor > 1.0)
@@ -259,9 +259,9 @@ def test_picture_hatches_gains_above_the_limit_of_the_loop_of_the_runs(poses, x,
 
 def test_picture_hatches_nothing_where_nothing_is_unstable(poses):
     endless = {name: (x, [math.inf] * len(x)) for name, (x, _) in poses.lines.items()}
-    (area,) = hatched(study_plots.stability_map_plot(replace(poses, lines=endless)))
+    (area,) = hatched(stability_map_plots.stability_map_plot(replace(poses, lines=endless)))
     assert np.ptp(area.get_paths()[0].vertices[:, 1]) == 0.0
-    assert not hatched(study_plots.stability_map_plot(replace(poses, limit="")))
+    assert not hatched(stability_map_plots.stability_map_plot(replace(poses, limit="")))
 
 
 def test_smallest_unstable_damping_is_where_the_gain_limit_is_the_gain():

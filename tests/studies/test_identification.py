@@ -283,9 +283,9 @@ def test_drift_over_the_workspace(drift):
 
 
 def test_map_is_drawn(drift):
-    from hapticclay.views import study_plots
+    from hapticclay.views import workspace_plots
 
-    figure = study_plots.workspace_plot(drift)
+    figure = workspace_plots.workspace_plot(drift)
     assert [ax.get_xlabel() for ax in figure.axes[2:4]] == ["world x [m]", "world x [m]"]
     figure.savefig("/dev/null", format="png")
 

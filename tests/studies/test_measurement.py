@@ -281,13 +281,13 @@ def test_command_line(tmp_path, capsys):
 
 
 def test_plot_of_measured_columns():
-    from hapticclay.views import study_plots
+    from hapticclay.views import identification_plots
 
     low, high = (
         hc.studies.identify_data(columns("G", "noise", np.random.default_rng(2), noise=x)[0])
         for x in (3.0, 0.01)
     )
-    figure = study_plots.identification_plot([low, high])
+    figure = identification_plots.identification_plot([low, high])
     coherence = figure.axes[-1]
     assert coherence.get_ylim()[0] < low.coherence.min() < 0.5  # nothing is cut off
     told = [x.get_text() for x in figure.legends[0].get_texts()]

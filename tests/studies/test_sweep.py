@@ -25,7 +25,7 @@ from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
 from hapticclay.studies import sampling, sweep
 from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
-from hapticclay.views import study_plots
+from hapticclay.views import style, sweep_plots
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -366,16 +366,16 @@ def test_maps(tmp_path):
         workers=1,
     )
     table = sweep.read_sweep(tmp_path)
-    figure = study_plots.sweep_plot(table)
+    figure = sweep_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
     shown = {t.get_text() for t in figure.legends[0].get_texts()}
     assert shown == {*table["status"].to_pylist(), "gain margin < 1"}  # gain 1 on y, at b = 100
-    study_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
+    sweep_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
-        study_plots.sweep_plot(table, "speedx")
+        sweep_plots.sweep_plot(table, "speedx")
 
 
 @pytest.mark.parametrize("package,extra", [("pyarrow", "sweep"), ("distributed", "cluster")])
@@ -605,10 +605,10 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     table = sweep.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
         assert (
-            study_plots.missing_reasons(table, value)
+            sweep_plots.missing_reasons(table, value)
             == ["no clay reached", "no clay reached", ""] * 3
         )
-        figure = study_plots.sweep_plot(table, value)
+        figure = sweep_plots.sweep_plot(table, value)
         shown = figure.axes[0].collections[0].get_array()
         np.testing.assert_array_equal(
             np.ma.getmaskarray(shown), [[True] * 3, [True] * 3, [False] * 3]
@@ -617,13 +617,13 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
             shown[2], [r[value] for r in table.to_pylist() if r["force"] == 1.0]
         )
         assert hatched(figure) == {"no clay reached": 6}
-    assert hatched(study_plots.sweep_plot(table, "crossing1")) == {"border not reached": 6}
+    assert hatched(sweep_plots.sweep_plot(table, "crossing1")) == {"border not reached": 6}
     assert figure.axes[1].get_ylabel() == "speed x [m/s]"
     free = table.set_column(
         table.column_names.index("b_x"), "b_x", [[0.0] * 9]
     )  # an experiment without clay
-    assert "no clay reached" not in study_plots.missing_reasons(free, "speed_x")
-    assert set(study_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
+    assert "no clay reached" not in sweep_plots.missing_reasons(free, "speed_x")
+    assert set(sweep_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
 @pytest.mark.parametrize("value", ["status", "speed_x"])
@@ -640,15 +640,13 @@ def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
         "speed_x": np.array([math.nan, 0.1, 0.2, 0.3, 0.4, math.nan]),
         "b_x": np.full(6, 90.0),
     }
-    figure = study_plots.sweep_plot(pa.table(runs), value)
+    figure = sweep_plots.sweep_plot(pa.table(runs), value)
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
-    (rings,) = [
-        c for c in figure.axes[0].collections if c.get_label() == study_plots.UNSTABLE["label"]
-    ]
+    (rings,) = [c for c in figure.axes[0].collections if c.get_label() == style.UNSTABLE["label"]]
     assert labels.count("gain margin < 1") == 1
     np.testing.assert_array_equal(rings.get_offsets()[:, 0], [10.0, 31.0, 57.0])
     runs |= {"gain_margin_x": np.full(6, 1.0), "gain_margin_y": np.full(6, math.nan)}
-    legend = study_plots.sweep_plot(pa.table(runs), value).legends[0]
+    legend = sweep_plots.sweep_plot(pa.table(runs), value).legends[0]
     assert "gain margin < 1" not in [t.get_text() for t in legend.get_texts()]
 
 
@@ -663,10 +661,10 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
     )
     sweep.run_sweep(s, tmp_path, workers=1)
     table = sweep.read_sweep(tmp_path)
-    why = study_plots.missing_reasons(table, "fe_over_v_x")
+    why = sweep_plots.missing_reasons(table, "fe_over_v_x")
     marks = {
         c.get_label(): len(c.get_offsets())
-        for c in study_plots.sweep_plot(table, "fe_over_v_x").axes[0].collections
+        for c in sweep_plots.sweep_plot(table, "fe_over_v_x").axes[0].collections
     }
     for name in ("refused", "no clay reached"):
         assert marks[name] == why.count(name) > 0
@@ -690,23 +688,23 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
         "energy_residual": "of what went through",
     }
     for name, unit in units.items():
-        assert name in table.column_names and study_plots._column_label(name).endswith(f" [{unit}]")
+        assert name in table.column_names and sweep_plots._column_label(name).endswith(f" [{unit}]")
     for name, unit in {
         "operator.damper": "N.s/m",
         "operator.mass": "kg",
         "gain.x": "1/kg",
         "force.y": "N",
     }.items():
-        assert study_plots._column_label(name).endswith(f" [{unit}]")
+        assert sweep_plots._column_label(name).endswith(f" [{unit}]")
     for make in hc.SCENARIOS.values():
         for name, parameter in inspect.signature(make).parameters.items():
             if isinstance(parameter.default, float) or (
                 isinstance(parameter.default, tuple) and isinstance(parameter.default[0], float)
             ):
-                assert "[" in study_plots._column_label(name), name
+                assert "[" in sweep_plots._column_label(name), name
     for text in ("axis", "cause"):
         with pytest.raises(ParameterError, match="column"):
-            study_plots.sweep_plot(table, text)
+            sweep_plots.sweep_plot(table, text)
 
 
 @pytest.mark.parametrize(

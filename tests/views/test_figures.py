@@ -28,8 +28,10 @@ from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, Limit, ZRegion, ZWidth
 from hapticclay.theory.loops import Loop
 from hapticclay.theory.stability_margins import Box
 from hapticclay.views import (
+    accuracy_plots,
     compare_plots,
     fit_plots,
+    identification_plots,
     impedance_plots,
     passivity_plots,
     path_plots,
@@ -37,9 +39,12 @@ from hapticclay.views import (
     robustness_plots,
     run_figures,
     run_plots,
-    study_plots,
+    stability_map_plots,
+    sweep_plots,
     theory_plots,
     wall_plots,
+    workspace_plots,
+    yield_map_plots,
 )
 from hapticclay.views.style import LEAST_TEXT
 
@@ -117,7 +122,7 @@ def yield_chart():
 def ladder():
     settings = tuple(
         Setting(series, dt, 1e2 * dt**2, dt**2, 1e-5 / dt, "finished")
-        for series in study_plots.SERIES_LOOKS
+        for series in accuracy_plots.SERIES_LOOKS
         for dt in (1e-2, 1e-3, 1e-4, 3.6e-4)
     )
     scenario = hc.constant_cut()
@@ -132,7 +137,7 @@ def identified(what, axis):
 def swept():
     """A sweep with every status and every reason for no figure."""
     pa = pytest.importorskip("pyarrow")
-    kinds = list(study_plots.OUTCOME_COLORS)
+    kinds = list(sweep_plots.OUTCOME_COLORS)
     b, K = (x.ravel() for x in np.meshgrid(np.geomspace(10, 1000, 9), np.geomspace(0.1, 10, 9)))
     status = [kinds[i % len(kinds)] for i in range(len(b))]
     speed = np.where(np.arange(len(b)) % 5, b / 1e4, np.nan)
@@ -301,18 +306,20 @@ CASES = {
     "path of the cut": lambda: path_plots.path_plot(record("constant")),
     "fit": lambda: fit_plots.fit_plot(fitted()),
     **{
-        f"map {kind}": lambda kind=kind: study_plots.stability_map_plot(stability_chart(kind))
+        f"map {kind}": lambda kind=kind: stability_map_plots.stability_map_plot(
+            stability_chart(kind)
+        )
         for kind in ("gain-damping", "delay-damping", "gain-pose")
     },
-    "map gain-yield": lambda: study_plots.yield_map_plot(yield_chart()),
-    "accuracy": lambda: study_plots.accuracy_plot(ladder()),
-    "identified G": lambda: study_plots.identification_plot(
+    "map gain-yield": lambda: yield_map_plots.yield_map_plot(yield_chart()),
+    "accuracy": lambda: accuracy_plots.accuracy_plot(ladder()),
+    "identified G": lambda: identification_plots.identification_plot(
         [identified("G", "x"), identified("G", "y")]
     ),
-    "identified Th": lambda: study_plots.identification_plot([identified("Th", "x")]),
-    "workspace": lambda: study_plots.workspace_plot(drift()),
-    "sweep status": lambda: study_plots.sweep_plot(swept()),
-    "sweep speed": lambda: study_plots.sweep_plot(swept(), "speed_x"),
+    "identified Th": lambda: identification_plots.identification_plot([identified("Th", "x")]),
+    "workspace": lambda: workspace_plots.workspace_plot(drift()),
+    "sweep status": lambda: sweep_plots.sweep_plot(swept()),
+    "sweep speed": lambda: sweep_plots.sweep_plot(swept(), "speed_x"),
     "bode": lambda: theory_plots.bode_plot(LOOP),
     "bode unstable": lambda: theory_plots.bode_plot(Loop("y", b=90.0, K=10.0), at="force"),
     "nyquist": lambda: theory_plots.nyquist_plot(LOOP, (0.5, 1.0, 3.0, 10.0, 30.0)),

@@ -1,0 +1,90 @@
+"""Error against run time, drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..studies.accuracy import CLEAR, SAMPLED, Ladder
+from .style import (
+    BLACK,
+    BLUE,
+    GREY,
+    PALE_GREY,
+    VERMILION,
+    add_legend,
+    figure_size,
+    figure_style,
+    panel_grid,
+    points,
+    set_title,
+    stroke,
+)
+
+SERIES_LOOKS: dict[str, Any] = {  # curve, and where its steps are written
+    "fast": (dict(color=BLUE, marker="o", ls="-"), dict(xytext=(7, 5), ha="left")),
+    "accurate": (dict(color=VERMILION, marker="s", ls="-"), dict(xytext=(-7, -12), ha="right")),
+    SAMPLED: (dict(color=GREY, marker="^", ls=":"), dict(xytext=(7, 5), ha="left")),
+}
+ERROR_AXES = {"s": "error of the border times [s]", "m": "error of the position [m]"}
+
+
+def accuracy_plot(ladder: Ladder) -> Figure:
+    """Plots error against run time, a panel a unit, a curve a method, a mark a step.
+
+    Rings mark settings that are the cheapest for an error; in the grey band, the error of the
+    reference hides that of a setting.
+
+    Args:
+        ladder: from `accuracy_ladder`.
+    """
+    units = ladder.units()
+    with figure_style():
+        count = max(len(units), 1)
+        rows, columns = panel_grid(count)
+        figure = Figure(figsize=figure_size(count, 4.6 * rows, 4.4 * count + 0.6))
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, unit in zip(axes, units, strict=False):
+            _accuracy_panel(ax, ladder, unit)
+        if units:
+            add_legend(figure, axes[-1], 5 if len(units) > 1 else 2)
+        parts = [ladder.scenario.name, f"{ladder.simulated:.4g} s simulated"]
+        set_title(axes[0], *parts, f"engine {ladder.engine}", "steps written beside the marks")
+    return figure
+
+
+def _accuracy_panel(ax: Axes, ladder: Ladder, unit: str) -> None:
+    ax.set(xscale="log", yscale="log", xlabel="run time [s]", ylabel=ERROR_AXES[unit])
+    marks = [(x, e) for x in ladder.settings if (e := ladder.shown(x, unit)) and x.wall]
+    for name, (look, side) in SERIES_LOOKS.items():
+        mine = [(x.wall, e, x.dt) for x, e in marks if x.series == name]
+        if not mine:
+            continue
+        walls, errors, steps = zip(*mine, strict=True)
+        ax.plot(walls, errors, ms=stroke(5), lw=stroke(1.4), label=name, zorder=3, **look)
+        for i in sorted({0, len(mine) - 1}):
+            at: Any = (walls[i], errors[i])
+            told: Any = dict(
+                side, textcoords="offset points", fontsize=points(8), color=look["color"]
+            )
+            ax.annotate(_step(steps[i]), at, **told)
+    best = [(x.wall, e) for x, e in marks if x in ladder.cheapest(unit).values()]
+    if best:
+        ring: Any = dict(
+            ls="none", marker="o", mfc="none", color=BLACK, ms=stroke(11), mew=stroke(1.2), zorder=4
+        )
+        ax.plot(*zip(*best, strict=True), label="cheapest for an error", **ring)
+    ax.margins(x=0.15, y=0.1)
+    (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
+    ax.set_xlim(first, 2.5 * last)  # room for the last step
+    if left := ladder.left[unit]:
+        low = min(low, 0.3 * left)
+        ax.axhspan(low, CLEAR * left, color=PALE_GREY, lw=0, label="hidden by the reference")
+    ax.set_ylim(low, high)
+
+
+def _step(dt: float) -> str:
+    """A step in words: 20 ms, 0.36 ms, 5 us."""
+    return f"{1e3 * dt:.3g} ms" if dt >= 1e-5 else f"{1e6 * dt:.3g} us"
