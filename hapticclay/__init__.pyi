@@ -35,6 +35,7 @@ from .model.signals import Sum as Sum
 from .model.spring import Spring as Spring
 from .model.tool import Tool as Tool
 from .results import Result as Result
+from .scene.changes import with_fields as with_fields
 from .scene.experiments import EXPERIMENTS as EXPERIMENTS
 from .scene.experiments import SCENARIOS as SCENARIOS
 from .scene.experiments import Experiment as Experiment
@@ -42,7 +43,6 @@ from .scene.experiments import constant_cut as constant_cut
 from .scene.experiments import free as free
 from .scene.experiments import stability_test as stability_test
 from .scene.experiments import variable_cut as variable_cut
-from .scene.fields import with_fields as with_fields
 from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device
 from .scene.virtual_wall import VirtualWall as VirtualWall

@@ -74,7 +74,7 @@ def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
     Raises:
         ParameterError: a word is not name=value, or a name stands twice.
     """
-    from ..scene.fields import named_values
+    from ..scene.changes import named_values
 
     return named_values("--set", (word for some in words for word in some))
 

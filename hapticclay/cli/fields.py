@@ -35,7 +35,8 @@ class FieldsCommand:
 
     def __call__(self) -> int:
         from ..scene.experiments import EXPERIMENTS, parameter_fields
-        from ..scene.fields import dotted_names, fields_of, no_field
+        from ..scene.field_kinds import no_field
+        from ..scene.fields import dotted_names, fields_of
         from ..scene.scenario import Scenario
 
         known, shown = fields_of(Scenario, part=Scenario()), []
@@ -65,7 +66,7 @@ def field_list(fields: Iterable[Field]) -> str:
 
 
 def _value_in_words(value: Any) -> str:
-    from ..scene.fields import UNSET
+    from ..scene.field_kinds import UNSET
 
     if value is UNSET:
         return "(to be given)"
@@ -76,7 +77,7 @@ def _value_in_words(value: Any) -> str:
 
 def _takes(field: Field) -> str:
     """Bounds of a number, or the words that a field takes."""
-    from ..scene.fields import union_members
+    from ..scene.field_kinds import union_members
 
     words, numbers = [], False
     for kind in union_members(field.hint):

@@ -78,7 +78,7 @@ class MBKCommand:
 
     def _arm(self, columns: int) -> int:
         from ..model.operator import Operator
-        from ..scene.fields import with_fields
+        from ..scene.changes import with_fields
         from ..studies.boundary import PushedLoop
         from ..studies.mbk import HANDS, arm_mbk
         from ..views import impedance_plots

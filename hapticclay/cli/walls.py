@@ -66,7 +66,7 @@ class DeviceOptions:
             source: the file; None for none.
             **base: fields that differ from the defaults where there is no file.
         """
-        from ..scene.fields import with_fields
+        from ..scene.changes import with_fields
         from ..scene.virtual_wall import VirtualWall
 
         wall = VirtualWall.load(source) if source else with_fields(VirtualWall(), base)
@@ -116,7 +116,7 @@ def quantities(given: dict[str, str | None]) -> dict[str, Any]:
     Raises:
         ParameterError: a text is none.
     """
-    from ..scene.fields import named_values
+    from ..scene.changes import named_values
 
     out: dict[str, Any] = {}
     for name, text in given.items():

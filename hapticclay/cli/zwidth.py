@@ -61,7 +61,7 @@ class ZWidthCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..scene.fields import with_fields
+        from ..scene.changes import with_fields
         from ..studies.zwidth import Press, zwidth
         from ..views.figure import Figure
         from ..views.wall_plots import zwidth_plot
@@ -101,7 +101,7 @@ class ZWidthCommand:
         return self.device.wall(self.source)
 
     def _arm(self, axis: Literal["x", "y"]) -> Wall:
-        from ..scene.fields import with_fields
+        from ..scene.changes import with_fields
         from ..studies.boundary import PushedLoop
 
         bound = "is for a bare device: leave it out beside --arm"
@@ -115,7 +115,7 @@ class ZWidthCommand:
 
     def _values(self, wall: Wall) -> list[Any]:
         """The values behind --vary."""
-        from ..scene.fields import named_values
+        from ..scene.changes import named_values
 
         if not self.vary:
             return []

@@ -42,20 +42,10 @@ from ..model.constants import (
 from ..model.flow import Flow
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from .fields import (
-    ENTIRE,
-    Field,
-    bounds_at,
-    check_added_hand,
-    dotted_names,
-    field_descriptions,
-    function_of,
-    make_part,
-    merged_values,
-    nested,
-    no_field,
-    values_of,
-)
+from .changes import check_added_hand, nested
+from .field_kinds import ENTIRE, no_field
+from .fields import Field, bounds_at, dotted_names, field_descriptions, function_of
+from .given_values import make_part, merged_values, values_of
 from .scenario import (
     EXPERIMENTS,
     Control,
@@ -169,7 +159,7 @@ class Experiment:
         The changes are made before the scenario is checked, so that another arm may go another way.
 
         Args:
-            *changes: plain data of the fields (`scene/fields.py`), the later ones on top.
+            *changes: plain data of the fields (`scene/plain_data.py`), the later ones on top.
 
         Raises:
             ParameterError: as `scenario`; or there is no such field.

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import ParameterError
 from ..files import atomic
 from .earlier_names import with_present_names
-from .fields import plain_data
+from .plain_data import plain_data
 
 SCENARIO_FILES = (".toml", ".json")
 

@@ -23,15 +23,11 @@ from ..model.operator import Operator, mobility_with
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.support import check_scene
-from .fields import (
-    check_added_hand,
-    dotted_names,
-    merged_values,
-    nested,
-    no_field,
-    values_of,
-)
+from .changes import check_added_hand, nested
+from .field_kinds import no_field
+from .fields import dotted_names
 from .files import read_settings, write_part
+from .given_values import merged_values, values_of
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1

@@ -17,8 +17,9 @@ from ..model.operator import NO_HAND, Operator
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
-from .fields import make_part, nested
+from .changes import nested
 from .files import read_settings, write_part
+from .given_values import make_part
 from .scenario import Scenario
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this

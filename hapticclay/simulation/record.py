@@ -22,7 +22,8 @@ from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..scene.earlier_names import with_present_names
-from ..scene.fields import make_part, plain_data
+from ..scene.given_values import make_part
+from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..scene.text import scenario_rows
 from ..stepping.monitor import Outcome

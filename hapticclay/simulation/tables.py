@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import needing
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
-from ..scene.fields import plain_data
+from ..scene.plain_data import plain_data
 from .columns import ARRAYS, EXTRA, SCALAR, Recorded
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from ..errors import ParameterError, choice, integer, number
 from ..files import versions
 from ..model.constants import AXES
 from ..results import Result
-from ..scene.fields import nested, with_fields
+from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch

@@ -18,9 +18,10 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer
 from ..files import versions
+from ..scene.changes import named_values
 from ..scene.earlier_names import with_present_names
 from ..scene.experiments import EXPERIMENTS
-from ..scene.fields import join_names, named_values
+from ..scene.field_kinds import join_names
 from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 

@@ -21,7 +21,7 @@ from ..model.operator import Operator
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
 from ..results import Result
-from ..scene.fields import with_fields
+from ..scene.changes import with_fields
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch

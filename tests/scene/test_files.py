@@ -18,10 +18,12 @@ from hapticclay import errors, files, units
 from hapticclay.errors import Bound, ParameterError, field_types
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
-from hapticclay.scene import fields
+from hapticclay.scene import field_kinds, fields
 from hapticclay.scene import files as scene_files
+from hapticclay.scene.changes import named_values, nested, with_fields
 from hapticclay.scene.experiments import EXPERIMENTS, parameter_unit
-from hapticclay.scene.fields import make_part, named_values, nested, plain_data, with_fields
+from hapticclay.scene.given_values import make_part
+from hapticclay.scene.plain_data import plain_data
 
 
 def floats(low, high):
@@ -675,7 +677,7 @@ def test_the_fields_of_a_scenario_are_all_there():
         operator=hc.Operator(),
     )
     for field in fields.fields_of(hc.Scenario, part=scenario):
-        if field.default is fields.UNSET or field.name.startswith(NOT_GIVEN):
+        if field.default is field_kinds.UNSET or field.name.startswith(NOT_GIVEN):
             continue
         x = scenario
         for name in field.name.split("."):

@@ -11,7 +11,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.scene.fields import nested
+from hapticclay.scene.changes import nested
 from hapticclay.simulation import stored
 from hapticclay.simulation.record import ARRAYS
 

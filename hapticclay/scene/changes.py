@@ -1,0 +1,153 @@
+"""Changes of fields by dotted name, from files, sweeps and the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from ..arguments import checked
+from ..errors import ParameterError
+from ..model.constants import AXES
+from .field_kinds import ENTIRE, join_names
+from .given_values import laid_over, make_part, values_of
+
+T = TypeVar("T")
+HAND = ["mass", "damper", "spring"]  # what a hand is added by
+
+
+@checked
+def with_fields(part: T, changes: Mapping[str, Any]) -> T:
+    """A part with some fields changed, all at once.
+
+    Args:
+        part: the part, as a scenario.
+        changes: values by dotted name, as in {"arm.l1": 0.3, "gain.x": 2.0}: numbers, "5 cm",
+            parts, or plain data of parts. What changes an entry goes before what changes the whole.
+
+    Returns:
+        A part of the same class. One number for a pair, and one part for a pair of parts, is that
+        of both axes. A part that was None begins as its defaults; but a hand is added whole, by
+        its mass, damper and spring.
+
+    Raises:
+        ParameterError: part is none, there is no such field, a value was refused, or a hand is
+            added in part.
+    """
+    if not dataclasses.is_dataclass(part) or isinstance(part, type):
+        raise ParameterError("part", part, "must be a part, as a Scenario")
+    data, values = nested(changes), values_of(part)
+    check_added_hand(values.get("operator"), data)
+    return make_part(type(part), data, values)
+
+
+def check_added_hand(old: Any, *changes: Mapping[Any, Any]) -> None:
+    """Refuses a mass, damper or spring alone where there is no hand, which would add the others.
+
+    Args:
+        old: the operator before.
+        *changes: plain data from `nested`, the later ones on top.
+
+    Raises:
+        ParameterError: a hand is added in part.
+    """
+    given = functools.reduce(laid_over, changes, {}).get("operator")
+    _check_hand(given, old, "operator")
+
+
+def _check_hand(given: Any, old: Any, path: str) -> None:
+    if not isinstance(given, Mapping):
+        return
+    if ENTIRE in given:
+        old = given[ENTIRE]
+    both = {n: given[n] for n in HAND if n in given}
+    for i, axis in enumerate(AXES):
+        if isinstance(given.get(axis), Mapping):
+            before = old[i] if isinstance(old, tuple) else old
+            _check_hand(both | given[axis], before, f"{path}.{axis}")
+    named = list(both)
+    if named and (old is None or isinstance(old, tuple) and None in old) and named != HAND:
+        more = " and ".join(join_names(path, n) for n in HAND if n not in named)
+        bound = f"adds a hand to a scene without one: give {more} as well, 0 for none"
+        raise ParameterError(join_names(path, named[0]), given[named[0]], bound)
+
+
+def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
+    """Plain data of values by dotted name; the key None holds what is given for a whole field.
+
+    Args:
+        changes: values by dotted name, or by name and deep.
+
+    Raises:
+        ParameterError: one value is given in both ways, or lies too deep.
+    """
+    out: dict[Any, Any] = {}
+    for name, value in changes.items():
+        try:
+            _plant(out, str(name).split("."), value)
+        except KeyError as twice:
+            bound = f"must be given once, and {twice.args[0]!r} is given twice"
+            raise ParameterError(str(name), value, bound) from None
+        except RecursionError:
+            raise ParameterError(str(name), ..., "must not lie so deep") from None
+    return out
+
+
+def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
+    name, rest = names[0], names[1:]
+    if rest or isinstance(value, Mapping):
+        below = tree.get(name)
+        if not isinstance(below, dict):
+            below = tree[name] = {ENTIRE: below} if name in tree else {}
+        if rest:
+            _plant(below, rest, value)
+        elif isinstance(value, Mapping):
+            for key, inner in value.items():
+                _plant(below, [key] if key is ENTIRE else str(key).split("."), inner)
+    elif isinstance(tree.get(name), dict):
+        tree[name][ENTIRE] = value
+    elif name in tree:
+        raise KeyError(name)
+    else:
+        tree[name] = value
+
+
+def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms".
+
+    Args:
+        field: name for the error.
+        words: the words.
+
+    Returns:
+        Values by dotted name.
+
+    Raises:
+        ParameterError: a word is not name=value, or a name stands twice.
+    """
+    out: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        name = name.strip()
+        if not equals or not name or name in out:
+            raise ParameterError(field, word, "must be name=value, each name once")
+        out[name] = _value_of(value.strip())
+    return out
+
+
+def _value_of(text: str) -> Any:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    items = text.split(",")
+    parts = [_number_or_text(x) for x in items]
+    if len(parts) > 1 and all(x.strip()[:1] in tuple("+-.0123456789") for x in items):
+        return parts
+    return parts[0] if len(parts) == 1 else text
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
