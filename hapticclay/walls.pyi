@@ -19,8 +19,8 @@ from .studies.port_energy import passivity_limit as passivity_limit
 from .studies.port_energy import polygon as polygon
 from .studies.port_energy import taken_energy as taken_energy
 from .studies.port_energy import zigzag as zigzag
-from .studies.zwidth import Limit as Limit
-from .studies.zwidth import Press as Press
+from .studies.wall_lines import Limit as Limit
+from .studies.wall_runs import Press as Press
 from .studies.zwidth import ZRegion as ZRegion
 from .studies.zwidth import ZWidth as ZWidth
 from .studies.zwidth import zwidth as zwidth

@@ -15,7 +15,8 @@ from ..model.constants import GAIN, TS
 from . import console, walls
 
 if TYPE_CHECKING:
-    from ..studies.zwidth import Wall, ZWidth
+    from ..studies.wall_lines import Wall
+    from ..studies.zwidth import ZWidth
 
 ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
 
@@ -62,7 +63,8 @@ class ZWidthCommand:
 
     def __call__(self) -> int:
         from ..scene.changes import with_fields
-        from ..studies.zwidth import Press, zwidth
+        from ..studies.wall_runs import Press
+        from ..studies.zwidth import zwidth
         from ..views.figure import Figure
         from ..views.wall_plots import zwidth_plot
 

@@ -26,7 +26,7 @@ from ..theory.mbk import (
 )
 from ..theory.stability_margins import Box
 from .boundary import PushedLoop, find_crossing, of_scenario, simulated_gain
-from .zwidth import growth_rates
+from .wall_runs import growth_rates
 
 MBK_SCHEMA = "hapticclay-mbk-1"
 MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}

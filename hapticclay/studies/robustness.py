@@ -32,7 +32,7 @@ from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
-from . import boundary, growth, sweep, zwidth
+from . import boundary, growth, sweep, wall_runs
 from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
@@ -195,7 +195,7 @@ class Trials:
             )
         else:
             push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
-            scenario = base.scenario(t_max, push=push, steps=zwidth.growth_steps(base))
+            scenario = base.scenario(t_max, push=push, steps=wall_runs.growth_steps(base))
         made = with_fields(scenario, others) if others else scenario
         if isinstance(base, VirtualWall):
             hardware = made.hardware
@@ -257,7 +257,7 @@ def judge(
 
     A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
     undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. That
-    of a wall is as long, and is read, as `zwidth.growth_rates` does, at the wall's own samples;
+    of a wall is as long, and is read, as `wall_runs.growth_rates` does, at the wall's own samples;
     where it hardly changes in size it is repeated, four times as long. A run that ends early, or
     drives the motors into their limits from so small a push, is unstable.
 
@@ -331,7 +331,7 @@ def _judge_walls(
         for first in range(0, len(members), WALL_BATCH):
             left = members[first : first + WALL_BATCH]
             for span in WALL_SPANS:
-                read = {i: zwidth.growth_reading(walls[i], span) for i in left}
+                read = {i: wall_runs.growth_reading(walls[i], span) for i in left}
                 jobs = [replace(runs[i], t_max=read[i][0] * walls[i].Ts) for i in left]
                 undecided = []
                 records = simulate_batch(jobs, threads=threads, every=every)

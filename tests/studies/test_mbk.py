@@ -10,7 +10,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.studies import mbk, zwidth
+from hapticclay.studies import mbk, wall_runs
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.views import impedance_plots
 
@@ -36,9 +36,9 @@ def test_runs_stop_being_stable_where_theory_says(plane, x):
 
 def test_growth_of_a_pushed_device():
     limit = hc.walls.stiffness_band(WALL)[1]
-    below, above = zwidth.growth_rates([replace(WALL, K=x * limit) for x in (0.99, 1.01)])
+    below, above = wall_runs.growth_rates([replace(WALL, K=x * limit) for x in (0.99, 1.01)])
     assert below < 0.0 < above
-    assert zwidth.growth_rates([replace(WALL, B=80.0)])[0] < -10.0  # faded to rounding
+    assert wall_runs.growth_rates([replace(WALL, B=80.0)])[0] < -10.0  # faded to rounding
 
 
 def test_least_mass_of_the_arm_by_runs():

@@ -10,17 +10,11 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.studies import boundary
+from hapticclay.studies import boundary, wall_lines, wall_runs
 from hapticclay.studies import zwidth as study
-from hapticclay.studies.zwidth import (
-    BY_REST,
-    Press,
-    come_to_rest,
-    growth_rates,
-    theoretical_damping,
-    worst_hand,
-    zwidth,
-)
+from hapticclay.studies.wall_lines import theoretical_damping, worst_hand
+from hapticclay.studies.wall_runs import Press, come_to_rest, growth_rates
+from hapticclay.studies.zwidth import BY_REST, zwidth
 from hapticclay.theory import gain_crossings
 from hapticclay.views.style import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
@@ -72,7 +66,8 @@ def test_boundary_of_runs_is_that_of_the_sampled_loop(change):
 
 
 def test_the_search_is_not_told_where(monkeypatch):
-    monkeypatch.setattr(study, "_exact", lambda wall: 37.0)
+    for module in (study, wall_lines):
+        monkeypatch.setattr(module, "exact_limit", lambda wall: 37.0)
     r = zwidth(BARE, B=(1.0,)).regions[0]
     expected = [largest_stiffness(replace(BARE, B=1.0))]
     assert r.K == pytest.approx(expected, rel=3e-3)
@@ -156,8 +151,8 @@ def test_a_buzz_without_friction_is_that_of_a_relay():
     device, swings = hc.Device(0.1, 0.5, quantum=2e-5), []
     for K in (50.0, 200.0):
         wall = replace(BARE, K=K, device=device)
-        record = hc.simulate(study._pressed(wall, Press(), 16.0, 4), every=4)
-        swing, _ = study._swing(record, 0.8, 1.0)
+        record = hc.simulate(wall_runs._pressed(wall, Press(), 16.0, 4), every=4)
+        swing, _ = wall_runs._swing(record, 0.8, 1.0)
         assert amplitude(K, 0.5e-3) < 0.5 * swing < amplitude(K, 1e-3)
         swings.append(swing / K)
         assert not come_to_rest([wall], Press(still=0.8 * swing))[0]

@@ -22,9 +22,10 @@ from hapticclay.studies.population import Draw, gain_band
 from hapticclay.studies.robustness import Instability
 from hapticclay.studies.sampling import Range
 from hapticclay.studies.stability_map import MapCell, StabilityMap
+from hapticclay.studies.wall_lines import Limit
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
-from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, Limit, ZRegion, ZWidth
+from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, ZRegion, ZWidth
 from hapticclay.theory.loops import Loop
 from hapticclay.theory.stability_margins import Box
 from hapticclay.views import (
