@@ -195,14 +195,15 @@ def significant(x: float) -> str:
 
 
 @contextlib.contextmanager
-def ctrl_c() -> Iterator[Callable[[], bool]]:
-    """Yields a function that tells whether Ctrl-C has been pressed; a second one interrupts.
+def ctrl_c() -> Iterator[threading.Event]:
+    """Yields an event that Ctrl-C sets in place of raising; a second Ctrl-C raises.
 
-    Under `ends`, SIGTERM and SIGHUP count too.
+    Under `ends`, SIGTERM and SIGHUP count too. Only the main thread hears signals: in another the
+    event is never set. Where Ctrl-C is ignored, as under nohup, it remains so.
     """
     pressed = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield pressed.is_set
+        yield pressed
         return
     before = signal.getsignal(signal.SIGINT)
 
@@ -214,7 +215,7 @@ def ctrl_c() -> Iterator[Callable[[], bool]]:
 
     signal.signal(signal.SIGINT, note)
     try:
-        yield pressed.is_set
+        yield pressed
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -57,8 +57,8 @@ class RunCommand:
         writable(out)
         for line in unstable_axes(self.scenario):
             print(f"hapticclay: {line}", file=sys.stderr)
-        with console.ctrl_c() as asked:
-            record = simulate_with_progress(self.scenario, self.every, asked, self.error)
+        with console.ctrl_c() as stop:
+            record = simulate_with_progress(self.scenario, self.every, stop.is_set, self.error)
         deliver(record, out, self.figures if self.plots else None)
         return 130 if record.outcome.code == "interrupted" else 0
 

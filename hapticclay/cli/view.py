@@ -102,11 +102,10 @@ class ViewCommand:
 
     def _session(self, tool: Tool) -> Record | None:
         """Plays a session until its window or page is closed; None if nothing was recorded."""
-        from ..views.player import stoppable
         from ..views.session import Session
 
         session = Session(self.scenario, self.stiffness, tool, self.every)
-        with stoppable() as stop, streaming(session, self.stream):
+        with console.ctrl_c() as stop, streaming(session, self.stream):
             if self.web:
                 _serve_page(session, self.host, self.port, stop.is_set)
             else:
@@ -152,12 +151,11 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
     """
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
-    from ..views.player import stoppable
     from ..views.replay import Replay
     from ..views.window import Window
 
     play = Replay(record, tool)
-    with stoppable() as stop, streaming(play, stream):
+    with console.ctrl_c() as stop, streaming(play, stream):
         Window(play).show(stop.is_set)
 
 

@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
 import threading
 import time
-from collections.abc import Iterator
 
 from .clock import FRAME_TIME
 from .replay import Replay
 from .session import Session
-
-
-@contextlib.contextmanager
-def stoppable() -> Iterator[threading.Event]:
-    """Yields an event that Ctrl-C sets in place of raising; a second Ctrl-C raises."""
-    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
-
-    def heard(*_) -> None:
-        stop.set()
-        signal.signal(signal.SIGINT, before)
-
-    signal.signal(signal.SIGINT, heard)
-    try:
-        yield stop
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 class Player(threading.Thread):

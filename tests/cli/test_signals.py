@@ -62,10 +62,8 @@ def test_an_export_leaves_no_temporary_file(tmp_path, monkeypatch, capsys, how):
 
 
 def test_a_signal_goes_to_who_listens_for_ctrl_c():
-    from hapticclay.views.player import stoppable
-
     with console.ends() as received:
-        with stoppable() as stop:  # of a session in a window or a page
+        with console.ctrl_c() as stop:  # of a session in a window or a page
             signal.raise_signal(signal.SIGTERM)
             assert stop.is_set()
             with pytest.raises(KeyboardInterrupt):  # the second does not wait
