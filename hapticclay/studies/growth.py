@@ -87,11 +87,21 @@ def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
     z = z[np.abs(z) > 1e-6]
     powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
     amplitude = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0])
-    weight = amplitude * np.maximum(np.abs(z) ** (len(v) - 1), 1.0)
+    rate, strong, swings = _judged(z, amplitude, len(v), dt, slowest)
+    return float(rate[swings].max()) if swings.any() else -math.inf
+
+
+def _judged(
+    z: np.ndarray, amplitude: np.ndarray, samples: int, dt: float, slowest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Growth rates of modes [1/s]; which are above rounding; which of these oscillate or run away.
+
+    Modes lie along the last axis of z and amplitude.
+    """
     rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
-    strong = weight > MODE_SHARE * weight.max(initial=0.0)
-    counts = strong & ((omega > slowest) | (rate > slowest))
-    return float(rate[counts].max()) if counts.any() else -math.inf
+    weight = amplitude * np.maximum(np.abs(z) ** (samples - 1), 1.0)
+    strong = weight > MODE_SHARE * weight.max(axis=-1, keepdims=True, initial=0.0)
+    return rate, strong, strong & ((omega > slowest) | (rate > slowest))
 
 
 def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
@@ -145,20 +155,17 @@ def _least_damped_of(
         j, F = j[sound], F[sound]
         z = np.linalg.eigvals(F).astype(complex)
         z[np.abs(z) < 1e-6] = 1e-6  # gone within a sample
-        growth, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
         powers = np.exp(np.log(z)[:, None, :] * np.arange(n)[None, :, None])
         q, R = np.linalg.qr(powers)
         ok = np.isfinite(R).all(axis=(1, 2)) & (
             np.abs(np.diagonal(R, axis1=1, axis2=2)).min(axis=1) > 1e-14
         )
-        j, z, growth, omega, powers, q, R = (x[ok] for x in (j, z, growth, omega, powers, q, R))
+        j, z, powers, q, R = (x[ok] for x in (j, z, powers, q, R))
         if not len(j):
             continue
         weight = np.linalg.solve(R, q.conj().transpose(0, 2, 1) @ v[j].astype(complex)[..., None])
         miss[j] = np.abs((powers @ weight)[..., 0] - v[j]).max(axis=1)
-        weight = np.abs(weight[..., 0]) * np.maximum(np.abs(z) ** (n - 1), 1.0)
-        strong = weight > MODE_SHARE * weight.max(axis=1, keepdims=True)
-        swings = strong & ((omega > SLOWEST_MODE) | (growth > SLOWEST_MODE))
+        growth, strong, swings = _judged(z, np.abs(weight[..., 0]), n, dt, SLOWEST_MODE)
         # One that folds onto zero frequency, and grows slowly, may be a swing: undecided.
         doubtful = (strong & ~swings & (growth > LEAST_RATE)).any(axis=1)
         found = np.where(swings, growth, -np.inf).max(axis=1)
