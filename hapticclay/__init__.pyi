@@ -1,6 +1,7 @@
 # Public names and the modules they come from; lazy_loader imports each when it is first used.
 
 from . import materials as materials
+from . import ports as ports
 from . import studies as studies
 from . import theory as theory
 from . import walls as walls

@@ -30,6 +30,7 @@ ROOMS = (
     "theory",
     "simulation",
     "studies",
+    "ports",
 )  # of classes that a file may name
 VIEWS = "hapticclay.views.result_plots"  # draws; looked up when a figure is asked for
 SHOWN_ROWS = 10  # of a table in a notebook

@@ -5,7 +5,7 @@ import types
 
 import hapticclay as hc
 
-DOORS = ("theory", "walls", "studies", "materials")
+DOORS = ("theory", "walls", "studies", "materials", "ports")
 NAMES = {
     f"{door}.{name}" if door else name: getattr(module, name)
     for door, module in [("", hc), *((x, getattr(hc, x)) for x in DOORS)]

@@ -48,6 +48,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "fields": "hapticclay.cli.fields:FieldsCommand",
     "materials": "hapticclay.cli.materials:MaterialsCommand",
     "view": "hapticclay.cli.view:ViewCommand",
+    "device": "hapticclay.cli.device:DeviceCommand",
     "video": "hapticclay.cli.video:VideoCommand",
     "info": "hapticclay.cli.info:InfoCommand",
     "export": "hapticclay.cli.export:ExportCommand",

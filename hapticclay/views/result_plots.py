@@ -26,6 +26,7 @@ PLOTS = {  # by class of the result: module here, and function
     "Band": "robustness_plots:band_plot",
     "Instability": "robustness_plots:instability_plot",
     "Design": "result_plots:design_plot",
+    "LoopReport": "loop_plots:loop_plot",
     "Comparison": "compare_plots:main_overlay",
 }
 DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]

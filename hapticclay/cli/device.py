@@ -1,0 +1,226 @@
+"""`hapticclay device`: the arm as a device for other programs, and reports of their loops."""
+
+from __future__ import annotations
+
+import logging
+import math
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from ..errors import ParameterError
+from ..files import writable
+from . import console
+from .run import deliver
+
+if TYPE_CHECKING:
+    from ..ports.device import Trajectory
+    from ..ports.report import LoopReport
+    from ..ports.server import DeviceServer
+    from ..scene.scenario import Scenario
+
+WAIT = 0.1  # [s] between two looks at whether the session is to end
+
+
+@dataclass(frozen=True)
+class DeviceCommand:
+    """Serve the simulated arm as a Haply Inverse3, or report on the loop of a client.
+
+    Programs for a real device connect over a WebSocket, read where the handle is, and send forces,
+    which move the arm beside a simulated hand. `device serve` runs until Ctrl-C, then writes the
+    record, what was exchanged, and a report: what the client rendered, and what its rate, its delay
+    and this hand can carry. `device report FOLDER` makes the report again.
+
+    Attributes:
+        action: serve or report.
+        source: To serve, a scenario file, whose arm, hand and hardware are used; none for the
+            paper's arm and hand. To report, the folder that a session wrote.
+        port: Port to listen on; 0 for a free one.
+        host: Address to listen on; a token guards any but this machine's.
+        clock: wall moves the arm in real time; tick moves it by --period at each message, so that
+            the same messages give the same run.
+        period: Of a message with --clock tick [s].
+        hand: Where the hand wants to be: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a
+            CSV file with the columns t, x, y. By default it rests about the start.
+        plane: Plane of the device in which the arm moves.
+        buttons: CSV file with the columns t, a, b, c, home (0 or 1): buttons over time.
+        clay: Let the clay of the scenario act beside the client's force.
+        device_id: Of the Inverse3, hexadecimal.
+        grip_id: Of the grip, hexadecimal.
+        largest_force: Longer forces are shortened to this [N].
+        duration: End after this time on the clock of the computer [s]; none for Ctrl-C.
+        out: Folder for the record, the exchanges and the report.
+        plots: Draw the plots.
+        figures: Formats and style of the plots.
+    """
+
+    action: Annotated[Literal["serve", "report"], tyro.conf.Positional]
+    source: Annotated[Path | None, tyro.conf.Positional] = None
+    port: int = 10_001
+    host: str = "127.0.0.1"
+    clock: Literal["wall", "tick"] = "wall"
+    period: float = 0.005
+    hand: tuple[str, ...] = ()
+    plane: Literal["xy", "xz"] = "xy"
+    buttons: Path | None = None
+    clay: bool = False
+    device_id: str = "04EA"
+    grip_id: str = "F00D"
+    largest_force: float = 10.0
+    duration: float | None = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/device, out/loop)")
+    ] = None
+    plots: bool = True
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        out = self.out or Path("out", "loop" if self.action == "report" else "device")
+        if self.action == "report":
+            return self._report(out)
+        writable(out)
+        with self._server() as server, console.ctrl_c() as stop:
+            print(f"an Inverse3 listens at {server.url}; Ctrl-C ends the session", flush=True)
+            end = math.inf if self.duration is None else time.monotonic() + self.duration
+            while not stop.wait(WAIT) and time.monotonic() < end:
+                if ended := server.service.device.ended:
+                    print(f"hapticclay: the arm stopped: {ended}", file=sys.stderr)
+                    break
+            server.close()
+            return self._deliver(server, out)
+
+    def _server(self) -> Any:
+        from ..ports.buttons import ButtonScript
+        from ..ports.server import serve
+        from ..ports.service import Inverse3
+
+        logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
+        shown = Inverse3(
+            self.device_id,
+            self.grip_id,
+            self.plane,
+            ButtonScript.of_file(self.buttons) if self.buttons else ButtonScript(),
+            self.largest_force,
+        )
+        return serve(
+            served_scenario(self.source),
+            host=self.host,
+            port=self.port,
+            clock=self.clock,
+            period=self.period if self.clock == "tick" else None,
+            hand=trajectory_of(self.hand),
+            clay=self.clay,
+            inverse3=shown,
+        )
+
+    def _deliver(self, server: DeviceServer, out: Path) -> int:
+        """Writes and prints what happened."""
+        from ..ports.exchanges import FILE
+
+        service = server.service
+        if not service.device.t:
+            print("nothing was recorded")
+            return 0
+        record = server.record()
+        talks = sorted(server.exchanges, key=len, reverse=True)
+        deliver(record, out, self.figures if self.plots else None)
+        if service.skipped:
+            share = service.skipped / (service.skipped + service.samples)
+            text = f"{service.skipped} control samples ({share:.1%}) were skipped"
+            print(f"hapticclay: {text}: the computer was late", file=sys.stderr)
+        if len(talks) > 1:
+            print(f"{len(talks)} clients; the report is of the one with the most messages")
+        if talks and len(talks[0]) > 1:
+            talks[0].save(out / FILE)
+            self._write(talks[0], record.scenario, out)
+        return 0
+
+    def _report(self, out: Path) -> int:
+        from ..ports.exchanges import Exchanges
+        from ..simulation.record import Record
+
+        if self.source is None:
+            raise ParameterError("source", "", "give the folder that a session wrote")
+        exchanges = Exchanges.load(self.source)
+        writable(out)
+        self._write(exchanges, Record.load(self.source).scenario, out)
+        return 0
+
+    def _write(self, exchanges: Any, scenario: Scenario, folder: Path) -> None:
+        from ..ports.report import loop_report
+
+        found = loop_report(exchanges, scenario)
+        try:
+            found.save(folder / "loop.json")
+            if self.plots:
+                self._draw(found, folder)
+        finally:  # a full disk must not hide the result
+            print(report_table(found))
+            print(found.headline())
+
+    def _draw(self, found: LoopReport, folder: Path) -> None:
+        from ..views.figure import Figure
+        from ..views.loop_plots import loop_plot
+
+        console.save_figures(
+            {"loop": Figure(lambda: loop_plot(found), found.tables)}, folder, self.figures
+        )
+
+
+def report_table(found: LoopReport) -> str:
+    """The report for a terminal.
+
+    Args:
+        found: from `loop_report`.
+    """
+    rows = [
+        (name, value if isinstance(value, str) else console.significant(value))
+        for name, (value,) in found.tables()["report"].items()
+    ]
+    return console.text_table(rows, ("loop", ""), "lr")
+
+
+def served_scenario(source: Path | None) -> Scenario:
+    """What is served: a scenario file, or the paper's arm and hand.
+
+    Args:
+        source: the file; None for the paper's.
+    """
+    from ..model.operator import Operator
+    from ..scene.scenario import Scenario
+
+    if source is None:
+        return Scenario(name="device", operator=Operator(), force=(0.0, 0.0), length=None)
+    return Scenario.load(source)
+
+
+def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
+    """Where the hand wants to be, from the words of an option.
+
+    Args:
+        words: x and y; or x0, y0, x1, y1 and a speed; or the name of a CSV file.
+
+    Raises:
+        ParameterError: they are none of these.
+    """
+    from ..ports.device import Trajectory
+
+    if not words:
+        return None
+    if len(words) == 1 and Path(words[0]).suffix.lower() == ".csv":
+        return Trajectory.of_file(words[0])
+    try:
+        x = [float(word) for word in words]
+    except ValueError:
+        x = []
+    if len(x) == 2:
+        return Trajectory.to((x[0], x[1]))
+    if len(x) == 5 and x[4] > 0.0 and x[:2] != x[2:4]:
+        way = math.dist(x[:2], x[2:4])
+        return Trajectory((0.0, way / x[4]), ((x[0], x[1]), (x[2], x[3])))
+    bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, or a CSV file"
+    raise ParameterError("hand", " ".join(words), bound)

@@ -1,0 +1,5 @@
+"""Ports: other programs at the arm, as they are at a real device."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

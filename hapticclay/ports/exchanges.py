@@ -1,0 +1,175 @@
+"""What client and device exchanged: a row a message."""
+
+from __future__ import annotations
+
+import collections
+import csv
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..files import atomic
+
+MOST_ROWS = 1_000_000  # that a log keeps, the newest: 17 minutes at 1 kHz
+COLUMNS = (
+    "received_s",
+    "began_s",
+    "sampled_s",
+    "x_m",
+    "y_m",
+    "vx_m_per_s",
+    "vy_m_per_s",
+    "asked_x_N",
+    "asked_y_N",
+    "asked_across_N",
+    "applied_x_N",
+    "applied_y_N",
+)
+
+
+class Exchange(NamedTuple):
+    """A message and its answer.
+
+    Attributes:
+        received: when the message came, on the computer's clock [s].
+        began: simulated time from which its force acted [s].
+        sampled: simulated time at which the answered state was measured [s].
+        position: of the handle in the plane of the arm, as answered [m].
+        velocity: of the handle, as answered [m/s].
+        asked: force that the client asked for [N]: in the plane of the arm, and across it.
+        applied: force on the handle in the plane of the arm, of all clients, after the limit [N].
+    """
+
+    received: float
+    began: float
+    sampled: float
+    position: tuple[float, float]
+    velocity: tuple[float, float]
+    asked: tuple[float, float, float]
+    applied: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Exchanges:
+    """What one client and the device exchanged, a row a message.
+
+    Attributes:
+        received: when each message came, on the computer's clock [s], shape (n,).
+        began: simulated time from which its force acted [s], shape (n,).
+        sampled: simulated time at which the answered state was measured [s], shape (n,).
+        position: of the handle in the plane of the arm [m], shape (n, 2).
+        velocity: of the handle [m/s], shape (n, 2).
+        asked: force that the client asked for [N], shape (n, 3): in the plane of the arm, and
+            across it, where it cannot act.
+        applied: force on the handle in the plane of the arm [N], shape (n, 2).
+    """
+
+    received: np.ndarray
+    began: np.ndarray
+    sampled: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    asked: np.ndarray
+    applied: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.received)
+
+    def __repr__(self) -> str:
+        return f"<Exchanges: {len(self)} messages>"
+
+    @classmethod
+    def of_table(cls, table: np.ndarray) -> Exchanges:
+        """Exchanges of a table.
+
+        Args:
+            table: columns as in COLUMNS, shape (n, 12).
+        """
+        t = np.asarray(table, float).reshape(-1, len(COLUMNS))
+        return cls(t[:, 0], t[:, 1], t[:, 2], t[:, 3:5], t[:, 5:7], t[:, 7:10], t[:, 10:12])
+
+    def table(self) -> np.ndarray:
+        """All of it, columns as in COLUMNS, shape (n, 12)."""
+        times = self.received, self.began, self.sampled
+        return np.column_stack([*times, self.position, self.velocity, self.asked, self.applied])
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes a CSV file, to the last bit, whole or not at all.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The file.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        text = io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(COLUMNS)
+        rows.writerows([[repr(float(x)) for x in row] for row in self.table()])
+        with atomic(Path(path)) as f:
+            f.write(text.getvalue().encode())
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Exchanges:
+        """Reads what `save` wrote.
+
+        Args:
+            path: the file, or the folder of a record that has exchanges.csv.
+
+        Raises:
+            ParameterError: the file cannot be read, or holds something else.
+        """
+        file = Path(path) / FILE if Path(path).is_dir() else Path(path)
+        try:
+            with file.open(newline="") as f:
+                head, *rows = list(csv.reader(f)) or [[]]
+            if tuple(head) != COLUMNS:
+                raise ValueError("other columns")
+            return cls.of_table(np.array([[float(x) for x in row] for row in rows]))
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            bound = f"must be a file of exchanges ({why})"
+            raise ParameterError("record", str(path), bound) from None
+
+
+FILE = "exchanges.csv"  # beside the record of a session
+
+
+class ExchangeLog:
+    """Keeps the newest exchanges.
+
+    Attributes:
+        count: exchanges so far, kept or not.
+    """
+
+    def __init__(self, most: int = MOST_ROWS):
+        """Begins empty.
+
+        Args:
+            most: rows to keep, the newest.
+        """
+        self.count = 0
+        self._rows: collections.deque[Exchange] = collections.deque(maxlen=most)
+
+    def add(self, row: Exchange) -> None:
+        """Adds an exchange.
+
+        Args:
+            row: the exchange.
+        """
+        self._rows.append(row)
+        self.count += 1
+
+    def exchanges(self) -> Exchanges:
+        """What is kept."""
+        rows = [(*r[:3], *r.position, *r.velocity, *r.asked, *r.applied) for r in list(self._rows)]
+        return Exchanges.of_table(np.array(rows))

@@ -1,0 +1,269 @@
+"""The loop report: what a client's loop rendered, and what this hand, rate and delay can carry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..results import Result, Tables
+from ..scene.scenario import Scenario
+from ..theory.client_loop import Handle, rendered_stiffness_limit, slowest_period
+from .exchanges import Exchanges
+
+LATEST = 4  # answers back that a force may have been computed from
+FEWEST = 8  # messages in contact that a fit needs
+FORCE_LEAST = 1e-9  # [N] a smaller force is none
+EXPLAINED = 0.9  # share of the force's square that a wall must explain
+DOUBT = 0.2  # largest standard error of K, as a share of K
+UNTOLD = ("delay", "K", "B", "K_error", "explained", "limit", "rate_needed")  # without a wall
+LINE = 25  # values of B of the line of theory
+
+
+class WallFit(NamedTuple):
+    """A wall that explains a client's forces.
+
+    Attributes:
+        K: stiffness [N/m].
+        B: damping [N.s/m].
+        K_error: standard error of K [N/m].
+        explained: share of the square of the force that it explains.
+        back: answers between the state that a force was computed from and the force, 1 for the
+            newest.
+        normal: direction of the force.
+        place: mean place in contact [m].
+        contact: messages that were fitted.
+    """
+
+    K: float
+    B: float
+    K_error: float
+    explained: float
+    back: int
+    normal: tuple[float, float]
+    place: tuple[float, float]
+    contact: int
+
+
+@dataclass(frozen=True)
+class LoopReport(Result):
+    """What a client's loop did, beside what it can carry.
+
+    Attributes:
+        messages: that were read.
+        rate: mean rate of the messages [Hz].
+        intervals: median and 99th percentile of the time between two messages [s].
+        period: median of the simulated time between two messages [s].
+        delay: simulated time from the measurement that a force was computed from to the force [s];
+            NaN where the forces do not tell.
+        limited: share of the messages whose force was shortened, or added to that of others.
+        K: stiffness that the forces show [N/m]; NaN where they do not tell.
+        B: damping that they show [N.s/m]; NaN where they do not tell.
+        K_error: standard error of K [N/m].
+        explained: share of the square of the force that K and B explain.
+        contact: messages that were fitted.
+        normal: direction of the wall.
+        limit: stiffness that this period, delay, hand and B carry [N/m].
+        rate_needed: rate that would carry K and B with as many samples of delay [Hz]; inf for none
+            up to a thousand times the present one.
+        line_B: damping of a line of theory [N.s/m].
+        line_K: stiffness that it carries [N/m]: the Z-width of this loop.
+        note: why K and B are not told; "" where they are.
+    """
+
+    messages: int
+    rate: float
+    intervals: tuple[float, float]
+    period: float
+    delay: float
+    limited: float
+    K: float
+    B: float
+    K_error: float
+    explained: float
+    contact: int
+    normal: tuple[float, float]
+    limit: float
+    rate_needed: float
+    line_B: tuple[float, ...]
+    line_K: tuple[float, ...]
+    note: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """ "holds", "buzzes" or "not told"."""
+        if math.isnan(self.K):
+            return "not told"
+        return "holds" if self.K <= self.limit else "buzzes"
+
+    def headline(self) -> str:
+        """The report in a line."""
+        rate = f"{1.0 / self.period:.4g} Hz" if self.period > 0.0 else "no rate"
+        if math.isnan(self.K):
+            return f"{self.messages} messages at {rate}; {self.note}"
+        late = self.delay / self.period
+        damped = f" and {self.B:.3g} N.s/m" if abs(self.B) > 1e-3 else ""
+        text = (
+            f"rendered {self.K:.4g} N/m{damped} at {rate}, {late:.2g} samples late; "
+            f"limit for this hand {self.limit:.4g} N/m: it {self.verdict}"
+        )
+        if self.verdict == "holds":
+            return text
+        if math.isinf(self.rate_needed):
+            return text + "; no rate carries it: damp the wall or soften it"
+        return text + f"; {self.rate_needed:.4g} Hz would carry it"
+
+    def tables(self) -> Tables:
+        """The report, and the line of theory."""
+        p50, p99 = self.intervals
+        rows: dict[str, Any] = {
+            "messages": self.messages,
+            "rate [Hz]": self.rate,
+            "interval, median [s]": p50,
+            "interval, 99th percentile [s]": p99,
+            "simulated period [s]": self.period,
+            "delay [s]": self.delay,
+            "forces limited [share]": self.limited,
+            "K [N/m]": self.K,
+            "standard error of K [N/m]": self.K_error,
+            "B [N.s/m]": self.B,
+            "explained [share]": self.explained,
+            "limit of K [N/m]": self.limit,
+            "rate needed [Hz]": self.rate_needed,
+            "verdict": self.verdict,
+        }
+        line = {"B [N.s/m]": self.line_B, "K limit [N/m]": self.line_K}
+        return {"report": {k: [v] for k, v in rows.items()}, "limit": line}
+
+
+def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
+    """Reads a client's loop from what it exchanged with a device.
+
+    The stiffness and damping are those that explain its forces best (least squares over place and
+    velocity of the answers, along the main direction of the force); which answer a force was
+    computed from is found by the same fit. The limit is that of the exact sampled loop.
+
+    Args:
+        exchanges: of one client.
+        scenario: of the device: its arm and its hand.
+
+    Returns:
+        The report; where the forces do not tell a wall, K and B are NaN and `note` says why.
+
+    Raises:
+        ParameterError: there are fewer than two messages.
+    """
+    if len(exchanges) < 2:
+        raise ParameterError("exchanges", len(exchanges), "must have two messages or more")
+    gaps = np.diff(exchanges.received)
+    period = float(np.median(np.diff(exchanges.began)))
+    shortened = np.abs(exchanges.asked[:, :2] - exchanges.applied).max(axis=1) > 1e-9
+    fit, note = fit_wall(exchanges)
+    mean = float(np.mean(gaps))
+    common: dict[str, Any] = {
+        "messages": len(exchanges),
+        "rate": 1.0 / mean if mean > 0.0 else math.inf,
+        "intervals": (float(np.median(gaps)), float(np.quantile(gaps, 0.99))),
+        "period": period,
+        "limited": float(np.mean(shortened)),
+    }
+    if fit is None or period <= 0.0:
+        note = note or "no simulated time passed between messages"
+        untold: dict[str, Any] = dict.fromkeys(UNTOLD, math.nan)
+        untold |= dict(contact=0, normal=(1.0, 0.0), line_B=(), line_K=())
+        return LoopReport(**common, **untold, note=note)
+    lag = exchanges.began[fit.back :] - exchanges.sampled[: -fit.back]
+    delay = max(0.0, float(np.median(lag)))
+    handle = Handle.of(scenario, fit.place, fit.normal)
+    limit = rendered_stiffness_limit(handle, fit.B, period, delay)
+    slow = slowest_period(handle, fit.K, fit.B, delay / period, period)
+    line_B, line_K = limit_line(handle, fit.B, period, delay)
+    return LoopReport(
+        **common,
+        delay=delay,
+        K=fit.K,
+        B=fit.B,
+        K_error=fit.K_error,
+        explained=fit.explained,
+        contact=fit.contact,
+        normal=fit.normal,
+        limit=limit,
+        rate_needed=1.0 / slow if slow else math.inf,
+        line_B=line_B,
+        line_K=line_K,
+    )
+
+
+def limit_line(
+    handle: Handle, B: float, Ts: float, delay: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Damping and the stiffness that it carries, from 0 to where nothing is carried.
+
+    Args:
+        handle: arm and hand.
+        B: damping that the line is to reach [N.s/m].
+        Ts: of the client [s].
+        delay: of its force [s].
+
+    Returns:
+        B [N.s/m] and K [N/m], of equal length.
+    """
+    mass = float(1.0 / (handle.normal @ np.linalg.inv(handle.inertia) @ handle.normal))
+    top = max(2.5 * mass / (Ts + delay), 1.2 * B)
+    rising = np.geomspace(1e-3 * top, 0.8 * top, LINE)
+    grid = [0.0, *rising.tolist(), *np.linspace(0.82 * top, top, LINE // 2).tolist()]
+    K = [rendered_stiffness_limit(handle, b, Ts, delay) for b in grid]
+    return tuple(grid), tuple(K)
+
+
+def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
+    """The wall that explains a client's forces, or why there is none.
+
+    Args:
+        exchanges: of one client.
+
+    Returns:
+        The wall, or None; and the reason, "" for none.
+    """
+    force = exchanges.asked[:, :2]
+    size = np.hypot(*force.T)
+    contact = np.isfinite(size) & (size > FORCE_LEAST)
+    contact[:LATEST] = False  # whose state may have come with the inventory
+    if contact.sum() < FEWEST:
+        return None, f"{int(contact.sum())} messages had a force: a wall is told from {FEWEST}"
+    normal = np.linalg.svd(force[contact], full_matrices=False)[2][0]
+    normal = normal if normal[np.argmax(np.abs(normal))] > 0.0 else -normal
+    found = [_fitted(exchanges, force @ normal, normal, contact, back) for back in range(1, LATEST)]
+    best = max(found, key=lambda fit: fit.explained)
+    if best.explained < EXPLAINED:
+        return None, f"a spring and damper explain {best.explained:.0%} of the force"
+    if best.K <= 0.0 or best.K_error > DOUBT * best.K:
+        return None, f"stiffness {best.K:.3g} +- {best.K_error:.2g} N/m: the forces tell too little"
+    return best, ""
+
+
+def _fitted(
+    exchanges: Exchanges, force: np.ndarray, normal: np.ndarray, contact: np.ndarray, back: int
+) -> WallFit:
+    """Least squares of the force over place and velocity of the answer so many messages before."""
+    at = np.flatnonzero(contact)
+    place, rate = exchanges.position[at - back], exchanges.velocity[at - back]
+    given = np.column_stack([place @ normal, rate @ normal, np.ones(len(at))])
+    scale = np.maximum(np.abs(given).max(axis=0), 1e-300)
+    y = force[at]
+    solution, _, rank, _ = np.linalg.lstsq(given / scale, y)
+    missed = y - given @ (solution / scale)
+    square = float(missed @ missed) / max(1, len(at) - 3)
+    spread = np.linalg.pinv((given / scale).T @ (given / scale))
+    error = math.sqrt(square * spread[0, 0]) / scale[0] if rank == 3 else math.inf
+    K, B, _ = 0.0 - solution / scale
+    total = float(((y - y.mean()) ** 2).sum())
+    even = total < 1e-12 * float(y @ y)  # a constant force is no wall
+    explained = 0.0 if even else 1.0 - float(missed @ missed) / total
+    mean = place.mean(axis=0)
+    way = float(normal[0]), float(normal[1])
+    where = float(mean[0]), float(mean[1])
+    return WallFit(float(K), float(B), error, explained, back, way, where, len(at))

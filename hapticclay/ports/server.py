@@ -1,0 +1,228 @@
+"""The service on a WebSocket, as programs for a real Inverse3 find it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import json
+import logging
+import secrets
+import socket
+import threading
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from ..errors import ParameterError, choice, integer, needing
+from ..files import versions
+from ..scene.scenario import Scenario
+from ..simulation.record import Record
+from .device import SimulatedDevice, Trajectory
+from .exchanges import Exchanges
+from .inverse import DEVICES, LARGEST_MESSAGE
+from .service import PLAIN, Inverse3, Service
+
+LOCAL = ("127.0.0.1", "localhost", "::1")
+CLOCKS = ("wall", "tick")
+LONGEST_QUEUE = 16  # messages of a client that wait to be answered
+
+
+class DeviceServer:
+    """A service that runs in a thread of its own.
+
+    Attributes:
+        service: sessions and clock.
+        url: for WebSocket clients.
+        port: that it listens on.
+    """
+
+    def __init__(self, service: Service, host: str = "127.0.0.1", port: int = 0):
+        """Listens.
+
+        Args:
+            service: what answers.
+            host: address to listen on; a token guards any but this machine's.
+            port: to listen on; 0 for a free one.
+
+        Raises:
+            ParameterError: the port or the address cannot be had, or websockets is not installed.
+        """
+        with needing("a device server", "websockets", "device"):
+            import websockets  # noqa: F401
+        integer("port", port, 0, 65_535)
+        self.service = service
+        self._token = "" if host in LOCAL else secrets.token_urlsafe(16)
+        self._loop = asyncio.new_event_loop()
+        self._done = asyncio.Event()
+        self._failed: OSError | None = None
+        ready = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, args=(host, port, ready), name="device server", daemon=True
+        )
+        self.port = port
+        self._thread.start()
+        ready.wait()
+        if self._failed is not None:
+            self._thread.join()
+            why = self._failed.strerror or str(self._failed)
+            raise ParameterError("port", port, f"must be free on {host} ({why})")
+        query = f"/?token={self._token}" if self._token else ""
+        self.url = f"ws://{f'[{host}]' if ':' in host else host}:{self.port}{query}"
+        service.start()
+
+    def __enter__(self) -> DeviceServer:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes all connections and stops the clock."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._done.set)
+            self._thread.join()
+        self.service.stop()
+
+    def record(self) -> Record:
+        """The record of the device so far, which then no longer moves.
+
+        Raises:
+            RuntimeError: it has not moved.
+        """
+        self.close()
+        return self.service.device.record()
+
+    @property
+    def exchanges(self) -> list[Exchanges]:
+        """What each client exchanged with the device, in the order of their connection."""
+        return [log.exchanges() for log in self.service.logs]
+
+    # ---- the thread
+
+    def _run(self, host: str, port: int, ready: threading.Event) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve(host, port, ready))
+        except OSError as error:
+            self._failed = error
+        finally:
+            ready.set()
+            self._loop.close()
+
+    async def _serve(self, host: str, port: int, ready: threading.Event) -> None:
+        from websockets.asyncio.server import serve as listen
+
+        quiet = logging.getLogger("hapticclay.ports.websockets")
+        quiet.setLevel(logging.CRITICAL)  # whoever knocks with rubbish gets no traceback
+        async with listen(
+            self._talk,
+            host,
+            port,
+            compression=None,
+            ping_interval=None,
+            max_size=LARGEST_MESSAGE,
+            max_queue=LONGEST_QUEUE,
+            server_header=None,
+            close_timeout=1.0,
+            process_request=self._http,
+            logger=quiet,
+        ) as server:
+            self.port = next(iter(server.sockets)).getsockname()[1]
+            ready.set()
+            await self._done.wait()
+
+    async def _talk(self, connection: Any) -> None:
+        """A client, until it goes."""
+        from websockets.exceptions import ConnectionClosed
+
+        connected = connection.transport.get_extra_info("socket")
+        with contextlib.suppress(OSError, AttributeError):
+            connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        number, inventory = self.service.connect()
+        try:
+            await connection.send(inventory)
+            async for data in connection:
+                await connection.send(self.service.answer(number, data))
+        except ConnectionClosed:
+            pass
+        finally:
+            self.service.leave(number)
+
+    def _http(self, connection: Any, request: Any) -> Any:
+        """Answers plain GETs; None lets a WebSocket through."""
+        where = urlsplit(request.path)
+        given = parse_qs(where.query).get("token", [""])[0]
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return _envelope(connection, HTTPStatus.FORBIDDEN, "a token is needed: ?token=...")
+        if "websocket" in request.headers.get("Upgrade", "").lower():
+            return None
+        if where.path == "/version":
+            return _envelope(connection, HTTPStatus.OK, data=_version())
+        if where.path == "/devices":
+            found = self.service.inventory()
+            return _envelope(connection, HTTPStatus.OK, data={k: found[k] for k in DEVICES})
+        return _envelope(connection, HTTPStatus.NOT_FOUND, f"no route {where.path}")
+
+
+def _version() -> dict[str, str]:
+    number = versions()["hapticclay"]
+    names = "build_time", "git_branch", "git_describe", "git_hash", "git_tag"
+    out = dict.fromkeys(names, "")
+    return out | {"project_name": "hapticclay", "project_version": number}
+
+
+def _envelope(connection: Any, status: HTTPStatus, error: str = "", data: Any = None) -> Any:
+    body = {"ok": False, "error": error} if error else {"ok": True, "data": data}
+    response = connection.respond(status, json.dumps(body) + "\n")
+    del response.headers["Content-Type"]
+    response.headers["Content-Type"] = "application/json"
+    return response
+
+
+@contextlib.contextmanager
+def serve(
+    scenario: Scenario,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    clock: str = "tick",
+    period: float | None = None,
+    hand: Trajectory | None = None,
+    clay: bool = False,
+    inverse3: Inverse3 = PLAIN,
+) -> Iterator[DeviceServer]:
+    """Serves the arm of a scenario as an Inverse3, while the `with` block runs.
+
+        with hapticclay.ports.serve(scenario, period=0.005) as server:
+            run_my_program(server.url)
+            record = server.record()
+
+    Args:
+        scenario: its arm, hand, hardware and step; compensator and servo do not act.
+        host: address to listen on; a token, part of `url`, guards any but this machine's.
+        port: to listen on; 0 for a free one.
+        clock: "tick": each message of the first client moves the device by a period, so that a
+            test gives the same run each time; "wall": the device moves in real time.
+        period: between two messages with the clock "tick" [s], 1e-5 to 1; None for the control
+            sample.
+        hand: where the hand wants to be over time; None for the muscle force of the scenario.
+        clay: whether the clay of the scenario acts as well.
+        inverse3: what the device shows itself as.
+
+    Yields:
+        The server.
+
+    Raises:
+        ParameterError: a value is out of its bounds, the port is taken, or websockets is not
+            installed.
+    """
+    most = inverse3.largest_force
+    service = Service(
+        SimulatedDevice(scenario, period=period, hand=hand, clay=clay, largest_force=most),
+        clock=choice("clock", clock, CLOCKS),
+        inverse3=inverse3,
+    )
+    with DeviceServer(service, host, port) as server:
+        yield server

@@ -1,0 +1,199 @@
+"""The sampled loop of an arm, a hand at it, and a program that renders a wall through a port.
+
+The handle moves by M p'' + D p' + S p = n f in the plane, M the inertia of arm and hand at a pose.
+The program reads place and velocity each Ts; its force f = -(K n.p + B n.v), `delay` late, is held
+for a Ts (zero-order hold). Between samples the motion is linear, so the loop is a matrix: exact for
+small motions about the pose. Friction, torque limits and the surface of the wall are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import ParameterError, number, pair
+from ..model.arm import inverse_kinematics, jacobian, mobility
+from ..scene.scenario import Scenario
+from . import linear_loop, roots
+
+STIFFEST = 1e9  # [N/m] above which no limit is sought
+SCANNED = 240  # values of K, even on a logarithm, between which a limit is sought
+SOFTEST = 1e-3  # [N/m] the least of them
+AT_REST = 1e-6  # modes so near to z = 1 only move the handle, which nothing may pull back
+ROUNDING = 1e-12  # of an eigenvalue
+LONGEST_QUEUE = 500  # samples of delay
+
+
+@dataclass(frozen=True)
+class Handle:
+    """Arm and hand at a pose, as the wall's force meets them.
+
+    Attributes:
+        inertia: of arm and hand at the handle [kg], shape (2, 2).
+        damping: of the hand [N.s/m], shape (2,).
+        stiffness: of the hand [N/m], shape (2,).
+        normal: direction of the wall, of length 1, shape (2,).
+    """
+
+    inertia: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    normal: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        place: tuple[float, float] = (0.0, 0.0),
+        normal: tuple[float, float] = (1.0, 0.0),
+    ) -> Handle:
+        """The handle of a scenario's arm and operator.
+
+        Args:
+            scenario: has arm, origin and operator; compensator and servo do not act.
+            place: of the handle, p [m].
+            normal: direction of the wall, of any length above 0.
+
+        Raises:
+            ParameterError: the place is out of reach, or the normal has no direction.
+        """
+        place = pair("place", place, -10.0, 10.0, unit="m")
+        size = math.hypot(*normal)
+        if not (size > 0.0 and math.isfinite(size)):
+            raise ParameterError("normal", normal, "must have a direction")
+        links = scenario.arm.links
+        x, y = scenario.origin[0] + place[0], scenario.origin[1] + place[1]
+        low, high = scenario.arm.reach
+        if not low < math.hypot(x, y) < high:
+            raise ParameterError("place", place, "must lie within the reach of the arm")
+        wxx, wxy, wyy = mobility(jacobian(*inverse_kinematics(x, y, links), links), links)
+        inertia = np.linalg.inv([[wxx, wxy], [wxy, wyy]])
+        hands = [
+            (0.0, 0.0, 0.0) if h is None else (h.mass, h.damper, h.spring)
+            for h in scenario.operators
+        ]
+        mass, damping, stiffness = np.array(hands).T
+        return cls(inertia + np.diag(mass), damping, stiffness, np.array(normal) / size)
+
+
+def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
+    """The loop over a sample, x(k+1) = A x(k): place, velocity, then forces on their way.
+
+    Args:
+        handle: arm and hand.
+        K: stiffness of the wall [N/m].
+        B: damping of the wall [N.s/m].
+        Ts: between two readings of the program [s].
+        delay: from a reading to the force computed from it [s].
+
+    Returns:
+        A, shape (n, n).
+
+    Raises:
+        ParameterError: the delay is of more than 500 samples.
+    """
+    whole, part = linear_loop.whole_samples(delay, Ts)
+    if whole > LONGEST_QUEUE:
+        raise ParameterError("delay", delay, f"must be {LONGEST_QUEUE} samples at most")
+    first, old = _held(handle, part * Ts)
+    rest, new = _held(handle, (1.0 - part) * Ts)
+    n = 4 + whole + 1
+    A = np.zeros((n, n))
+    A[:4, :4] = rest @ first
+    law = np.zeros(n)
+    law[:2], law[2:4] = -K * handle.normal, -B * handle.normal
+    queue = [law, *np.eye(n)[4:]]  # forces of this sample, of the one before, ...
+    A[:4] += np.outer(new, queue[whole]) + np.outer(rest @ old, queue[whole + 1])
+    for j in range(whole + 1):
+        A[4 + j] = queue[j]
+    return A
+
+
+def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Change of place and velocity over a time, and by a force along the normal held for it."""
+    from scipy.linalg import expm
+
+    inverse = np.linalg.inv(handle.inertia)
+    a = np.zeros((5, 5))
+    a[:2, 2:4] = np.eye(2)
+    a[2:4, :2] = -inverse * handle.stiffness
+    a[2:4, 2:4] = -inverse * handle.damping
+    a[2:4, 4] = inverse @ handle.normal
+    e = expm(a * t)
+    return e[:4, :4], e[:4, 4]
+
+
+def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
+    """Whether the loop is stable: every mode that swings or runs away lies within the unit circle.
+
+    Args:
+        handle: arm and hand.
+        K: stiffness of the wall [N/m].
+        B: damping of the wall [N.s/m].
+        Ts: between two readings of the program [s].
+        delay: from a reading to the force computed from it [s].
+    """
+    z = np.linalg.eigvals(client_map(handle, K, B, Ts, delay))
+    moving = z[np.abs(z - 1.0) > AT_REST]
+    return bool(np.abs(moving).max(initial=0.0) < 1.0 + ROUNDING)
+
+
+@checked
+def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float = 0.0) -> float:
+    """Stiffness up to which a wall that a program renders is stable [N/m].
+
+    Args:
+        handle: arm and hand.
+        B: damping of the wall [N.s/m], -1e6 to 1e6.
+        Ts: between two readings of the program [s], 1e-6 to 1.
+        delay: from a reading to the force computed from it [s], 0 to 10.
+
+    Returns:
+        The limit; 0 if no wall is stable, inf if all are that were tried (1e-3 to 1e9 N/m).
+
+    Raises:
+        ParameterError: a number is out of its bounds, or the delay is of more than 500 samples.
+    """
+    B, Ts = number("B", B, -1e6, 1e6), number("Ts", Ts, 1e-6, 1.0)
+    delay = number("delay", delay, 0.0, 10.0)
+    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED).tolist()
+
+    def stable(K: float) -> bool:
+        return holds(handle, K, B, Ts, delay)
+
+    if not stable(grid[0]):
+        return 0.0
+    for low, high in zip(grid[:-1], grid[1:], strict=True):
+        if not stable(high):
+            return roots.bisect(stable, low, high, 1e-9)[0]
+    return math.inf
+
+
+@checked
+def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -> float:
+    """Longest Ts at which a program may render a wall, no longer than a given one [s].
+
+    Args:
+        handle: arm and hand.
+        K: stiffness of the wall [N/m].
+        B: damping of the wall [N.s/m].
+        late: delay in samples, the same at every Ts.
+        Ts: that to begin with [s].
+
+    Returns:
+        The period; 0 if none down to a thousandth of Ts is short enough.
+    """
+    grid = np.geomspace(Ts, 1e-3 * Ts, 200).tolist()
+
+    def stable(period: float) -> bool:
+        return holds(handle, K, B, period, late * period)
+
+    if stable(grid[0]):
+        return grid[0]
+    for high, low in zip(grid[:-1], grid[1:], strict=True):
+        if stable(low):
+            return roots.bisect(stable, low, high, 1e-9)[0]
+    return 0.0

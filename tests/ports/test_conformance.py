@@ -1,0 +1,256 @@
+"""What a program for a real Inverse3 relies on."""
+
+import json
+import math
+import socket
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+import hapticclay as hc
+from hapticclay.errors import ParameterError
+from hapticclay.model.constants import NOMINAL
+from hapticclay.ports import Inverse3, Trajectory, serve
+from hapticclay.ports.inverse import DEVICES
+from tests.ports.conftest import SCENE, tick
+
+PERIOD = 0.005
+
+
+def x_of(state):
+    return state["cursor_position"]["x"]
+
+
+def test_the_inventory_is_complete_and_first(served):
+    _, client = served(period=PERIOD)
+    first = client().first
+    assert [len(first[k]) for k in DEVICES] == [1, 0, 0, 1, 0]
+    device, grip = first["inverse3"][0], first["wireless_verse_grip"][0]
+    assert {"device_id", "config", "state", "status"} == set(device) == set(grip)
+    assert device["device_id"] == "04EA" and grip["device_id"] == "F00D"
+    assert device["state"]["cursor_position"] == {"x": 0.08, "y": -0.15, "z": 0.14}
+
+
+def test_one_answer_a_message_whatever_it_is(served):
+    _, client = served(period=PERIOD)
+    c = client()
+    sent = ["{}", "rubbish", b"\xff\xfe", "[]", tick(device_id="05DA"), tick(), tick().encode()]
+    for data in sent:
+        frame = c.send(data)
+        assert "config" not in frame["inverse3"][0]
+    with pytest.raises(TimeoutError):
+        c.socket.recv(timeout=0.05)
+
+
+def test_the_configuration_comes_on_request(served):
+    _, client = served(period=PERIOD)
+    c = client()
+    asked = {"session": {"force_render_full_state": {"device_types": ["inverse3"]}}}
+    assert "config" in c.send(json.dumps(asked))["inverse3"][0]
+    assert "config" not in c.send("{}")["inverse3"][0]
+
+
+@pytest.mark.parametrize("key", ["values", "vector"])
+def test_a_force_moves_the_handle_as_the_equation_of_motion_says(served, key):
+    """Against the closed solution of a mass, damper and spring under a constant force.
+
+    At this pose x and y of the arm do not couple; in 40 ms the handle moves by less than 1 mm, so
+    that the mobility changes by less than 1 %.
+    """
+    scene = hc.Scenario(
+        operator=hc.Operator(0.25, 2.0, 60.0),
+        force=(0.0, 0.0),
+        origin=NOMINAL,
+        length=None,
+    )
+    _, client = served(scene, period=PERIOD)
+    c = client()
+    for _ in range(8):
+        state = c.state(tick(x=1.0, key=key))
+    m = 1.0 / scene.arm.nominal_mobility[0] + 0.25
+    t = 8 * PERIOD - PERIOD / 14  # the newest sample
+    decay, w = 1.0 / m, math.sqrt(60.0 / m - 1.0 / m**2)
+    swing = math.exp(-decay * t) * (math.cos(w * t) + decay / w * math.sin(w * t))
+    expected = (1.0 - swing) / 60.0
+    assert x_of(state) - 0.08 == pytest.approx(expected, rel=0.01)
+    assert state["current_cursor_force"] == {"x": 1.0, "y": 0.0, "z": 0.0}
+    assert state["control_mode"] == state["mode"] != "idle"
+
+
+def test_two_entries_for_one_device_act_both(served):
+    _, client = served(period=PERIOD)
+    entry = json.loads(tick(x=1.0))["inverse3"][0]
+    probe = {"device_id": "04EA", "commands": {"probe_position": {}}}
+    state = client().state(json.dumps({"inverse3": [probe, entry, entry]}))
+    assert state["current_cursor_force"]["x"] == 2.0
+
+
+def test_a_force_is_shortened_and_echoed(served):
+    _, client = served(period=PERIOD, inverse3=Inverse3(largest_force=5.0))
+    force = client().state(tick(x=30.0, y=-40.0))["current_cursor_force"]
+    assert [force["x"], force["y"]] == pytest.approx([3.0, -4.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("value", ["NaN", "Infinity", "true", '"2"'])
+def test_a_force_that_is_not_finite_is_none(served, value):
+    server, client = served(period=PERIOD)
+    state = client().state(tick(x=3.0).replace("3.0", value))
+    assert state["current_cursor_force"]["x"] == 0.0
+    assert server.service.notices["force is not finite"] == 1
+
+
+def test_two_clients_add(served):
+    server, client = served(period=PERIOD)
+    first, second = client(), client()
+    second.send(tick(y=1.0))  # the first one moves the clock
+    assert server.service.device.t == 0.0
+    force = first.state(tick(x=2.0))["current_cursor_force"]
+    assert (force["x"], force["y"]) == (2.0, 1.0)
+    force = first.state(tick(x=2.0))["current_cursor_force"]
+    assert (force["x"], force["y"]) == (2.0, 0.0)  # a command holds for one tick
+
+
+def test_the_tick_clock_gives_the_same_run_to_the_last_bit():
+    def run():
+        with serve(SCENE, period=PERIOD, hand=Trajectory.to((0.02, 0.01))) as server:
+            from tests.ports.conftest import Client
+
+            c, x = Client(server.url), 0.0
+            for _ in range(40):
+                x = x_of(c.state(tick(x=-300.0 * (x - 0.081) if x > 0.081 else 0.0)))
+            c.socket.close()
+            return server.record()
+
+    a, b = run(), run()
+    assert np.array_equal(a.p, b.p) and np.array_equal(a.tau, b.tau) and len(a.t) > 500
+
+
+def test_the_vertical_plane_and_the_force_that_cannot_act(served):
+    server, client = served(period=PERIOD, inverse3=Inverse3(plane="xz"))
+    c = client()
+    for _ in range(4):
+        state = c.state(tick(y=5.0, z=1.0))
+    assert state["cursor_position"]["y"] == -0.15 and state["cursor_position"]["z"] > 0.14
+    assert state["current_cursor_force"] == {"x": 0.0, "y": 0.0, "z": 1.0}
+    assert any("cannot act" in notice for notice in server.service.notices)
+
+
+def test_measured_as_the_hardware_measures(served):
+    scene = hc.Scenario(
+        operator=hc.Operator(0.25, 2.0, 60.0),
+        force=(0.0, 0.0),
+        control="sampled",
+        hardware=hc.Hardware(encoder=500, velocity="difference"),
+    )
+    _, client = served(scene, period=PERIOD)
+    c = client()
+    seen = {c.state(tick(x=2.0))["cursor_position"]["x"] for _ in range(20)}
+    assert 1 < len(seen) < 10  # counts of about 3 mm
+
+
+def test_http_beside_the_socket(served):
+    server, client = served(period=PERIOD)
+    client()
+    url = server.url.replace("ws:", "http:")
+    with urllib.request.urlopen(url + "/version") as answer:
+        assert answer.headers["Content-Type"] == "application/json"
+        assert json.load(answer)["data"]["project_name"] == "hapticclay"
+    with urllib.request.urlopen(url + "/devices") as answer:
+        found = json.load(answer)
+    assert found["ok"] and found["data"]["inverse3"][0]["device_id"] == "04EA"
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(url + "/elsewhere")
+    with refused.value as answer:
+        assert answer.code == 404 and json.load(answer)["ok"] is False
+
+
+def test_the_handshake_and_the_frames_as_bytes(served):
+    """A header below 4 kB, no compression, one unfragmented text frame below 8 kB."""
+    server, _ = served(period=PERIOD)
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5.0) as raw:
+        raw.sendall(
+            b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+            b"Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n\r\n"
+        )
+        data = b""
+        while b"\r\n\r\n" not in data or len(data.partition(b"\r\n\r\n")[2]) < 4:
+            data += raw.recv(8192)
+        head, _, frame = data.partition(b"\r\n\r\n")
+        assert b" 101 " in head and len(head) < 4096 and b"deflate" not in head
+        assert frame[0] == 0x81 and frame[1] == 126  # final, text; length in two bytes
+        assert int.from_bytes(frame[2:4], "big") < 8000
+
+
+def test_a_message_of_more_than_64_kB_ends_the_connection(served):
+    _, client = served(period=PERIOD)
+    c = client()
+    c.socket.send(b" " * 70_000)
+    with pytest.raises(ConnectionClosed) as closed:
+        c.socket.recv(timeout=5.0)
+    assert closed.value.rcvd.code == 1009
+
+
+def test_the_watchdog_takes_a_stale_force_away(served):
+    server, client = served(clock="wall")
+    c = client()
+    assert c.state(tick(x=2.0))["current_cursor_force"]["x"] == 2.0
+    end = time.monotonic() + 5.0
+    while server.service.device.force != (0.0, 0.0) and time.monotonic() < end:
+        time.sleep(0.005)
+    assert server.service.device.force == (0.0, 0.0)
+    assert c.send("{}")["inverse3"][0]["state"]["control_mode"] == "idle"
+
+
+def test_other_machines_need_the_token():
+    with serve(SCENE, host="0.0.0.0", period=PERIOD) as server:
+        bare, _, token = server.url.replace("ws://0.0.0.0", "http://127.0.0.1").partition("/?")
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(bare + "/version")
+        with refused.value as answer:
+            assert answer.code == 403
+        with urllib.request.urlopen(f"{bare}/version?{token}") as answer:
+            assert answer.status == 200
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"clock": "sand"}, "clock"),
+        ({"period": 0.0}, "period"),
+        ({"port": 70_000}, "port"),
+    ],
+)
+def test_bad_options_are_refused(options, field):
+    with pytest.raises(ParameterError) as error, serve(SCENE, **options):
+        pass
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("device_id", "04eg"), ("grip_id", ""), ("plane", "yz"), ("largest_force", -1.0)],
+)
+def test_bad_names_are_refused(field, value):
+    with pytest.raises(ParameterError) as error:
+        Inverse3(**{field: value})
+    assert error.value.field == field
+
+
+def test_a_period_that_is_no_multiple_of_the_control_sample_is_refused():
+    scene = hc.Scenario(control="sampled", Ts=0.002, dt=0.001, operator=hc.Operator())
+    with pytest.raises(ParameterError, match="whole multiple"), serve(scene, period=0.005):
+        pass
+
+
+def test_a_taken_port_is_told():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(ParameterError, match="must be free"), serve(SCENE, port=port):
+            pass

@@ -1,0 +1,26 @@
+"""The pages about ports run, and say what they print."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def code_of(page):
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.S)
+    return code
+
+
+def test_the_test_of_the_device_page_passes(tmp_path):
+    (tmp_path / "test_wall.py").write_text(code_of("device.md"))
+    words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_wall.py"]
+    out = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert out.returncode == 0 and "1 passed" in out.stdout, out.stdout
+
+
+def test_the_snippet_of_the_buzz_page_prints_what_it_says():
+    code = code_of("buzz.md")
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []

@@ -1,0 +1,139 @@
+"""The loop report: walls that are known, and walls that a client renders through the server."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+import hapticclay as hc
+from hapticclay.errors import ParameterError
+from hapticclay.ports import Exchanges, LoopReport, loop_report
+from hapticclay.ports.device import SimulatedDevice
+from hapticclay.ports.report import fit_wall
+from hapticclay.ports.service import REST, Service
+from hapticclay.theory.client_loop import Handle, rendered_stiffness_limit
+from tests.ports.conftest import tick
+
+SCENE = hc.Scenario(operator=hc.Operator(0.25, 2.0, 60.0), force=(0.0, 0.0), length=None)
+PERIOD = 0.005
+
+
+def swinging(K, B, back, normal=(0.6, 0.8), n=120, noise=0.0):
+    """Exchanges of a client whose wall, and whose state, are known."""
+    rng = np.random.default_rng(1)
+    t = PERIOD * np.arange(n)
+    way = np.array(normal)
+    depth = 2e-3 * np.sin(40.0 * t) + 1e-3 * np.sin(93.0 * t)
+    speed = 80e-3 * np.cos(40.0 * t) + 93e-3 * np.cos(93.0 * t)
+    across = np.outer(3e-3 * np.cos(11.0 * t), [-way[1], way[0]])
+    force = np.zeros(n)
+    force[back:] = -(K * depth + B * speed)[:-back]
+    force = np.where(force > 0.0, force, 0.0)  # it pushes, and does not pull
+    force[force > 0.0] += noise * rng.standard_normal((force > 0.0).sum())
+    plane = np.outer(force, way)
+    return Exchanges(
+        0.1 + 1.01 * t,
+        t,
+        t + PERIOD - 3e-4,
+        np.outer(depth, way) + across,
+        np.outer(speed, way),
+        np.column_stack([plane, np.zeros(n)]),
+        plane,
+    )
+
+
+@pytest.mark.parametrize("back", [1, 2, 3])
+@pytest.mark.parametrize("B", [0.0, 6.0])
+def test_a_known_wall_is_found(back, B):
+    r = loop_report(swinging(640.0, B, back), SCENE)
+    assert pytest.approx(640.0, rel=1e-9) == r.K
+    assert pytest.approx(B, abs=1e-6) == r.B
+    # the state was measured 0.3 ms before it was answered
+    assert r.delay == pytest.approx((back - 1) * PERIOD + 3e-4, abs=1e-9)
+    assert r.rate == pytest.approx(1.0 / (1.01 * PERIOD), rel=1e-6)
+    assert r.normal == pytest.approx((0.6, 0.8), abs=1e-9)
+    assert r.explained == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_standard_error_holds():
+    """Noise of 0.05 N: of 3 standard errors, one K in 370 lies outside."""
+    fit, note = fit_wall(swinging(640.0, 4.0, 1, noise=0.05))
+    assert fit is not None and not note
+    assert 0.0 < fit.K_error < 20.0 and abs(fit.K - 640.0) < 3.0 * fit.K_error
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [
+        (lambda e: dataclasses.replace(e, asked=0.0 * e.asked), "0 messages had a force"),
+        (lambda e: dataclasses.replace(e, asked=np.ones_like(e.asked)), "explain 0%"),
+        (lambda e: dataclasses.replace(e, asked=-e.asked), "tell too little"),
+    ],
+)
+def test_what_is_no_wall_is_not_told(change, note):
+    r = loop_report(change(swinging(640.0, 0.0, 1)), SCENE)
+    assert math.isnan(r.K) and r.verdict == "not told" and note in r.note
+    assert r.note in r.headline()
+
+
+def test_too_few_messages_are_refused():
+    with pytest.raises(ParameterError, match="two messages"):
+        loop_report(Exchanges.of_table(np.zeros((1, 12))), SCENE)
+
+
+def test_it_is_saved_and_loaded(tmp_path):
+    r = loop_report(swinging(640.0, 4.0, 1), SCENE)
+    assert LoopReport.load(r.save(tmp_path / "loop.json")) == r
+    data = swinging(640.0, 4.0, 2)
+    again = Exchanges.load(data.save(tmp_path / "exchanges.csv"))
+    assert np.array_equal(again.table(), data.table())
+    (tmp_path / "exchanges.csv").write_text("x,y\n1,2\n")
+    with pytest.raises(ParameterError, match="other columns"):
+        Exchanges.load(tmp_path)
+
+
+# ---- through the server --------------------------------------------------------------------------
+
+
+def render(scene, K, normal, late, messages=300):
+    """A client that renders a wall of both sides; its exchanges, and how its swing changes."""
+    device = SimulatedDevice(scene, period=PERIOD)
+    service = Service(device, clock="tick")
+    number, _ = service.connect()
+    depths, forces = [], [0.0] * (late + 1)
+    for _ in range(messages):
+        f = forces[-1 - late]
+        state = json.loads(service.answer(number, tick(f * normal[0], f * normal[1])))
+        place = state["inverse3"][0]["state"]["cursor_position"]
+        depth = normal[0] * (place["x"] - REST[0]) + normal[1] * (place["y"] - REST[1])
+        depths.append(depth)
+        forces.append(-K * depth)
+    third = messages // 3
+    early, last = np.abs(depths[third : 2 * third]).max(), np.abs(depths[-third:]).max()
+    return service.logs[0].exchanges(), last / early
+
+
+@pytest.mark.parametrize(
+    ("hand", "normal", "late"),
+    [
+        (hc.Operator(0.25, 4.0, 60.0), (1.0, 0.0), 0),
+        (hc.Operator(0.6, 12.0, 200.0), (0.6, 0.8), 1),
+        (hc.Operator(0.1, 3.0, 20.0), (0.0, 1.0), 0),
+    ],
+)
+def test_a_wall_at_200_Hz_holds_below_the_limit_and_buzzes_above(hand, normal, late):
+    scene = dataclasses.replace(SCENE, operator=hand, velocity=(2e-3 * normal[0], 2e-3 * normal[1]))
+    # a measurement is answered a control sample of 1/14 period after it was made
+    limit = rendered_stiffness_limit(
+        Handle.of(scene, normal=normal), 0.0, PERIOD, (late + 1 / 14) * PERIOD
+    )
+    held, below = render(scene, 0.95 * limit, normal, late)
+    buzzed, above = render(scene, 1.05 * limit, normal, late)
+    assert below < 1.0 < above
+    report = loop_report(held, scene)
+    assert report.K == pytest.approx(0.95 * limit, rel=1e-3)
+    assert report.limit == pytest.approx(limit, rel=0.01)
+    assert report.verdict == "holds" and loop_report(buzzed, scene).verdict == "buzzes"
+    assert "it buzzes" in loop_report(buzzed, scene).headline()
