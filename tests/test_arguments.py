@@ -55,6 +55,7 @@ def good(tmp_path_factory):
         "mass": 1.0, "damper": 1.0, "spring": 1.0, "Ts": 1e-3, "decay": 1.0, "name": "stiff clay",
         "trials": hc.studies.Trials(wall, {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}),
         "out": "nowhere", "path": "nowhere",
+        "exchanges": hc.ports.Exchanges.of_table(np.arange(24.0).reshape(2, 12)),
         "part": cut, "changes": {"gain.x": 1.0}, "scenarios": [cut], "resists": 90.0,
     }  # fmt: skip
     pushed = importlib.import_module("hapticclay.studies.boundary").PushedLoop()
@@ -171,7 +172,7 @@ def test_every_public_name_suggests_the_nearest_argument(good):
         *((f"EXPERIMENTS[{name!r}]", kind) for name, kind in EXPERIMENTS.items()),
         *((f"SCENARIOS[{name!r}]", made) for name, made in hc.SCENARIOS.items()),
     ]
-    own = (ParameterError, hc.Bound, hc.Figure, hc.Sample, hc.Signal)
+    own = (ParameterError, hc.Bound, hc.Figure, hc.Sample, hc.Signal, hc.ports.DeviceServer)
     count = 0
     for name, made in asked:
         if made in own or (isinstance(made, type) and issubclass(made, tuple)):

@@ -5,13 +5,16 @@ from __future__ import annotations
 import bisect
 import os
 from dataclasses import dataclass
+from typing import Annotated
 
-from ..errors import ParameterError
+from ..arguments import named
+from ..errors import Bound, ParameterError, check_fields
 from .device import read_columns
 
 NAMES = ("a", "b", "c", "home")
 
 
+@named
 @dataclass(frozen=True)
 class ButtonScript:
     """Which buttons are pressed over time.
@@ -21,8 +24,18 @@ class ButtonScript:
         pressed: names of those pressed from each time on.
     """
 
-    t: tuple[float, ...] = ()
+    t: Annotated[tuple[float, ...], Bound(unit="s")] = ()
     pressed: tuple[frozenset[str], ...] = ()
+
+    def __post_init__(self):
+        check_fields(self, "buttons.")
+        if not isinstance(self.pressed, tuple) or len(self.pressed) != len(self.t):
+            raise ParameterError("buttons.pressed", self.pressed, "must have a set for each time")
+        if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):
+            raise ParameterError("buttons.t", self.t, "must ascend")
+        for names in self.pressed:
+            if not isinstance(names, frozenset) or not names <= set(NAMES):
+                raise ParameterError("buttons.pressed", names, f"must be of {', '.join(NAMES)}")
 
     def at(self, t: float) -> frozenset[str]:
         """Names of the buttons that are pressed at a time.
@@ -45,8 +58,6 @@ class ButtonScript:
         """
         rows = read_columns("buttons", path, ("t", *NAMES))
         t = tuple(r[0] for r in rows)
-        if list(t) != sorted(set(t)):
-            raise ParameterError("buttons", str(path), "must have ascending times")
         return cls(
             t, tuple(frozenset(n for n, x in zip(NAMES, r[1:], strict=True) if x) for r in rows)
         )

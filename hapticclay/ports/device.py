@@ -7,11 +7,12 @@ import math
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError, number
+from ..arguments import named
+from ..errors import Bound, ParameterError, check_fields, number
 from ..model.arm import handle_velocity, jacobian, joint_torques
 from ..model.constants import TS
 from ..model.sampled_controller import Controller
@@ -39,6 +40,7 @@ class Sensed(NamedTuple):
     velocity: Pair
 
 
+@named
 @dataclass(frozen=True)
 class Trajectory:
     """Where the hand wants to be over time: straight from point to point, at rest behind the last.
@@ -48,16 +50,17 @@ class Trajectory:
         points: places of the handle [m], shape (n, 2).
     """
 
-    t: tuple[float, ...]
-    points: tuple[Pair, ...]
+    t: Annotated[tuple[float, ...], Bound(unit="s")]
+    points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
+        check_fields(self, "hand.")
         if not self.t or len(self.t) != len(self.points):
-            raise ParameterError("hand", self.t, "must have a place for each time")
+            raise ParameterError("hand.t", self.t, "must have a place for each time")
+        if any(len(p) != 2 for p in self.points):
+            raise ParameterError("hand.points", self.points, "must have x and y each")
         if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):
-            raise ParameterError("hand", self.t, "must have ascending times")
-        if not np.all(np.isfinite(self.points)) or not np.all(np.isfinite(self.t)):
-            raise ParameterError("hand", self.points, "must be finite")
+            raise ParameterError("hand.t", self.t, "must ascend")
 
     def at(self, t: float) -> tuple[Pair, Pair]:
         """Place [m] and velocity [m/s] at a time.
@@ -67,7 +70,8 @@ class Trajectory:
         """
         i = int(np.searchsorted(self.t, t, side="right"))
         if i in (0, len(self.t)):
-            return self.points[min(i, len(self.t) - 1)], (0.0, 0.0)
+            x, y = self.points[min(i, len(self.t) - 1)]
+            return (x, y), (0.0, 0.0)
         (x0, y0), (x1, y1) = self.points[i - 1], self.points[i]
         span = self.t[i] - self.t[i - 1]
         vx, vy = (x1 - x0) / span, (y1 - y0) / span

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import named
 from ..errors import ParameterError
 from ..files import atomic
 
@@ -54,6 +55,7 @@ class Exchange(NamedTuple):
     applied: tuple[float, float]
 
 
+@named
 @dataclass(frozen=True, eq=False)
 class Exchanges:
     """What one client and the device exchanged, a row a message.

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import checked, named
 from ..errors import ParameterError
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
@@ -48,6 +49,7 @@ class WallFit(NamedTuple):
     contact: int
 
 
+@named
 @dataclass(frozen=True)
 class LoopReport(Result):
     """What a client's loop did, beside what it can carry.
@@ -139,6 +141,7 @@ class LoopReport(Result):
         return {"report": {k: [v] for k, v in rows.items()}, "limit": line}
 
 
+@checked
 def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
     """Reads a client's loop from what it exchanged with a device.
 

@@ -15,6 +15,7 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, needing
 from ..files import versions
 from ..scene.scenario import Scenario
@@ -29,6 +30,7 @@ CLOCKS = ("wall", "tick")
 LONGEST_QUEUE = 16  # messages of a client that wait to be answered
 
 
+@checked
 class DeviceServer:
     """A service that runs in a thread of its own.
 
@@ -49,9 +51,11 @@ class DeviceServer:
         Raises:
             ParameterError: the port or the address cannot be had, or websockets is not installed.
         """
+        integer("port", port, 0, 65_535)
+        if not isinstance(host, str):
+            raise ParameterError("host", host, "must be an address, as 127.0.0.1")
         with needing("a device server", "websockets", "device"):
             import websockets  # noqa: F401
-        integer("port", port, 0, 65_535)
         self.service = service
         self._token = "" if host in LOCAL else secrets.token_urlsafe(16)
         self._loop = asyncio.new_event_loop()
@@ -181,6 +185,7 @@ def _envelope(connection: Any, status: HTTPStatus, error: str = "", data: Any = 
     return response
 
 
+@named
 @contextlib.contextmanager
 def serve(
     scenario: Scenario,

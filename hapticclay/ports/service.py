@@ -13,9 +13,10 @@ import threading
 import time
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from ..errors import ParameterError, choice, number
+from ..arguments import named
+from ..errors import Bound, ParameterError, check_fields
 from . import inverse
 from .buttons import ButtonScript
 from .device import LARGEST_FORCE, Pair, Sensed, SimulatedDevice
@@ -32,6 +33,7 @@ AT_ONCE = 8  # control samples that the thread makes before clients get their tu
 LOG = logging.getLogger("hapticclay.ports")
 
 
+@named
 @dataclass(frozen=True)
 class Inverse3:
     """What the simulated device shows itself as.
@@ -46,17 +48,16 @@ class Inverse3:
 
     device_id: str = "04EA"
     grip_id: str = "F00D"
-    plane: str = "xy"
+    plane: Literal["xy", "xz"] = "xy"
     buttons: ButtonScript = ButtonScript()
-    largest_force: float = LARGEST_FORCE
+    largest_force: Annotated[float, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
 
     def __post_init__(self):
+        check_fields(self)
         for name in ("device_id", "grip_id"):
             if not ID.fullmatch(getattr(self, name)):
                 bound = "must be 1 to 16 hexadecimal digits, as 04EA"
                 raise ParameterError(name, getattr(self, name), bound)
-        choice("plane", self.plane, tuple(PLANES))
-        number("largest_force", self.largest_force, 0.0, 1e3, above=True, unit="N")
 
 
 PLAIN = Inverse3()
