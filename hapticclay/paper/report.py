@@ -95,7 +95,7 @@ PICTURES = (
         "Fig. 7: path of the constant cut",
         "Straight through the slab. Without inertia shaping the arm pulls the handle aside by less "
         "than a millimetre.",
-        lambda r: views.run_plots.path_plot(r.constant()),
+        lambda r: views.path_plots.path_plot(r.constant()),
         "the place and the length of the slab, 5 cm and 10 cm, are drawn as printed; its path is "
         "lost.",
     ),
@@ -120,7 +120,7 @@ PICTURES = (
         "fig09",
         "Fig. 9: path of the variable cut",
         "Clay of 50 N·s/m up to 5 cm on each axis and of 100 N·s/m beyond, growing in x.",
-        lambda r: views.run_plots.path_plot(r.variable()),
+        lambda r: views.path_plots.path_plot(r.variable()),
         "the contours of the clay are drawn as printed: 5 cm on both axes, 50 and 100 N·s/m; its "
         "path is lost.",
     ),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError, number
 from .device import read_columns
 
 NAMES = ("a", "b", "c", "home")
@@ -28,7 +28,10 @@ class ButtonScript:
     pressed: tuple[frozenset[str], ...] = ()
 
     def __post_init__(self):
-        check_fields(self, "buttons.")
+        if not isinstance(self.t, tuple):
+            raise ParameterError("buttons.t", self.t, "must be a tuple of times")
+        for i, x in enumerate(self.t):
+            number(f"buttons.t[{i}]", x, -1e9, 1e9, unit="s")
         if not isinstance(self.pressed, tuple) or len(self.pressed) != len(self.t):
             raise ParameterError("buttons.pressed", self.pressed, "must have a set for each time")
         if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):

@@ -7,6 +7,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submodules=[
         "accuracy_plots",
         "identification_plots",
+        "path_plots",
         "run_plots",
         "stability_map_plots",
         "sweep_plots",

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import NOMINAL
-from hapticclay.ports import Inverse3, Trajectory, serve
+from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
 from hapticclay.ports.inverse import DEVICES
 from tests.ports.conftest import SCENE, tick
 
@@ -150,6 +150,44 @@ def test_measured_as_the_hardware_measures(served):
     c = client()
     seen = {c.state(tick(x=2.0))["cursor_position"]["x"] for _ in range(20)}
     assert 1 < len(seen) < 10  # counts of about 3 mm
+
+
+def test_a_script_presses_the_buttons(served, tmp_path):
+    (tmp_path / "b.csv").write_text("t,a,b,c,home\n0.01,1,0,0,0\n0.02,0,0,0,1\n")
+    shown = Inverse3(buttons=ButtonScript.of_file(tmp_path / "b.csv"))
+    _, client = served(period=PERIOD, inverse3=shown)
+    c = client()
+    frames = [c.send("{}")["wireless_verse_grip"][0]["state"]["buttons"] for _ in range(6)]
+    assert [f["a"] for f in frames] == [False, False, True, True, False, False]
+    assert (
+        [f["home"] for f in frames] == [f["button_3"] for f in frames] == [False] * 4 + [True] * 2
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["t,a\n0,1\n", "t,a,b,c,home\n1,0,0,0,0\n0,1,0,0,0\n", "t,a,b,c,home\n", "x"]
+)
+def test_bad_scripts_are_refused(text, tmp_path):
+    (tmp_path / "b.csv").write_text(text)
+    with pytest.raises(ParameterError, match="buttons"):
+        ButtonScript.of_file(tmp_path / "b.csv")
+
+
+def test_a_hand_follows_a_line_and_a_recorded_trial(served, tmp_path):
+    """A stiff hand far from its natural frequency: within 1 mm of where it wants to be."""
+    (tmp_path / "h.csv").write_text("t,x,y\n0,0,0\n0.5,0.01,0\n1,0.01,0.005\n")
+    hand = Trajectory.of_file(tmp_path / "h.csv")
+    assert hand.at(0.25) == ((0.005, 0.0), (0.02, 0.0)) and hand.at(9.0)[0] == (0.01, 0.005)
+    scene = hc.Scenario(operator=hc.Operator(0.2, 150.0, 4000.0), force=(0.0, 0.0))
+    _, client = served(scene, period=0.02, hand=hand)
+    c = client()
+    places = [c.state("{}")["cursor_position"] for _ in range(50)]
+    for k in (12, 24, 49):
+        (x, y), _ = hand.at(0.02 * (k + 1))
+        assert places[k]["x"] - 0.08 == pytest.approx(x, abs=1e-3)
+        assert places[k]["y"] + 0.15 == pytest.approx(y, abs=1e-3)
+    with pytest.raises(ParameterError, match="spring"), serve(hc.Scenario(), hand=hand):
+        pass
 
 
 def test_http_beside_the_socket(served):
