@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -913,6 +913,10 @@ class Clay:
     def springs(self) -> bool:
         """Whether it springs back anywhere."""
         return any(getattr(law, "springs", ()) for law in self.laws)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # its fields alone: `kinds` is kept in the instance and holds functions, which do not pickle
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @functools.cached_property
     def kinds(self) -> tuple[Law, ...]:
