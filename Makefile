@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test coverage check docs pages linkcheck bench build clean
+.PHONY: demo test coverage check docs pages linkcheck bench build release clean
 .DELETE_ON_ERROR:
 
 .venv/run.done: pyproject.toml
@@ -21,7 +21,7 @@ demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say 
 	@echo "plots: $(CURDIR)/out/run/constant/velocity.png $(CURDIR)/out/run/constant/force.png"
 
 test: .venv/dev.done  ## set up and run all tests, on all cores
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --durations=20
 
 coverage: .venv/dev.done  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
 	$(BIN)/python -m pytest -m "not perf" -k "not beyond_the_limit_of_the_process" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
@@ -50,6 +50,10 @@ bench: .venv/dev.done  ## error against run time, stiff and extreme scenes, thro
 
 build: .venv/dev.done  ## wheel and sdist into dist/
 	$(BIN)/python -m build --quiet
+
+release: .venv/dev.done  ## the same, if the published benchmarks were measured on this code
+	$(BIN)/hapticclay bench --check --out docs/bench
+	$(MAKE) build
 
 clean:
 	rm -rf .venv out dist docs/gallery

@@ -1,19 +1,34 @@
 """Every benchmark, and the one page that holds their results.
 
-    python -m benchmarks.bench [--quick] [--out DIR] [--readme FILE] [--page-only]
+    python -m benchmarks.bench [--out DIR] [--readme FILE] [--quick] [--anew] [--check]
+        [--page-only]
 
-Each part writes its own data as JSON; bench.md is made from these files and nothing else.
+Each part writes its own data as JSON; bench.md is made from these files and nothing else. After an
+interruption, the same command measures the parts that are missing or were measured on other code.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
+from tqdm import tqdm
+
 from hapticclay import files
 
-from . import common, extremes, hits, parts, scaling, stiffness, throughput, work_precision
+from . import (
+    common,
+    extremes,
+    hits,
+    parts,
+    provenance,
+    scaling,
+    stiffness,
+    throughput,
+    work_precision,
+)
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
@@ -53,12 +68,24 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     text += ["## Left out", "\n".join(f"- {x}" for x in omissions) or "Nothing.", "## Machine"]
     made: dict[tuple[str, ...], list[str]] = {}
     for name, found in data.items():
-        made.setdefault(tuple(found["machine"]), []).append(name.replace("_", " "))
+        lines = *found["machine"], *made_line(found.get("made"))
+        made.setdefault(lines, []).append(name.replace("_", " "))
     text += [
         "\n".join((f"- {', '.join(names)}:", *(f"  - {x}" for x in lines)))
         for lines, names in made.items()
     ]
     return "\n\n".join(text) + "\n"
+
+
+def made_line(made: dict[str, Any] | None) -> list[str]:
+    """A line on when and on which code a part was measured; none for data without it."""
+    if made is None:
+        return []
+    load = " and ".join(map(str, made["load"]))
+    return [
+        f"commit {made['commit']}, {made['date']}, in {made['took']:.0f} s; "
+        f"load average {load}, before and after"
+    ]
 
 
 def recommended(data: dict[str, dict[str, Any]]) -> str:
@@ -83,11 +110,59 @@ def publish(out: Path, readme: Path | None = None) -> None:
             )
 
 
-def main(out: Path = Path("out/bench"), quick: bool = False, readme: Path | None = None) -> None:
-    """Measures all parts, writes data, diagrams and the page, prints what matters most."""
-    for name, part in PARTS.items():
-        print(f"{name.replace('_', ' ')} ...", flush=True)
-        part.main(out, quick)
+def is_measured(name: str, out: Path, quick: bool) -> bool:
+    """Whether a folder holds a part's data, as asked for, measured on the code of this checkout."""
+    found = load(out).get(name)
+    return bool(found and found.get("quick") == quick and not provenance.stale({name: found}))
+
+
+def estimated(names: list[str], data: dict[str, dict[str, Any]]) -> float:
+    """Time that parts take together by the durations that were noted last [s]; 0 for unknown."""
+    took = [data.get(name, {}).get("made", {}).get("took", 0.0) for name in names]
+    return sum(took) if all(took) else 0.0
+
+
+def measure(out: Path, quick: bool, anew: bool) -> None:
+    """Measures the parts whose data are missing or stale, with a bar."""
+    due = [name for name in PARTS if anew or not is_measured(name, out, quick)]
+    for name in PARTS:
+        if name not in due:
+            print(f"{name.replace('_', ' ')}: measured before on this code", flush=True)
+    published = {} if quick else load(provenance.ROOT / "docs" / "bench")
+    left = estimated(due, published | load(out))
+    if left:
+        print(f"about {left / 60.0:.0f} min by the durations noted last", flush=True)
+    with tqdm(total=len(due), unit="part", disable=None, leave=False) as bar:
+        for name in due:
+            bar.set_description(name.replace("_", " "))
+            watch = provenance.Stopwatch()
+            found = PARTS[name].main(out, quick)
+            common.note(out, name, {**found, "quick": quick, "made": watch.stamp()})
+            bar.update()
+
+
+def check(folder: Path) -> int:
+    """Prints which parts of a page are older than the code; the exit status, 1 if one is."""
+    data = load(folder)
+    old = provenance.stale(data)
+    missing = [name for name in PARTS if name not in data]
+    for name in missing:
+        print(f"{name}: not measured")
+    for name, commit in old.items():
+        print(f"{name}: measured on other code than this (commit {commit})")
+    if not (old or missing):
+        print(f"{folder / 'bench.md'}: all parts were measured on this code")
+    return int(bool(old or missing))
+
+
+def main(
+    out: Path = Path("out/bench"),
+    quick: bool = False,
+    readme: Path | None = None,
+    anew: bool = False,
+) -> None:
+    """Measures what is due, writes data, diagrams and the page, prints what matters most."""
+    measure(out, quick, anew)
     publish(out, readme)
     data = load(out)
     print(f"\n{recommended(data)}\n")
@@ -117,8 +192,14 @@ if __name__ == "__main__":
     parser.add_argument(
         "--page-only", action="store_true", help="make the page anew from the data in the folder"
     )
+    parser.add_argument("--anew", action="store_true", help="measure all parts again")
+    parser.add_argument(
+        "--check", action="store_true", help="name the parts in the folder older than the code"
+    )
     args = parser.parse_args()
+    if args.check:
+        sys.exit(check(args.out))
     if args.page_only:
         publish(args.out, args.readme)
     else:
-        main(args.out, args.quick, args.readme)
+        main(args.out, args.quick, args.readme, args.anew)

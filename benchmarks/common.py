@@ -66,9 +66,20 @@ def number(x: float | None) -> str:
 def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:
     """Write out/name.json with schema and machine; return what it holds."""
     data = {"schema": f"hapticclay-{name.replace('_', '-')}-2", "machine": machine(), **found}
+    note(out, name, data)
+    return data
+
+
+def note(out: Path, name: str, data: dict[str, Any]) -> None:
+    """Write out/name.json anew, with more beside what `write` wrote.
+
+    Args:
+        out: the folder.
+        name: of the part.
+        data: all that the file is to hold.
+    """
     with files.atomic(out / f"{name}.json") as f:
         f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
-    return data
 
 
 def parser(doc: str | None) -> argparse.ArgumentParser:

@@ -15,24 +15,33 @@ class BenchCommand:
     """Run the benchmarks of a checkout: accuracy against run time, stiff scenes, throughput.
 
     The benchmarks are not installed with the package. Peers whose package is missing are listed as
-    left out.
+    left out. After an interruption, the same command measures only the parts that are missing or
+    were measured on other code.
 
     Attributes:
         out: Folder for bench.md, the data and the diagrams.
         quick: Run fewer jobs, settings and scenes: about a minute.
+        anew: Measure again what was measured before.
+        check: Measure nothing; name the parts in the folder that are older than stepping or model,
+            and exit with status 1 if there are any.
     """
 
     out: Path = Path("out/bench")
     quick: bool = False
+    anew: bool = False
+    check: bool = False
 
     def __call__(self) -> int:
         checkout = Path(__file__).resolve().parents[2]
         if not (checkout / "benchmarks" / "bench.py").is_file():
             bound = "not found: run from a checkout, after pip install -e .[bench]"
             raise ParameterError("benchmarks", str(checkout / "benchmarks"), bound)
-        writable(self.out)
         sys.path.insert(0, str(checkout))
         import importlib
 
-        importlib.import_module("benchmarks.bench").main(self.out, self.quick)
+        bench = importlib.import_module("benchmarks.bench")
+        if self.check:
+            return bench.check(self.out)
+        writable(self.out)
+        bench.main(self.out, self.quick, anew=self.anew)
         return 0

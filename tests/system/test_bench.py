@@ -14,6 +14,7 @@ from benchmarks import (
     hits,
     parts,
     problems,
+    provenance,
     scaling,
     stiffness,
     throughput,
@@ -224,6 +225,59 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     )
     page = (tmp_path / "o" / "bench.md").read_text()
     assert page == bench.page(data) and all(c.name in page for c in some)
+
+
+def test_a_page_is_stale_once_stepping_computes_something_else(tmp_path):
+    package = tmp_path / "hapticclay" / "stepping"
+    package.mkdir(parents=True)
+    file = package / "kick.py"
+    file.write_text("def kick(v):\n    return 2.0 * v\n")
+    before = provenance.code_digest(tmp_path)
+    data = {"hits": {"made": {"code": before, "commit": "abc"}}, "parts": {}}
+    assert provenance.stale(data, tmp_path) == {"parts": "unknown"}
+    file.write_text('def kick(v):\n    """Twice."""\n    # as it was\n    return 2.0*v\n')
+    assert provenance.code_digest(tmp_path) == before
+    file.write_text("def kick(v):\n    return 2.5 * v\n")
+    assert provenance.stale(data, tmp_path) == {"hits": "abc", "parts": "unknown"}
+
+
+def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys):
+    for name in bench.PARTS:
+        common.note(tmp_path, name, {"made": provenance.Stopwatch().stamp()})
+    assert bench.check(tmp_path) == 0
+    common.note(tmp_path, "hits", {"made": {"code": "0", "commit": "abc"}})
+    (tmp_path / "parts.json").unlink()
+    capsys.readouterr()
+    assert bench.check(tmp_path) == 1
+    assert capsys.readouterr().out == (
+        "parts: not measured\nhits: measured on other code than this (commit abc)\n"
+    )
+
+
+def test_an_interrupted_benchmark_goes_on_with_what_is_missing(tmp_path, monkeypatch, capsys):
+    begun, stops = [], iter([False, True])
+
+    class Part:
+        def __init__(self, name):
+            self.name = name
+
+        def main(self, out, quick):
+            begun.append(self.name)
+            if next(stops, False):
+                raise KeyboardInterrupt
+            return common.write(out, self.name, {"rows": []})
+
+    monkeypatch.setattr(bench, "PARTS", {name: Part(name) for name in "abc"})
+    with pytest.raises(KeyboardInterrupt):
+        bench.measure(tmp_path, False, False)
+    bench.measure(tmp_path, False, False)
+    assert begun == ["a", "b", "b", "c"]
+    assert "a: measured before on this code" in capsys.readouterr().out
+    assert bench.estimated(["a", "b"], bench.load(tmp_path)) >= 0.0
+    for quick, anew, more in ((False, False, ""), (True, False, "abc"), (True, True, "abc")):
+        begun.clear()
+        bench.measure(tmp_path, quick, anew)
+        assert begun == list(more)
 
 
 def test_published_page_was_made_from_the_published_data():

@@ -1,0 +1,115 @@
+"""Which code a page's figures were measured on, and whether that code is still the one that ships.
+
+Figures of run time and error depend on how a run advances and on what a scene is, so a page is
+stale once `hapticclay/stepping`, `hapticclay/model` or a model in `mjcf/` computes something else.
+Comments, docstrings and layout compute nothing and do not count.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import os
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+MEASURED = ("hapticclay/model/*.py", "hapticclay/stepping/*.py", "mjcf/*")
+UNKNOWN = "unknown"  # commit of a copy without history
+
+
+def code_digest(root: Path = ROOT) -> str:
+    """Digest of the code that the figures depend on.
+
+    Args:
+        root: of a checkout.
+
+    Returns:
+        16 hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    for file in sorted(f for pattern in MEASURED for f in root.glob(pattern) if f.is_file()):
+        digest.update(str(file.relative_to(root)).encode())
+        digest.update(_meaning(file))
+    return digest.hexdigest()[:16]
+
+
+def _meaning(file: Path) -> bytes:
+    """What a file computes: the syntax of a module without docstrings; other files whole."""
+    if file.suffix != ".py":
+        return file.read_bytes()
+    tree = ast.parse(file.read_text())
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [x for x in body if not _is_text(x)]  # type: ignore[attr-defined]
+    return ast.dump(tree).encode()
+
+
+def _is_text(node: ast.AST) -> bool:
+    """Whether a statement is a string that nothing takes, as a docstring."""
+    value = getattr(node, "value", None)
+    return (
+        isinstance(node, ast.Expr) and isinstance(value, ast.Constant) and type(value.value) is str
+    )
+
+
+def commit(root: Path = ROOT) -> str:
+    """The commit of a checkout, with "+" where tracked files have changed since.
+
+    Args:
+        root: of the checkout.
+
+    Returns:
+        The first 10 digits of the commit; "unknown" outside of git.
+    """
+    try:
+        said = subprocess.run(
+            ["git", "-C", str(root), "describe", "--always", "--abbrev=10", "--dirty=+",
+             "--exclude=*"],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return UNKNOWN
+    return said.stdout.strip()
+
+
+class Stopwatch:
+    """Notes commit, code, date, duration and load of a measurement that begins now."""
+
+    def __init__(self) -> None:
+        """Starts the clock."""
+        self._begin, self._load = time.monotonic(), os.getloadavg()[0]
+        self._commit, self._code = commit(), code_digest()
+
+    def stamp(self) -> dict[str, Any]:
+        """What a file of figures says of its making, at the end of the measurement.
+
+        Returns:
+            commit; code, the digest of what was measured; date; took, the duration [s]; load, the
+            load average of the machine before and after.
+        """
+        return {
+            "commit": self._commit,
+            "code": self._code,
+            "date": time.strftime("%Y-%m-%d"),
+            "took": round(time.monotonic() - self._begin, 1),
+            "load": [round(x, 1) for x in (self._load, os.getloadavg()[0])],
+        }
+
+
+def stale(data: dict[str, dict[str, Any]], root: Path = ROOT) -> dict[str, str]:
+    """Parts of a page that were measured on other code than the one in a checkout.
+
+    Args:
+        data: of the parts, by name.
+        root: of the checkout.
+
+    Returns:
+        Name of each such part and the commit that it was measured on.
+    """
+    now = code_digest(root)
+    old = {name: x for name, x in data.items() if x.get("made", {}).get("code") != now}
+    return {name: x.get("made", {}).get("commit", UNKNOWN) for name, x in old.items()}
