@@ -131,6 +131,8 @@ class Fitted(Result):
         source: name of the data.
     """
 
+    drawn_by = "hapticclay.views.fit_plots:fit_plot"
+
     law: str
     parameters: tuple[FlowParameter, ...]
     candidates: tuple[FittedLaw, ...]
