@@ -7,9 +7,10 @@ import importlib
 import json
 import math
 import os
+import pkgutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -32,13 +33,19 @@ ROOMS = (
     "studies",
     "ports",
 )  # of classes that a file may name
-VIEWS = "hapticclay.views.result_plots"  # draws; looked up when a figure is asked for
 SHOWN_ROWS = 10  # of a table in a notebook
 Tables = Mapping[str, Mapping[str, Sequence[Any]]]
 
 
 class Result:
-    """What a question was answered with; a subclass is a frozen dataclass."""
+    """What a question was answered with; a subclass is a frozen dataclass.
+
+    Attributes:
+        drawn_by: module and function, "module:function", that draw it, looked up when a figure is
+            asked for.
+    """
+
+    drawn_by: ClassVar[str]
 
     def headline(self) -> str:
         """What was found, in one line."""
@@ -75,7 +82,7 @@ class Result:
 
     def plot(self) -> Figure:
         """Draws it, as the command does."""
-        return importlib.import_module(VIEWS).plot_of(self)
+        return pkgutil.resolve_name(self.drawn_by)(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes all of it, to the last bit, whole or not at all.

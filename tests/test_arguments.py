@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors, units
 from hapticclay.cli import app
+from hapticclay.cli import words as cli_words
 from hapticclay.errors import ParameterError, field_types
 from hapticclay.scene.experiments import EXPERIMENTS
 from tests.public import NAMES
@@ -207,7 +208,12 @@ SIZES = {"m": ("mm", "1e-3"), "s": ("ms", "1e-3"), "N": ("kN", "1e3"), "kg": ("g
 def numbers_with_units(kind):
     """Fields of one number with a known unit: name, bound."""
     for name, (hint, bound) in field_types(kind).items():
-        if bound and bound.unit and units.parse_unit(bound.unit) and float in app._members(hint):
+        if (
+            bound
+            and bound.unit
+            and units.parse_unit(bound.unit)
+            and float in cli_words._members(hint)
+        ):
             yield name, hint, bound
 
 
@@ -216,7 +222,7 @@ PLACES = [
     for kind in (*EXPERIMENTS.values(), hc.Scenario, hc.Arm, hc.Operator, hc.Flow, hc.VirtualWall,
                  hc.Device, hc.Hardware, hc.theory.Loop, hc.walls.Press)
     for name, hint, bound in numbers_with_units(kind)
-    if not any(getattr(k, "__origin__", None) is tuple for k in app._members(hint))
+    if not any(getattr(k, "__origin__", None) is tuple for k in cli_words._members(hint))
 ]  # fmt: skip
 
 
@@ -323,9 +329,9 @@ def test_options_refuse_another_kind_of_unit(words):
 def test_every_option_with_a_number_says_its_unit_in_a_known_way():
     """What stands in brackets in the help is a unit, or a list of them."""
     for command in app.COMMANDS:
-        for name, told in app._option_units([command]).items():
-            kind = app.options([command]).get(name)
-            if float in app._members(kind) and told not in ("", "1/inch"):
+        for name, told in cli_words._option_units([command]).items():
+            kind = cli_words.options([command]).get(name)
+            if float in cli_words._members(kind) and told not in ("", "1/inch"):
                 assert all(units.parse_unit(x) for x in told.split(", ")), (command, name, told)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -25,8 +25,10 @@ from .traits import (
     Hold,
     Law,
     Refusal,
+    Soft,
     Told,
     check_traits,
+    multiplied,
     present,
     told_pair,
     told_values,
@@ -947,6 +949,26 @@ class Clay:
         return all(x.seen_in_b for x in self.kinds)
 
     @property
+    def along_motion(self) -> bool:
+        """Whether it resists along the motion, whatever its direction."""
+        return self.isotropic or any(x.along_motion for x in self.kinds)
+
+    @property
+    def varies(self) -> set[str]:
+        """What the damping of a region varies over, "time", "place"; empty for one number each."""
+        return {x.varies for x in self.kinds if x.varies}
+
+    def resists_otherwise(self, i: int) -> bool:
+        """Whether anything but damping times velocity resists along one of its axes.
+
+        Args:
+            i: axis, 0 for x, 1 for y.
+        """
+        return any(
+            np.any(x.force(self.laws[i], 1.0, 1.0)) for x in self.kinds if x.force and not x.viscous
+        )
+
+    @property
     def holding(self) -> bool:
         """Whether it can hold a tool at rest somewhere."""
         return any(x.holds for x in self.kinds)
@@ -964,6 +986,27 @@ class Clay:
     def blocks(self) -> list[Block]:
         """Rectangles of clay beside the laws of the axes."""
         return [block for x in self.kinds for block in x.blocks(self)]
+
+    @property
+    def ground(self) -> Any:
+        """The cells that a tool cuts for good; None where it leaves the clay as it was."""
+        return next((x.ground(self) for x in self.kinds if x.ground), None)
+
+    @property
+    def soft(self) -> list[Soft]:
+        """What the steps of the fast method must resolve."""
+        found = (x.soft(self) for x in self.kinds if x.soft)
+        return [x for x in found if x]
+
+    def scaled(self, factor: float) -> Clay:
+        """Returns the same clay with a multiple of its damping, yield force and the like.
+
+        Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
+
+        Args:
+            factor: on all of them, within their bounds.
+        """
+        return functools.reduce(lambda clay, kind: kind.scaled(clay, factor), self.kinds, self)
 
     @property
     def columns(self) -> list[Column]:
@@ -1025,18 +1068,36 @@ def _rates(clay: Clay) -> list[float]:
     return [v for law in clay.laws for v in law.rates.ravel().tolist()]
 
 
+def _scaled(name: str) -> Callable[[Clay, float], Clay]:
+    """What multiplies a quantity of the laws of both axes."""
+
+    def of(law: Any, factor: float) -> Any:
+        given = getattr(law, name)
+        return replace(law, **{name: multiplied(given, factor, B_MAX)}) if given else law
+
+    return lambda clay, factor: replace(clay, x=of(clay.x, factor), y=of(clay.y, factor))
+
+
+def _soft(clay: Clay) -> Soft:
+    most = max(float(x.damping.max()) for x in clay.laws if isinstance(x, Smooth))
+    return Soft(most, "smooth clay", "; or integrator 'accurate', or clay of cells")
+
+
 TRAITS = (
     Law(
         "viscous", "clay", lambda c: any(x.damping.any() for x in c.laws),
         words=lambda c: told_values("b = {}", _damping_values(c), "N.s/m"),
-        force=lambda law, speed, _: law.damping * speed,
+        force=lambda law, speed, _: law.damping * speed, scaled=_scaled("values"),
     ),
     Law(
-        "growth", "clay", lambda c: c.grows, LEFT_OUT, seen_in_b=False,
+        "growth", "clay", lambda c: c.grows, LEFT_OUT, seen_in_b=False, varies="time",
         words=lambda c: told_values("grows by {}", _rates(c), "N.s/m per s"),
+        scaled=_scaled("growth"),
     ),
     Law("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
-    Law("smooth", "clay", lambda c: bool(c.smooth), seen_in_b=False),
+    Law(
+        "smooth", "clay", lambda c: bool(c.smooth), seen_in_b=False, varies="place", soft=_soft,
+    ),
     Law(
         "rotated axes", "clay", lambda c: c.angle != 0.0,
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},

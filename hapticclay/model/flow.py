@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import Bound, check_fields
 from .constants import B_MAX
-from .traits import LEFT_OUT, Column, Hold, Law, Told, told_pair, told_values
+from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Told, multiplied, told_pair, told_values
 
 KICK_PARTS = 6  # of a kick, at most; two stops and what lies between and around, and one to spare
 AXIS_ROUNDS = 60  # from axis to axis until both forces agree
@@ -475,12 +475,25 @@ def _holds(clay: Any, i: int) -> Hold:
     return Hold(float(clay.laws[i].flows[0].max()), "Fy", clay.isotropic)
 
 
+def _scaled(clay: Any, factor: float) -> Any:
+    """The clay with its yield force and consistency multiplied; it goes on to yield."""
+
+    def of(law: Any) -> Any:
+        if not law.yields:
+            return law
+        Fy = multiplied(law.Fy, factor, FY_MAX, LEAST)
+        return replace(law, Fy=Fy, K=multiplied(law.K, factor, CONSISTENCY_MAX, LEAST))
+
+    return replace(clay, x=of(clay.x), y=of(clay.y))
+
+
 TRAITS = tuple(
     Law(
         name, "clay",
         lambda c, along=along: any(x.yields for x in c.laws) and c.isotropic == along, LEFT_OUT,
         viscous=False, seen_in_b=False, columns=COLUMNS, words=_words, here=_here,
         at=lambda law, place: law.flows_at(*place), force=_cell_force, holds=_holds,
+        along_motion=along, scaled=_scaled,
     )
     for name, along in (("yield by axis", False), ("yield along the motion", True))
 )  # fmt: skip

@@ -15,7 +15,7 @@ from .constants import AXES, B_MAX
 from .flow import FY_MAX
 from .materials import SMALL_TOOL, material
 from .tool import Tool
-from .traits import LEFT_OUT, Block, Hold, Law, Refusal, Told
+from .traits import LEAST, LEFT_OUT, Block, Hold, Law, Refusal, Soft, Told
 
 CELLS = 20  # in the width of the tool, where none are asked for
 COARSEST = 8  # cells in it, at least
@@ -364,6 +364,15 @@ def _block(groove: Groove) -> Block:
     return Block(groove.x, groove.y, groove.hardest, groove.thickest, groove.tool)
 
 
+def _scaled(clay: Any, factor: float) -> Any:
+    """The clay with its pressure and damping multiplied; it goes on to resist."""
+    groove = clay.groove
+    most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
+    k = min(max(factor, LEAST), most)
+    names = "pressure", "gradient", "damping"
+    return replace(clay, groove=replace(groove, **{x: k * getattr(groove, x) for x in names}))
+
+
 TRAITS = (
     Law(
         "groove", "clay", lambda c: c.groove is not None, LEFT_OUT,
@@ -377,6 +386,7 @@ TRAITS = (
         },
         viscous=False, of_velocity=False, seen_in_b=False, words=_words, here=_here,
         holds=lambda c, _: Hold(c.groove.hardest, "the pressure", True),
-        blocks=lambda c: (_block(c.groove),),
+        blocks=lambda c: (_block(c.groove),), ground=lambda c: c.groove,
+        soft=lambda c: Soft(c.largest, "clay that stays cut"), scaled=_scaled,
     ),
 )  # fmt: skip

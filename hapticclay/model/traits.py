@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 from ..errors import ParameterError
 
 T = TypeVar("T", bound="Trait")
+LEAST = 1e-9  # [N], [N/(m/s)^n] of clay that is scaled down and goes on to resist
 YES, LEFT_OUT, NO = "yes", "left out", "no"  # what linear theory makes of a part
 
 
@@ -135,8 +136,26 @@ class Block(NamedTuple):
         return (x >= x0 - m) & (x <= x1 + m) & (y >= y0 - m) & (y <= y1 + m)
 
 
+class Soft(NamedTuple):
+    """Clay whose damping the steps of the fast method must resolve, as no kick may be split in it.
+
+    Attributes:
+        damping: the largest [N.s/m].
+        where: in words.
+        instead: what resolves it but a shorter step, in words.
+    """
+
+    damping: float
+    where: str
+    instead: str = ""
+
+
 def _none(*_: Any) -> tuple[Any, ...]:
     return ()
+
+
+def _as_it_is(clay: Any, _: float) -> Any:
+    return clay
 
 
 @dataclass(frozen=True)
@@ -148,6 +167,8 @@ class Law(Trait):
         of_velocity: whether its force follows from the velocity alone, by the damping and by Fy, K
             and n of `Grid.flows_at`, so that theory knows the speed under a constant push.
         seen_in_b: whether the damping tells its regions apart.
+        along_motion: whether its force has the direction of the motion; else each axis has its own.
+        varies: what the damping of a region varies over, "time" or "place"; "" for one number.
         columns: quantities of a stretch beside its damping, which `at` returns.
         words: of clay, its quantities over the whole scene.
         at: of the law of one axis and a place (x, y) [m], values of `columns`.
@@ -156,11 +177,17 @@ class Law(Trait):
             them [N]; None where it has none beside those of others.
         holds: of clay and an axis, 0 or 1, what holds a tool at rest; None where nothing does.
         blocks: of clay, its rectangles.
+        ground: of clay, the cells that a tool cuts for good, as `Groove` has them (`shape`,
+            `edges`, `relief`, `shares`, `highest`); None where a tool leaves clay as it was.
+        soft: of clay, what steps must resolve of it; None for nothing.
+        scaled: of clay and a factor, the clay with what resists multiplied by it, within bounds.
     """
 
     viscous: bool = True
     of_velocity: bool = True
     seen_in_b: bool = True
+    along_motion: bool = False
+    varies: str = ""
     columns: tuple[Column, ...] = ()
     words: Callable[[Any], Sequence[Told]] = _none
     at: Callable[[Any, Any], Sequence[float]] = _none
@@ -168,6 +195,23 @@ class Law(Trait):
     force: Callable[[Any, float, float], Any] | None = None
     holds: Callable[[Any, int], Hold | None] | None = None
     blocks: Callable[[Any], Sequence[Block]] = _none
+    ground: Callable[[Any], Any] | None = None
+    soft: Callable[[Any], Soft | None] | None = None
+    scaled: Callable[[Any, float], Any] = _as_it_is
+
+
+def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> Any:
+    """Numbers, or rows of them, multiplied within bounds; those that are 0 stay so.
+
+    Args:
+        values: they, or tuples of them.
+        factor: on each.
+        most: upper bound.
+        least: lower bound of those that are not 0.
+    """
+    if isinstance(values, tuple):
+        return tuple(multiplied(x, factor, most, least) for x in values)
+    return min(max(values * factor, least), most) if values else values
 
 
 def told_values(form: str, values: Iterable[float], unit: str = "") -> tuple[Told, ...]:

@@ -76,6 +76,8 @@ class LoopReport(Result):
         note: why K and B are not told; "" where they are.
     """
 
+    drawn_by = "hapticclay.views.loop_plots:loop_plot"
+
     messages: int
     rate: float
     intervals: tuple[float, float]

@@ -14,7 +14,7 @@ from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
-from ..model.clay import Clay, Smooth
+from ..model.clay import Clay
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from ..model.controller import SERVO, Servo
@@ -144,8 +144,7 @@ class Scenario:
         self._check_servo()
         self._check_interface()
         self._check_rotated_axes()
-        self._check_smooth_clay()
-        self._check_groove()
+        self._check_soft_clay()
         self._check_reach("start", self.start)
         if self.length is not None:
             if self.length <= self.start[0]:
@@ -289,30 +288,16 @@ class Scenario:
             return math.inf
         return 2.0 / (self.dt * self.mobility)
 
-    def _check_smooth_clay(self) -> None:
-        """Refuses smooth clay that is stiff, which the steps would have to land on."""
-        laws = self.clay.laws if self.clay else ()
-        b = max((float(x.damping.max()) for x in laws if isinstance(x, Smooth)), default=0.0)
-        most = self._soft_damping() if b else math.inf
-        if b > most:
-            bound = (
-                f"must be at most {self.dt * most / b:.3g} s in smooth clay of {b:.4g} N.s/m, "
-                f"which may have {most:.4g} at this dt; or integrator 'accurate', or clay of cells"
-            )
-            raise ParameterError("dt", self.dt, bound)
-
-    def _check_groove(self) -> None:
-        """Refuses clay that stays cut where it is stiff."""
-        clay = self.clay
-        if clay is None or clay.groove is None:
-            return
-        b, most = clay.largest, self._soft_damping()
-        if b > most:
-            bound = (
-                f"must be at most {self.dt * most / b:.3g} s in a groove where b reaches {b:.4g} "
-                f"N.s/m; at this dt it may reach {most:.4g}"
-            )
-            raise ParameterError("dt", self.dt, bound)
+    def _check_soft_clay(self) -> None:
+        """Refuses stiff clay in which no kick can be split."""
+        for b, where, instead in self.clay.soft if self.clay else ():
+            most = self._soft_damping()
+            if b > most:
+                bound = (
+                    f"must be at most {self.dt * most / b:.3g} s in {where} where b reaches "
+                    f"{b:.4g} N.s/m; at this dt it may reach {most:.4g}{instead}"
+                )
+                raise ParameterError("dt", self.dt, bound)
 
     def _check_reach(self, field: str, p: tuple[float, float]) -> None:
         """Refuses p, or a straight path from start to p, out of the arm's reach."""

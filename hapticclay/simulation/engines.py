@@ -114,7 +114,7 @@ def saved_in_a_step(scenario: Scenario) -> float:
     """
     method = "accurate" if scenario.integrator == "accurate" else "continuous"
     each = SAVED["sampled" if scenario.control == "sampled" else method]
-    grooved = scenario.clay is not None and scenario.clay.groove is not None
+    grooved = scenario.clay is not None and scenario.clay.ground is not None
     return each + (SAVED_IN_GROOVE if grooved else 0.0)
 
 

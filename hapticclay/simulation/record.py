@@ -487,7 +487,7 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
 
 def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
     """Raises ValueError unless there is a height a cell of clay that stays cut, if there is any."""
-    block = scenario.clay and scenario.clay.groove
+    block = scenario.clay and scenario.clay.ground
     shape, got = block.shape if block else None, None if ground is None else ground.shape
     if shape != got or (ground is not None and not np.isfinite(ground).all()):
         raise ValueError(f"array ground must be finite and of shape {shape}, has {got}")

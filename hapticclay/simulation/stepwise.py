@@ -14,10 +14,6 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import ParameterError, choice, integer, number, numbers_of, pair
-from ..model.clay import Clay
-from ..model.constants import B_MAX
-from ..model.flow import CONSISTENCY_MAX, FY_MAX
-from ..model.groove import Groove
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
@@ -32,7 +28,6 @@ from .engines import ENGINES, kernel_for, pays
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges
 TOLD = 1000  # steps after which to ask anew whether machine code pays
-LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
 
 
 class Sample(NamedTuple):
@@ -309,7 +304,8 @@ class Simulation:
                     raise ParameterError("operator", operator, bound)
                 changes["operator"] = operator
             if b is not None:
-                changes["clay"] = scaled(self._given.clay, number("b", b, 0.0, 1e6))
+                factor, clay = number("b", b, 0.0, 1e6), self._given.clay
+                changes["clay"] = clay and clay.scaled(factor)
             run.change(replace(run.scenario, **changes))
             self._state = None
 
@@ -346,37 +342,3 @@ class Simulation:
     def _take_over(self, torque: tuple[float, ...]) -> None:
         self._torque = torque[0], torque[1]
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
-
-
-def scaled(clay: Clay | None, factor: float) -> Clay | None:
-    """Returns the same clay with a multiple of its damping, yield force, consistency and pressure.
-
-    Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
-
-    Args:
-        clay: the clay; None for none.
-        factor: on all of them, within their bounds.
-    """
-
-    def times(values: Any, least: float = 0.0, most: float = B_MAX) -> Any:  # numbers, or rows
-        if isinstance(values, tuple):
-            return tuple(times(x, least, most) for x in values)
-        return min(max(values * factor, least), most) if values else values
-
-    def law(f: Any) -> Any:
-        more = {"growth": times(f.growth)} if f.growth else {}
-        more |= {"Fy": times(f.Fy, LEAST_YIELD, FY_MAX)} if f.Fy else {}
-        more |= {"K": times(f.K, LEAST_YIELD, CONSISTENCY_MAX)} if f.K else {}
-        return replace(f, values=times(f.values), **more)
-
-    def block(groove: Groove | None) -> Groove | None:
-        if groove is None:
-            return None
-        most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
-        k = min(max(factor, LEAST_YIELD), most)  # a block resists, however little
-        names = "pressure", "gradient", "damping"
-        return replace(groove, **{name: k * getattr(groove, name) for name in names})
-
-    if clay is None:
-        return None
-    return replace(clay, x=law(clay.x), y=law(clay.y), groove=block(clay.groove))

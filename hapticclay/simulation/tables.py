@@ -144,7 +144,7 @@ def to_xarray(record: Recorded) -> Dataset:
         "axis": list(AXES),
         "joint": list(JOINTS),
     }
-    block = record.scenario.clay and record.scenario.clay.groove
+    block = record.scenario.clay and record.scenario.clay.ground
     if record.ground is not None and block:
         for name, edges in zip(("cell_x", "cell_y"), block.edges, strict=True):
             told = {"units": "m", "long_name": f"centre of a cell of clay along {name[-1]}"}

@@ -84,6 +84,8 @@ class Comparison(Result):
         files: what each says, what theory says of it, and its run.
     """
 
+    drawn_by = "hapticclay.views.compare_plots:main_overlay"
+
     files: tuple[Compared, ...]
 
     def __iter__(self) -> Iterator[Compared]:

@@ -131,6 +131,8 @@ class Fitted(Result):
         source: name of the data.
     """
 
+    drawn_by = "hapticclay.views.fit_plots:fit_plot"
+
     law: str
     parameters: tuple[FlowParameter, ...]
     candidates: tuple[FittedLaw, ...]
@@ -229,6 +231,13 @@ class Fitted(Result):
         }
 
 
+class _Met(NamedTuple):
+    """Clay at the samples of a record."""
+
+    flows: np.ndarray  # b, Fy, K and n at each, (n, 4)
+    dented: dict[str, np.ndarray]  # where a law resists a tool at rest that has gone into it
+
+
 class _Sliding(NamedTuple):
     """Samples that slide."""
 
@@ -282,13 +291,13 @@ def fit_flow(
         axis = choice("axis", "x" if axis is None else axis, AXES)
         t, p, v, f = data.t, data.output, None, data.input
         inside, source = np.ones(len(t), dtype=bool), data.name
-        kinds = None
+        met = None
     else:
         if not isinstance(data, Record | str | os.PathLike):
             raise ParameterError("data", data, "must be a Measurement, a Record or its folder")
         source = "record" if isinstance(data, Record) else Path(data).name
         record = data if isinstance(data, Record) else Record.load(data)
-        axis, p, v, f, inside, kinds = _of_record(record, axis)
+        axis, p, v, f, inside, met = _of_record(record, axis)
         t = record.t
     for name, span, x in (("time", time, t), ("place", place, p)):
         if span is not None:
@@ -300,8 +309,8 @@ def fit_flow(
     if count < LEAST_SLIDING:
         bound = f"must leave {LEAST_SLIDING} samples or more inside clay"
         raise ParameterError("data", f"{count} samples", bound)
-    if kinds is not None:
-        _check_kinds(kinds[inside])
+    if met is not None:
+        _check_met(met, inside)
     try:
         s = _sliding(t, p, f, inside) if v is None else _known(t, v, f, inside)
     except np.linalg.LinAlgError:
@@ -330,46 +339,49 @@ def _plain_name(law: str) -> str:
 
 
 def _of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
-    """Axis, position, velocity, force, which samples lie inside clay, and b, k, Fy, K, n there."""
+    """Axis, position, velocity, force, which samples lie inside clay, and the clay at them."""
     clay = r.scenario.clay
     if clay is None:
         raise ParameterError("data", r.scenario.name, "must be a record with clay")
     if clay.blocks:
-        bound = "must be a record without a groove: a groove has no law of speed"
+        bound = "must be a record without clay that stays cut, which has no law of speed"
         raise ParameterError("data", r.scenario.name, bound)
-    axis = choice("axis", axis or ("path" if clay.isotropic else "x"), (*AXES, "path"))
+    axis = choice("axis", axis or ("path" if clay.along_motion else "x"), (*AXES, "path"))
     if clay.angle and axis != "path":
         raise ParameterError("axis", axis, 'must be "path" in clay with rotated axes')
-    if axis == "path" and clay.yields and not clay.isotropic:
+    yielding = [x for x in clay.kinds if x.of_velocity and not x.viscous]
+    if axis == "path" and not all(x.along_motion for x in yielding):
         raise ParameterError("axis", axis, "must be x or y in clay whose axes yield by themselves")
     index = AXES.index(axis) if axis in AXES else 0
     law, places = clay.laws[index], tuple(r.p.T)
     at = law.index(*places)
     inside = law.some[at]
-    flows = [x[at] for x in law.flows] if law.yields else []
-    stiffness = [(law.elastic[..., 0] + law.elastic[..., 2])[at]] if law.springs else [0.0 * r.t]
-    kinds = np.array([r.b[:, index], *stiffness, *flows]).T
+    still = {x.name: x.force(law, 0.0, 1.0) for x in clay.kinds if x.force and not x.of_velocity}
+    dented = {name: force[at] > 0.0 for name, force in still.items() if np.any(force)}
+    met = _Met(np.array([r.b[:, index], *law.flows_at(*places)]).T, dented)
     if axis in AXES:
-        return axis, places[index], r.v[:, index], r.fe[:, index], inside, kinds
+        return axis, places[index], r.v[:, index], r.fe[:, index], inside, met
     if not np.array_equal(*r.b.T):
         raise ParameterError("axis", axis, "must be x or y in clay that damps them differently")
     speed = np.hypot(*r.v.T)
     force = np.sum(r.fe * r.v, axis=1)
     force = np.divide(force, speed, out=np.zeros(len(speed)), where=speed > 0.0)
     along = np.cumsum(np.append(0.0, np.hypot(*np.diff(r.p, axis=0).T)))
-    return axis, along, speed, force, inside, kinds
+    return axis, along, speed, force, inside, met
 
 
-def _check_kinds(kinds: np.ndarray) -> None:
-    """Refuse samples that lie in clays of several laws, or in clay that springs back."""
-    if np.any(kinds[:, 1] > 0.0):
-        told = f"samples with springs of {kinds[:, 1].max():g} N/m"
-        raise ParameterError("data", told, "must lie in clay that does not spring back")
+def _check_met(met: _Met, inside: np.ndarray) -> None:
+    """Refuse samples that lie in clays of several laws, or in clay whose force depends on more."""
+    for name, where in met.dented.items():
+        if np.any(where[inside]):
+            bound = "must lie in clay whose force follows from the velocity alone"
+            raise ParameterError("data", f"samples in clay with {name}", bound)
+    kinds = met.flows[inside]
     if np.any(np.ptp(kinds, axis=0) > 1e-9 * np.max(np.abs(kinds), axis=0)):
         low, high = kinds.min(axis=0).tolist(), kinds.max(axis=0).tolist()
         told = ", ".join(
             f"{name} {a:g} to {b:g}"
-            for name, a, b in zip(("b", "k", "Fy", "K", "n"), low, high, strict=False)
+            for name, a, b in zip(("b", "Fy", "K", "n"), low, high, strict=True)
             if a < b
         )
         bound = "must lie in clay of one law: choose a part of them by time or place"

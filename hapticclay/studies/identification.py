@@ -141,6 +141,8 @@ class Identified(Result):
         source: name of the measured columns; empty for the simulated arm.
     """
 
+    drawn_by = "hapticclay.views.identification_plots:identified_plot"
+
     what: str
     axis: str
     frequency: np.ndarray

@@ -57,6 +57,8 @@ class MeasuredImpedance(Result):
         notes: what the run has and theory leaves out.
     """
 
+    drawn_by = "hapticclay.views.impedance_plots:impedance_plot"
+
     subject: Subject
     measured: Impedance
     computed: Impedance

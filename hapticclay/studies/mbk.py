@@ -64,6 +64,8 @@ class DeviceMBK(Result):
         range: from free motion to the stiffest stable wall.
     """
 
+    drawn_by = "hapticclay.views.impedance_plots:mbk_plot"
+
     wall: VirtualWall
     regions: dict[str, Region]
     found: dict[str, tuple[Border, ...]]
@@ -133,6 +135,8 @@ class ArmMBK(Result):
         worst: the same over all hands of the box; its own hand in a sampled loop is one of them.
         found: the border by runs with the loop's own hand.
     """
+
+    drawn_by = "hapticclay.views.impedance_plots:least_mass_plot"
 
     loop: PushedLoop
     box: Box

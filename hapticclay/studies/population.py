@@ -219,6 +219,8 @@ class Band(Result):
         told: the population in words.
     """
 
+    drawn_by = "hapticclay.views.robustness_plots:band_plot"
+
     x_name: str
     y_name: str
     x: np.ndarray

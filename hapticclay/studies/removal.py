@@ -77,7 +77,7 @@ class Removal:
             its floor over the depth of the tool.
         cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
         volume: removed so far [m^3].
-        groove: the clay that stays cut; None for other clay.
+        ground: the cells that are cut for good; None for other clay.
     """
 
     def __init__(
@@ -119,13 +119,13 @@ class Removal:
         self.wide, self.high = (np.diff(at) for at in lines)
         self.clay = _clay_share(scenario.clay, spans, lines)
         self._before = np.zeros(self.clay.shape)
-        self.groove = scenario.clay.groove if scenario.clay else None
-        if self.groove:
-            edges, places = self.groove.edges, (self.x, self.y)
+        self.ground = scenario.clay.ground if scenario.clay else None
+        if self.ground:
+            edges, places = self.ground.edges, (self.x, self.y)
             at = [np.searchsorted(e, c, "right") for e, c in zip(edges, places, strict=True)]
             cells = np.ix_(*at)
-            self.clay = np.pad(self.groove.relief, 1)[cells].T / tool.depth  # none beyond
-            self._before = 1.0 - np.pad(self.groove.shares, 1)[cells].T
+            self.clay = np.pad(self.ground.relief, 1)[cells].T / tool.depth  # none beyond
+            self._before = 1.0 - np.pad(self.ground.shares, 1)[cells].T
         self.restore()
 
     def restore(self) -> None:
@@ -176,10 +176,10 @@ class Removal:
         Args:
             thickness: of the block [m].
         """
-        if self.groove:
-            scale = min(1.0, HIGHEST * thickness / (self.groove.highest or thickness))
+        if self.ground:
+            scale = min(1.0, HIGHEST * thickness / (self.ground.highest or thickness))
             above = self.clay * self.tool.depth
-            return thickness + scale * (above * (1.0 - self.cut) - self.groove.highest)
+            return thickness + scale * (above * (1.0 - self.cut) - self.ground.highest)
         return np.where(self.clay > 0.5, thickness - self.tool.depth * self.cut, 0.0)
 
 

@@ -450,6 +450,8 @@ class Instability(Result):
         longer: whether the first run left it undecided, shape (n,).
     """
 
+    drawn_by = "hapticclay.views.robustness_plots:instability_plot"
+
     trials: Trials
     points: np.ndarray
     unstable: np.ndarray

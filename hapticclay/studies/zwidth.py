@@ -161,6 +161,8 @@ class ZWidth(Result):
         press: the push where the verdict is that of rest.
     """
 
+    drawn_by = "hapticclay.views.wall_plots:zwidth_plot"
+
     regions: tuple[ZRegion, ...]
     vary: str = ""
     press: Press = Press()

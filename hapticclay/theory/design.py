@@ -88,6 +88,8 @@ class Design(Result):
         margins: the margins that it has.
     """
 
+    drawn_by = "hapticclay.views.result_plots:design_plot"
+
     compensator: Compensator
     K: float
     error: float

@@ -43,6 +43,8 @@ class Impedance(Result):
         rendered: Ze, the impedance that is to be rendered [N.s/m], complex, shape (n,).
     """
 
+    drawn_by = "hapticclay.views.result_plots:effective_parts_plot"
+
     omega: np.ndarray
     Z: np.ndarray
     transparency: np.ndarray

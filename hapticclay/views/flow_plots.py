@@ -51,11 +51,11 @@ def force_velocity_plot(record: Record) -> Figure:
     c, s = math.cos(clay.angle), math.sin(clay.angle)
     own = np.array(((c, -s), (s, c)))  # columns: the clay's axes
     v, fe, held = record.v @ own, record.fe @ own, record.held()
-    across = clay.isotropic and not np.array_equal(record.b[:, 0], record.b[:, 1])
-    whole = not (clay.grows or clay.smooth or across)
+    across = clay.along_motion and not np.array_equal(record.b[:, 0], record.b[:, 1])
+    whole = not (clay.varies or across)
     if not whole:
         fe = fe - record.b * v
-    if clay.isotropic:
+    if clay.along_motion:
         named = "velocity along the motion [m/s]"
         panels: dict[str, Any] = {named: (main, *along_motion(v, fe, main), held.all(axis=1))}
     else:
@@ -63,7 +63,7 @@ def force_velocity_plot(record: Record) -> Figure:
         if clay.angle:
             names = [f"velocity along its {a} axis [m/s]" for a in ("first", "second")]
         panels = {names[i]: (i, v[:, i], fe[:, i], held[:, i]) for i in (main, 1 - main)}
-        some = {n: x for n, x in panels.items() if clay.laws[x[0]].yields and x[1].any()}
+        some = {n: x for n, x in panels.items() if clay.resists_otherwise(x[0]) and x[1].any()}
         panels = some or dict([next(iter(panels.items()))])
     met = {name: flows_met(record, x[0], whole) for name, x in panels.items()}
     shown = list(dict.fromkeys(flow for flows in met.values() for flow in flows))

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ..model.groove import Groove
 from ..simulation.record import Record
 from .captions import scenario_parts
 from .style import (
@@ -33,7 +32,7 @@ def ground_plot(record: Record) -> Figure:
     """
     from matplotlib.colors import LinearSegmentedColormap
 
-    ground, p, block = record.ground, 100.0 * record.p, groove_of(record)
+    ground, p, block = record.ground, 100.0 * record.p, ground_of(record)
     assert ground is not None
     x, y = (100.0 * e for e in block.edges)
     corners = np.array(((x[0], y[0]), (x[-1], y[-1])))
@@ -63,12 +62,12 @@ def ground_plot(record: Record) -> Figure:
     return figure
 
 
-def groove_of(record: Record) -> Groove:
-    """The clay that stays cut of a run in it.
+def ground_of(record: Record) -> Any:
+    """The cells that were cut in a run: see `Clay.ground`.
 
     Args:
         record: the run.
     """
     clay = record.scenario.clay
-    assert clay is not None and clay.groove is not None
-    return clay.groove
+    assert clay is not None
+    return clay.ground

@@ -70,7 +70,7 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
         look: Any = dict(color=clay_color(1.0), alpha=CLAY_ALPHA, lw=0)
         ax.add_patch(Rectangle((100.0 * x0, 100.0 * y0), *size, **look))
     edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
-    if clay.smooth or max(map(len, edges)) > MOST_BORDERS:
+    if "place" in clay.varies or max(map(len, edges)) > MOST_BORDERS:
         _clay_image(ax, clay, low, high)
         return
     for x0, x1 in zip(edges[0], edges[0][1:], strict=False):

@@ -1,9 +1,6 @@
-"""The figure of a result: what its `plot` draws."""
+"""Figures of results of theory."""
 
 from __future__ import annotations
-
-import importlib
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,34 +9,7 @@ from ..theory.design import Design
 from ..theory.impedance import Impedance
 from .style import BLACK, BLUE, figure_size, figure_style, set_title, stroke, unit_text
 
-if TYPE_CHECKING:
-    from ..results import Result
-
-PLOTS = {  # by class of the result: module here, and function
-    "ZWidth": "wall_plots:zwidth_plot",
-    "Impedance": "result_plots:effective_parts_plot",
-    "MeasuredImpedance": "impedance_plots:impedance_plot",
-    "DeviceMBK": "impedance_plots:mbk_plot",
-    "ArmMBK": "impedance_plots:least_mass_plot",
-    "Identified": "identification_plots:identified_plot",
-    "Fitted": "fit_plots:fit_plot",
-    "Band": "robustness_plots:band_plot",
-    "Instability": "robustness_plots:instability_plot",
-    "Design": "result_plots:design_plot",
-    "LoopReport": "loop_plots:loop_plot",
-    "Comparison": "compare_plots:main_overlay",
-}
 DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]
-
-
-def plot_of(result: Result) -> Figure:
-    """Draws a result.
-
-    Args:
-        result: of one of the classes in PLOTS.
-    """
-    module, _, name = PLOTS[type(result).__name__].partition(":")
-    return getattr(importlib.import_module(f".{module}", __package__), name)(result)
 
 
 def effective_parts_plot(found: Impedance) -> Figure:

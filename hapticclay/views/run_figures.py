@@ -16,7 +16,7 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from . import figure as shown
 from .flow_plots import force_velocity_plot
-from .ground_plots import groove_of, ground_plot
+from .ground_plots import ground_of, ground_plot
 from .path_plots import path_plot
 from .run_axes import is_viscous, main_axis
 from .run_plots import force_ratio_plot, maneuver_plot, velocity_plot
@@ -92,7 +92,7 @@ def _cells(record: Record) -> dict[str, dict[str, Any]]:
     """What is left of each cell of clay that stays cut."""
     if record.ground is None:
         return {}
-    x, y = (0.5 * (e[1:] + e[:-1]) for e in groove_of(record).edges)
+    x, y = (0.5 * (e[1:] + e[:-1]) for e in ground_of(record).edges)
     i, j = (a.ravel() for a in np.indices(record.ground.shape))
     return {"cells": {"x [m]": x[i], "y [m]": y[j], "left [m]": record.ground.ravel()}}
 

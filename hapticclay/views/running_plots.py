@@ -162,7 +162,7 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
     elif clay and not clay.viscous:
         u, along = _over_velocity(r, i)
         over = speed
-        if clay.isotropic:
+        if clay.along_motion:
             over = "v along the motion [m/s]" if roomy else "v [m/s]"
         second = Panel(u, np.append(along, 0.0), (over, told), "", told, ((along, BLUE),))
     return (
@@ -183,7 +183,7 @@ def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
     """Velocity and force of the clay, along the motion if it resists so; NaN in free air."""
     clay = r.scenario.clay
     assert clay is not None
-    v, fe = along_motion(r.v, r.fe, i) if clay.isotropic else (r.v[:, i], r.fe[:, i])
+    v, fe = along_motion(r.v, r.fe, i) if clay.along_motion else (r.v[:, i], r.fe[:, i])
     law = clay.laws[i]
     return np.where(law.some[law.index(*r.p.T)], v, np.nan), fe
 
@@ -195,10 +195,9 @@ def _running_laws(ax: Axes, r: Record, i: int) -> None:
         clay is None
         or clay.viscous
         or not clay.of_velocity
-        or clay.grows
-        or clay.smooth
+        or clay.varies
         or clay.angle
-        or (clay.isotropic and not np.array_equal(r.b[:, 0], r.b[:, 1]))
+        or (clay.along_motion and not np.array_equal(r.b[:, 0], r.b[:, 1]))
         or len(flows_met(r, i)) > 4
     ):
         return

@@ -18,7 +18,6 @@ from ..errors import ParameterError, integer, number
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
-from ..simulation.stepwise import scaled
 from ..stepping import monitor
 from ..studies.removal import TOOL, Tool, removed
 from .clock import LATE_EDGES, Clock
@@ -155,7 +154,8 @@ class Session:
             scenario = replace(scenario, gain=gain)
         if b is not None:
             self._damping = number("b", b, 0.0, 1e6)
-            scenario = replace(scenario, clay=scaled(self.given.clay, self._damping))
+            clay = self.given.clay
+            scenario = replace(scenario, clay=clay and clay.scaled(self._damping))
         self.scenario = scenario
         self.run.change(scenario)
 

@@ -345,8 +345,8 @@ def _law_plot(colors: dict[int, str], clay: Clay | None, place: str, named: str)
         return plot(
             f"clay, fe [N]{named}", place, lambda f, i: (100.0 * f.p[i], f.fe[i]), 0.1, colors
         )
-    axes, told = (list(colors)[:1], " along the motion") if clay.isotropic else (colors, named)
-    law = functools.partial(_law_point, isotropic=clay.isotropic)
+    axes, told = (list(colors)[:1], " along the motion") if clay.along_motion else (colors, named)
+    law = functools.partial(_law_point, isotropic=clay.along_motion)
     return plot(f"clay, fe [N]{told}", "velocity [cm/s]", law, 0.1, axes)
 
 

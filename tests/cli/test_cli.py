@@ -14,6 +14,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app, console
+from hapticclay.cli.words import ordered
 from hapticclay.simulation import record, simulate
 from hapticclay.views import run_figures
 
@@ -153,7 +154,14 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["stabilty"], ["stabilty", "did you mean 'stability'"]),
         (["run"], ["give an experiment or a scenario file: constant, variable, stability, free\n"]),
         (["help", "nope"], ["command = 'nope'"]),
-        ([], ["give a command: run, stability"]),
+        (["--nonsense"], ["--nonsense: no option of hapticclay; see hapticclay --help"]),
+        (["info"], ["info needs record: a path"]),
+        (["compare"], ["compare needs source: one or more, each a path"]),
+        (["device", "srve"], ["action = 'srve'", "did you mean 'serve'?"]),
+        (["export", "o", "--format", "cvs"], ["--format = 'cvs'", "did you mean 'csv'?"]),
+        (["run", "constant", "--operator=true"], ["--operator = 'true': must be without a value"]),
+        (["run", "variable", "--growth", "30s"], ["--growth = '30s'", "did you mean '30/s'?"]),
+        ([], ["give a command: accuracy, bench"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
         (["run", "constant", "--error", "1e-6 kg"], ["error = '1e-6 kg'", "such as '1e-7 m'"]),
         (["run", "constant", "--error", "0"], ["error = 0.0", ">= 1e-11"]),
@@ -423,7 +431,7 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
 
 
 @pytest.mark.parametrize(
-    "words,ordered",
+    "words,sorted_words",
     [
         ("run --out o constant --b 50", "run constant --out o --b 50"),
         ("run --gain 1 0.5 --operator constant", "run constant --gain 1 0.5 --operator"),
@@ -446,10 +454,10 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
         ("--help", "--help"),
     ],
 )
-def test_options_may_stand_before_what_they_belong_to(words, ordered, tmp_path, monkeypatch):
+def test_options_may_stand_before_what_they_belong_to(words, sorted_words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "o").mkdir()
-    assert app.ordered(words.split()) == ordered.split()
+    assert ordered(words.split()) == sorted_words.split()
 
 
 def test_a_record_may_come_last(capsys, tmp_path, monkeypatch):
@@ -622,7 +630,7 @@ def test_a_file_names_its_folder_and_takes_changes(capsys, tmp_path, monkeypatch
         (["run", "bad.toml"], ["must be TOML: Invalid value (at line 1, column 5)"]),
         (["run", "typo.toml"], ["arm.l3 = 0.3: no such field", "(in typo.toml)"]),
         (["run", "good.toml", "other.toml"], ["'other.toml': one word too many"]),
-        (["run", "file"], ["Missing", "PATH"]),
+        (["run", "file"], ["give the path of a file"]),
         (["accuracy", "none.toml"], ["none.toml", "No such file"]),
         (["video", "none.toml"], ["none.toml", "No such file"]),
         (["view", "typo.toml"], ["arm.l3 = 0.3: no such field"]),

@@ -1,6 +1,7 @@
-"""The cost of extensions: a class and a line an experiment, a module and a line a command."""
+"""The cost of extensions: a class and a line an experiment, a module a command, three a study."""
 
 import dataclasses
+import importlib
 import os
 import re
 import subprocess
@@ -10,7 +11,8 @@ from typing import Annotated
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli import app
+from hapticclay.cli import app, commands
+from hapticclay.cli.words import ordered
 from hapticclay.errors import Bound, ParameterError
 from hapticclay.scene.experiments import (
     EXPERIMENTS,
@@ -70,6 +72,97 @@ class GreetCommand:
 '''
 
 
+STUDY = {  # a question, its figure and its command, a module each
+    "reach_study": '''
+"""How far the handle comes under a push."""
+
+from dataclasses import dataclass
+
+import hapticclay as hc
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reach(hc.Result):
+    """How far the handle came in a time.
+
+    Attributes:
+        force: pushes [N].
+        reach: places at the end [m].
+    """
+
+    drawn_by = "reach_plots:reach_plot"
+
+    force: tuple[float, ...]
+    reach: tuple[float, ...]
+
+    def headline(self):
+        return f"up to {max(self.reach):.3g} m"
+
+    def tables(self):
+        return {"reach": {"force [N]": self.force, "reach [m]": self.reach}}
+
+
+def reach(forces):
+    runs = [hc.simulate(hc.constant_cut(force=(f, 0.0), t_max=0.2)) for f in forces]
+    return Reach(tuple(forces), tuple(float(r.p[-1, 0]) for r in runs))
+''',
+    "reach_plots": '''
+"""The figure of a reach."""
+
+from matplotlib.figure import Figure
+
+
+def reach_plot(found):
+    figure = Figure()
+    ax = figure.subplots()
+    ax.plot(found.force, found.reach)
+    ax.set(xlabel="force [N]", ylabel="reach [m]")
+    return figure
+''',
+    "reach_command": '''
+"""`hapticclay reach`: how far the handle comes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hapticclay.cli import console
+
+
+@dataclass(frozen=True)
+class ReachCommand:
+    """Find how far the handle comes under some pushes.
+
+    Attributes:
+        force: Pushes along x [N].
+        out: Folder for reach.json and the figure.
+        figures: Format and style of the figure.
+    """
+
+    force: tuple[float, ...] = (1.0, 2.0)
+    out: Path = Path("out/reach")
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        from hapticclay.views.figure import Figure
+        from reach_study import reach
+
+        found = reach(self.force)
+        console.save_json(found.tables(), self.out / "reach.json")
+        console.save_figures({"reach": Figure(found.plot, found.tables)}, self.out, self.figures)
+        print(found.headline())
+        return 0
+''',
+}
+
+
+@pytest.fixture
+def reach(monkeypatch, tmp_path):
+    for name, text in STUDY.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(commands.COMMANDS, "reach", "reach_command")
+
+
 @pytest.fixture
 def staircase(monkeypatch):
     monkeypatch.setitem(EXPERIMENTS, "staircase", Staircase)
@@ -79,7 +172,7 @@ def staircase(monkeypatch):
 def greet(monkeypatch, tmp_path):
     (tmp_path / "greet_command.py").write_text(COMMAND)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(app.COMMANDS, "greet", "greet_command:GreetCommand")
+    monkeypatch.setitem(commands.COMMANDS, "greet", "greet_command")
 
 
 def said(capsys, *args):
@@ -118,7 +211,7 @@ def test_a_new_experiment_has_help_and_messages(capsys, staircase):
     ):
         code, out, err = said(capsys, *words)
         assert (code, out, err.count("\n")) == (2, "", 1) and told in err
-    assert app.ordered(["video", "--steps", "2", "staircase"])[:2] == ["video", "staircase"]
+    assert ordered(["video", "--steps", "2", "staircase"])[:2] == ["video", "staircase"]
 
 
 def test_a_new_experiment_is_swept_and_mapped(capsys, tmp_path, staircase):
@@ -153,6 +246,30 @@ def test_a_new_command_runs_and_has_help_and_messages(capsys, greet):
     ):
         code, out, err = said(capsys, *words)
         assert (code, out, err.count("\n")) == (2, "", 1) and told in err
+
+
+def test_a_new_study_has_a_command_a_figure_its_numbers_and_a_result(capsys, tmp_path, reach):
+    out = tmp_path / "o"
+    words = ["reach", "--force", "1N", "0.002kN", "--data", "--format", "svg", "--out", str(out)]
+    code, told, err = said(capsys, *words)
+    assert (code, err) == (0, "") and told.startswith("up to ")
+    assert {p.name for p in out.iterdir()} == {"reach.json", "reach.svg", "reach.csv"}
+    head, first, *_ = (out / "reach.csv").read_text().splitlines()
+    assert head == "force [N],reach [m]" and first.startswith("1.0,")
+    found = importlib.import_module("reach_study").reach([2.0])
+    assert repr(found) == f"<Reach: {told.strip()}>" and "reach [m]" in found._repr_html_()
+    assert list(found.to_frame().columns) == ["force [N]", "reach [m]"]
+    assert found.plot().axes[0].get_xlabel() == "force [N]"
+    assert "• reach" in said(capsys, "--help")[1]
+    assert "Pushes along x [N]. (default: 1.0 2.0)" in said(capsys, "reach", "--help")[1]
+    code, told, err = said(capsys, "reach", "--forse", "1")
+    assert (code, told) == (2, "") and "did you mean --force?" in err
+
+
+def test_every_module_of_the_command_line_is_a_command_or_of_the_parser():
+    for name in commands.COMMANDS:
+        kind = commands.load_command(name)
+        assert dataclasses.is_dataclass(kind) and callable(kind) and kind.__doc__
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli import words as cli_words
+from hapticclay.cli.commands import load_command
 from hapticclay.views.figure import FORMATS
 
 ALL = ["--format", "png", "svg", "pdf", "--style", "print", "--data"]
@@ -70,9 +72,9 @@ def test_numbers_of_a_run_are_those_of_its_record(tmp_path, capsys):
 
 def test_every_command_that_draws_has_the_options():
     for name in app.COMMANDS:
-        own = {f.name: f.type for f in dataclasses.fields(app.load_command(name))}
+        own = {f.name: f.type for f in dataclasses.fields(load_command(name))}
         if "FigureOptions" in str(own.get("figures")):
-            assert {"format", "dpi", "style", "data"} <= set(app.options([name]))
+            assert {"format", "dpi", "style", "data"} <= set(cli_words.options([name]))
 
 
 @pytest.mark.parametrize("words,told", [

@@ -380,7 +380,7 @@ def test_what_it_does_not_go_with_is_refused():
     for device in (hc.Hardware(passivity=True), hc.Hardware(coupling=hc.Coupling(1e3, 10.0))):
         with pytest.raises(ParameterError, match="hardware .* in clay that stays cut"):
             grooved(BLOCK, control="sampled", hardware=device)
-    with pytest.raises(ParameterError, match="dt .* in a groove where b reaches"):
+    with pytest.raises(ParameterError, match="dt .* in clay that stays cut where b reaches"):
         grooved(dataclasses.replace(BLOCK, damping=1e9))
     with pytest.raises(ParameterError, match="ground"):
         BLOCK.after(np.zeros((3, 3)))

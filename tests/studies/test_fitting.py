@@ -141,7 +141,7 @@ def test_a_record_gives_back_its_own_clay():
     assert part.flow.b == pytest.approx(40.0, rel=1e-6)
     wall = hc.Profile((0.1,), (40.0, 40.0), springs=(hc.Spring(), hc.Spring(k=100.0)))
     hit = hc.simulate(dataclasses.replace(hc.constant_cut(t_max=12.0), clay=hc.Clay(wall, wall)))
-    with pytest.raises(hc.ParameterError, match="does not spring back"):
+    with pytest.raises(hc.ParameterError, match="springs.*from the velocity alone"):
         hc.studies.fit_flow(hit)
     assert hc.studies.fit_flow(hit, place=(0.0, 0.099)).flow.b == pytest.approx(40.0, rel=1e-6)
     field = hc.Smooth((0.0, 0.2), (-0.1, 0.1), ((50.0,), (50.0,)))
@@ -305,7 +305,7 @@ def test_what_cannot_be_fitted_is_refused():
         hc.studies.fit_flow(hc.simulate(hc.free(t_max=0.1)))
     block = hc.Groove(x=(0.02, 0.08), y=(-0.02, 0.02), pressure=20e3)
     grooved = dataclasses.replace(hc.free(t_max=0.1), clay=hc.Clay.of_groove(block))
-    with pytest.raises(hc.ParameterError, match="a groove has no law of speed"):
+    with pytest.raises(hc.ParameterError, match="which has no law of speed"):
         hc.studies.fit_flow(hc.simulate(grooved))
     with pytest.raises(hc.ParameterError, match="data = 3: must be a Measurement"):
         hc.studies.fit_flow(3)  # pyright: ignore[reportArgumentType]

@@ -22,7 +22,7 @@ from hapticclay.views import (
 from hapticclay.views.clock import FRAME_TIME
 from hapticclay.views.frame import Frame
 from hapticclay.views.replay import Replay
-from hapticclay.views.session import Session, scaled
+from hapticclay.views.session import Session
 from hapticclay.views.stage import Stage, held_words
 from hapticclay.views.viewer import _law_point
 from hapticclay.views.window import Window
@@ -324,14 +324,14 @@ def test_session_holds_and_lets_go():
 def test_scaling_keeps_to_the_bounds():
     clay = hc.Clay(LAYERS, LAYERS)
     for factor in (0.0, 0.3, 1.0, 1e6):
-        law = scaled(clay, factor).x
+        law = clay.scaled(factor).x
         np.testing.assert_allclose(law.values, np.multiply(LAYERS.values, factor))
         np.testing.assert_allclose(
             law.Fy, np.clip(np.multiply(LAYERS.Fy, factor), 0, 1e6), atol=1e-9
         )
         assert law.n == LAYERS.n
-    block = scaled(hc.Clay.of_groove(BLOCK), 0.0)
-    assert block is not None and block.groove is not None
+    block = hc.Clay.of_groove(BLOCK).scaled(0.0)
+    assert block.groove is not None
     assert 0.0 < block.groove.hardest < 1e-8  # a block that does not resist is refused
 
 

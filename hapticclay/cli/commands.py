@@ -1,0 +1,26 @@
+"""The commands of `hapticclay`: a module of this folder each, imported when it is used."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+PARSER = ("app", "commands", "console", "walls", "words")  # modules that are no command
+COMMANDS = {
+    name: f"{__package__}.{name}"
+    for _, name, _ in pkgutil.iter_modules([str(Path(__file__).parent)])
+    if name not in PARSER
+}
+"""Module of each command by its name. It has a class NameCommand, upper and lower case alike, a
+dataclass of the options; calling it returns the exit status."""
+
+
+def load_command(name: str) -> type:
+    """The class of a command, whose module is imported only now.
+
+    Args:
+        name: a name in COMMANDS.
+    """
+    module = importlib.import_module(COMMANDS[name])
+    return next(x for n, x in vars(module).items() if n.lower() == f"{name}command")
