@@ -12,7 +12,7 @@ from matplotlib.text import Text
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.removal import removed
-from hapticclay.views import run_figures, run_plots, session, stage
+from hapticclay.views import run_figures, run_plots, stage
 from hapticclay.views.style import clay_color
 
 DOCS = Path(__file__).parents[2] / "docs" / "clay.md"
@@ -139,12 +139,12 @@ def test_smooth_clay_in_files_sweeps_and_sessions(tmp_path):
         hc.Scenario.load(tmp_path / "clay.toml")
     moved = hc.with_fields(record.scenario, {"clay.x.x": (0.0, 0.2)})
     assert moved.clay.x.x == (0.0, 0.2)
-    assert session.scaled(record.scenario.clay, 2.0).y.values == ((2.0 / 3.0, 4.0), (6.0, 1800.0))
+    assert record.scenario.clay.scaled(2.0).y.values == ((2.0 / 3.0, 4.0), (6.0, 1800.0))
 
 
 def test_a_session_scales_a_grid_and_keeps_the_rest():
     law = hc.Grid((0.0,), (0.1,), [[1.0, 2.0], [3.0, 9e8]], [[0.0, 1.0], [2.0, 3.0]])
-    scaled = session.scaled(hc.Clay(law, hc.Profile((), (5.0,)), 0.3), 2.0)
+    scaled = hc.Clay(law, hc.Profile((), (5.0,)), 0.3).scaled(2.0)
     assert scaled.x.values == ((2.0, 4.0), (6.0, 1e9)) and scaled.angle == 0.3
     assert scaled.x.growth == ((0.0, 2.0), (4.0, 6.0)) and scaled.y.values == (10.0,)
 
