@@ -105,7 +105,8 @@ def render(scene, K, normal, late, messages=300):
     depths, forces = [], [0.0] * (late + 1)
     for _ in range(messages):
         f = forces[-1 - late]
-        state = json.loads(service.answer(number, tick(f * normal[0], f * normal[1])))
+        (answer,) = service.answer(number, tick(f * normal[0], f * normal[1]))
+        state = json.loads(answer)
         place = state["inverse3"][0]["state"]["cursor_position"]
         depth = normal[0] * (place["x"] - REST[0]) + normal[1] * (place["y"] - REST[1])
         depths.append(depth)
