@@ -25,11 +25,11 @@ from .commands import IDLE, NOTHING, Command, Pair, Vector
 from .driven_arm import LARGEST_FORCE, LIMP, Drive, Sensed
 from .exchanges import Exchange, ExchangeLog
 from .inverse import Cursor
+from .planes import across, flat, lifted
 
 REST: Vector = (0.08, -0.15, 0.14)  # [m] where an Inverse3 has its cursor at rest: handle at p = 0
 ID = re.compile("[0-9A-F]{1,16}")
 PORTS = {"inverse": 10_001, "rosbridge": 9090}  # where clients look for each protocol
-PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that are x and y of the arm
 PATIENCE = 0.05  # [s] without a message after which a client's command no longer acts
 LATE = 0.1  # [s] behind the clock from which on time is skipped
 MOST_NOTICES, LONGEST_NOTICE = 100, 120  # kinds that are counted apart; characters
@@ -161,7 +161,7 @@ class Service:
             inverse3: what the device shows itself as, and the protocol it speaks.
         """
         self.device, self.clock, self.notices = device, clock, Counter[str]()
-        self.inverse3, self._plane = inverse3, PLANES[inverse3.plane]
+        self.inverse3, self._plane = inverse3, inverse3.plane
         self.speech = speech_of(inverse3.protocol)
         self.skipped = self.samples = 0
         self._sessions: dict[int, Session] = {}
@@ -220,10 +220,12 @@ class Service:
             session: of the client.
             command: what it asks; without anything it is idle.
         """
-        device, (i, j) = self.device, self._plane
+        device = self.device
         session.command, session.heard = command, time.monotonic()
         force = command.force or NOTHING
-        if force[self._normal]:
+        x, y = flat(force, self._plane)
+        z = across(force, self._plane)
+        if z:
             self.count("force across the plane of the arm is recorded and cannot act")
         began = device.t
         applied = device.drive(self._drive())
@@ -233,8 +235,8 @@ class Service:
                 if s.number != session.number:
                     s.command = IDLE
         seen = device.sensed
-        asked = force[i], force[j], force[self._normal]
-        row = Exchange(session.heard, began, seen.t, seen.position, seen.velocity, asked, applied)
+        place, rate = seen.position, seen.velocity
+        row = Exchange(session.heard, began, seen.t, place, rate, (x, y, z), applied)
         session.log.add(row)
 
     @property
@@ -267,37 +269,26 @@ class Service:
 
     # ---- between cursor and arm
 
-    @property
-    def _normal(self) -> int:
-        """Axis of the cursor along which the arm cannot move."""
-        return 3 - sum(self._plane)
-
     def _drive(self) -> Drive:
         """What all clients ask together, those that were silent for too long left out."""
-        now, (i, j) = time.monotonic(), self._plane
+        now = time.monotonic()
         fresh = [
             s.command
             for s in self._sessions.values()
             if self.clock == "tick" or now - s.heard < PATIENCE
         ]
-        forces = [c.force for c in fresh if c.force is not None]
+        forces = [flat(c.force, self._plane) for c in fresh if c.force is not None]
         torques = [c.torques for c in fresh if c.torques is not None]
-        targets = [c.target for c in fresh if c.target is not None]
+        targets = [flat(c.target, self._plane) for c in fresh if c.target is not None]
         target = None
         if targets:  # the newest client's
-            target = targets[-1][i] - REST[i], targets[-1][j] - REST[j]
+            (x, y), (x0, y0) = targets[-1], flat(REST, self._plane)
+            target = x - x0, y - y0
         return Drive(
-            (sum(f[i] for f in forces), sum(f[j] for f in forces)),
+            (sum(f[0] for f in forces), sum(f[1] for f in forces)),
             target,
             (sum(x[0] for x in torques), sum(x[1] for x in torques)),
         )
-
-    def _lifted(self, v: Pair, rest: Vector = NOTHING) -> Vector:
-        """A vector of the arm's plane as one of the cursor."""
-        out = list(rest)
-        for axis, value in zip(self._plane, v, strict=True):
-            out[axis] += value
-        return out[0], out[1], out[2]
 
     def cursor(self, mode: str = "idle") -> Cursor:
         """The newest measurement, in the frame of the device.
@@ -305,11 +296,11 @@ class Service:
         Args:
             mode: what the client that it is for drives.
         """
-        seen, device = self.device.sensed, self.device
+        seen, device, plane = self.device.sensed, self.device, self._plane
         return Cursor(
-            self._lifted(seen.position, REST),
-            self._lifted(seen.velocity),
-            self._lifted(device.force),
+            lifted(seen.position, plane, REST),
+            lifted(seen.velocity, plane),
+            lifted(device.force, plane),
             mode,
             (math.degrees(seen.angles[0]), math.degrees(seen.angles[1])),
             (math.degrees(seen.rates[0]), math.degrees(seen.rates[1])),
