@@ -15,11 +15,11 @@ import tyro
 from ..errors import ParameterError
 from ..files import writable
 from . import console
+from .device_options import deliver_loops, write_report
 from .run import deliver
 
 if TYPE_CHECKING:
     from ..ports.device import Trajectory
-    from ..ports.report import LoopReport
     from ..ports.server import DeviceServer
     from ..scene.scenario import Scenario
 
@@ -124,24 +124,18 @@ class DeviceCommand:
 
     def _deliver(self, server: DeviceServer, out: Path) -> int:
         """Writes and prints what happened."""
-        from ..ports.exchanges import FILE
-
         service = server.service
         if not service.device.t:
             print("nothing was recorded")
             return 0
         record = server.record()
-        talks = sorted(server.exchanges, key=len, reverse=True)
         deliver(record, out, self.figures if self.plots else None)
         if service.skipped:
             share = service.skipped / (service.skipped + service.samples)
             text = f"{service.skipped} control samples ({share:.1%}) were skipped"
             print(f"hapticclay: {text}: the computer was late", file=sys.stderr)
-        if len(talks) > 1:
-            print(f"{len(talks)} clients; the report is of the one with the most messages")
-        if talks and len(talks[0]) > 1:
-            talks[0].save(out / FILE)
-            self._write(talks[0], record.scenario, out)
+        figures = self.figures if self.plots else None
+        deliver_loops(server.exchanges, record.scenario, out, figures)
         return 0
 
     def _report(self, out: Path) -> int:
@@ -152,41 +146,9 @@ class DeviceCommand:
             raise ParameterError("source", "", "give the folder that a session wrote")
         exchanges = Exchanges.load(self.source)
         writable(out)
-        self._write(exchanges, Record.load(self.source).scenario, out)
+        scenario = Record.load(self.source).scenario
+        write_report(exchanges, scenario, out, self.figures if self.plots else None)
         return 0
-
-    def _write(self, exchanges: Any, scenario: Scenario, folder: Path) -> None:
-        from ..ports.report import loop_report
-
-        found = loop_report(exchanges, scenario)
-        try:
-            found.save(folder / "loop.json")
-            if self.plots:
-                self._draw(found, folder)
-        finally:  # a full disk must not hide the result
-            print(report_table(found))
-            print(found.headline())
-
-    def _draw(self, found: LoopReport, folder: Path) -> None:
-        from ..views.figure import Figure
-        from ..views.loop_plots import loop_plot
-
-        console.save_figures(
-            {"loop": Figure(lambda: loop_plot(found), found.tables)}, folder, self.figures
-        )
-
-
-def report_table(found: LoopReport) -> str:
-    """The report for a terminal.
-
-    Args:
-        found: from `loop_report`.
-    """
-    rows = [
-        (name, value if isinstance(value, str) else console.significant(value))
-        for name, (value,) in found.tables()["report"].items()
-    ]
-    return console.text_table(rows, ("loop", ""), "lr")
 
 
 def served_scenario(source: Path | None) -> Scenario:

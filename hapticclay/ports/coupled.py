@@ -162,6 +162,18 @@ class DeviceHand:
             self._take(sample)
         return self.held
 
+    def watch(self) -> bool:
+        """Reads where the device is, without force.
+
+        Returns:
+            Whether the sample came in time.
+        """
+        sample = self.client.exchange()
+        self.held = sample is not None
+        if sample is not None:
+            self._take(sample)
+        return self.held
+
     def _take(self, sample: DeviceSample) -> None:
         x, y = flat(sample.position, self.plane)
         self.place = x + self._offset[0], y + self._offset[1]
