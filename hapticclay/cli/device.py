@@ -15,11 +15,11 @@ import tyro
 from ..errors import ParameterError
 from ..files import writable
 from . import console
+from .device_options import deliver_loops, write_report
 from .run import deliver
 
 if TYPE_CHECKING:
     from ..ports.device import Trajectory
-    from ..ports.report import LoopReport
     from ..ports.server import DeviceServer
     from ..scene.scenario import Scenario
 
@@ -28,7 +28,7 @@ WAIT = 0.1  # [s] between two looks at whether the session is to end
 
 @dataclass(frozen=True)
 class DeviceCommand:
-    """Serve the simulated arm as a Haply Inverse3, or report on the loop of a client.
+    """Serve the simulated arm as a haptic device, or report on the loop of a client.
 
     Programs for a real device connect over a WebSocket, read where the handle is, and send forces,
     which move the arm beside a simulated hand. `device serve` runs until Ctrl-C, then writes the
@@ -39,7 +39,9 @@ class DeviceCommand:
         action: serve or report.
         source: To serve, a scenario file, whose arm, hand and hardware are used; none for the
             paper's arm and hand. To report, the folder that a session wrote.
-        port: Port to listen on; 0 for a free one.
+        protocol: inverse is that of a Haply Inverse3, rosbridge has topics of CRTK and of the
+            drivers of a Touch, as JSON for ROS programs.
+        port: Port to listen on, 0 for a free one; by default that of the protocol, 10001 or 9090.
         host: Address to listen on; a token guards any but this machine's.
         clock: wall moves the arm in real time; tick moves it by --period at each message, so that
             the same messages give the same run.
@@ -60,7 +62,8 @@ class DeviceCommand:
 
     action: Annotated[Literal["serve", "report"], tyro.conf.Positional]
     source: Annotated[Path | None, tyro.conf.Positional] = None
-    port: int = 10_001
+    protocol: Literal["inverse", "rosbridge"] = "inverse"
+    port: int | None = None
     host: str = "127.0.0.1"
     clock: Literal["wall", "tick"] = "wall"
     period: float = 0.005
@@ -84,7 +87,8 @@ class DeviceCommand:
             return self._report(out)
         writable(out)
         with self._server() as server, console.ctrl_c() as stop:
-            print(f"an Inverse3 listens at {server.url}; Ctrl-C ends the session", flush=True)
+            shown = "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
+            print(f"{shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
             end = math.inf if self.duration is None else time.monotonic() + self.duration
             while not stop.wait(WAIT) and time.monotonic() < end:
                 if ended := server.service.device.ended:
@@ -96,7 +100,7 @@ class DeviceCommand:
     def _server(self) -> Any:
         from ..ports.buttons import ButtonScript
         from ..ports.server import serve
-        from ..ports.service import Inverse3
+        from ..ports.service import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
         shown = Inverse3(
@@ -105,11 +109,12 @@ class DeviceCommand:
             self.plane,
             ButtonScript.of_file(self.buttons) if self.buttons else ButtonScript(),
             self.largest_force,
+            self.protocol,
         )
         return serve(
             served_scenario(self.source),
             host=self.host,
-            port=self.port,
+            port=PORTS[self.protocol] if self.port is None else self.port,
             clock=self.clock,
             period=self.period if self.clock == "tick" else None,
             hand=trajectory_of(self.hand),
@@ -119,24 +124,18 @@ class DeviceCommand:
 
     def _deliver(self, server: DeviceServer, out: Path) -> int:
         """Writes and prints what happened."""
-        from ..ports.exchanges import FILE
-
         service = server.service
         if not service.device.t:
             print("nothing was recorded")
             return 0
         record = server.record()
-        talks = sorted(server.exchanges, key=len, reverse=True)
         deliver(record, out, self.figures if self.plots else None)
         if service.skipped:
             share = service.skipped / (service.skipped + service.samples)
             text = f"{service.skipped} control samples ({share:.1%}) were skipped"
             print(f"hapticclay: {text}: the computer was late", file=sys.stderr)
-        if len(talks) > 1:
-            print(f"{len(talks)} clients; the report is of the one with the most messages")
-        if talks and len(talks[0]) > 1:
-            talks[0].save(out / FILE)
-            self._write(talks[0], record.scenario, out)
+        figures = self.figures if self.plots else None
+        deliver_loops(server.exchanges, record.scenario, out, figures)
         return 0
 
     def _report(self, out: Path) -> int:
@@ -147,41 +146,9 @@ class DeviceCommand:
             raise ParameterError("source", "", "give the folder that a session wrote")
         exchanges = Exchanges.load(self.source)
         writable(out)
-        self._write(exchanges, Record.load(self.source).scenario, out)
+        scenario = Record.load(self.source).scenario
+        write_report(exchanges, scenario, out, self.figures if self.plots else None)
         return 0
-
-    def _write(self, exchanges: Any, scenario: Scenario, folder: Path) -> None:
-        from ..ports.report import loop_report
-
-        found = loop_report(exchanges, scenario)
-        try:
-            found.save(folder / "loop.json")
-            if self.plots:
-                self._draw(found, folder)
-        finally:  # a full disk must not hide the result
-            print(report_table(found))
-            print(found.headline())
-
-    def _draw(self, found: LoopReport, folder: Path) -> None:
-        from ..views.figure import Figure
-        from ..views.loop_plots import loop_plot
-
-        console.save_figures(
-            {"loop": Figure(lambda: loop_plot(found), found.tables)}, folder, self.figures
-        )
-
-
-def report_table(found: LoopReport) -> str:
-    """The report for a terminal.
-
-    Args:
-        found: from `loop_report`.
-    """
-    rows = [
-        (name, value if isinstance(value, str) else console.significant(value))
-        for name, (value,) in found.tables()["report"].items()
-    ]
-    return console.text_table(rows, ("loop", ""), "lr")
 
 
 def served_scenario(source: Path | None) -> Scenario:

@@ -14,6 +14,7 @@ import tyro
 from ..errors import ParameterError
 from ..files import writable
 from . import console
+from .device_options import DeviceOptions
 from .run import deliver
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class ViewCommand:
         host: Address to serve the browser on; a token guards any but this machine's.
         port: Port to serve the browser on.
         figures: Formats and style of the plots.
+        devices: A device that is the hand, or a server for programs.
         stream: Send the session, 60 times a second, as JSON over UDP to HOST:PORT, as in
             localhost:9870, for PlotJuggler.
     """
@@ -75,6 +77,7 @@ class ViewCommand:
     host: str = "127.0.0.1"
     port: int = 8080
     figures: console.FigureOptions = console.FigureOptions()
+    devices: DeviceOptions = DeviceOptions()
     stream: str | None = None
 
     def __call__(self) -> int:
@@ -83,28 +86,32 @@ class ViewCommand:
 
         tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
-            if self.web:
-                raise ParameterError(
-                    "web",
-                    True,
-                    "shows sessions only: make a film of a record with hapticclay video",
-                )
+            self._refuse_sessions_options()
             replay(self.scenario, tool, self.stream)
             return 0
         writable(self.out or Path("out/view"))
-        record = self._session(tool)
-        if record is None:
+        with self.devices.session(self.scenario, self.stiffness, tool, self.every) as session:
+            self._play(session)
+        if not session.recorded:
             print("nothing was recorded")
             return 0
+        record = session.record()
         out = self.out or console.default_folder("view", record.scenario)
-        deliver(record, out, self.figures if self.plots else None)
+        figures = self.figures if self.plots else None
+        deliver(record, out, figures)
+        self.devices.deliver(session, out, figures)
         return 0
 
-    def _session(self, tool: Tool) -> Record | None:
-        """Plays a session until its window or page is closed; None if nothing was recorded."""
-        from ..views.session import Session
+    def _refuse_sessions_options(self) -> None:
+        """Refuses options that are not for a record."""
+        if self.web:
+            bound = "shows sessions only: make a film of a record with hapticclay video"
+            raise ParameterError("web", True, bound)
+        if self.devices.given:
+            raise ParameterError("device", True, "is for sessions: leave it out with a record")
 
-        session = Session(self.scenario, self.stiffness, tool, self.every)
+    def _play(self, session: Session) -> None:
+        """Plays a session until its window or page is closed."""
         with console.ctrl_c() as stop, streaming(session, self.stream):
             if self.web:
                 _serve_page(session, self.host, self.port, stop.is_set)
@@ -112,7 +119,6 @@ class ViewCommand:
                 from ..views.window import Window
 
                 Window(session).show(stop.is_set)
-        return session.record() if session.recorded else None
 
 
 @contextlib.contextmanager

@@ -1,6 +1,15 @@
 # Ports for other programs: public names, and the modules they come from.
 
 from .buttons import ButtonScript as ButtonScript
+from .client import DeviceClient as DeviceClient
+from .client import DeviceSample as DeviceSample
+from .client import Limits as Limits
+from .client import connect as connect
+from .client_log import ClientLog as ClientLog
+from .client_log import Timing as Timing
+from .coupled import Coupled as Coupled
+from .coupled import Rendered as Rendered
+from .coupled import render as render
 from .device import Trajectory as Trajectory
 from .exchanges import Exchanges as Exchanges
 from .report import LoopReport as LoopReport

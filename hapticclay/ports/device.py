@@ -7,37 +7,20 @@ import math
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, number
-from ..model.arm import handle_velocity, jacobian, joint_torques
 from ..model.constants import TS
-from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
+from .commands import Pair
+from .driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
 
-LARGEST_FORCE = 10.0  # [N] of the length of a force, unless asked for
 LONGEST = 1e5  # [s] of a session
-
-Pair = tuple[float, float]
-
-
-class Sensed(NamedTuple):
-    """What the device measured at a control sample.
-
-    Attributes:
-        t: time of the sample [s].
-        position: of the handle [m].
-        velocity: of the handle [m/s].
-    """
-
-    t: float
-    position: Pair
-    velocity: Pair
 
 
 @named
@@ -126,15 +109,17 @@ def read_columns(
 
 
 class SimulatedDevice:
-    """The arm of a scenario beside its hand, driven by forces in place of its controller.
+    """The arm of a scenario beside its hand, driven by a client in place of its controller.
 
     A force acts through the transposed Jacobian at the measured joint angles, held for a control
     sample, within the torque limits and behind the delay of the scenario's hardware.
 
     Attributes:
-        largest_force: longer forces are shortened to this length [N].
         scenario: what is simulated.
+        paced: whether something else than the clock of a service moves it: no.
     """
+
+    paced = False
 
     def __init__(
         self,
@@ -158,24 +143,11 @@ class SimulatedDevice:
             ParameterError: the period is no whole multiple of the control sample, or the hand has
                 no spring to follow a trajectory by.
         """
-        self.largest_force = number("largest_force", largest_force, 0.0, 1e3, above=True)
         self.scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
-        origin, links = self.scenario.origin, self.scenario.arm.links
-        start = (float(x) for x in self.scenario.start)
-        rate = (float(x) for x in self.scenario.velocity)
-        self._sensed = Sensed(0.0, (next(start), next(start)), (next(rate), next(rate)))
-        self._force: Pair = (0.0, 0.0)
-
-        def law(t: float, q: Pair, qd: Pair, fh: Pair, state: Any, params: Any) -> Any:
-            u = jacobian(q[0], q[1], links)
-            place = u[1] + u[3] - origin[0], -u[0] - u[2] - origin[1]
-            self._sensed = Sensed(t, place, handle_velocity(qd[0], qd[0] + qd[1], u))
-            return joint_torques(self._force[0], self._force[1], u), state
-
-        self._simulation = Simulation(
-            replace(self.scenario, controller=Controller(law)), engine="python"
-        )
+        self._arm = DrivenArm(self.scenario, largest_force)
+        driven = replace(self.scenario, controller=self._arm.controller)
+        self._simulation = Simulation(driven, engine="python")
 
     @property
     def t(self) -> float:
@@ -185,32 +157,34 @@ class SimulatedDevice:
     @property
     def sensed(self) -> Sensed:
         """The newest measurement."""
-        return self._sensed
+        return self._arm.sensed
 
     @property
     def force(self) -> Pair:
-        """The force that acts [N]."""
-        return self._force
+        """The force that acts on the handle [N]."""
+        return self._arm.force
+
+    @property
+    def torques(self) -> Pair:
+        """Torques that act on the joints beside that force [N.m]."""
+        return self._arm.asked.torques
 
     @property
     def ended(self) -> str:
         """Why the device no longer moves; "" while it does."""
         outcome = self._simulation.outcome
-        return "" if outcome is None else outcome.text
+        return "" if outcome is None else str(outcome)
 
-    def push(self, force: Pair) -> Pair:
-        """Sets the force on the handle from the next control sample on.
+    def drive(self, drive: Drive) -> Pair:
+        """Changes what the motors do from the next control sample on.
 
         Args:
-            force: in the plane of the arm [N].
+            drive: in the plane of the arm.
 
         Returns:
-            The force that will act: shortened where it is longer than the limit.
+            The force that will act: shortened where it is longer than the limit [N].
         """
-        size = math.hypot(*force)
-        scale = min(1.0, self.largest_force / size) if size else 0.0
-        self._force = force[0] * scale, force[1] * scale
-        return self._force
+        return self._arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
         """Moves on.

@@ -7,17 +7,24 @@ Vectors are (x, y, z) in metre, metre per second and newton, z up.
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-Vector = tuple[float, float, float]
+from .commands import AXES, NOTHING, Command, Pair, Vector, by_axis, finite
 
-NOTHING: Vector = (0.0, 0.0, 0.0)
-AXES = ("x", "y", "z")
 LARGEST_MESSAGE = 65_536  # bytes
-FORCE_KEYS = ("vector", "values")  # of 3.5, of 3.1 to 3.4
+JOINTS = ("a0", "a1")  # of the arm, which is planar
+KEYS = {  # of a command's body, of 3.5 first
+    "set_cursor_force": ("vector", "values"),
+    "set_cursor_position": ("position", "values"),
+    "set_angular_torques": ("torques", "values"),
+}
+NAMES = {  # of a command's body, in notices
+    "set_cursor_force": "force",
+    "set_cursor_position": "position",
+    "set_angular_torques": "torque",
+}
 PROBES = ("probe_position", "probe_orientation")
 DEVICES = ("inverse3", "minverse", "verse_grip", "wireless_verse_grip", "custom_verse_grip")
 BUTTONS = ("a", "b", "c", "home", "button_0", "button_1", "button_2", "button_3")
@@ -39,6 +46,32 @@ class Force:
 
 
 @dataclass(frozen=True)
+class Target:
+    """A place at which a client wants a device to hold its cursor.
+
+    Attributes:
+        device_id: of the device.
+        vector: the place [m].
+    """
+
+    device_id: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Torques:
+    """Torques that a client asks of a device.
+
+    Attributes:
+        device_id: of the device.
+        torques: of the joints a0 and a1 [N.m].
+    """
+
+    device_id: str
+    torques: Pair
+
+
+@dataclass(frozen=True)
 class Message:
     """What a client sent.
 
@@ -48,6 +81,8 @@ class Message:
         full: whether the answer is to hold the configuration.
         profile: name that the client gives its session; "" for none.
         notices: what was left out, and why.
+        targets: in the order of their entries; for one device the last one counts.
+        torques: in the order of their entries; those for one device add up.
     """
 
     forces: tuple[Force, ...] = ()
@@ -55,17 +90,21 @@ class Message:
     full: bool = False
     profile: str = ""
     notices: tuple[str, ...] = ()
+    targets: tuple[Target, ...] = ()
+    torques: tuple[Torques, ...] = ()
 
-    def force_on(self, device_id: str) -> Vector | None:
-        """Sum of the forces on a device [N]; None if there are none.
+    def command(self, device_id: str) -> Command:
+        """What the message asks of a device.
 
         Args:
             device_id: of the device.
         """
-        asked = [f.vector for f in self.forces if f.device_id == device_id]
-        if not asked:
-            return None
-        return sum(f[0] for f in asked), sum(f[1] for f in asked), sum(f[2] for f in asked)
+        forces = [f.vector for f in self.forces if f.device_id == device_id]
+        targets = [x.vector for x in self.targets if x.device_id == device_id]
+        torques = [x.torques for x in self.torques if x.device_id == device_id]
+        force = tuple(map(sum, zip(*forces, strict=True))) if forces else None
+        torque = tuple(map(sum, zip(*torques, strict=True))) if torques else None
+        return Command(force, targets[-1] if targets else None, torque)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -76,13 +115,19 @@ class Cursor:
         position: [m].
         velocity: [m/s].
         force: that the device applies [N].
-        driven: whether a client commands it.
+        mode: what a client drives: "force", "position", "torque", or "idle" for nothing.
+        angles: of the joints a0 and a1 [deg].
+        rates: of these joints [deg/s].
+        torques: of these joints [N.m].
     """
 
     position: Vector
     velocity: Vector = NOTHING
     force: Vector = NOTHING
-    driven: bool = False
+    mode: str = "idle"
+    angles: Pair = (0.0, 0.0)
+    rates: Pair = (0.0, 0.0)
+    torques: Pair = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -126,18 +171,34 @@ def read_message(data: str | bytes) -> Message:
         return Message(notices=("not an object",))
     notices = [f"unknown key {name}" for name in tree if name not in ("session", *DEVICES)]
     full, profile = _session(tree.get("session", {}), notices)
-    forces, devices = [], []
+    found = _Found([], [], [], [])
     for kind in DEVICES:
         for entry in _entries(tree.get(kind, []), kind, notices):
             name = entry.get("device_id")
             if not isinstance(name, str):
                 notices.append(f"{kind} without device_id")
                 continue
-            devices.append(name)
-            vector = _commanded(entry, notices)
-            if vector is not None:
-                forces.append(Force(name, vector))
-    return Message(tuple(forces), tuple(devices), full, profile, tuple(dict.fromkeys(notices)))
+            found.devices.append(name)
+            _read_commands(name, entry, found, notices)
+    return Message(
+        tuple(found.forces),
+        tuple(found.devices),
+        full,
+        profile,
+        tuple(dict.fromkeys(notices)),
+        tuple(found.targets),
+        tuple(found.torques),
+    )
+
+
+@dataclass
+class _Found:
+    """What the entries of a message hold."""
+
+    devices: list[str]
+    forces: list[Force]
+    targets: list[Target]
+    torques: list[Torques]
 
 
 def _session(part: Any, notices: list[str]) -> tuple[bool, str]:
@@ -167,8 +228,10 @@ def _entries(part: Any, kind: str, notices: list[str]) -> Iterator[Mapping[str, 
             notices.append(f"entry of {kind} is no object")
 
 
-def _commanded(entry: Mapping[str, Any], notices: list[str]) -> Vector | None:
-    """The force that the entry of a device asks for; None for none."""
+def _read_commands(
+    device: str, entry: Mapping[str, Any], found: _Found, notices: list[str]
+) -> None:
+    """Adds the commands of a device's entry to what was found."""
     notices += [
         f"unknown key {name} of a device"
         for name in entry
@@ -179,40 +242,36 @@ def _commanded(entry: Mapping[str, Any], notices: list[str]) -> Vector | None:
     commands = entry.get("commands", {})
     if not isinstance(commands, Mapping):
         notices.append("commands is no object")
-        return None
-    vector = None
+        return
     for name, body in commands.items():
         if name == "set_cursor_force":
-            vector = _force(body, notices)
+            x, y, z = _numbers(name, body, AXES, notices) or NOTHING
+            found.forces.append(Force(device, (x, y, z)))
+        elif name == "set_cursor_position":
+            if place := _numbers(name, body, AXES, notices):  # no place is no target
+                found.targets.append(Target(device, (place[0], place[1], place[2])))
+        elif name == "set_angular_torques":
+            a0, a1 = _numbers(name, body, JOINTS, notices) or (0.0, 0.0)
+            found.torques.append(Torques(device, (a0, a1)))
         elif name not in PROBES:
             notices.append(f"command {name} is not simulated")
-    return vector
 
 
-def _force(body: Any, notices: list[str]) -> Vector:
-    """The vector of a force; nothing where it is none, or not finite."""
+def _numbers(
+    command: str, body: Any, names: Sequence[str], notices: list[str]
+) -> tuple[float, ...] | None:
+    """The numbers of a command's body, 0 where one is missing; None where one is not finite."""
     given = None
     if isinstance(body, Mapping):
-        given = next((body[key] for key in FORCE_KEYS if key in body), None)
+        given = next((body[key] for key in KEYS[command] if key in body), None)
     if not isinstance(given, Mapping):
-        notices.append("set_cursor_force without vector")
-        return NOTHING
-    values = [_finite(given.get(axis, 0.0)) for axis in AXES]
+        notices.append(f"{command} without {KEYS[command][0]}")
+        return None
+    values = [finite(given.get(name, 0.0)) for name in names]
     if None in values:
-        notices.append("force is not finite")
-        return NOTHING
-    x, y, z = (v for v in values if v is not None)
-    return x, y, z
-
-
-def _finite(value: Any) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
+        notices.append(f"{NAMES[command]} is not finite")
         return None
-    try:
-        found = float(value)
-    except OverflowError:
-        return None
-    return found if math.isfinite(found) else None
+    return tuple(v for v in values if v is not None)
 
 
 def message_text(message: Message) -> str:
@@ -227,22 +286,29 @@ def message_text(message: Message) -> str:
         session["configure"] = {"profile": {"name": message.profile}}
     if session:
         tree["session"] = session
-    named = [f.device_id for f in message.forces]
-    entries: list[dict[str, Any]] = [
-        {
-            "device_id": f.device_id,
-            "commands": {"set_cursor_force": {"values": _axes(f.vector)}},
-        }
-        for f in message.forces
-    ]
-    entries += [
-        {"device_id": name, "commands": {"probe_position": {}}}
-        for name in message.devices
-        if name not in named
-    ]
+    entries = [_entry(x.device_id, *_body(x)) for x in _commands(message)]
+    named = {entry["device_id"] for entry in entries}
+    entries += [_entry(name, "probe_position", {}) for name in message.devices if name not in named]
     if entries:
         tree["inverse3"] = entries
     return json.dumps(tree, allow_nan=False)
+
+
+def _commands(message: Message) -> Sequence[Force | Target | Torques]:
+    return *message.forces, *message.targets, *message.torques
+
+
+def _body(command: Force | Target | Torques) -> tuple[str, dict[str, Any]]:
+    """Name and body of a command."""
+    if isinstance(command, Torques):
+        joints = dict(zip(JOINTS, command.torques, strict=True))
+        return "set_angular_torques", {"torques": joints | {"a2": 0.0}}
+    name = "set_cursor_force" if isinstance(command, Force) else "set_cursor_position"
+    return name, {"values": by_axis(command.vector)}
+
+
+def _entry(device_id: str, command: str, body: dict[str, Any]) -> dict[str, Any]:
+    return {"device_id": device_id, "commands": {command: body}}
 
 
 # ---- what the service sends ----------------------------------------------------------------------
@@ -288,32 +354,29 @@ def frame_text(frame: Frame) -> str:
     return json.dumps(frame_data(frame), allow_nan=False)
 
 
-def _axes(v: Vector) -> dict[str, float]:
-    return dict(zip(AXES, v, strict=True))
-
-
-def _joints() -> dict[str, float]:
-    return {"a0": 0.0, "a1": 0.0, "a2": 0.0}
+def _joints(values: Pair = (0.0, 0.0)) -> dict[str, float]:
+    return {"a0": values[0], "a1": values[1], "a2": 0.0}
 
 
 def _transform() -> dict[str, Any]:
     unit = {"x": 1.0, "y": 1.0, "z": 1.0}
-    return {"position": _axes(NOTHING), "rotation": dict(UNTURNED), "scale": unit}
+    return {"position": by_axis(NOTHING), "rotation": dict(UNTURNED), "scale": unit}
 
 
 def _cursor_state(cursor: Cursor) -> dict[str, Any]:
-    mode = "force" if cursor.driven else "idle"
+    mode = cursor.mode
+    domains = {"idle": "undefined", "torque": "angular"}
     return {
-        "cursor_position": _axes(cursor.position),
-        "cursor_velocity": _axes(cursor.velocity),
-        "angular_position": _joints(),
-        "angular_velocity": _joints(),
+        "cursor_position": by_axis(cursor.position),
+        "cursor_velocity": by_axis(cursor.velocity),
+        "angular_position": _joints(cursor.angles),
+        "angular_velocity": _joints(cursor.rates),
         "body_orientation": dict(UNTURNED),
-        "current_cursor_force": _axes(cursor.force),
-        "current_cursor_position": _axes(cursor.position),
-        "current_angular_torques": _joints(),
-        "current_angular_position": _joints(),
-        "control_domain": "cartesian" if cursor.driven else "undefined",
+        "current_cursor_force": by_axis(cursor.force),
+        "current_cursor_position": by_axis(cursor.position),
+        "current_angular_torques": _joints(cursor.torques),
+        "current_angular_position": _joints(cursor.angles),
+        "control_domain": domains.get(mode, "cartesian"),
         "control_mode": mode,
         "mode": mode,
         "transform": _transform(),
@@ -378,7 +441,10 @@ def read_frame(data: str | bytes) -> Frame | None:
             position,
             _vector(state.get("cursor_velocity", {})),
             _vector(state.get("current_cursor_force", {})),
-            state.get("control_mode", state.get("mode", "idle")) != "idle",
+            str(state.get("control_mode", state.get("mode", "idle"))),
+            _pair(state.get("angular_position", {})),
+            _pair(state.get("angular_velocity", {})),
+            _pair(state.get("current_angular_torques", {})),
         )
         return Frame(
             str(device["device_id"]),
@@ -393,7 +459,12 @@ def read_frame(data: str | bytes) -> Frame | None:
 
 
 def _vector(given: Mapping[str, Any]) -> Vector:
-    x, y, z = (_finite(given.get(axis, 0.0)) for axis in AXES)
+    x, y, z = (finite(given.get(axis, 0.0)) for axis in AXES)
     if x is None or y is None or z is None:
         raise ValueError("not finite")
     return x, y, z
+
+
+def _pair(given: Mapping[str, Any]) -> Pair:
+    a, b = (finite(given.get(joint, 0.0)) for joint in JOINTS)
+    return a or 0.0, b or 0.0  # which no loop depends on

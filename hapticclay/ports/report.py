@@ -12,7 +12,12 @@ from ..arguments import checked, named
 from ..errors import ParameterError
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
-from ..theory.client_loop import Handle, rendered_stiffness_limit, slowest_period
+from ..theory.client_loop import (
+    Handle,
+    rendered_stiffness_limit,
+    rendered_stiffness_limits,
+    slowest_period,
+)
 from .exchanges import Exchanges
 
 LATEST = 4  # answers back that a force may have been computed from
@@ -71,8 +76,8 @@ class LoopReport(Result):
         limit: stiffness that this period, delay, hand and B carry [N/m].
         rate_needed: rate that would carry K and B with as many samples of delay [Hz]; inf for none
             up to a thousand times the present one.
-        line_B: damping of a line of theory [N.s/m].
-        line_K: stiffness that it carries [N/m]: the Z-width of this loop.
+        line_B: damping of a line of theory [N.s/m], from 0 on.
+        line_K: stiffness that it carries [N/m]: the Z-width of this period, delay and hand.
         note: why K and B are not told; "" where they are.
     """
 
@@ -103,15 +108,30 @@ class LoopReport(Result):
             return "not told"
         return "holds" if self.K <= self.limit else "buzzes"
 
+    @property
+    def age(self) -> float:
+        """Age of the state that a force was computed from, when the force acts [samples]."""
+        return self.delay / self.period if self.period > 0.0 else math.nan
+
+    @property
+    def z_width(self) -> tuple[float, float, float]:
+        """Largest stiffness that the loop carries, at which damping, and its largest damping.
+
+        [N/m], [N.s/m], [N.s/m]; NaN without a wall.
+        """
+        if not self.line_K:
+            return math.nan, math.nan, math.nan
+        K, B = max(zip(self.line_K, self.line_B, strict=True))
+        return K, B, max((b for b, k in zip(self.line_B, self.line_K, strict=True) if k), default=0)
+
     def headline(self) -> str:
         """The report in a line."""
         rate = f"{1.0 / self.period:.4g} Hz" if self.period > 0.0 else "no rate"
         if math.isnan(self.K):
             return f"{self.messages} messages at {rate}; {self.note}"
-        late = self.delay / self.period
         damped = f" and {self.B:.3g} N.s/m" if abs(self.B) > 1e-3 else ""
         text = (
-            f"rendered {self.K:.4g} N/m{damped} at {rate}, {late:.2g} samples late; "
+            f"rendered {self.K:.4g} N/m{damped} at {rate}, {self.age:.2g} samples late; "
             f"limit for this hand {self.limit:.4g} N/m: it {self.verdict}"
         )
         if self.verdict == "holds":
@@ -122,7 +142,8 @@ class LoopReport(Result):
 
     def tables(self) -> Tables:
         """The report, and the line of theory."""
-        p50, p99 = self.intervals
+        (p50, p99), (K, B, most) = self.intervals, self.z_width
+        undamped = self.line_K[0] if self.line_K else math.nan
         rows: dict[str, Any] = {
             "messages": self.messages,
             "rate [Hz]": self.rate,
@@ -130,12 +151,17 @@ class LoopReport(Result):
             "interval, 99th percentile [s]": p99,
             "simulated period [s]": self.period,
             "delay [s]": self.delay,
+            "age of the state [samples]": self.age,
             "forces limited [share]": self.limited,
             "K [N/m]": self.K,
             "standard error of K [N/m]": self.K_error,
             "B [N.s/m]": self.B,
             "explained [share]": self.explained,
             "limit of K [N/m]": self.limit,
+            "limit of K without damping [N/m]": undamped,
+            "Z-width: largest K [N/m]": K,
+            "at B [N.s/m]": B,
+            "Z-width: largest B [N.s/m]": most,
             "rate needed [Hz]": self.rate_needed,
             "verdict": self.verdict,
         }
@@ -220,8 +246,7 @@ def limit_line(
     top = max(2.5 * mass / (Ts + delay), 1.2 * B)
     rising = np.geomspace(1e-3 * top, 0.8 * top, LINE)
     grid = [0.0, *rising.tolist(), *np.linspace(0.82 * top, top, LINE // 2).tolist()]
-    K = [rendered_stiffness_limit(handle, b, Ts, delay) for b in grid]
-    return tuple(grid), tuple(K)
+    return tuple(grid), rendered_stiffness_limits(handle, grid, Ts, delay)
 
 
 def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:

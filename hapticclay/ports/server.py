@@ -22,11 +22,12 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from .device import SimulatedDevice, Trajectory
 from .exchanges import Exchanges
-from .inverse import DEVICES, LARGEST_MESSAGE
+from .inverse import LARGEST_MESSAGE
 from .service import PLAIN, Inverse3, Service
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 CLOCKS = ("wall", "tick")
+PUSH_PERIOD = 0.002  # [s] between two states that a client has not asked for
 LONGEST_QUEUE = 16  # messages of a client that wait to be answered
 
 
@@ -144,15 +145,32 @@ class DeviceServer:
         connected = connection.transport.get_extra_info("socket")
         with contextlib.suppress(OSError, AttributeError):
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        number, inventory = self.service.connect()
+        number, texts = self.service.connect()
+        pushing = None
         try:
-            await connection.send(inventory)
+            for text in texts:
+                await connection.send(text)
+            if self.service.speech.pushes:
+                pushing = asyncio.create_task(self._push(connection, number))
             async for data in connection:
-                await connection.send(self.service.answer(number, data))
+                for text in self.service.answer(number, data):
+                    await connection.send(text)
         except ConnectionClosed:
             pass
         finally:
+            if pushing is not None:
+                pushing.cancel()
             self.service.leave(number)
+
+    async def _push(self, connection: Any, number: int) -> None:
+        """Sends a client what it has not asked for, until it goes."""
+        from websockets.exceptions import ConnectionClosed
+
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                for text in self.service.due(number):
+                    await connection.send(text)
+                await asyncio.sleep(PUSH_PERIOD)
 
     def _http(self, connection: Any, request: Any) -> Any:
         """Answers plain GETs; None lets a WebSocket through."""
@@ -165,8 +183,7 @@ class DeviceServer:
         if where.path == "/version":
             return _envelope(connection, HTTPStatus.OK, data=_version())
         if where.path == "/devices":
-            found = self.service.inventory()
-            return _envelope(connection, HTTPStatus.OK, data={k: found[k] for k in DEVICES})
+            return _envelope(connection, HTTPStatus.OK, data=self.service.inventory())
         return _envelope(connection, HTTPStatus.NOT_FOUND, f"no route {where.path}")
 
 
@@ -198,7 +215,7 @@ def serve(
     clay: bool = False,
     inverse3: Inverse3 = PLAIN,
 ) -> Iterator[DeviceServer]:
-    """Serves the arm of a scenario as an Inverse3, while the `with` block runs.
+    """Serves the arm of a scenario as a device, while the `with` block runs.
 
         with hapticclay.ports.serve(scenario, period=0.005) as server:
             run_my_program(server.url)
@@ -214,7 +231,7 @@ def serve(
             sample.
         hand: where the hand wants to be over time; None for the muscle force of the scenario.
         clay: whether the clay of the scenario acts as well.
-        inverse3: what the device shows itself as.
+        inverse3: what the device shows itself as, and the protocol it speaks.
 
     Yields:
         The server.

@@ -1,35 +1,40 @@
 """The service behind the sockets: sessions of clients, a clock that moves the device, a watchdog.
 
-Two clocks. "tick": each message of the first client moves the device by a period under its force,
-so that the same messages give the same run to the last bit. "wall": the device moves in real time
-in a thread of its own, under the newest force of each client (a zero-order hold).
+What a client says is read and answered by a protocol; here all clients only have commands. Two
+clocks. "tick": each command of the first client moves the device by a period, so that the same
+messages give the same run to the last bit. "wall": the device moves in real time in a thread of its
+own, under the newest command of each client (a zero-order hold).
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import re
 import threading
 import time
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
-from . import inverse
+from ..scene.scenario import Scenario
 from .buttons import ButtonScript
-from .device import LARGEST_FORCE, Pair, Sensed, SimulatedDevice
+from .commands import IDLE, NOTHING, Command, Pair, Vector
+from .driven_arm import LARGEST_FORCE, LIMP, Drive, Sensed
 from .exchanges import Exchange, ExchangeLog
-from .inverse import Vector
+from .inverse import Cursor
+from .planes import across, flat, lifted
 
 REST: Vector = (0.08, -0.15, 0.14)  # [m] where an Inverse3 has its cursor at rest: handle at p = 0
 ID = re.compile("[0-9A-F]{1,16}")
-PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that are x and y of the arm
-PATIENCE = 0.05  # [s] without a message after which a client's force is no longer applied
+PORTS = {"inverse": 10_001, "rosbridge": 9090}  # where clients look for each protocol
+PATIENCE = 0.05  # [s] without a message after which a client's command no longer acts
 LATE = 0.1  # [s] behind the clock from which on time is skipped
 MOST_NOTICES, LONGEST_NOTICE = 100, 120  # kinds that are counted apart; characters
 AT_ONCE = 8  # control samples that the thread makes before clients get their turn
+LOOK = 0.002  # [s] between two looks at the clients of a device that something else moves
 LOG = logging.getLogger("hapticclay.ports")
 
 
@@ -44,6 +49,7 @@ class Inverse3:
         plane: "xy" or "xz", plane of the cursor in which the arm moves.
         buttons: of the grip, over time.
         largest_force: longer forces are shortened to this length [N], > 0, at most 1e3.
+        protocol: "inverse", of the Haply Inverse service, or "rosbridge", topics of ROS as JSON.
     """
 
     device_id: str = "04EA"
@@ -51,6 +57,7 @@ class Inverse3:
     plane: Literal["xy", "xz"] = "xy"
     buttons: ButtonScript = ButtonScript()
     largest_force: Annotated[float, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
+    protocol: Literal["inverse", "rosbridge"] = "inverse"
 
     def __post_init__(self):
         check_fields(self)
@@ -63,33 +70,77 @@ class Inverse3:
 PLAIN = Inverse3()
 
 
+class Device(Protocol):
+    """What a service drives: a `SimulatedDevice`, or the arm of a session that a person watches.
+
+    Attributes:
+        paced: whether something else than the clock of the service moves it.
+    """
+
+    paced: bool
+
+    @property
+    def t(self) -> float: ...
+    @property
+    def sensed(self) -> Sensed: ...
+    @property
+    def force(self) -> Pair: ...
+    @property
+    def torques(self) -> Pair: ...
+    @property
+    def ended(self) -> str: ...
+    @property
+    def scenario(self) -> Scenario: ...
+    def drive(self, drive: Drive) -> Pair: ...
+    def advance(self, samples: int | None = None) -> None: ...
+
+
 @dataclass
 class Session:
     """A client that is connected.
 
     Attributes:
         number: 1 for the first client, and so on.
-        asked: its force, along x, y, z of the device [N].
-        heard: when its last message came [s].
-        driving: whether its last message had a force.
+        command: its newest one.
+        heard: when its last command came [s].
         log: its exchanges.
         profile: name that it gave itself.
+        memory: what its protocol keeps.
     """
 
     number: int
-    asked: Vector = inverse.NOTHING
-    heard: float = 0.0
-    driving: bool = False
+    command: Command = IDLE
+    heard: float = -math.inf
     log: ExchangeLog = field(default_factory=ExchangeLog)
     profile: str = ""
+    memory: Any = None
+
+
+class Speech(Protocol):
+    """A protocol: reads what a client sends, and writes what it is sent.
+
+    Attributes:
+        name: of the protocol.
+        pushes: whether clients are sent states that they have not asked for.
+    """
+
+    name: str
+    pushes: bool
+
+    def greet(self, service: Service, session: Session) -> list[str]: ...
+    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]: ...
+    def due(self, service: Service, session: Session) -> list[str]: ...
+    def inventory(self, service: Service) -> dict[str, Any]: ...
 
 
 class Service:
-    """Answers messages with frames: an inventory at first, then one frame a message.
+    """Clients, their commands, and the clock.
 
     Attributes:
         device: what is driven.
         clock: "tick" or "wall".
+        inverse3: what the device shows itself as.
+        speech: the protocol.
         notices: what was left out of messages, and how often.
         skipped: control samples that the wall clock left out, since the computer was late.
         samples: control samples that it made.
@@ -97,7 +148,7 @@ class Service:
 
     def __init__(
         self,
-        device: SimulatedDevice,
+        device: Device,
         *,
         clock: str = "wall",
         inverse3: Inverse3 = PLAIN,
@@ -107,10 +158,11 @@ class Service:
         Args:
             device: what is driven.
             clock: "tick" or "wall".
-            inverse3: what the device shows itself as.
+            inverse3: what the device shows itself as, and the protocol it speaks.
         """
         self.device, self.clock, self.notices = device, clock, Counter[str]()
-        self.inverse3, self._plane = inverse3, PLANES[inverse3.plane]
+        self.inverse3, self._plane = inverse3, inverse3.plane
+        self.speech = speech_of(inverse3.protocol)
         self.skipped = self.samples = 0
         self._sessions: dict[int, Session] = {}
         self._logs: list[ExchangeLog] = []
@@ -119,80 +171,95 @@ class Service:
 
     # ---- clients
 
-    def connect(self) -> tuple[int, str]:
+    def connect(self) -> tuple[int, list[str]]:
         """A new client.
 
         Returns:
-            The number of its session, and the inventory to send first.
+            The number of its session, and what to send first.
         """
         with self._lock:
             number = len(self._logs) + 1
             session = self._sessions[number] = Session(number)
             self._logs.append(session.log)
-            return number, self._frame(session, full=True)
+            return number, self.speech.greet(self, session)
 
     def leave(self, number: int) -> None:
-        """A client has gone, and its force with it.
+        """A client has gone, and its command with it.
 
         Args:
             number: of its session.
         """
         with self._lock:
             self._sessions.pop(number, None)
-            if self.clock == "tick" or not self._sessions:
-                self.device.push((0.0, 0.0))
+            self.device.drive(LIMP if self.clock == "tick" else self._drive())
 
-    def answer(self, number: int, data: str | bytes) -> str:
-        """The frame for a message.
+    def answer(self, number: int, data: str | bytes) -> list[str]:
+        """What to send for a message.
 
         Args:
             number: of the client's session.
             data: its message, text or binary, whatever it is.
         """
-        message = inverse.read_message(data)
         with self._lock:
-            session, device = self._sessions[number], self.device
-            self._note(message)
-            force = message.force_on(self.inverse3.device_id)
-            session.driving, session.heard = force is not None, time.monotonic()
-            session.asked = inverse.NOTHING if force is None else force
-            session.profile = message.profile or session.profile
-            if session.asked[self._normal]:
-                self._count("force across the plane of the arm is recorded and cannot act")
-            began = device.t
-            applied = device.push(self._total())
-            if self.clock == "tick" and number == min(self._sessions):
-                device.advance()
-                for s in self._sessions.values():  # a command holds for a tick
-                    if s.number != number:
-                        s.asked = inverse.NOTHING
-            seen = device.sensed
-            place, rate = seen.position, seen.velocity
-            i, j = self._plane
-            asked = session.asked[i], session.asked[j], session.asked[self._normal]
-            row = Exchange(session.heard, began, seen.t, place, rate, asked, applied)
-            session.log.add(row)
-            return self._frame(session, message.full)
+            return self.speech.answer(self, self._sessions[number], data)
+
+    def due(self, number: int) -> list[str]:
+        """What to send a client that has not asked.
+
+        Args:
+            number: of its session.
+        """
+        with self._lock:
+            session = self._sessions.get(number)
+            return [] if session is None else self.speech.due(self, session)
+
+    def obey(self, session: Session, command: Command) -> None:
+        """Takes a client's command; with the clock "tick", the first client's moves the device.
+
+        Args:
+            session: of the client.
+            command: what it asks; without anything it is idle.
+        """
+        device = self.device
+        session.command, session.heard = command, time.monotonic()
+        force = command.force or NOTHING
+        x, y = flat(force, self._plane)
+        z = across(force, self._plane)
+        if z:
+            self.count("force across the plane of the arm is recorded and cannot act")
+        began = device.t
+        applied = device.drive(self._drive())
+        if self.clock == "tick" and session.number == min(self._sessions):
+            device.advance()
+            for s in self._sessions.values():  # a command holds for a tick
+                if s.number != session.number:
+                    s.command = IDLE
+        seen = device.sensed
+        place, rate = seen.position, seen.velocity
+        row = Exchange(session.heard, began, seen.t, place, rate, (x, y, z), applied)
+        session.log.add(row)
 
     @property
     def logs(self) -> list[ExchangeLog]:
         """Exchanges of each client, in the order of their connection."""
         return list(self._logs)
 
+    @property
+    def clients(self) -> int:
+        """Number of clients that are connected."""
+        return len(self._sessions)
+
     def inventory(self) -> dict[str, Any]:
-        """What a client is sent first, as plain data."""
+        """What the device shows itself as, as plain data."""
         with self._lock:
-            return inverse.frame_data(self._made(Session(0), full=True))
+            return self.speech.inventory(self)
 
-    def _note(self, message: inverse.Message) -> None:
-        shown, others = self.inverse3, []
-        for name in message.devices:
-            if name not in (shown.device_id, shown.grip_id):
-                others.append(f"a client drives {name}, this device is {shown.device_id}")
-        for notice in (*message.notices, *dict.fromkeys(others)):
-            self._count(notice)
+    def count(self, notice: str) -> None:
+        """Counts what was left out of a message, and says it the first time.
 
-    def _count(self, notice: str) -> None:
+        Args:
+            notice: what, and why.
+        """
         notice = notice[:LONGEST_NOTICE]
         if notice not in self.notices and len(self.notices) >= MOST_NOTICES:
             notice = "further kinds"  # whoever sends rubbish at random fills no memory
@@ -200,43 +267,50 @@ class Service:
         if self.notices[notice] == 1:
             LOG.warning(notice)
 
-    # ---- frames
+    # ---- between cursor and arm
 
-    @property
-    def _normal(self) -> int:
-        """Axis of the cursor along which the arm cannot move."""
-        return 3 - sum(self._plane)
-
-    def _total(self) -> Pair:
-        """Sum of the forces of all clients whose last message is not too old."""
+    def _drive(self) -> Drive:
+        """What all clients ask together, those that were silent for too long left out."""
         now = time.monotonic()
         fresh = [
-            s for s in self._sessions.values() if self.clock == "tick" or now - s.heard < PATIENCE
+            s.command
+            for s in self._sessions.values()
+            if self.clock == "tick" or now - s.heard < PATIENCE
         ]
-        i, j = self._plane
-        return sum(s.asked[i] for s in fresh), sum(s.asked[j] for s in fresh)
-
-    def _lifted(self, v: Pair, rest: Vector = inverse.NOTHING) -> Vector:
-        """A vector of the arm's plane as one of the cursor."""
-        out = list(rest)
-        for axis, value in zip(self._plane, v, strict=True):
-            out[axis] += value
-        return out[0], out[1], out[2]
-
-    def _made(self, session: Session, full: bool) -> inverse.Frame:
-        seen: Sensed = self.device.sensed
-        cursor = inverse.Cursor(
-            self._lifted(seen.position, REST),
-            self._lifted(seen.velocity),
-            self._lifted(self.device.force),
-            session.driving,
+        forces = [flat(c.force, self._plane) for c in fresh if c.force is not None]
+        torques = [c.torques for c in fresh if c.torques is not None]
+        targets = [flat(c.target, self._plane) for c in fresh if c.target is not None]
+        target = None
+        if targets:  # the newest client's
+            (x, y), (x0, y0) = targets[-1], flat(REST, self._plane)
+            target = x - x0, y - y0
+        return Drive(
+            (sum(f[0] for f in forces), sum(f[1] for f in forces)),
+            target,
+            (sum(x[0] for x in torques), sum(x[1] for x in torques)),
         )
-        shown = self.inverse3
-        pressed = shown.buttons.at(seen.t)
-        return inverse.Frame(shown.device_id, cursor, shown.grip_id, pressed, session.number, full)
 
-    def _frame(self, session: Session, full: bool) -> str:
-        return inverse.frame_text(self._made(session, full))
+    def cursor(self, mode: str = "idle") -> Cursor:
+        """The newest measurement, in the frame of the device.
+
+        Args:
+            mode: what the client that it is for drives.
+        """
+        seen, device, plane = self.device.sensed, self.device, self._plane
+        return Cursor(
+            lifted(seen.position, plane, REST),
+            lifted(seen.velocity, plane),
+            lifted(device.force, plane),
+            mode,
+            (math.degrees(seen.angles[0]), math.degrees(seen.angles[1])),
+            (math.degrees(seen.rates[0]), math.degrees(seen.rates[1])),
+            device.torques,
+        )
+
+    @property
+    def pressed(self) -> frozenset[str]:
+        """Names of the buttons that are pressed."""
+        return self.inverse3.buttons.at(self.device.sensed.t)
 
     # ---- the wall clock
 
@@ -251,12 +325,17 @@ class Service:
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
-        self.device.push((0.0, 0.0))
+        self.device.drive(LIMP)
 
     def _go(self) -> None:
         sample = float(self.device.scenario.Ts or self.device.scenario.dt)
         begin = time.perf_counter()
         while not self._stop.is_set() and not self.device.ended:
+            if self.device.paced:
+                with self._lock:
+                    self.device.drive(self._drive())
+                self._stop.wait(LOOK)
+                continue
             with self._lock:
                 late = time.perf_counter() - begin - self.device.t
                 if late > LATE:
@@ -265,7 +344,22 @@ class Service:
                     self.skipped += skip
                 due = min(int(late / sample), AT_ONCE)
                 if due:
-                    self.device.push(self._total())
+                    self.device.drive(self._drive())
                     self.device.advance(due)
                     self.samples += due
             time.sleep(0.0 if due else 0.25 * sample)
+
+
+def speech_of(protocol: str) -> Speech:
+    """The protocol of a name.
+
+    Args:
+        protocol: "inverse" or "rosbridge".
+    """
+    if protocol == "rosbridge":
+        from .rosbridge_service import RosbridgeSpeech
+
+        return RosbridgeSpeech()
+    from .inverse_service import InverseSpeech
+
+    return InverseSpeech()

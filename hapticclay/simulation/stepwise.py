@@ -176,6 +176,13 @@ class Simulation:
             self._state = Sample(**{name: x[-1] for name, x in found.items()})
         return self._state
 
+    def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""
+        with self._alone() as run:
+            p, before = run.position(), run.position(-run.scenario.dt)
+            vx, vy = ((a - b) / run.scenario.dt for a, b in zip(p, before, strict=True))
+        return p, (vx, vy)
+
     @property
     def diverging(self) -> bool:
         """Whether the motion so far is unstable by the rules of the monitor.

@@ -9,6 +9,7 @@ small motions about the pose. Friction, torque limits and the surface of the wal
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from . import linear_loop, roots
 STIFFEST = 1e9  # [N/m] above which no limit is sought
 SCANNED = 240  # values of K, even on a logarithm, between which a limit is sought
 SOFTEST = 1e-3  # [N/m] the least of them
+AT_ONCE = 40  # of them at a time
 AT_REST = 1e-6  # modes so near to z = 1 only move the handle, which nothing may pull back
 ROUNDING = 1e-12  # of an eigenvalue
 LONGEST_QUEUE = 500  # samples of delay
@@ -136,9 +138,14 @@ def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
         Ts: between two readings of the program [s].
         delay: from a reading to the force computed from it [s].
     """
-    z = np.linalg.eigvals(client_map(handle, K, B, Ts, delay))
-    moving = z[np.abs(z - 1.0) > AT_REST]
-    return bool(np.abs(moving).max(initial=0.0) < 1.0 + ROUNDING)
+    return bool(_stable(client_map(handle, K, B, Ts, delay)))
+
+
+def _stable(maps: np.ndarray) -> np.ndarray:
+    """Whether each map is stable, shape (...) of maps (..., n, n)."""
+    z = np.linalg.eigvals(maps)
+    size = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
+    return size.max(axis=-1) < 1.0 + ROUNDING
 
 
 @checked
@@ -157,18 +164,49 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
     Raises:
         ParameterError: a number is out of its bounds, or the delay is of more than 500 samples.
     """
-    B, Ts = number("B", B, -1e6, 1e6), number("Ts", Ts, 1e-6, 1.0)
-    delay = number("delay", delay, 0.0, 10.0)
-    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED).tolist()
+    (limit,) = rendered_stiffness_limits(handle, (B,), Ts, delay)
+    return limit
+
+
+@checked
+def rendered_stiffness_limits(
+    handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
+) -> tuple[float, ...]:
+    """The same for several dampings of the wall: the Z-width of a program's loop.
+
+    Args:
+        handle: arm and hand.
+        B: dampings of the wall [N.s/m], -1e6 to 1e6 each.
+        Ts: between two readings of the program [s], 1e-6 to 1.
+        delay: from a reading to the force computed from it [s], 0 to 10.
+
+    Returns:
+        A limit for each [N/m].
+
+    Raises:
+        ParameterError: as `rendered_stiffness_limit`.
+    """
+    dampings = [number("B", b, -1e6, 1e6) for b in B]
+    Ts, delay = number("Ts", Ts, 1e-6, 1.0), number("delay", delay, 0.0, 10.0)
+    free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
+    by_K = client_map(handle, 1.0, 0.0, Ts, delay) - free
+    by_B = client_map(handle, 0.0, 1.0, Ts, delay) - free
+    return tuple(_limit(free + b * by_B, by_K) for b in dampings)
+
+
+def _limit(soft: np.ndarray, by_K: np.ndarray) -> float:
+    """The least K at which soft + K by_K is unstable [N/m]; inf for none that was tried."""
 
     def stable(K: float) -> bool:
-        return holds(handle, K, B, Ts, delay)
+        return bool(_stable(soft + K * by_K))
 
-    if not stable(grid[0]):
-        return 0.0
-    for low, high in zip(grid[:-1], grid[1:], strict=True):
-        if not stable(high):
-            return roots.bisect(stable, low, high, 1e-9)[0]
+    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED)
+    for first in range(0, SCANNED, AT_ONCE):
+        some = grid[first : first + AT_ONCE]
+        failed = np.flatnonzero(~_stable(soft + some[:, None, None] * by_K))
+        if len(failed):
+            i = first + int(failed[0])
+            return roots.bisect(stable, float(grid[i - 1]), float(grid[i]), 1e-9)[0] if i else 0.0
     return math.inf
 
 

@@ -9,7 +9,7 @@ import numpy as np
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
 LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
-RECENT_FRAMES = 60  # over which the real-time factor is averaged
+RECENT = 1.0  # [s] over which the real-time factor is averaged
 
 
 class Clock:
@@ -23,10 +23,16 @@ class Clock:
         simulated: simulated time dealt out [s].
     """
 
-    def __init__(self):
+    def __init__(self, span: float = FRAME_TIME):
+        """Begins with the first slice.
+
+        Args:
+            span: real time between two slices, as it should be [s].
+        """
+        self._span = span
         self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
         self.real = self.simulated = 0.0  # [s] in all
-        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT_FRAMES)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=round(RECENT / span))
         self._then: float | None = None
         self._owed = 0.0
 
@@ -36,7 +42,7 @@ class Clock:
         Args:
             now: real time [s].
         """
-        passed = FRAME_TIME if self._then is None else now - self._then
+        passed = self._span if self._then is None else now - self._then
         self._then = now
         self._owed += passed
         due = min(self._owed, LONGEST_SLICE)
@@ -47,7 +53,7 @@ class Clock:
         self.frames += 1
         self.real += passed
         self.simulated += due
-        late = min(max(1e3 * (passed - FRAME_TIME), 0.0), LATE_EDGES[-1] - 1e-9)
+        late = min(max(1e3 * (passed - self._span), 0.0), LATE_EDGES[-1] - 1e-9)
         self.late[np.searchsorted(LATE_EDGES, late, "right") - 1] += 1
         self._recent.append((passed, due))
         return due

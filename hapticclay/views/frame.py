@@ -16,6 +16,33 @@ class Listener(Protocol):
         """
 
 
+class Partner(Protocol):
+    """A device beside a session, whose slices follow its samples.
+
+    Attributes:
+        span: real time between two slices [s].
+    """
+
+    span: float
+
+    def exchange(self) -> None:
+        """Talks to the device, and may wait for it; other threads may use the session meanwhile."""
+
+    def lead(self, play: Any) -> None:
+        """Tells the session what the device did, before a slice.
+
+        Args:
+            play: the session.
+        """
+
+    def follow(self, play: Any) -> None:
+        """Takes what the device is to be told, after a slice.
+
+        Args:
+            play: the session.
+        """
+
+
 class Frame(NamedTuple):
     """State at the end of a slice, for plots that run along.
 

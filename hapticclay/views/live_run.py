@@ -30,6 +30,7 @@ class Pull:
     Attributes:
         spring: k of x and y [N/m], (2,).
         force: steady force beside it [N], (2,).
+        carried: force by which the damper of a hand that moves along carries the handle [N], (2,).
         knots: (t [s], x, y [m]) of the point's path so far.
     """
 
@@ -41,6 +42,7 @@ class Pull:
             p: position of the handle [m].
         """
         self.spring, self.force = np.array(spring), (0.0, 0.0)
+        self.carried = 0.0, 0.0
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
@@ -78,7 +80,8 @@ class Pull:
     def steady(self) -> tuple[float, ...]:
         """The force as parts.Push.steady: since [s], (x, y) [N], its rate [N/s]."""
         (fx, fy), (px, py) = self.force, (self.spring * self._from).tolist()
-        return float(self._since), fx + px, fy + py, *(self.spring * self._rate).tolist()
+        cx, cy = self.carried
+        return float(self._since), fx + cx + px, fy + cy + py, *(self.spring * self._rate).tolist()
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
         """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`.
@@ -87,7 +90,7 @@ class Pull:
             t: centre of the interval [s].
             h: half its length [s]; the force changes evenly, and h does not matter.
         """
-        return np.array(self.force) + self.spring * self.at(t)
+        return np.array(self.force) + np.array(self.carried) + self.spring * self.at(t)
 
 
 class LiveRun(Run):

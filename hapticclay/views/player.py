@@ -6,6 +6,7 @@ import threading
 import time
 
 from .clock import FRAME_TIME
+from .frame import Partner
 from .replay import Replay
 from .session import Session
 
@@ -36,18 +37,30 @@ class Player(threading.Thread):
         at = time.perf_counter()
         try:
             while not self._stop_now.is_set():
+                partner = self.play.partner
+                if partner is not None:
+                    partner.exchange()
                 with self.lock:
-                    play = self.play
-                    if play.paused or play.ended:
-                        play.clock.rest()
-                    else:
-                        play.advance(play.clock.due(time.perf_counter()))
-                        if play.stream is not None:
-                            play.stream.send(play)
-                at = max(at + FRAME_TIME, time.perf_counter())
+                    self._slice(partner)
+                span = FRAME_TIME if partner is None else partner.span
+                at = max(at + span, time.perf_counter())
                 self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
         except Exception as error:  # raised again by stop()
             self.error = error
+
+    def _slice(self, partner: Partner | None) -> None:
+        """Plays on as far as is due."""
+        play = self.play
+        if play.paused or play.ended:
+            play.clock.rest()
+            return
+        if partner is not None:
+            partner.lead(play)
+        play.advance(play.clock.due(time.perf_counter()))
+        if partner is not None:
+            partner.follow(play)
+        if play.stream is not None:
+            play.stream.send(play)
 
     def stop(self) -> None:
         """Ends the thread; raises the error that ended it before, if any."""

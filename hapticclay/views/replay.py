@@ -7,7 +7,7 @@ import numpy as np
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .clock import Clock
-from .frame import Frame, Listener
+from .frame import Frame, Listener, Partner
 from .live_verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
 
@@ -24,9 +24,11 @@ class Replay:
         n: sample reached.
         frames: states shown so far.
         stream: as of a session.
+        partner: as of a session: None.
     """
 
     stream: Listener | None = None
+    partner: Partner | None = None
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample.

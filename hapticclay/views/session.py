@@ -19,9 +19,10 @@ from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..stepping import monitor
+from ..stepping.run import Kernel
 from ..studies.removal import TOOL, Tool, removed
-from .clock import LATE_EDGES, Clock
-from .frame import Frame, Listener
+from .clock import FRAME_TIME, LATE_EDGES, Clock
+from .frame import Frame, Listener, Partner
 from .live_run import PULL_MARGIN, LiveRun, live_kernel, played
 from .live_verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
@@ -42,9 +43,13 @@ class Session:
         point: that the hand pulls to [m]; None if it does not.
         frames: end of each slice so far.
         stream: that a player tells of each slice; None for none.
+        partner: a device whose samples the slices follow; None for none.
+        frame_time: simulated time that two frames lie apart at least [s].
     """
 
     stream: Listener | None = None
+    partner: Partner | None = None
+    frame_time = 0.0
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
@@ -70,22 +75,33 @@ class Session:
         Args:
             scenario: clay, gain and arm.
         """
-        for field, value in (("control", "continuous"), ("integrator", "fast")):
-            if getattr(scenario, field) != value:
-                raise ParameterError(
-                    field, getattr(scenario, field), f"must be {value!r} in a session"
-                )
+        self.scenario = self.prepared(scenario)
         self.given = scenario
-        self.scenario = played(scenario, self.stiffness)
-        self.run = LiveRun(self.scenario, self.every, live_kernel(self.scenario))
+        self.run = LiveRun(self.scenario, self.every, self.kernel())
         self.paused, self.recording = False, True
-        self.clock = Clock()
+        self.clock = Clock(FRAME_TIME if self.partner is None else self.partner.span)
         self.point: tuple[float, float] | None = None
         self._damping = 1.0
         self.frames: list[Frame] = []
         self._carry = 0.0
         self._swung = -math.inf  # time of the last growing swing [s]
         self._look()
+
+    def prepared(self, scenario: Scenario) -> Scenario:
+        """The scenario as it is run.
+
+        Args:
+            scenario: as it was given.
+
+        Raises:
+            ParameterError: it is sampled, or accurate.
+        """
+        refuse_other(scenario, control="continuous", integrator="fast")
+        return played(scenario, self.stiffness)
+
+    def kernel(self) -> Kernel:
+        """How the steps are made."""
+        return live_kernel(self.scenario)
 
     def restart(self) -> None:
         """Begins the same scenario again, with the present gain, damping and recording switch."""
@@ -181,13 +197,14 @@ class Session:
         if not steps:
             return np.empty((0, 2))
         if self.point is None:
-            run.pull.jump(run.t, *self._state())
+            run.pull.jump(run.t, *self.handle())
         else:
             run.pull.lead(run.t, self.point, steps * dt)
         run.keeping = self.recording
+        before = run.position()
         run.slice(steps)
         self._look()
-        return np.array([self.frames[-2].p, self.frames[-1].p])
+        return np.array([before, run.position()])
 
     def record(self) -> Record:
         """Ends the run and returns its record, with removed volume, hand's point and gain.
@@ -241,8 +258,8 @@ class Session:
         volume, rate = removed(way, self.tool.width, self.tool.depth)
         return volume[kept], rate[kept]
 
-    def _state(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Handle position [m] and velocity [m/s], half a step ago."""
+    def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Place of the handle [m], and its velocity half a step ago [m/s]."""
         p, behind = self.run.position(), self.run.position(-self.scenario.dt)
         vx, vy = ((a - b) / self.scenario.dt for a, b in zip(p, behind, strict=True))
         return p, (vx, vy)
@@ -251,7 +268,9 @@ class Session:
         watch = self.run.watch
         if watch.onset and max(map(len, watch.swings)) >= monitor.SWINGS:
             self._swung = self.t
-        p, v = self._state()
+        if self.frames and self.t < self.frames[-1].t + self.frame_time - 1e-9:
+            return
+        p, v = self.handle()
         b = self.b
         hands = [th or NO_HAND for th in self.scenario.operators]
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
@@ -270,3 +289,18 @@ class Session:
         most = min(PULL_MARGIN[1], 0.25 * (stretched - folded))
         scale = min(max(r, folded + least), stretched - most) / r
         return x * scale - self.scenario.origin[0], y * scale - self.scenario.origin[1]
+
+
+def refuse_other(scenario: Scenario, **fields: str) -> None:
+    """Refuses a scenario that a session cannot run.
+
+    Args:
+        scenario: to be played.
+        **fields: its fields, and the only value that each can have.
+
+    Raises:
+        ParameterError: a field has another value.
+    """
+    for field, value in fields.items():
+        if getattr(scenario, field) != value:
+            raise ParameterError(field, getattr(scenario, field), f"must be {value!r} in a session")

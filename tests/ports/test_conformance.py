@@ -13,8 +13,10 @@ from websockets.exceptions import ConnectionClosed
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.model.arm import inverse_kinematics, jacobian, joint_torques
 from hapticclay.model.constants import NOMINAL
 from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
+from hapticclay.ports.driven_arm import TARGET_STIFFNESS
 from hapticclay.ports.inverse import DEVICES
 from tests.ports.conftest import SCENE, tick
 
@@ -79,6 +81,71 @@ def test_a_force_moves_the_handle_as_the_equation_of_motion_says(served, key):
     assert x_of(state) - 0.08 == pytest.approx(expected, rel=0.01)
     assert state["current_cursor_force"] == {"x": 1.0, "y": 0.0, "z": 0.0}
     assert state["control_mode"] == state["mode"] != "idle"
+
+
+def command(name, body, device_id="04EA"):
+    return json.dumps({"inverse3": [{"device_id": device_id, "commands": {name: body}}]})
+
+
+@pytest.mark.parametrize("key", ["values", "position"])
+def test_a_place_is_held_against_the_spring_of_the_hand(served, key):
+    """At rest the pull K (target - x) and the spring of the hand are equal."""
+    _, client = served(period=4 * PERIOD)
+    c, text = client(), {"x": 0.085, "y": -0.15, "z": 0.14}
+    for _ in range(150):  # 3 s: ten times as long as the slowest mode takes to fall to 1/e
+        state = c.state(command("set_cursor_position", {key: text}))
+    K, way = TARGET_STIFFNESS, x_of(state) - 0.08
+    assert way == pytest.approx(K * 0.005 / (K + 60.0), rel=1e-4)
+    assert state["current_cursor_force"]["x"] == pytest.approx(60.0 * way, rel=1e-3)
+    assert state["control_mode"] == "position" and state["control_domain"] == "cartesian"
+
+
+def test_a_pull_to_a_far_place_is_shortened(served):
+    _, client = served(period=PERIOD, inverse3=Inverse3(largest_force=2.0))
+    state = client().state(command("set_cursor_position", {"position": {"x": 5.0, "y": -0.15}}))
+    assert state["current_cursor_force"]["x"] == pytest.approx(2.0, rel=1e-6)
+
+
+def test_torques_move_the_joints_as_the_force_that_they_stand_for(served):
+    """J' f as torques of the joints, and f itself: one motion while the pose changes little."""
+    scene = hc.Scenario(operator=hc.Operator(0.25, 2.0, 60.0), force=(0.0, 0.0))
+    u = jacobian(*inverse_kinematics(*scene.origin, scene.arm.links), scene.arm.links)
+    a0, a1 = joint_torques(1.0, 0.0, u)
+    torques = {"torques": {"a0": a0, "a1": a1, "a2": 0.0}}
+    seen = []
+    for text in (command("set_angular_torques", torques), tick(x=1.0)):
+        _, client = served(scene, period=PERIOD)
+        c = client()
+        for _ in range(8):
+            state = c.state(text)
+        seen.append(x_of(state) - 0.08)
+        if "torques" in text:
+            assert state["control_domain"] == "angular"
+            assert state["current_angular_torques"]["a0"] == a0
+    assert seen[0] == pytest.approx(seen[1], rel=1e-3) and seen[1] > 1e-4
+
+
+def test_joint_angles_are_those_of_the_place(served):
+    _, client = served(period=PERIOD, hand=Trajectory.to((0.03, 0.02)))
+    c = client()
+    for _ in range(20):
+        state = c.state("{}")
+    place, links = state["cursor_position"], SCENE.arm.links
+    x, y = place["x"] - 0.08 + SCENE.origin[0], place["y"] + 0.15 + SCENE.origin[1]
+    expected = [math.degrees(q) for q in inverse_kinematics(x, y, links)]
+    angles = state["angular_position"]
+    assert [angles["a0"], angles["a1"]] == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_arm_that_is_stretched_ends_and_still_answers(served):
+    server, client = served(period=0.05, hand=Trajectory.to((3.0, 0.0)))
+    c = client()
+    for _ in range(200):
+        c.send(tick(x=10.0))
+        if server.service.device.ended:
+            break
+    assert server.service.device.ended
+    assert c.send("{}")["inverse3"]
 
 
 def test_two_entries_for_one_device_act_both(served):

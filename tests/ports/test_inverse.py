@@ -7,12 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hapticclay.ports.commands import Command
 from hapticclay.ports.inverse import (
     DEVICES,
     Cursor,
     Force,
     Frame,
     Message,
+    Target,
+    Torques,
     frame_data,
     frame_text,
     message_text,
@@ -47,9 +50,35 @@ def test_a_message_is_read_as_it_was_sent(forces, full, profile):
     assert read_message(message_text(sent).encode()) == sent
 
 
+@given(ID, VECTOR, st.tuples(FINITE, FINITE))
+def test_places_and_torques_are_read_as_they_were_sent(name, place, torques):
+    both = (Target(name, place),), (Torques(name, torques),)
+    sent = Message(devices=(name, name), targets=both[0], torques=both[1])
+    assert read_message(message_text(sent)) == sent
+
+
+@pytest.mark.parametrize(
+    ("body", "command"),
+    [
+        (
+            '"set_cursor_position":{"values":{"x":0.1,"y":0,"z":-1}}',
+            Command(None, (0.1, 0.0, -1.0)),
+        ),
+        ('"set_cursor_position":{"position":{"x":0.1}}', Command(None, (0.1, 0.0, 0.0))),
+        ('"set_cursor_position":{"position":{"x":NaN}}', Command()),  # no place is no target
+        ('"set_angular_torques":{"torques":{"a0":1,"a1":2,"a2":3}}', Command(torques=(1.0, 2.0))),
+        ('"set_angular_torques":{"torques":{"a0":"much"}}', Command(torques=(0.0, 0.0))),
+    ],
+)
+def test_places_and_torques_of_all_versions(body, command):
+    message = read_message('{"inverse3":[{"device_id":"04EA","commands":{%s}}]}' % body)  # noqa: UP031
+    assert message.command("04EA") == command
+    assert message.command("05DA") == Command()
+
+
 @given(ID, VECTOR, VECTOR, VECTOR, st.sets(st.sampled_from(["a", "b", "c", "home"])))
 def test_a_frame_is_read_as_it_was_sent(name, position, velocity, force, buttons):
-    cursor = Cursor(position, velocity, force, True)
+    cursor = Cursor(position, velocity, force, "torque", (1.0, -2.5), (0.5, 3.0), (0.1, -0.2))
     sent = Frame(name, cursor, "F00D", frozenset(buttons), 3, True)
     assert read_frame(frame_text(sent)) == sent
 
@@ -72,7 +101,7 @@ def test_both_keys_of_a_force(key):
 @pytest.mark.parametrize("value", ["NaN", "Infinity", "true", '"1"', "null", "1" + "0" * 400])
 def test_a_force_that_is_no_finite_number_is_none(value):
     message = read_message(TICK % ("values", f'{{"x": {value}}}'))
-    assert message.force_on("04EA") == (0.0, 0.0, 0.0)
+    assert message.command("04EA").force == (0.0, 0.0, 0.0)
     assert message.notices == ("force is not finite",)
 
 
@@ -80,8 +109,8 @@ def test_entries_for_one_device_add_up():
     probe = {"device_id": "04EA", "commands": {"probe_position": {}}}
     push = {"device_id": "04EA", "commands": {"set_cursor_force": {"vector": {"x": 1.0}}}}
     message = read_message(json.dumps({"inverse3": [probe, push, push]}))
-    assert message.force_on("04EA") == (2.0, 0.0, 0.0) and not message.notices
-    assert message.force_on("05DA") is None
+    assert message.command("04EA").force == (2.0, 0.0, 0.0) and not message.notices
+    assert message.command("05DA").force is None
 
 
 def test_what_is_left_out_is_told_once_each():
@@ -98,7 +127,7 @@ def test_what_is_left_out_is_told_once_each():
         "unknown key camera",
         "unknown key session.noise",
         "command fly is not simulated",
-        "command set_cursor_position is not simulated",
+        "set_cursor_position without position",
         "inverse3 without device_id",
         "entry of inverse3 is no object",
     }

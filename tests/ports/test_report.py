@@ -98,42 +98,79 @@ def test_it_is_saved_and_loaded(tmp_path):
 
 
 def render(scene, K, normal, late, messages=300):
-    """A client that renders a wall of both sides; its exchanges, and how its swing changes."""
+    """A client that renders a wall of both sides; its exchanges, and the growth of its swing."""
     device = SimulatedDevice(scene, period=PERIOD)
     service = Service(device, clock="tick")
     number, _ = service.connect()
     depths, forces = [], [0.0] * (late + 1)
     for _ in range(messages):
         f = forces[-1 - late]
-        state = json.loads(service.answer(number, tick(f * normal[0], f * normal[1])))
+        (answer,) = service.answer(number, tick(f * normal[0], f * normal[1]))
+        state = json.loads(answer)
         place = state["inverse3"][0]["state"]["cursor_position"]
         depth = normal[0] * (place["x"] - REST[0]) + normal[1] * (place["y"] - REST[1])
         depths.append(depth)
         forces.append(-K * depth)
-    third = messages // 3
-    early, last = np.abs(depths[third : 2 * third]).max(), np.abs(depths[-third:]).max()
-    return service.logs[0].exchanges(), last / early
+    return service.logs[0].exchanges(), growth(np.array(depths[messages // 10 :]))
 
 
-@pytest.mark.parametrize(
-    ("hand", "normal", "late"),
-    [
-        (hc.Operator(0.25, 4.0, 60.0), (1.0, 0.0), 0),
-        (hc.Operator(0.6, 12.0, 200.0), (0.6, 0.8), 1),
-        (hc.Operator(0.1, 3.0, 20.0), (0.0, 1.0), 0),
-    ],
-)
-def test_a_wall_at_200_Hz_holds_below_the_limit_and_buzzes_above(hand, normal, late):
-    scene = dataclasses.replace(SCENE, operator=hand, velocity=(2e-3 * normal[0], 2e-3 * normal[1]))
-    # a measurement is answered a control sample of 1/14 period after it was made
-    limit = rendered_stiffness_limit(
-        Handle.of(scene, normal=normal), 0.0, PERIOD, (late + 1 / 14) * PERIOD
+def growth(x):
+    """Largest growth of a swing's modes in a sample, by a matrix pencil: |z| of sum c z^k.
+
+    T. K. Sarkar, O. Pereira, IEEE Antennas Propag. Mag. 37 (1995) 48. The handle has two modes,
+    each a pair z; forces on their way fall within a few samples.
+    """
+    half = len(x) // 2
+    hankel = np.array([x[i : i + half] for i in range(len(x) - half)])
+    _, _, modes = np.linalg.svd(hankel, full_matrices=False)
+    kept = modes[:4].T
+    z = np.linalg.eigvals(np.linalg.pinv(kept[:-1]) @ kept[1:])
+    return float(np.abs(z).max())
+
+
+COARSE = PERIOD / 4  # [s] control sample and step of these devices, so that a run takes 0.1 s
+
+
+def set_up(seed):
+    """A device, a hand, a direction and a delay at random, and the limit of their loop."""
+    rng = np.random.default_rng(seed)
+    mass, damper, spring = rng.uniform((0.1, 1.0, 20.0), (0.8, 12.0, 200.0)).tolist()
+    size, weight = rng.uniform(0.7, 1.3, 2).tolist()
+    arm = SCENE.arm
+    arm = dataclasses.replace(
+        arm, l1=size * arm.l1, l2=size * arm.l2, I1=weight * arm.I1, I2=weight * arm.I2
     )
+    turn = rng.uniform(0.0, math.pi)
+    normal, late = (math.cos(turn), math.sin(turn)), int(rng.integers(0, 3))
+    scene = dataclasses.replace(
+        SCENE,
+        arm=arm,
+        origin=(size * SCENE.origin[0], size * SCENE.origin[1]),
+        operator=hc.Operator(mass, damper, spring),
+        velocity=(2e-4 * normal[0], 2e-4 * normal[1]),
+        control="sampled",
+        Ts=COARSE,
+        dt=COARSE,
+    )
+    # a measurement is answered a control sample after it was made
+    delay = late * PERIOD + COARSE
+    return (
+        scene,
+        normal,
+        late,
+        rendered_stiffness_limit(Handle.of(scene, normal=normal), 0.0, PERIOD, delay),
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_wall_at_200_Hz_holds_below_the_limit_and_buzzes_above(seed):
+    """Within 5 % of the limit of the linear loop; a swing of 10 um hardly turns the arm."""
+    scene, normal, late, limit = set_up(seed)
     held, below = render(scene, 0.95 * limit, normal, late)
     buzzed, above = render(scene, 1.05 * limit, normal, late)
     assert below < 1.0 < above
-    report = loop_report(held, scene)
-    assert report.K == pytest.approx(0.95 * limit, rel=1e-3)
+    report, other = loop_report(held, scene), loop_report(buzzed, scene)
+    assert report.K == pytest.approx(0.95 * limit, rel=2e-3)
     assert report.limit == pytest.approx(limit, rel=0.01)
-    assert report.verdict == "holds" and loop_report(buzzed, scene).verdict == "buzzes"
-    assert "it buzzes" in loop_report(buzzed, scene).headline()
+    assert report.verdict == "holds" and other.verdict == "buzzes"
+    assert "it buzzes" in other.headline()

@@ -1,0 +1,167 @@
+"""What a client exchanged with a device: how fast, how late, and columns for identification."""
+
+from __future__ import annotations
+
+import collections
+import csv
+import io
+import math
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..files import atomic
+from .commands import AXES, Vector
+
+MOST_ROWS = 1_000_000  # that a log keeps, the newest
+FILE = "device.csv"  # beside the record of a session
+FEWEST = 2
+
+
+class Exchanged(NamedTuple):
+    """A force that was sent, and the answer.
+
+    Attributes:
+        sent: when the force went, on the computer's clock [s].
+        received: when the answer came [s].
+        t: time of the answer, as it counts [s].
+        position: of the cursor [m].
+        velocity: of the cursor [m/s].
+        force: that was sent [N].
+    """
+
+    sent: float
+    received: float
+    t: float
+    position: Vector
+    velocity: Vector
+    force: Vector
+
+
+class Timing(NamedTuple):
+    """How regular the exchanges were.
+
+    Attributes:
+        exchanges: that were answered.
+        missed: that were not, in time.
+        rate: mean rate [Hz].
+        interval: median and 99th percentile of the time between two answers [s].
+        latency: median and 99th percentile of the time from a force to the answer [s].
+        jitter: standard deviation of the interval [s].
+    """
+
+    exchanges: int
+    missed: int
+    rate: float
+    interval: tuple[float, float]
+    latency: tuple[float, float]
+    jitter: float
+
+    def summary(self) -> dict[str, Any]:
+        """The figures with their units, for the notes of a record."""
+        return {
+            "exchanges": self.exchanges,
+            "missed": self.missed,
+            "rate_hz": self.rate,
+            "interval_p50_p99_s": list(self.interval),
+            "latency_p50_p99_s": list(self.latency),
+            "jitter_s": self.jitter,
+        }
+
+
+class ClientLog:
+    """Keeps the newest exchanges.
+
+    Attributes:
+        missed: exchanges without an answer in time.
+    """
+
+    def __init__(self, most: int = MOST_ROWS):
+        """Begins empty.
+
+        Args:
+            most: rows to keep, the newest.
+        """
+        self.missed = 0
+        self._rows: collections.deque[Exchanged] = collections.deque(maxlen=most)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @property
+    def rows(self) -> list[Exchanged]:
+        """What is kept, in order."""
+        return list(self._rows)
+
+    def add(self, row: Exchanged) -> None:
+        """Adds an exchange.
+
+        Args:
+            row: the exchange.
+        """
+        self._rows.append(row)
+
+    def timing(self) -> Timing:
+        """How regular the exchanges were; NaN where there are fewer than two."""
+        rows = self.rows
+        if len(rows) < FEWEST:
+            none = math.nan, math.nan
+            return Timing(len(rows), self.missed, math.nan, none, none, math.nan)
+        sent, received = np.array([r[:2] for r in rows]).T
+        gaps, late = np.diff(received), received - sent
+        return Timing(
+            len(rows),
+            self.missed,
+            float(1.0 / gaps.mean()),
+            (float(np.median(gaps)), float(np.quantile(gaps, 0.99))),
+            (float(np.median(late)), float(np.quantile(late, 0.99))),
+            float(gaps.std()),
+        )
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Evenly sampled columns: t_s, x_m, y_m, z_m and the force on the handle fx_N, fy_N, fz_N.
+
+        The step is the median time between two answers. Places are those at these times, between
+        two answers on a straight line; a force is the one that the device held from then on.
+
+        Raises:
+            ParameterError: there are fewer than two exchanges.
+        """
+        rows = self.rows
+        if len(rows) < FEWEST:
+            raise ParameterError("log", len(rows), "must hold two exchanges or more")
+        t = np.array([r.t for r in rows])
+        step = float(np.median(np.diff(t)))
+        even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
+        place = np.array([r.position for r in rows])
+        force = np.array([r.force for r in rows])
+        # the force of the next exchange follows an answer: it is held until the answer after it
+        held = np.minimum(np.searchsorted(t, even + 1e-9 * step, side="right"), len(rows) - 1)
+        out = {"t_s": even}
+        out |= {f"{a}_m": np.interp(even, t, place[:, i]) for i, a in enumerate(AXES)}
+        return out | {f"f{a}_N": force[held, i] for i, a in enumerate(AXES)}
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the columns as a CSV file, whole or not at all.
+
+        `hapticclay identify --csv` and `hapticclay fit` read it.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The file.
+
+        Raises:
+            ParameterError: there are fewer than two exchanges, or the file cannot be written.
+        """
+        columns, text = self.columns(), io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(columns)
+        rows.writerows(zip(*(map(repr, x.tolist()) for x in columns.values()), strict=True))
+        with atomic(Path(path)) as f:
+            f.write(text.getvalue().encode())
+        return Path(path)

@@ -1,0 +1,283 @@
+"""A device as the hand of a simulated arm, over a virtual coupling: a spring and a damper.
+
+The spring is computed at the samples of the device and held between them. Held for Ts it gives back
+at most K Ts/2 v^2 more power than an ideal one takes, which the damper B >= K Ts/2 consumes.
+Coupling: J. E. Colgate, M. C. Stanley, J. M. Brown, IROS 1995.
+"""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import dataclass, replace
+from typing import Annotated, NamedTuple
+
+from ..arguments import checked, named
+from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..model.operator import Operator
+from ..scene.scenario import Scenario
+from ..simulation.record import Record
+from ..simulation.stepwise import Simulation
+from .client import PLAIN, DeviceClient, DeviceSample, Limits
+from .client_log import ClientLog, Timing
+from .commands import NOTHING, Pair
+from .planes import PLANES, flat, lifted
+
+SETTLING = 50  # exchanges without force, in which the period of the device is measured
+LONGEST = 3600.0  # [s] of a session
+
+
+@named
+@dataclass(frozen=True)
+class Coupled:
+    """A spring and a damper between the hand of a device and a simulated handle.
+
+    Attributes:
+        K: stiffness [N/m], 0 to 1e5.
+        B: damping [N.s/m], 0 to 1e3, at least K Ts/2 at the rate of the device.
+        plane: "xy" or "xz", plane of the device in which the arm moves.
+    """
+
+    K: Annotated[float, Bound(0.0, 1e5, "N/m", above=True)] = 300.0
+    B: Annotated[float, Bound(0.0, 1e3, "N.s/m", above=True)] = 5.0
+    plane: str = "xy"
+
+    def __post_init__(self):
+        check_fields(self, "coupling.")
+        choice("coupling.plane", self.plane, tuple(PLANES))
+
+    def check(self, Ts: float) -> None:
+        """Refuses a coupling that is not passive.
+
+        Args:
+            Ts: between two samples of the device [s].
+
+        Raises:
+            ParameterError: B < K Ts/2.
+        """
+        if self.B < 0.5 * self.K * Ts * (1.0 - 1e-9):
+            bound = f"must be K Ts/2 = {0.5 * self.K * Ts:.4g} N.s/m at least, at {1 / Ts:.4g} Hz"
+            raise ParameterError("coupling.B", self.B, bound)
+
+    def at(self, Ts: float) -> Coupled:
+        """The coupling with a spring that its damper makes passive.
+
+        Args:
+            Ts: between two samples of the device [s].
+        """
+        return replace(self, K=min(self.K, 2.0 * self.B / Ts))
+
+    def force(self, hand: Pair, rate: Pair, p: Pair, v: Pair) -> Pair:
+        """Force on the simulated handle; the device gets the opposite.
+
+        Args:
+            hand: place of the device's handle, in the plane of the arm [m].
+            rate: its velocity [m/s].
+            p: place of the simulated handle [m].
+            v: its velocity [m/s].
+        """
+        K, B = self.K, self.B
+        return (
+            K * (hand[0] - p[0]) + B * (rate[0] - v[0]),
+            K * (hand[1] - p[1]) + B * (rate[1] - v[1]),
+        )
+
+    @property
+    def operator(self) -> Operator:
+        """The coupling as the operator of a scenario, to whom the hand is a muscle force."""
+        return Operator(0.0, self.B, self.K)
+
+    def pull(self, hand: Pair, rate: Pair) -> Pair:
+        """The muscle force of that operator [N].
+
+        Args:
+            hand: place of the device's handle [m].
+            rate: its velocity [m/s].
+        """
+        return self.K * hand[0] + self.B * rate[0], self.K * hand[1] + self.B * rate[1]
+
+
+PLAIN_COUPLING = Coupled()
+
+
+class DeviceHand:
+    """The handle of a device, as a hand in the plane of the arm.
+
+    It begins at the simulated handle, wherever the device is held.
+
+    Attributes:
+        client: reads the device.
+        coupling: to the arm, its K lowered where the exchanges come slower than asked.
+        place: of the device's handle, in the plane of the arm [m].
+        rate: its velocity [m/s].
+        held: whether the newest sample came in time.
+        t: time of the newest sample [s].
+    """
+
+    def __init__(self, client: DeviceClient, coupling: Coupled, start: Pair):
+        """Measures the period of the device, without force.
+
+        Args:
+            client: reads the device.
+            coupling: to the arm.
+            start: place of the simulated handle [m].
+
+        Raises:
+            ParameterError: the coupling is not passive at the rate that was asked.
+        """
+        coupling.check(client.limits.Ts)
+        self.client, self.plane = client, coupling.plane
+        self.coupling = coupling.at(max(client.limits.Ts, self._settle()))
+        self._offset = 0.0, 0.0
+        self.place, self.rate, self.held, self.t = start, (0.0, 0.0), False, 0.0
+        if sample := client.exchange():
+            x, y = flat(sample.position, self.plane)
+            self._offset = start[0] - x, start[1] - y
+            self._take(sample)
+
+    def _settle(self) -> float:
+        """Median of the time between two answers [s]."""
+        seen = [self.client.exchange() for _ in range(SETTLING)]
+        t = [x.t for x in seen if x is not None]
+        if len(t) < 2:
+            raise ParameterError("device", self.client.url, "must answer in time")
+        return statistics.median(b - a for a, b in zip(t[:-1], t[1:], strict=True))
+
+    def exchange(self, p: Pair, v: Pair) -> bool:
+        """Sends the device the force of the coupling, and reads where it is.
+
+        Args:
+            p: place of the simulated handle [m].
+            v: its velocity [m/s].
+
+        Returns:
+            Whether the sample came in time.
+        """
+        push = NOTHING
+        if self.held:
+            x, y = self.coupling.force(self.place, self.rate, p, v)
+            push = lifted((-x, -y), self.plane)
+        sample = self.client.exchange(push)
+        self.held = sample is not None
+        if sample is not None:
+            self._take(sample)
+        return self.held
+
+    def watch(self) -> bool:
+        """Reads where the device is, without force.
+
+        Returns:
+            Whether the sample came in time.
+        """
+        sample = self.client.exchange()
+        self.held = sample is not None
+        if sample is not None:
+            self._take(sample)
+        return self.held
+
+    def _take(self, sample: DeviceSample) -> None:
+        x, y = flat(sample.position, self.plane)
+        self.place = x + self._offset[0], y + self._offset[1]
+        self.rate, self.held, self.t = flat(sample.velocity, self.plane), True, sample.t
+
+    def notes(self) -> dict[str, object]:
+        """What a record says of the device."""
+        return {
+            "url": self.client.url,
+            "device_id": self.client.device_id,
+            "lost": self.client.lost,
+            "coupling_K": self.coupling.K,
+            "coupling_B": self.coupling.B,
+            **self.client.log.timing().summary(),
+        }
+
+
+class Rendered(NamedTuple):
+    """What a person at a device felt.
+
+    Attributes:
+        record: of the simulated arm.
+        log: what was exchanged with the device.
+        timing: how regular that was.
+    """
+
+    record: Record
+    log: ClientLog
+    timing: Timing
+
+
+@checked
+def render(
+    scenario: Scenario,
+    url: str,
+    duration: float = 10.0,
+    *,
+    coupling: Coupled = PLAIN_COUPLING,
+    limits: Limits = PLAIN,
+    engine: str = "python",
+) -> Rendered:
+    """Lets a device, real or simulated, take the place of a scenario's hand, without a window.
+
+    Between two samples of the device the arm is simulated for as long as they lie apart; then the
+    force of the coupling goes to the device. Where a sample is lost the hand lets go.
+
+    Args:
+        scenario: arm, clay and control; its operator, muscle force, length and t_max do not count.
+        url: of an Inverse service, as ws://127.0.0.1:10001.
+        duration: of the session [s], > 0, at most 3600.
+        coupling: between device and simulated handle.
+        limits: of force and time.
+        engine: as in `simulate`; "native" compiles before the session.
+
+    Returns:
+        Record, exchanges and their timing. The record's notes have the timing, too.
+
+    Raises:
+        ParameterError: there is no device, the coupling is not passive at its rate, or a value is
+            out of its bounds.
+    """
+    duration = number("duration", duration, 0.0, LONGEST, above=True, unit="s")
+    coupling.check(limits.Ts)
+    with DeviceClient(url, limits) as client:
+        start = float(scenario.start[0]), float(scenario.start[1])
+        hand = DeviceHand(client, coupling, start)
+        simulation = Simulation(held_by(scenario, hand.coupling), engine=engine)
+        begin = hand.t
+        while hand.t - begin < duration and not client.lost and simulation.outcome is None:
+            p, v = simulation.handle()
+            before = hand.t
+            if not hand.exchange(p, v):
+                continue
+            steps = round((hand.t - begin - simulation.t) / scenario.dt)
+            if steps > 0:
+                simulation.advance(steps, force=_muscle(hand, p, v, hand.t - before))
+        if not simulation.t:
+            raise ParameterError("device", url, "must answer in time")
+        record = simulation.record()
+        notes = {**record.notes, "device": hand.notes()}
+    return Rendered(replace(record, notes=notes), client.log, client.log.timing())
+
+
+def _muscle(hand: DeviceHand, p: Pair, v: Pair, passed: float) -> Pair:
+    """Muscle force of the hand [N]; of one that was out of sight it lets go."""
+    if passed > hand.client.limits.patience:
+        return hand.coupling.pull(p, v)
+    return hand.coupling.pull(hand.place, hand.rate)
+
+
+def held_by(scenario: Scenario, coupling: Coupled) -> Scenario:
+    """A scenario whose hand is a device.
+
+    Args:
+        scenario: arm, clay and control.
+        coupling: between device and simulated handle.
+    """
+    return replace(
+        scenario,
+        operator=coupling.operator,
+        force=(0.0, 0.0),
+        muscle=None,
+        command=None,
+        length=None,
+        t_max=LONGEST,
+        stop_when_unstable=False,
+    )

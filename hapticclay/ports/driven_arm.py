@@ -1,0 +1,115 @@
+"""The motors of a simulated device: they do what a client asks, and measure as hardware does."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from ..errors import number
+from ..model.arm import handle_velocity, jacobian, joint_torques
+from ..model.sampled_controller import Controller
+from ..scene.scenario import Scenario
+from .commands import Pair
+
+LARGEST_FORCE = 10.0  # [N] of the length of a force, unless asked for
+TARGET_STIFFNESS, TARGET_DAMPING = 1000.0, 60.0  # [N/m], [N.s/m] by which a place is held
+NOWHERE: Pair = (0.0, 0.0)
+
+
+class Sensed(NamedTuple):
+    """What the device measured at a control sample.
+
+    Attributes:
+        t: time of the sample [s].
+        position: of the handle [m].
+        velocity: of the handle [m/s].
+        angles: of the joints [rad].
+        rates: of the joints [rad/s].
+    """
+
+    t: float
+    position: Pair
+    velocity: Pair
+    angles: Pair = NOWHERE
+    rates: Pair = NOWHERE
+
+
+class Drive(NamedTuple):
+    """What the motors are asked to do, in the plane of the arm.
+
+    Attributes:
+        force: on the handle [N].
+        target: where the handle is to be held [m]; None for nowhere.
+        torques: of the joints, beside both [N.m].
+    """
+
+    force: Pair = NOWHERE
+    target: Pair | None = None
+    torques: Pair = NOWHERE
+
+
+LIMP = Drive()
+
+
+class DrivenArm:
+    """Motors that apply forces, hold a place, or apply torques, held for a control sample.
+
+    Attributes:
+        largest_force: a longer sum of force and pull to the target is shortened to this [N].
+        sensed: the newest measurement.
+        asked: what the motors are asked to do.
+        force: on the handle, as it acts from the newest sample on [N].
+    """
+
+    def __init__(self, scenario: Scenario, largest_force: float = LARGEST_FORCE):
+        """Limp, at the start of a scenario.
+
+        Args:
+            scenario: has arm, origin, start and velocity.
+            largest_force: > 0, at most 1e3 [N].
+
+        Raises:
+            ParameterError: the force is out of its bounds.
+        """
+        self.largest_force = number("largest_force", largest_force, 0.0, 1e3, above=True)
+        self._origin, self._links = scenario.origin, scenario.arm.links
+        (x, y), (vx, vy) = scenario.start, scenario.velocity
+        self.sensed = Sensed(0.0, (float(x), float(y)), (float(vx), float(vy)))
+        self.asked, self.force = LIMP, NOWHERE
+        self.controller = Controller(self._law)
+
+    def drive(self, drive: Drive) -> Pair:
+        """Changes what the motors do from the next control sample on.
+
+        Args:
+            drive: what is asked.
+
+        Returns:
+            The force that will act on the handle if it stays where it is [N].
+        """
+        self.asked = drive
+        self.force = self._at(self.sensed)
+        return self.force
+
+    def _at(self, seen: Sensed) -> Pair:
+        """Force on the handle at a measurement."""
+        fx, fy = self.asked.force
+        if self.asked.target is not None:
+            (px, py), (vx, vy), (tx, ty) = seen.position, seen.velocity, self.asked.target
+            fx += TARGET_STIFFNESS * (tx - px) - TARGET_DAMPING * vx
+            fy += TARGET_STIFFNESS * (ty - py) - TARGET_DAMPING * vy
+        size = math.hypot(fx, fy)
+        scale = min(1.0, self.largest_force / size) if size else 0.0
+        return fx * scale, fy * scale
+
+    def _law(self, t: float, q: Pair, qd: Pair, fh: Pair, state: Any, params: Any) -> Any:
+        """Torques of a control sample: the transposed Jacobian at the measured angles."""
+        u = jacobian(q[0], q[1], self._links)
+        place = u[1] + u[3] - self._origin[0], -u[0] - u[2] - self._origin[1]
+        rate = handle_velocity(qd[0], qd[0] + qd[1], u)
+        seen = Sensed(t, place, rate, (float(q[0]), float(q[1])), (float(qd[0]), float(qd[1])))
+        force = self._at(seen)
+        self.sensed, self.force = seen, force
+        first, second = joint_torques(*force, u)
+        extra = self.asked.torques
+        return (first + extra[0], second + extra[1]), state

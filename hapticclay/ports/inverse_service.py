@@ -1,0 +1,81 @@
+"""How a Haply Inverse service talks: an inventory at first, then one state frame a message."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from . import inverse
+
+if TYPE_CHECKING:
+    from .service import Service, Session
+
+
+class InverseSpeech:
+    """The protocol of the Inverse service, versions 3.1 to 3.5."""
+
+    name, pushes = "inverse", False
+
+    def greet(self, service: Service, session: Session) -> list[str]:
+        """The inventory.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+        """
+        return [inverse.frame_text(frame_of(service, session, full=True))]
+
+    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]:
+        """One frame, whatever the message is.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+            data: its message.
+        """
+        message, shown = inverse.read_message(data), service.inverse3
+        others = {x for x in message.devices if x not in (shown.device_id, shown.grip_id)}
+        for notice in message.notices:
+            service.count(notice)
+        for name in sorted(others):
+            service.count(f"a client drives {name}, this device is {shown.device_id}")
+        session.profile = message.profile or session.profile
+        service.obey(session, message.command(shown.device_id))
+        return [inverse.frame_text(frame_of(service, session, message.full))]
+
+    def due(self, service: Service, session: Session) -> list[str]:
+        """Nothing: the service speaks when it is spoken to.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+        """
+        return []
+
+    def inventory(self, service: Service) -> dict[str, Any]:
+        """The devices of each kind, as plain data.
+
+        Args:
+            service: that is asked.
+        """
+        found = inverse.frame_data(frame_of(service, None, full=True))
+        return {kind: found[kind] for kind in inverse.DEVICES}
+
+
+def frame_of(service: Service, session: Session | None, full: bool) -> inverse.Frame:
+    """The state of the device.
+
+    Args:
+        service: that has it.
+        session: of the client that it is for; None for nobody.
+        full: whether it holds the configuration.
+    """
+    mode, number = (session.command.mode, session.number) if session else ("idle", 0)
+    shown = service.inverse3
+    return inverse.Frame(
+        shown.device_id,
+        service.cursor(mode),
+        shown.grip_id,
+        service.pressed,
+        number,
+        full,
+    )

@@ -1,0 +1,245 @@
+"""Messages of rosbridge v2, JSON over a WebSocket, without sockets, and the ROS messages in them.
+
+Whatever arrives is read to an `Operation`: what cannot be used has an error in it. Names of types
+are those of ROS 1 and ROS 2, and stamps have the fields of both.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .commands import AXES, NOTHING, Command, Vector, by_axis, finite
+from .inverse import Cursor
+
+FRAME = "base"
+IDENTITY = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+LEVELS = ("none", "error", "warning", "info")  # of status messages, each with those before it
+PUBLISHED = {  # last part of a topic's name: its type
+    "measured_cp": "geometry_msgs/PoseStamped",
+    "measured_cv": "geometry_msgs/TwistStamped",
+    "measured_js": "sensor_msgs/JointState",
+    "operating_state": "crtk_msgs/operating_state",
+    "phantom/pose": "geometry_msgs/PoseStamped",
+    "phantom/state": "omni_msgs/OmniState",
+    "phantom/joint_states": "sensor_msgs/JointState",
+    "phantom/button": "omni_msgs/OmniButtonEvent",
+}
+TAKEN = {
+    "body/servo_cf": "geometry_msgs/WrenchStamped",
+    "spatial/servo_cf": "geometry_msgs/WrenchStamped",
+    "servo_cf": "geometry_msgs/WrenchStamped",
+    "servo_cp": "geometry_msgs/PoseStamped",
+    "phantom/force_feedback": "omni_msgs/OmniFeedback",
+}
+PLACES = {"geometry_msgs/WrenchStamped": ("wrench", "force")}  # of the vector in a message
+PLACES |= {"geometry_msgs/PoseStamped": ("pose", "position"), "omni_msgs/OmniFeedback": ("force",)}
+JOINTS = ("shoulder", "elbow")
+
+
+@dataclass(frozen=True)
+class Operation:
+    """What a client sent.
+
+    Attributes:
+        op: the operation; "" where nothing can be read.
+        id: that an answer repeats; None for none.
+        topic: its name, or that of a service.
+        type: of the topic, without "msg"; "" for none.
+        msg: the ROS message, or the arguments of a service.
+        throttle: least time between two messages of a subscription [s].
+        compression: that a subscription asks for.
+        error: why the operation cannot be used; "" where it can.
+    """
+
+    op: str = ""
+    id: str | int | None = None
+    topic: str = ""
+    type: str = ""
+    msg: Mapping[str, Any] = field(default_factory=dict)
+    throttle: float = 0.0
+    compression: str = "none"
+    error: str = ""
+
+
+# ---- what clients send ---------------------------------------------------------------------------
+
+
+def read_operation(data: str | bytes) -> Operation:
+    """Reads what a client sent.
+
+    Args:
+        data: a frame, text or binary.
+
+    Returns:
+        The operation; of rubbish one with an error.
+    """
+    try:
+        tree = json.loads(data)
+    except (ValueError, RecursionError):
+        return Operation(error="not JSON")
+    if not isinstance(tree, dict) or not isinstance(tree.get("op"), str):
+        return Operation(error="no object with an op")
+    name = tree.get("id")
+    name = name if isinstance(name, str | int) else None
+    topic = tree.get("topic", tree.get("service", tree.get("level", "")))
+    msg = tree.get("msg", tree.get("args", {}))
+    return Operation(
+        tree["op"],
+        name,
+        topic if isinstance(topic, str) else "",
+        plain_type(tree.get("type")),
+        msg if isinstance(msg, Mapping) else {},
+        1e-3 * max(0.0, finite(tree.get("throttle_rate", 0)) or 0.0),
+        str(tree.get("compression", "none")),
+        "" if isinstance(topic, str) else "topic is no text",
+    )
+
+
+def plain_type(given: Any) -> str:
+    """Name of a type as ROS 1 has it: geometry_msgs/PoseStamped.
+
+    Args:
+        given: of ROS 1 or ROS 2; anything else is "".
+    """
+    return given.replace("/msg/", "/") if isinstance(given, str) else ""
+
+
+def kind_of(topic: str, kinds: Mapping[str, str]) -> str:
+    """Which of some topics a name ends with, whatever namespace stands before; "" for none.
+
+    Args:
+        topic: the name, as in /arm/body/servo_cf.
+        kinds: last parts of names.
+    """
+    found = [kind for kind in kinds if f"/{topic.lstrip('/')}".endswith(f"/{kind}")]
+    return max(found, key=len, default="")
+
+
+def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
+    """What a message on a topic that is taken asks of the device.
+
+    Args:
+        kind: of TAKEN.
+        msg: the message.
+
+    Returns:
+        The command, and what was left out of it, "" for nothing.
+    """
+    part: Any = msg
+    for name in PLACES[TAKEN[kind]]:
+        part = part.get(name) if isinstance(part, Mapping) else None
+    if not isinstance(part, Mapping):
+        return _command(kind, None), f"{kind} without a vector"
+    x, y, z = (finite(part.get(axis, 0.0)) for axis in AXES)
+    if x is None or y is None or z is None:
+        return _command(kind, None), f"{kind} is not finite"
+    return _command(kind, (x, y, z)), ""
+
+
+def _command(kind: str, vector: Vector | None) -> Command:
+    if kind == "servo_cp":
+        return Command(target=vector)
+    return Command(force=vector or NOTHING)
+
+
+# ---- what the server sends -----------------------------------------------------------------------
+
+
+def publish_text(topic: str, msg: Mapping[str, Any]) -> str:
+    """A message on a topic.
+
+    Args:
+        topic: its name.
+        msg: the ROS message.
+    """
+    return json.dumps({"op": "publish", "topic": topic, "msg": msg}, allow_nan=False)
+
+
+def status_text(level: str, text: str, to: Operation) -> str:
+    """A status message.
+
+    Args:
+        level: "error", "warning" or "info".
+        text: what there is to say.
+        to: the operation that it is about.
+    """
+    name = {} if to.id is None else {"id": to.id}
+    return json.dumps({"op": "status", **name, "level": level, "msg": text})
+
+
+def response_text(to: Operation, values: Any, result: bool) -> str:
+    """The answer of a service.
+
+    Args:
+        to: the call.
+        values: what it returns; of a failure, the reason.
+        result: whether it succeeded.
+    """
+    name = {} if to.id is None else {"id": to.id}
+    body = {"service": to.topic, "values": values, "result": result}
+    return json.dumps({"op": "service_response", **name, **body}, allow_nan=False)
+
+
+def ros_time(t: float) -> dict[str, int]:
+    """A time, with the fields of ROS 1 and ROS 2.
+
+    Args:
+        t: since the epoch of its clock [s].
+    """
+    whole = math.floor(t)
+    parts = int(1e9 * (t - whole))
+    return {"secs": whole, "nsecs": parts, "sec": whole, "nanosec": parts}
+
+
+def ros_message(kind: str, cursor: Cursor, pressed: frozenset[str], t: float) -> dict[str, Any]:
+    """The message of a published topic.
+
+    Args:
+        kind: of PUBLISHED.
+        cursor: newest measurement.
+        pressed: names of the pressed buttons.
+        t: time of the measurement [s].
+    """
+    stamped: dict[str, Any] = {"header": {"stamp": ros_time(t), "frame_id": FRAME}}
+    if kind == "phantom/button":
+        return {"grey_button": int("a" in pressed), "white_button": int("b" in pressed)}
+    if kind == "operating_state":
+        return stamped | {"state": "ENABLED", "is_homed": True, "is_busy": False}
+    if kind in ("measured_js", "phantom/joint_states"):
+        return stamped | _joint_state(cursor)
+    if kind == "measured_cv":
+        twist = {"linear": by_axis(cursor.velocity), "angular": by_axis(NOTHING)}
+        return stamped | {"twist": twist}
+    if kind == "phantom/state":
+        return stamped | _omni_state(cursor, pressed)
+    return stamped | {"pose": _pose(cursor.position)}
+
+
+def _pose(place: Vector) -> dict[str, Any]:
+    return {"position": by_axis(place), "orientation": dict(IDENTITY)}
+
+
+def _joint_state(cursor: Cursor) -> dict[str, Any]:
+    return {
+        "name": list(JOINTS),
+        "position": [math.radians(x) for x in cursor.angles],
+        "velocity": [math.radians(x) for x in cursor.rates],
+        "effort": list(cursor.torques),
+    }
+
+
+def _omni_state(cursor: Cursor, pressed: frozenset[str]) -> dict[str, Any]:
+    """In millimetres, as the drivers publish it unless they are told otherwise."""
+    x, y, z = (1e3 * a for a in cursor.position)
+    u, v, w = (1e3 * a for a in cursor.velocity)
+    return {
+        "locked": False,
+        "close_gripper": "a" in pressed,
+        "pose": _pose((x, y, z)),
+        "current": by_axis(NOTHING),
+        "velocity": by_axis((u, v, w)),
+    }

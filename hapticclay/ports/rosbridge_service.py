@@ -1,0 +1,227 @@
+"""How a rosbridge server with a haptic device talks: topics in, topics out, few services."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from . import rosbridge
+from .commands import IDLE
+from .rosbridge import LEVELS, PUBLISHED, TAKEN, Operation
+
+if TYPE_CHECKING:
+    from .service import Service, Session
+
+MOST_TOPICS = 100  # that a client may subscribe to
+
+
+@dataclass
+class Subscriptions:
+    """What a client has asked to be sent.
+
+    Attributes:
+        topics: their kinds, by name.
+        throttles: least time between two messages [s], by topic and id of the subscription.
+        sent: simulated time of the newest state sent, by topic [s].
+        level: of the status messages that it wants.
+        buttons: that it was told of last; None for none.
+    """
+
+    topics: dict[str, str] = field(default_factory=dict)
+    throttles: dict[str, dict[str | int | None, float]] = field(default_factory=dict)
+    sent: dict[str, float] = field(default_factory=dict)
+    level: str = "error"
+    buttons: frozenset[str] | None = None
+
+    def add(self, operation: Operation, kind: str) -> None:
+        """Begins a subscription.
+
+        Args:
+            operation: that asks for it.
+            kind: of its topic.
+        """
+        self.topics[operation.topic] = kind
+        self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
+
+    def remove(self, operation: Operation) -> None:
+        """Ends a subscription, or without an id all of a topic.
+
+        Args:
+            operation: that asks for it.
+        """
+        left = self.throttles.get(operation.topic, {})
+        if operation.id is None:
+            left.clear()
+        left.pop(operation.id, None)
+        if not left:
+            for table in (self.topics, self.throttles, self.sent):
+                table.pop(operation.topic, None)
+
+
+class RosbridgeSpeech:
+    """The protocol of rosbridge v2, with topics of CRTK and of the drivers of the Touch."""
+
+    name, pushes = "rosbridge", True
+
+    def __init__(self):
+        self._epoch = time.time()
+
+    def greet(self, service: Service, session: Session) -> list[str]:
+        """Nothing: a client subscribes first.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+        """
+        session.memory = Subscriptions()
+        return []
+
+    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]:
+        """Status messages, answers of services, and what is due after a command.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+            data: its message.
+        """
+        operation = rosbridge.read_operation(data)
+        if operation.error:
+            return self._status(service, session, "error", operation.error, operation)
+        act = OPERATIONS.get(operation.op)
+        if act is None:
+            text = f"unknown operation: {operation.op}"
+            return self._status(service, session, "error", text, operation)
+        return act(self, service, session, operation)
+
+    def due(self, service: Service, session: Session) -> list[str]:
+        """Topics of a client with a state that it has not been sent.
+
+        Args:
+            service: that is asked.
+            session: of the client.
+        """
+        kept, t, out = session.memory, service.device.sensed.t, []
+        cursor, pressed = service.cursor(), service.pressed
+        epoch = self._epoch if service.clock == "wall" else 0.0
+        for topic, kind in kept.topics.items():
+            if kind == "phantom/button":
+                if kept.buttons == pressed:
+                    continue
+                kept.buttons = pressed
+            before = kept.sent.get(topic)
+            wait = min(kept.throttles[topic].values())
+            if before is not None and 0.0 <= t - before < max(wait, 1e-9):
+                continue
+            kept.sent[topic] = t
+            msg = rosbridge.ros_message(kind, cursor, pressed, epoch + t)
+            out.append(rosbridge.publish_text(topic, msg))
+        return out
+
+    def inventory(self, service: Service) -> dict[str, Any]:
+        """Topics and their types, as plain data.
+
+        Args:
+            service: that is asked.
+        """
+        return {"published": dict(PUBLISHED), "taken": dict(TAKEN)}
+
+    # ---- operations
+
+    def _subscribe(self, service: Service, session: Session, x: Operation) -> list[str]:
+        kind, kept = rosbridge.kind_of(x.topic, PUBLISHED), session.memory
+        wrong = _wrong_type(x, PUBLISHED.get(kind, ""))
+        if x.compression not in ("none", "None"):
+            wrong = f"compression {x.compression} is not simulated"
+        elif x.topic not in kept.topics and len(kept.topics) >= MOST_TOPICS:
+            wrong = f"more than {MOST_TOPICS} topics"
+        if wrong:
+            return self._status(service, session, "error", wrong, x)
+        if not kind:
+            text = f"nothing is published on {x.topic}"
+            return self._status(service, session, "warning", text, x)
+        kept.add(x, kind)
+        kept.sent.pop(x.topic, None)
+        return self.due(service, session)
+
+    def _unsubscribe(self, service: Service, session: Session, x: Operation) -> list[str]:
+        session.memory.remove(x)
+        return []
+
+    def _advertise(self, service: Service, session: Session, x: Operation) -> list[str]:
+        kind = rosbridge.kind_of(x.topic, TAKEN)
+        if wrong := _wrong_type(x, TAKEN.get(kind, "")):
+            return self._status(service, session, "error", wrong, x)
+        if not kind:
+            text = f"nobody listens to {x.topic}"
+            return self._status(service, session, "warning", text, x)
+        return []
+
+    def _unadvertise(self, service: Service, session: Session, x: Operation) -> list[str]:
+        """A client that stops publishing a command stops commanding."""
+        if rosbridge.kind_of(x.topic, TAKEN) and session.command != IDLE:
+            session.command = IDLE
+        return []
+
+    def _publish(self, service: Service, session: Session, x: Operation) -> list[str]:
+        kind = rosbridge.kind_of(x.topic, TAKEN)
+        if not kind:
+            text = f"nobody listens to {x.topic}"
+            return self._status(service, session, "warning", text, x)
+        command, left_out = rosbridge.command_of(kind, x.msg)
+        told = self._status(service, session, "error", left_out, x) if left_out else []
+        service.obey(session, command)
+        return [*told, *self.due(service, session)]
+
+    def _call_service(self, service: Service, session: Session, x: Operation) -> list[str]:
+        values = self._called(service, x)
+        if values is None:
+            text = f"Service {x.topic} does not exist"
+            service.count(text)
+            return [rosbridge.response_text(x, text, False)]
+        return [rosbridge.response_text(x, values, True)]
+
+    def _called(self, service: Service, x: Operation) -> dict[str, Any] | None:
+        """What a service returns; None for a service that there is not."""
+        both = PUBLISHED | TAKEN
+        if x.topic == "/rosapi/topics":
+            return {"topics": [f"/{name}" for name in both], "types": list(both.values())}
+        if x.topic == "/rosapi/topic_type":
+            return {"type": both.get(rosbridge.kind_of(str(x.msg.get("topic", "")), both), "")}
+        if x.topic == "/rosapi/get_time":
+            return {"time": rosbridge.ros_time(self._epoch + service.device.t)}
+        return None
+
+    def _set_level(self, service: Service, session: Session, x: Operation) -> list[str]:
+        if x.topic not in LEVELS:
+            return self._status(service, session, "error", f"no level {x.topic}", x)
+        session.memory.level = x.topic
+        return []
+
+    def _status(
+        self, service: Service, session: Session, level: str, text: str, to: Operation
+    ) -> list[str]:
+        """A status message, for a client that wants those of its level."""
+        service.count(text)
+        if LEVELS.index(level) > LEVELS.index(session.memory.level):
+            return []
+        return [rosbridge.status_text(level, text, to)]
+
+
+OPERATIONS = {
+    "subscribe": RosbridgeSpeech._subscribe,
+    "unsubscribe": RosbridgeSpeech._unsubscribe,
+    "advertise": RosbridgeSpeech._advertise,
+    "unadvertise": RosbridgeSpeech._unadvertise,
+    "publish": RosbridgeSpeech._publish,
+    "call_service": RosbridgeSpeech._call_service,
+    "set_level": RosbridgeSpeech._set_level,  # the name in rosbridge_library
+    "set_status_level": RosbridgeSpeech._set_level,  # and in its specification
+}
+
+
+def _wrong_type(x: Operation, known: str) -> str:
+    """Why a topic cannot have the type that a client gives it; "" where it can."""
+    if not known or not x.type or x.type == known:
+        return ""
+    return f"{x.topic} is of type {known}, not {x.type}"
