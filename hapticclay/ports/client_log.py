@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import collections
 import csv
 import io
 import math
@@ -15,8 +14,8 @@ import numpy as np
 from ..errors import ParameterError
 from ..files import atomic
 from .commands import AXES, Vector
+from .rows import MOST_ROWS, Rows
 
-MOST_ROWS = 1_000_000  # that a log keeps, the newest
 FILE = "device.csv"  # beside the record of a session
 FEWEST = 2
 
@@ -86,7 +85,7 @@ class ClientLog:
             most: rows to keep, the newest.
         """
         self.missed = 0
-        self._rows: collections.deque[Exchanged] = collections.deque(maxlen=most)
+        self._rows = Rows(12, most)  # numbers of an Exchanged
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -94,7 +93,11 @@ class ClientLog:
     @property
     def rows(self) -> list[Exchanged]:
         """What is kept, in order."""
-        return list(self._rows)
+        out = []
+        for x in self._rows.table().tolist():
+            place, rate, force = ((a, b, c) for a, b, c in (x[3:6], x[6:9], x[9:12]))
+            out.append(Exchanged(x[0], x[1], x[2], place, rate, force))
+        return out
 
     def add(self, row: Exchanged) -> None:
         """Adds an exchange.
@@ -102,7 +105,7 @@ class ClientLog:
         Args:
             row: the exchange.
         """
-        self._rows.append(row)
+        self._rows.add((*row[:3], *row.position, *row.velocity, *row.force))
 
     def timing(self) -> Timing:
         """How regular the exchanges were; NaN where there are fewer than two."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import collections
 import csv
 import io
 import os
@@ -15,8 +14,8 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError
 from ..files import atomic
+from .rows import MOST_ROWS, Rows
 
-MOST_ROWS = 1_000_000  # that a log keeps, the newest: 17 minutes at 1 kHz
 COLUMNS = (
     "received_s",
     "began_s",
@@ -147,11 +146,7 @@ FILE = "exchanges.csv"  # beside the record of a session
 
 
 class ExchangeLog:
-    """Keeps the newest exchanges.
-
-    Attributes:
-        count: exchanges so far, kept or not.
-    """
+    """Keeps the newest exchanges."""
 
     def __init__(self, most: int = MOST_ROWS):
         """Begins empty.
@@ -159,8 +154,12 @@ class ExchangeLog:
         Args:
             most: rows to keep, the newest.
         """
-        self.count = 0
-        self._rows: collections.deque[Exchange] = collections.deque(maxlen=most)
+        self._rows = Rows(len(COLUMNS), most)
+
+    @property
+    def count(self) -> int:
+        """Exchanges so far, kept or not."""
+        return self._rows.count
 
     def add(self, row: Exchange) -> None:
         """Adds an exchange.
@@ -168,10 +167,9 @@ class ExchangeLog:
         Args:
             row: the exchange.
         """
-        self._rows.append(row)
-        self.count += 1
+        times, (position, velocity, asked, applied) = row[:3], row[3:]
+        self._rows.add((*times, *position, *velocity, *asked, *applied))
 
     def exchanges(self) -> Exchanges:
         """What is kept."""
-        rows = [(*r[:3], *r.position, *r.velocity, *r.asked, *r.applied) for r in list(self._rows)]
-        return Exchanges.of_table(np.array(rows))
+        return Exchanges.of_table(self._rows.table())

@@ -155,6 +155,7 @@ class DeviceServer:
             async for data in connection:
                 for text in self.service.answer(number, data):
                     await connection.send(text)
+                await asyncio.sleep(0.0)  # a turn for others, however many messages wait
         except ConnectionClosed:
             pass
         finally:

@@ -30,8 +30,10 @@ from .planes import across, flat, lifted
 REST: Vector = (0.08, -0.15, 0.14)  # [m] where an Inverse3 has its cursor at rest: handle at p = 0
 ID = re.compile("[0-9A-F]{1,16}")
 PORTS = {"inverse": 10_001, "rosbridge": 9090}  # where clients look for each protocol
-PATIENCE = 0.05  # [s] without a message after which a client's command no longer acts
+# [s] without a message after which a client's command no longer acts: with the thread's turn, 50 ms
+PATIENCE = 0.048
 LATE = 0.1  # [s] behind the clock from which on time is skipped
+MOST_LOGS = 100  # of clients
 MOST_NOTICES, LONGEST_NOTICE = 100, 120  # kinds that are counted apart; characters
 AT_ONCE = 8  # control samples that the thread makes before clients get their turn
 LOOK = 0.002  # [s] between two looks at the clients of a device that something else moves
@@ -165,7 +167,8 @@ class Service:
         self.speech = speech_of(inverse3.protocol)
         self.skipped = self.samples = 0
         self._sessions: dict[int, Session] = {}
-        self._logs: list[ExchangeLog] = []
+        self._logs: dict[int, ExchangeLog] = {}
+        self._count = 0  # of clients so far
         self._lock, self._stop = threading.RLock(), threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -178,9 +181,14 @@ class Service:
             The number of its session, and what to send first.
         """
         with self._lock:
-            number = len(self._logs) + 1
+            self._count += 1
+            number = self._count
             session = self._sessions[number] = Session(number)
-            self._logs.append(session.log)
+            self._logs[number] = session.log
+            if len(self._logs) > MOST_LOGS:  # clients that come and go fill no memory
+                gone = [k for k in self._logs if k not in self._sessions]
+                if gone:
+                    del self._logs[min(gone, key=lambda k: self._logs[k].count)]
             return number, self.speech.greet(self, session)
 
     def leave(self, number: int) -> None:
@@ -241,8 +249,8 @@ class Service:
 
     @property
     def logs(self) -> list[ExchangeLog]:
-        """Exchanges of each client, in the order of their connection."""
-        return list(self._logs)
+        """Exchanges of each client, in the order of their connection; of 100 at most."""
+        return list(self._logs.values())
 
     @property
     def clients(self) -> int:
