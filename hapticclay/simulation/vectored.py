@@ -74,7 +74,7 @@ class VectoredRuns:
         self.force[k], self.steady[k] = s.force, scene.steady_force(s)
         self.looked_at[k], self.diverging[k] = -np.inf, False
         c.quiet[k], c.swings[k], c.seen[k] = 1, 0.0, (0, -1, -1, 0)
-        c.times[k], c.marks[k], c.looked[k] = 0.0, (0, 0, OPEN), 0
+        c.times[k], c.marks[k], c.looked[k] = 0.0, (0, 0, OPEN, 0, 0, 0), 0
         if self.compiled or self.of[k]:
             self._place(k)
         self.is_shown = False
@@ -265,7 +265,7 @@ class VectoredRuns:
             return
         run.pause = c.until[k]
         run.go(None)
-        c.quiet[k], c.times[k], c.marks[k] = 0, run.t, (run.i, run.filled, run.state.status.code)
+        c.quiet[k], c.times[k], c.marks[k, :3] = 0, run.t, (run.i, run.filled, run.code)
         if run.outcome is not None:
             self._end(k, run)
 

@@ -52,7 +52,8 @@ class Vector(NamedTuple):
             0; shape (n, 4).
         until: samples to pause at, shape (n,).
         looked: samples judged so far, shape (n,).
-        marks: sample, rows not judged and code of each, shape (n, 3).
+        marks: sample, rows not judged and code of each; engine steps, crossings and stops of the
+            last call; shape (n, 6).
         times: now [s], shape (n,).
         quiet: 1 while the monitor can have nothing to report, shape (n,).
         swings: see monitor.is_quiet, shape (n, 2, monitor.QUIET).
@@ -153,13 +154,15 @@ def moved(like, state, place, x, k, ahead):
     readied(parts, s, e, place.limits)
     while s.status.code == OPEN and path.has_room(parts.time, s, e, room):
         s = path.advance(parts, s, e, room)
-        if x.kept[k, 3] == 0:
+        if x.kept[k, 3] == 0:  # no one asks for crossings: there is room for more
             s = path.with_filled(s, Filled(0, s.filled.rows, 0, 0))
     if ahead:
         swap_written(x.written, k, place.scratch, True)
         show(e, x, k, table, first)
         return
-    put_state(s, x.states, k)
+    made = s.filled
+    x.marks[k, 3], x.marks[k, 4], x.marks[k, 5] = made.steps, made.crossings, made.stops
+    put_state(path.with_filled(s, Filled(0, made.rows, 0, 0)), x.states, k)
     judged(parts, x, k, table, first, s.filled.rows)
     x.times[k] = s.clock.t
     x.marks[k, 0], x.marks[k, 1], x.marks[k, 2] = s.clock.i, s.filled.rows, s.status.code
@@ -240,7 +243,7 @@ class Common:
     def __init__(self, n: int):
         self.kept = np.zeros((n, 4), np.int64)
         self.until, self.looked = np.zeros((2, n), np.int64)
-        self.marks, self.times = np.zeros((n, 3), np.int64), np.zeros(n)
+        self.marks, self.times = np.zeros((n, 6), np.int64), np.zeros(n)
         self.quiet, self.swings = np.zeros(n, np.int64), np.zeros((n, 2, monitor.QUIET))
         self.seen, self.shown = np.zeros((n, 4), np.int64), np.zeros((n, SHOWN))
 
@@ -310,7 +313,7 @@ class RunVector:
         s, x = run.state, self.x
         x.states[k] = many.numbers_of(s)
         x.looked[k], x.times[k] = run.looked, s.clock.t
-        x.marks[k] = s.clock.i, s.filled.rows, s.status.code
+        x.marks[k, :3] = s.clock.i, s.filled.rows, s.status.code
 
     def give(self, k: int, run: Run) -> None:
         """Gives a run its state back.
@@ -370,7 +373,7 @@ class Row:
     Attributes:
         parts: of the run, as the row has them.
         leads: whether the row has the state, and the run an old one.
-        marks: sample, rows not judged and code.
+        marks: see Vector.marks.
         t: now [s].
     """
 
@@ -378,8 +381,7 @@ class Row:
         self.common = Common(1)
         self.vector = RunVector(run, self.common, kernel)
         self.key, self.parts, self.leads, self.taken = kind_key(run), None, False, False
-        self.marks, self.t, self.which = [0, 0, OPEN], 0.0, np.zeros(1, np.int64)
-        self.filled = list(self.vector.at.filled)
+        self.marks, self.t, self.which = [0] * 6, 0.0, np.zeros(1, np.int64)
         scratch = np.empty(sum(a.nbytes for a in scene.written(run.parts)) // 8 + 1)
         place = Place(run.native, run.model.actuator_ctrlrange, scratch)
         v = self.vector
@@ -425,10 +427,8 @@ class Row:
         self.marks, self.t, self.leads = x.marks[0].tolist(), float(x.times[0]), True
 
     def made(self) -> Filled:
-        """What has been made since the last look; then it is but the rows."""
-        states, at = self.vector.x.states, self.filled
-        steps, n, crossings, stops = map(int, states[0, at].tolist())
-        states[0, at] = 0.0, n, 0.0, 0.0
+        """What the last call has made, and the rows so far."""
+        _, n, _, steps, crossings, stops = self.marks
         return Filled(steps, n, crossings, stops)
 
     def given(self) -> State:
