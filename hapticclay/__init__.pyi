@@ -48,6 +48,7 @@ from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device
 from .scene.virtual_wall import VirtualWall as VirtualWall
 from .simulation.batch import simulate_batch as simulate_batch
+from .simulation.column_batch import simulate_columns as simulate_columns
 from .simulation.error_estimate import Accuracy as Accuracy
 from .simulation.record import Record as Record
 from .simulation.record import observed_passivity as observed_passivity

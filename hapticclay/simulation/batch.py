@@ -23,7 +23,7 @@ from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.engine import warnings_caught
 from ..stepping.machine_code import compile_time, is_kept
-from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, kind_key
+from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, draws_of, kind_key
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
@@ -109,7 +109,7 @@ def simulate_batch(
             pass
     todo = checked_scenarios(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
-    out = _Summaries() if summaries else _Records()
+    out = Summaries() if summaries else _Records()
     if not has_numba():
         if first:
             print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
@@ -129,7 +129,7 @@ def simulate_batch(
     parts = map(plan.jobs, _in_parts(itertools.chain(first, todo), together))
     with warnings_caught():
         count = max(min(threads, len(first)), 1)
-        _on_threads(parts, make, out.put, count, pool.stop)
+        on_threads(parts, make, out.put, count, pool.stop)
     return out.all()
 
 
@@ -281,6 +281,16 @@ class Plan:
         """The module stepping.compiled; None where it cannot be loaded."""
         return load_compiled()
 
+    def takes(self, key: Any, like: Scenario, n: int) -> bool:
+        """Whether many runs of a kind, which has no other, are made together; compiled then.
+
+        Args:
+            key: of the kind.
+            like: one of the runs.
+            n: how many there are.
+        """
+        return self._carries(key, [like] * min(n, KNOWN))
+
     def _carries(self, key: Any, jobs: list[Scenario]) -> bool:
         """Whether runs of a kind are made together; compiled then."""
         if key not in self.carried:
@@ -295,7 +305,7 @@ class Plan:
         if not self.carried[key]:
             pattern = self.patterns.of(key, jobs[0])
             with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
-                self.pool.lane().group(pattern, jobs[:1])
+                self.pool.lane().group(pattern, draws_of(jobs[:1]))
             self.carried[key] = True
         return True
 
@@ -376,7 +386,7 @@ class _Records:
         return self.found
 
 
-class _Summaries:
+class Summaries:
     """The same, an array of SUMMARY that grows in place."""
 
     def __init__(self):
@@ -463,7 +473,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _on_threads(
+def on_threads(
     parts: Iterable[list[Job]],
     make: Callable[[list[Job]], Any],
     put: Callable[[int, Any], None],

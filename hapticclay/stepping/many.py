@@ -17,7 +17,6 @@ import numpy as np
 
 from ..model import controller, regions
 from ..model.clay import Profile
-from ..model.controller import Servo
 from ..model.operator import NO_HAND, mobility_with
 from ..scene.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous
@@ -290,42 +289,39 @@ class Pattern:
         self.is_made = self.parts.form is None
         self.row, self.at = np.array(numbers_of(self.parts)), places(self.parts)
 
-    def roomy(self, jobs: Sequence[Scenario]) -> Parts:
+    def roomy(self, delays: Sequence[float]) -> Parts:
         """Parts whose arrays have room for each of some runs; those that they have are kept.
 
         Args:
-            jobs: their scenarios.
+            delays: of their torques [s].
         """
-        longest = max((s.hardware.delay for s in jobs if s.hardware), default=0.0)
+        longest = max(delays, default=0.0)
         held = self.parts.sampler
         if held and held.delay and longest > held.delay.delay:
             self.parts = scene.for_delays(self.parts, longest)
         return self.parts
 
-    def numbers(self, jobs: Sequence[Scenario]) -> np.ndarray:
+    def numbers(self, d: Draws) -> np.ndarray:
         """The numbers of their parts, shape (n, m).
 
         Args:
-            jobs: scenarios.
+            d: what the runs differ in.
         """
-        at, out = self.at, np.tile(self.row, (len(jobs), 1))
-        out[:, at.arm.ox : at.arm.oy + 1] = [s.origin for s in jobs]
-        out[:, [x.K for x in at.lag]] = [s.gain for s in jobs]
-        out[:, at.push.steady[1:3]] = [s.force for s in jobs]
-        servo = jobs[0].servo
-        alike = all(s.servo is servo for s in jobs)
+        at, out = self.at, np.tile(self.row, (len(d.gain), 1))
+        out[:, at.arm.ox : at.arm.oy + 1] = d.origin
+        out[:, [x.K for x in at.lag]] = d.gain
+        out[:, at.push.steady[1:3]] = d.force
         for i in (0, 1):
-            rows_ = servo[i].numbers if alike else [s.servo[i].numbers for s in jobs]
-            out[:, at.servo[i]] = rows_
+            for servo, runs in d.servo[i].items():
+                out[np.array(runs)[:, None], at.servo[i]] = servo.numbers
         if at.hand is not None:
-            self._put_hands(out, jobs)
+            self._put_hands(out, d.hands)
         if at.sampler is not None and at.sampler.delay is not None:
-            self._put_delays(out, [s.hardware.delay for s in jobs if s.hardware])
+            self._put_delays(out, d.delays)
         return out
 
-    def _put_hands(self, out: np.ndarray, jobs: Sequence[Scenario]) -> None:
+    def _put_hands(self, out: np.ndarray, hands: np.ndarray) -> None:
         """Puts the operators' arms into numbers, and the mobility with them."""
-        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
         for i, x in enumerate(self.at.hand):
             out[:, [x.mass, x.damper, x.spring]] = hands[:, i]
         mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
@@ -334,7 +330,7 @@ class Pattern:
                 trace = self.scenario.arm.links[4]
                 out[:, special.stiff.mobility] = mobility_with(trace, mass)
 
-    def _put_delays(self, out: np.ndarray, delays: list[float]) -> None:
+    def _put_delays(self, out: np.ndarray, delays: Sequence[float]) -> None:
         """Puts delays of the torques into numbers."""
         at, Ts = self.at.sampler, self.parts.sampler.Ts
         whole, share = np.array([delay_in_samples(x, Ts) for x in delays]).T
@@ -342,41 +338,87 @@ class Pattern:
         if at.passivity is not None:
             out[:, at.passivity.whole], out[:, at.passivity.share] = whole, share
 
-    def tables(self, jobs: Sequence[Scenario]) -> np.ndarray:
+    def tables(self, d: Draws) -> np.ndarray:
         """Their tables of the clay, shape (n, len(parts.table)).
 
         Args:
-            jobs: scenarios.
+            d: what the runs differ in.
         """
         table = self.parts.table
-        out = np.tile(table, (len(jobs), 1))
-        if self.scenario.clay is not None:
+        out = np.tile(table, (len(d.gain), 1))
+        if d.values is not None:
             at = [int(table[regions.VALUES + i]) for i in (0, 1)]
             for i in range(2 if at[0] != at[1] else 1):
-                values = [s.clay.laws[i].values for s in jobs if s.clay]
-                out[:, at[i] : at[i] + len(values[0])] = values
+                out[:, at[i] : at[i] + d.values[i].shape[1]] = d.values[i]
         return out
 
-    def memory(self, jobs: Sequence[Scenario]) -> np.ndarray:
+    def memory(self, d: Draws) -> np.ndarray:
         """Rows of controller.held_compensator of their axes, shape (n, 40); (n, 0) for none.
 
         Args:
-            jobs: scenarios.
+            d: what the runs differ in.
         """
         if self.parts.sampler is None:
-            return np.empty((len(jobs), 0))
-        return np.concatenate([self._memory(jobs, i) for i in (0, 1)], axis=1)
+            return np.empty((len(d.gain), 0))
+        return np.concatenate([self._memory(d, i) for i in (0, 1)], axis=1)
 
-    def _memory(self, jobs: Sequence[Scenario], i: int) -> np.ndarray:
-        Ts, shape = self.parts.sampler.Ts, jobs[0].compensators[i]
-        out, found = np.empty((len(jobs), 20)), dict[Servo, list[int]]()
-        for k, s in enumerate(jobs):
-            found.setdefault(s.servo[i], []).append(k)
-        for servo, at in found.items():
-            gains, which = np.unique([jobs[k].gain[i] for k in at], return_inverse=True)
+    def _memory(self, d: Draws, i: int) -> np.ndarray:
+        Ts, shape = self.parts.sampler.Ts, self.scenario.compensators[i]
+        out = np.empty((len(d.gain), 20))
+        for servo, runs in d.servo[i].items():
+            at = np.array(runs)
+            gains, which = np.unique(d.gain[at, i], return_inverse=True)
             A, B = controller.held_compensator(servo, shape, gains, Ts)
             out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
         return out
+
+
+class Draws(NamedTuple):
+    """What runs of one kind differ in, as columns over n runs.
+
+    Attributes:
+        gain: of x and y [1/kg], shape (n, 2).
+        force: constant muscle force [N], shape (n, 2).
+        origin: world position of p = 0 [m], shape (n, 2).
+        starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
+        servo: of x and of y: the servos, and the runs that have them.
+        hands: mass, damper and spring of x and of y, shape (n, 2, 3); None without operators.
+        delays: of the torques [s]; empty without hardware.
+        values: dampings of the clay's regions [N.s/m], of x and of y, shape (n, regions) each; None
+            without clay.
+    """
+
+    gain: np.ndarray
+    force: np.ndarray
+    origin: np.ndarray
+    starts: np.ndarray
+    servo: Any
+    hands: Any
+    delays: Any
+    values: Any
+
+
+def draws_of(jobs: Sequence[Scenario]) -> Draws:
+    """What scenarios of one kind differ in.
+
+    Args:
+        jobs: the scenarios.
+    """
+    first, hands, values = jobs[0], None, None
+    if any(first.operators):
+        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
+    if first.clay is not None:
+        values = [np.array([s.clay.laws[i].values for s in jobs if s.clay]) for i in (0, 1)]
+    servo: Any = [{x: range(len(jobs))} for x in first.servo]
+    if not all(s.servo is first.servo for s in jobs):
+        servo = {}, {}
+        for i in (0, 1):
+            for k, s in enumerate(jobs):
+                servo[i].setdefault(s.servo[i], []).append(k)
+    columns = ([s.gain for s in jobs], [s.force for s in jobs], [s.origin for s in jobs])
+    starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
+    delays = [s.hardware.delay for s in jobs if s.hardware]
+    return Draws(*(np.array(x, float) for x in columns), starts, servo, hands, delays, values)
 
 
 class Patterns:
@@ -434,30 +476,29 @@ class Lane:
             if len(found) < FEWEST or not (p := self.patterns.of(key, jobs[found[0]])).is_made:
                 left += found
                 continue
-            fields, good = self.group(p, [jobs[i] for i in found])
+            fields, good = self.group(p, draws_of([jobs[i] for i in found]))
             at = np.array(found)
             done.append((at[good], fields))
             left += at[~good].tolist()
         return done, sorted(left)
 
-    def group(self, p: Pattern, jobs: list[Scenario]) -> tuple[dict[str, Any], np.ndarray]:
+    def group(self, p: Pattern, d: Draws) -> tuple[dict[str, Any], np.ndarray]:
         """Makes runs of one kind.
 
         Args:
             p: its pattern.
-            jobs: their scenarios.
+            d: what the runs differ in.
 
         Returns:
             Fields of a summary of those that are good, and which are.
         """
-        parts, n = p.roomy(jobs), len(jobs)
+        parts, n = p.roomy(d.delays), len(d.gain)
         model, data = self.store.engine(p.scenario)
         e = self.store.arrays(parts, model, data, self.kernel)
-        starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
         crossed = np.full((n, SUMMARY_CROSSINGS, 3), np.nan)
         crossed[:, :, 0] = -1.0
         runs = Runs(
-            p.numbers(jobs), p.tables(jobs), p.memory(jobs), starts, model.actuator_ctrlrange,
+            p.numbers(d), p.tables(d), p.memory(d), d.starts, model.actuator_ctrlrange,
             self.reset, self.store.rows, self.store.crossings,
             self.store.rendered if scene.tells(parts) else np.empty((0, 3)), np.zeros(n, np.int64),
             np.zeros((n, rows.ROW)), np.zeros((n, 2)), crossed, np.zeros((n, 4), np.int64),

@@ -60,13 +60,18 @@ def largest_damping(s: Scenario) -> float:
     return B_MAX if clay.grows else clay.largest
 
 
-def hardness(s: Scenario, b: float) -> tuple[bool, bool]:
-    """Whether a scene has the parts Stiff and Hits, in clay of some largest damping [N.s/m]."""
+def hardness(s: Scenario, b: Any) -> tuple[Any, Any]:
+    """Whether a scene has the parts Stiff and Hits, in clay of some largest damping [N.s/m].
+
+    Args:
+        s: the scene.
+        b: the damping, a number or an array over runs.
+    """
     if is_held(s) or (s.integrator != "fast" and s.control != "sampled"):
         return False, False
     # share of its velocity that a step of explicit damping would take from a handle without a hand
     k = b * s.dt * s.arm.links[4]
-    return k > STIFF, k > HITTING and s.control != "sampled"
+    return k > STIFF, s.control != "sampled" and k > HITTING
 
 
 def clay_part(s: Scenario):
