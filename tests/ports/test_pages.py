@@ -24,3 +24,11 @@ def test_the_snippet_of_the_buzz_page_prints_what_it_says():
     code = code_of("buzz.md")
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+
+
+def test_the_snippet_of_the_page_about_devices_prints_what_it_says(tmp_path):
+    code = code_of("connect.md")
+    words = [sys.executable, "-c", code]
+    out = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+    assert len((tmp_path / "device.csv").read_text().splitlines()) > 300
