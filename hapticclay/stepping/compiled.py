@@ -78,7 +78,8 @@ from .notice import Notice
 
 SOURCES = (
     arm, compensator, controller, damping, flow, groove, hardware, operator, pieces, regions,
-    smooth, spring, borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
+    smooth, spring, borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff,
+    viscous, yielding,
     engine_step, begin, energy, laws, many, monitor, driver, friction, sampled, sampled_controller,
     wires, ends, instant, march, modes, search,
 )  # fmt: skip
