@@ -22,7 +22,8 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 import hapticclay as hc
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine
 from hapticclay.scene.scenario import Scenario

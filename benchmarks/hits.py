@@ -25,7 +25,8 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.clay import Clay, Profile, slab
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
 from hapticclay.scene.scenario import Scenario

@@ -26,7 +26,7 @@ from scipy.integrate import DOP853, LSODA, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from hapticclay.model.clay import Profile
+from hapticclay.model.cells import Profile
 from hapticclay.scene.scenario import Scenario
 from tests.oracles.arm import G0, G1, I1, I2, L1, L2, S0, S1, SG
 

@@ -18,7 +18,7 @@ from typing import Any
 from tabulate import tabulate
 
 from hapticclay.files import atomic
-from hapticclay.studies import sweep
+from hapticclay.studies import sweep, sweep_store
 from hapticclay.studies.sampling import Sweep, parse_grid
 
 from . import common
@@ -64,7 +64,7 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
         for k in range(rounds + 1):
             for n in times:
                 out = Path(folder) / f"{k}-{n}"
-                sweep.begin_sweep(todo, out)
+                sweep_store.begin_sweep(todo, out)
                 begin = time.perf_counter()
                 jobs = client.map(
                     sweep.run_chunk,

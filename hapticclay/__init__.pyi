@@ -9,10 +9,9 @@ from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .errors import Warning as Warning
 from .model.arm import Arm as Arm
+from .model.cells import Grid as Grid
+from .model.cells import Profile as Profile
 from .model.clay import Clay as Clay
-from .model.clay import Grid as Grid
-from .model.clay import Profile as Profile
-from .model.clay import Smooth as Smooth
 from .model.clay import slab as slab
 from .model.compensator import Compensator as Compensator
 from .model.constants import SecondOrder as SecondOrder
@@ -33,6 +32,7 @@ from .model.shapes import Step as Step
 from .model.signals import Multisine as Multisine
 from .model.signals import Signal as Signal
 from .model.signals import Sum as Sum
+from .model.smooth import Smooth as Smooth
 from .model.spring import Spring as Spring
 from .model.tool import Tool as Tool
 from .results import Result as Result

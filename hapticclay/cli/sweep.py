@@ -69,23 +69,23 @@ class SweepCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..studies import sweep
+        from ..studies import sweep_store
 
         asked = self._plan()
         if self.workers is not None:
             integer("workers", self.workers, 1, 1024)
-        with sweep.claimed(asked, self.out) as (plan, todo):
+        with sweep_store.claimed(asked, self.out) as (plan, todo):
             try:
                 self._make(plan, todo)
             except KeyboardInterrupt:
-                missing = sweep.missing_parts(plan, self.out)
+                missing = sweep_store.missing_parts(plan, self.out)
                 here = len(plan) - sum(len(plan.chunk_runs(n)) for n in missing)
                 print(
                     f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
                     "the same command resumes the sweep"
                 )
                 raise
-        table = sweep.read_sweep(self.out)
+        table = sweep_store.read_sweep(self.out)
         for status, n in Counter(table["status"].to_pylist()).most_common():
             print(f"{n:8d}  {status}")
         print(f"{table.num_rows} runs in {self.out / 'data'}")

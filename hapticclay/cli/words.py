@@ -132,7 +132,7 @@ def _option_units(words: Sequence[str]) -> dict[str, str]:
     from ..scene.fields import field_descriptions
 
     kind = load_command(words[0])
-    nested = (x.kind for x in _own_slots(kind).values() if dataclasses.is_dataclass(x.kind))
+    nested: Any = (x.kind for x in _own_slots(kind).values() if dataclasses.is_dataclass(x.kind))
     out: dict[str, str] = {}
     for part in (*nested, kind):
         for name, about in field_descriptions(part).items():

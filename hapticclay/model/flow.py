@@ -142,7 +142,7 @@ def thinned(q, k, n):
 def implicit_share(z):
     """Share of the velocity at the end of a step in that at which a force is taken.
 
-    One half, second order, unless the force would overshoot: as in `clay.split_damping`.
+    One half, second order, unless the force would overshoot: as in `damping.split_damping`.
 
     Args:
         z: velocity that the force takes by the end, per unit of velocity.

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from .clay import NOTHING, Clay, Profile, Smooth, smooth_damping
+from .cells import Profile
+from .clay import NOTHING, Clay
+from .smooth import Smooth, smooth_damping
 
 # A table is one row of numbers. Its head says where the rest begins, two places each: END, one
 # place, holds the end of the path itself [m], inf for none; EDGES, borders along x and along y
 # between -inf and inf [m]; LANDED, beside them, 1.0 where steps end whatever clay lies beyond;
 # OWN, for the clay of each axis, two lists that add up to the number of the cell in which that axis
-# is, by region along x and along y; SMOOTH, for smooth clay of each axis, clay.Smooth.numbers, 0.0
+# is, by region along x and along y; SMOOTH, for smooth clay of each axis, Smooth.numbers, 0.0
 # for none; of the cells, one for smooth clay, for each axis: VALUES, damping on entry [N.s/m];
 # RATES, at which it grows [N.s/m per s], 0.0 for none; ENTERED, time of the first entry [s], NaN
 # before; FLOWS, where the clay yields, 0.0 elsewhere: Fy [N], K [N/(m/s)^n] and n of each cell;
@@ -168,7 +170,7 @@ def enter_region(table, ix, iy, t):
         t: time of entry [s].
 
     Returns:
-        (low, high, base, rate), a pair (x, y) each: borders [m] and clay, as in `clay.damping_at`.
+        (low, high, base, rate), a pair (x, y) each: borders [m] and clay, see damping.damping_at.
     """
     basex, ratex = _cell_law(table, 0, ix, iy, t)
     basey, ratey = _cell_law(table, 1, ix, iy, t)

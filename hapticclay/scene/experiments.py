@@ -18,7 +18,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, field_types
-from ..model.clay import Clay, Profile, slab
+from ..model.cells import Profile
+from ..model.clay import Clay, slab
 from ..model.constants import (
     AXES,
     B_CONSTANT,

@@ -282,7 +282,7 @@ class Scenario:
             raise ParameterError("clay.angle", clay.angle, bound)
 
     def _soft_damping(self) -> float:
-        """Damping of clay up to which no kick has to be split: see clay.split_damping [N.s/m]."""
+        """Damping of clay up to which no kick is split: see damping.split_damping [N.s/m]."""
         held = self.control == "sampled" and self.render == "held"
         if held or self.integrator == "accurate":
             return math.inf

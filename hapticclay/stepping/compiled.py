@@ -28,15 +28,16 @@ from numba.np import arrayobj
 
 from ..model import (
     arm,
-    clay,
     compensator,
     controller,
+    damping,
     flow,
     groove,
     hardware,
     operator,
     pieces,
     regions,
+    smooth,
     spring,
 )
 from ..scene.scenario import Scenario
@@ -80,8 +81,9 @@ from .machine_code import COMPLETE, cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
 SOURCES = (
-    arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
-    borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
+    arm, compensator, controller, damping, flow, groove, hardware, operator, pieces, regions,
+    smooth, spring, borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff,
+    viscous, yielding,
     engine_step, begin, energy, laws, many, monitor, driver, friction, sampled, sampled_controller,
     wires, ends, instant, march, modes, search, vector,
 )  # fmt: skip

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import controller, regions
-from ..model.clay import Profile
+from ..model.cells import Profile
 from ..model.operator import NO_HAND, mobility_with
 from ..scene.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous

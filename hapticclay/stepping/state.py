@@ -350,7 +350,7 @@ class Laws(NamedTuple):
 
 
 class Split(NamedTuple):
-    """See clay.split_damping.
+    """See damping.split_damping.
 
     Attributes:
         over: 1.0 where any part is reduced, else 0.0.

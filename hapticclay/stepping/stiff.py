@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..model import arm
-from ..model import clay as law
+from ..model import damping as law
 from . import hand as hands
 from .servo import added
 from .state import Handle
@@ -23,7 +23,7 @@ def behind_sample(stiff, split, step, at):
 
 
 def slow_force(stiff, hand, acting, law_, pull):
-    """The force that stiff clay bears in slow motion, (x, y) [N]; see clay.slow_force."""
+    """The force that stiff clay bears in slow motion, (x, y) [N]; see damping.slow_force."""
     if stiff is None or acting.split.over == 0.0:
         return NONE
     at, k, uh, share = acting.at, acting.viscous, acting.uh, acting.split.share

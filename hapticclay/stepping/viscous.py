@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..model import clay as law
 from ..model import controller, regions
+from ..model import damping as law
 from . import hand as hands
 from .state import Clay, Growth, Load, Split, Viscous
 
@@ -39,7 +39,7 @@ def weighted(step, b0, b1):
 
 
 def split_damping(stiff, step, hand, b0, b1):
-    """Damping in a kick, see clay.split_damping, and the split."""
+    """Damping in a kick, see damping.split_damping, and the split."""
     if stiff is None:
         return weighted(step, b0, b1), None
     dx, dy = hands.dampers(hand)

@@ -33,7 +33,7 @@ from .robustness import stored_runs as stored_runs
 from .sampling import Range as Range
 from .sampling import Sweep as Sweep
 from .sampling import parse_grid as parse_grid
-from .sweep import read_sweep as read_sweep
 from .sweep import run_sweep as run_sweep
+from .sweep_store import read_sweep as read_sweep
 from .workspace import Drift as Drift
 from .workspace import drift_map as drift_map

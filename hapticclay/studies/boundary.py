@@ -14,7 +14,8 @@ from ..arguments import named
 from ..errors import Bound, ParameterError, number
 from ..model import arm
 from ..model.arm import Arm
-from ..model.clay import Clay, Profile
+from ..model.cells import Profile
+from ..model.clay import Clay
 from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
 from ..model.hardware import Hardware

@@ -32,7 +32,7 @@ from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..theory import wall_limits
-from . import boundary, growth, sweep, wall_runs
+from . import boundary, growth, sweep, sweep_store, wall_runs
 from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
@@ -628,7 +628,7 @@ def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: in
         return Cost(left, each * left)
     blank = trials.blank_row()
     rows = [{**blank, **dict(zip(trials.names, v, strict=True))} for v in trials.points(0).tolist()]
-    size = sweep.row_size(trials, rows) * left
+    size = sweep_store.row_size(trials, rows) * left
     return Cost(left, each * left, size, shutil.disk_usage(out).free)
 
 
@@ -667,7 +667,7 @@ def monte_carlo(
             show(len(rows[-1][1]))
         return Instability(trials, *(np.concatenate(x) for x in zip(*rows, strict=True)))
     folder = Path(out)
-    with sweep.claimed(trials, folder) as (_, todo):
+    with sweep_store.claimed(trials, folder) as (_, todo):
         if todo:
             left = sum(len(trials.chunk_runs(n)) for n in todo)
             cost = measure_cost(trials, left, folder, sweep.processes(todo, workers))
@@ -693,12 +693,12 @@ def stored_runs(trials: Trials, out: Path | str) -> Instability:
     Raises:
         ParameterError: it holds none, or others.
     """
-    digest = sweep.stored_digest(Path(out))
+    digest = sweep_store.stored_digest(Path(out))
     if digest is None:
         raise ParameterError("out", str(out), "holds no runs")
     if digest != trials.digest():
         raise ParameterError("out", str(out), "holds the runs of other trials")
-    table = sweep.read_sweep(out)
+    table = sweep_store.read_sweep(out)
     columns = {n: table[n].to_numpy() for n in (*trials.names, "unstable", "longer")}
     points = np.column_stack([columns[n] for n in trials.names])
     return Instability(trials, points, columns["unstable"], columns["longer"])

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..model.clay import Profile, Smooth
+from ..model.cells import Profile
 from ..model.constants import AXES
 from ..model.signals import Multisine
+from ..model.smooth import Smooth
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from .style import (
@@ -142,13 +143,13 @@ def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
         return list(spans[0]), [0.0, 1.0, 0.0]
     if isinstance(law, Profile):
         seen = law.along == axis
-        return list(law.edges) * seen, law.forces(*SHADED).ravel().tolist() * seen
+        return list(law.edges) * seen, law.forces(clay.kinds, *SHADED).ravel().tolist() * seen
     x, first = np.unique(record.p[:, i], return_index=True)
     if isinstance(law, Smooth) and len(x) > SHADES:
         near = np.searchsorted(x, np.linspace(x[0], x[-1], SHADES))
         x, first = x[near], first[near]
     x_met, y_met = record.p[first].T
-    force = law.forces_at(x_met, y_met, *SHADED)
+    force = law.forces_at(clay.kinds, x_met, y_met, *SHADED)
     change = np.flatnonzero(np.diff(force))
     return (0.5 * (x[change] + x[change + 1])).tolist(), force[[*change, -1]].tolist()
 

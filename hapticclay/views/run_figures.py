@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..model.clay import Profile
+from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..simulation.record import Record

@@ -281,7 +281,7 @@ def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
         0 to 1, of the shape of x and y together.
     """
     x, y = np.asarray(x), np.asarray(y)
-    here = [law.forces_at(x, y, *SHADED) for law in clay.laws]
+    here = [law.forces_at(clay.kinds, x, y, *SHADED) for law in clay.laws]
     here += [block.at_speed(SHADED[0]) * block.holds(x, y) for block in clay.blocks]
     return np.maximum.reduce(np.broadcast_arrays(*here)) / (cutting_force(clay) or 1.0)
 
@@ -292,7 +292,7 @@ def cutting_force(clay: Clay) -> float:
     Args:
         clay: of the scene.
     """
-    laws = [float(law.forces(*SHADED).max()) for law in clay.laws]
+    laws = [float(law.forces(clay.kinds, *SHADED).max()) for law in clay.laws]
     return max(*laws, *(block.at_speed(SHADED[0]) for block in clay.blocks))
 
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from ..errors import ParameterError, choice
-from ..studies.sweep import column_told
+from ..studies.sweep_rows import column_told
 from .style import (
     BLACK,
     BLUE,

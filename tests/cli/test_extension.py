@@ -22,7 +22,7 @@ from hapticclay.scene.experiments import (
     parameter_unit,
 )
 from hapticclay.studies.sampling import Sweep, parse_grid
-from hapticclay.studies.sweep import read_sweep
+from hapticclay.studies.sweep_store import read_sweep
 from hapticclay.views import sweep_plots
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from benchmarks import hits, reference
 from hapticclay.errors import ParameterError
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.constants import AXES, ORIGIN, TORQUE_LIMIT
 from hapticclay.simulation import accuracy
 from tests.oracles import bounces

@@ -285,7 +285,8 @@ def test_a_handle_that_slides_along_a_border_goes_on():
 
 
 def test_a_border_into_stiff_clay_on_the_other_axis_is_crossed_once():
-    from hapticclay.model.clay import Clay, Profile
+    from hapticclay.model.cells import Profile
+    from hapticclay.model.clay import Clay
     from hapticclay.model.operator import Operator
     from hapticclay.scene.scenario import Scenario
 

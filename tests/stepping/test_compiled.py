@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay import stepping
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import batch, engines, record
 from hapticclay.simulation.record import Record

@@ -11,7 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine
 from tests.oracles import G0, G1, axis_rates, piecewise_linear

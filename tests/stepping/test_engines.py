@@ -12,7 +12,8 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.model import support
-from hapticclay.model.clay import LAWS, Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import LAWS, Clay
 from hapticclay.model.constants import TS
 from hapticclay.simulation import record
 from hapticclay.stepping.machine_code import kind_of

@@ -10,7 +10,8 @@ import pytest
 
 import hapticclay as hc
 from benchmarks import bench, extremes, reference
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from tests.oracles import piecewise_linear, store
 

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import arm, constants, hardware
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
 from hapticclay.stepping import scene

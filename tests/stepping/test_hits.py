@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from benchmarks import hits, reference
-from hapticclay.model.clay import Clay, Profile, slab
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay, slab
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
 from hapticclay.scene.scenario import Scenario

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import hapticclay as hc
-from hapticclay.model import arm, clay
+from hapticclay.model import arm, damping
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.stepping import driver, kick, path, sampled
 from hapticclay.stepping import run as runs
@@ -98,7 +98,7 @@ def kick_by_laws(run, state, before, after):
     trace = s.arm.l1**2 / s.arm.I1 + s.arm.l2**2 / s.arm.I2
     Wmost = trace / (1.0 + min(th.mass for th in hands) * trace)
     dampers = [th.damper for th in hands]
-    b0x, b1x, b0y, b1y, stiff, *_ = clay.split_damping(b, b, H, L, R, Wmost, *dampers)
+    b0x, b1x, b0y, b1y, stiff, *_ = damping.split_damping(b, b, H, L, R, Wmost, *dampers)
     assert not stiff
     f, d, n, a, feed, rate = [], [], [], [], [], []
     for i in (0, 1):

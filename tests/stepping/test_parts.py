@@ -15,7 +15,8 @@ from scipy import signal
 from scipy.linalg import expm
 
 import hapticclay as hc
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.studies import boundary, growth
 from tests.oracles import parts

@@ -12,7 +12,8 @@ from scipy.integrate import quad
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.stepping import modes, pace
 from hapticclay.stepping.run import Run
 from tests.oracles import store

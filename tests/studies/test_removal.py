@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.model.clay import Clay, Profile
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
 from hapticclay.studies.removal import Removal, Tool, removed
 from hapticclay.views.stage import Stage
 from tests.oracles import store

@@ -23,7 +23,7 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
-from hapticclay.studies import sampling, sweep
+from hapticclay.studies import sampling, sweep, sweep_rows, sweep_store
 from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
 from hapticclay.views import style, sweep_plots
 
@@ -211,7 +211,7 @@ def test_bad_sweeps_are_refused(kw, word):
 def test_rows_say_what_the_runs_said(tmp_path):
     s = Sweep("constant", parse_grid("b=90 gain.y=0.5,1"), {}, chunk=2)
     assert sweep.run_sweep(s, tmp_path, workers=1) == 2
-    rows = sweep.read_sweep(tmp_path).to_pylist()
+    rows = sweep_store.read_sweep(tmp_path).to_pylist()
     assert [r["status"] for r in rows] == ["finished", "diverged"]
     r = hc.simulate(hc.constant_cut())
     assert [rows[0][f"crossing{k}"] for k in (1, 2, 3)] == [c.time for c in r.crossings]
@@ -229,14 +229,14 @@ def test_rows_say_what_the_runs_said(tmp_path):
 def test_clay_that_yields_has_no_linear_gain_margin(margin):
     clay = hc.slab(90.0 if margin else hc.Flow(Fy=0.1, b=90.0))
     r = hc.simulate(replace(hc.constant_cut(), clay=clay, t_max=0.05))
-    row = sweep.result_row(0, [], np.empty(0), r)
+    row = sweep_rows.result_row(0, [], np.empty(0), r)
     assert [math.isfinite(row[f"gain_margin_{axis}"]) for axis in "xy"] == [margin, margin]
 
 
 def test_a_refused_run_is_a_row(tmp_path):
     s = Sweep("constant", parse_grid("b=90 dt=0.001,0.5"), {"t_max": 0.01})
     sweep.run_sweep(s, tmp_path, workers=1)
-    rows = sweep.read_sweep(tmp_path).to_pylist()
+    rows = sweep_store.read_sweep(tmp_path).to_pylist()
     assert [r["status"] for r in rows] == ["time limit", "refused"] and "dt = 0.5" in rows[1][
         "cause"
     ]
@@ -247,18 +247,18 @@ def test_only_what_is_missing_is_done_and_the_result_is_the_same(tmp_path):
     assert sweep.run_sweep(small(), whole, workers=1) == 6
     assert sweep.run_sweep(small(), whole, workers=1) == 0
     sweep.run_sweep(small(), torn, workers=1)
-    sweep.sweep_part(torn, 1).unlink()
+    sweep_store.sweep_part(torn, 1).unlink()
     (torn / "data" / ".part-000001.parquet.abc").write_bytes(b"half a file")
-    assert sweep.missing_parts(small(), torn) == [1]
+    assert sweep_store.missing_parts(small(), torn) == [1]
     assert sweep.run_sweep(small(), torn, workers=1) == 2
-    assert columns(sweep.read_sweep(torn)) == columns(sweep.read_sweep(whole))
+    assert columns(sweep_store.read_sweep(torn)) == columns(sweep_store.read_sweep(whole))
 
 
 def test_two_processes_give_the_same(tmp_path):
     one, two = tmp_path / "1", tmp_path / "2"
     sweep.run_sweep(small(), one, workers=1)
     sweep.run_sweep(small(), two, workers=2)
-    assert columns(sweep.read_sweep(one)) == columns(sweep.read_sweep(two))
+    assert columns(sweep_store.read_sweep(one)) == columns(sweep_store.read_sweep(two))
 
 
 def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
@@ -267,7 +267,7 @@ def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
         sweep.run_sweep(small(seed=1), tmp_path, workers=1)
     (tmp_path / "sweep.json").write_text("{")
     with pytest.raises(ParameterError, match="another sweep"):
-        sweep.begin_sweep(small(), tmp_path)
+        sweep_store.begin_sweep(small(), tmp_path)
 
 
 def test_spec_file(tmp_path):
@@ -332,11 +332,11 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, how, code):
         assert "Traceback" not in told
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
-    sweep.read_sweep(out)  # whatever is there is valid
+    sweep_store.read_sweep(out)  # whatever is there is valid
     again = subprocess.run(
         [*COMMAND, "--out", str(out)], capture_output=True, text=True, check=True
     )
-    table = sweep.read_sweep(out)
+    table = sweep_store.read_sweep(out)
     assert table["run"].to_pylist() == list(range(80)) and "80 runs" in again.stdout
 
 
@@ -365,7 +365,7 @@ def test_maps(tmp_path):
         tmp_path,
         workers=1,
     )
-    table = sweep.read_sweep(tmp_path)
+    table = sweep_store.read_sweep(tmp_path)
     figure = sweep_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
@@ -437,7 +437,7 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
         assert sweep.run_sweep(s, far, scheduler=address, progress=kill) >= 24
         assert killed and workers[0].wait(10) == -9
         sweep.run_sweep(s, here, workers=1)
-        assert columns(sweep.read_sweep(far)) == columns(sweep.read_sweep(here))
+        assert columns(sweep_store.read_sweep(far)) == columns(sweep_store.read_sweep(here))
     finally:
         for p in (*workers, scheduler):
             p.kill()
@@ -474,29 +474,29 @@ def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd):
 
 def test_a_damaged_folder_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="hapticclay sweep has written"):
-        sweep.read_sweep(tmp_path)
+        sweep_store.read_sweep(tmp_path)
     Path(tmp_path / "data").mkdir()
     with pytest.raises(ParameterError):
-        sweep.read_sweep(tmp_path)
+        sweep_store.read_sweep(tmp_path)
 
 
 def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
     import pyarrow.parquet as pq
 
     sweep.run_sweep(small(), tmp_path, workers=1)
-    marked = columns(sweep.read_sweep(tmp_path))
+    marked = columns(sweep_store.read_sweep(tmp_path))
     for n in range(3):
-        file = sweep.sweep_part(tmp_path, n)
-        pq.write_table(sweep._read_part(file).replace_schema_metadata(None), file)
-    assert columns(sweep.read_sweep(tmp_path)) == marked
+        file = sweep_store.sweep_part(tmp_path, n)
+        pq.write_table(sweep_store._read_part(file).replace_schema_metadata(None), file)
+    assert columns(sweep_store.read_sweep(tmp_path)) == marked
 
 
 def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
     """On a made-up clock: the first run compiles for a minute, each further one takes `each`."""
     s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    real = sweep.run_point
+    real = sweep_rows.run_point
     for each, runs in (
-        (0.25, sweep.PROBES + 1),
+        (0.25, sweep_rows.PROBES + 1),
         (0.5, 12),
         (30.0, 2),
     ):  # 11 of 0.5 s are more than 5 s, and one of 30
@@ -507,7 +507,7 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             made.append(args[1])
             return real(*args)
 
-        monkeypatch.setattr(sweep, "run_point", timed)
+        monkeypatch.setattr(sweep_rows, "run_point", timed)
         monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
         assert sweep.estimate_time(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
@@ -552,7 +552,7 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
     ]
     assert [(int(m[1]), int(m[2])) for m in told if m] == [(6 * k, 10 * k) for k in range(1, 11)]
     for n in range(30):
-        sweep.sweep_part(tmp_path, n).unlink()
+        sweep_store.sweep_part(tmp_path, n).unlink()
     ticks = iter(range(0, 10**6, 100))  # seconds, 100 from one look at the clock to the next
     monkeypatch.setattr(sweep_command.time, "monotonic", lambda: next(ticks))
     assert app.main(args) == 0
@@ -602,7 +602,7 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
         tmp_path,
         workers=1,
     )
-    table = sweep.read_sweep(tmp_path)
+    table = sweep_store.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
         assert (
             sweep_plots.missing_reasons(table, value)
@@ -660,7 +660,7 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
         seed=4,
     )
     sweep.run_sweep(s, tmp_path, workers=1)
-    table = sweep.read_sweep(tmp_path)
+    table = sweep_store.read_sweep(tmp_path)
     why = sweep_plots.missing_reasons(table, "fe_over_v_x")
     marks = {
         c.get_label(): len(c.get_offsets())
@@ -676,7 +676,7 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
 def test_every_column_and_parameter_has_its_unit(tmp_path):
     """Units of the docstrings; a ratio names what it is relative to."""
     sweep.run_sweep(small(), tmp_path, workers=1)
-    table = sweep.read_sweep(tmp_path)
+    table = sweep_store.read_sweep(tmp_path)
     units = {
         "end_time": "s",
         "crossing2": "s",
@@ -711,9 +711,9 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
     "seconds,size", [(1e-9, 1024), (0.001, 1024), (0.01, 150), (0.2, 7), (1.5, 1), (40.0, 1)]
 )
 def test_a_chunk_holds_a_second_or_two_of_work(tmp_path, monkeypatch, seconds, size):
-    monkeypatch.setattr(sweep, "run_time", lambda plan: seconds)
+    monkeypatch.setattr(sweep_store, "run_time", lambda plan: seconds)
     plan = Sweep("constant", parse_grid("b=10:1000:60log gain.x=1:2:50"), {"t_max": 0.02})
-    with sweep.claimed(plan, tmp_path) as (begun, todo):
+    with sweep_store.claimed(plan, tmp_path) as (begun, todo):
         assert begun.chunk == size and len(todo) == -(-3000 // size)
     assert json.loads((tmp_path / "sweep.json").read_text())["chunk"] == size
 
@@ -729,19 +729,19 @@ def test_the_time_of_a_run_is_that_with_machine_code_loaded(monkeypatch, each, m
         made.append(index)
         return {"wall_time": each}
 
-    monkeypatch.setattr(sweep, "run_point", timed)
-    monkeypatch.setattr(sweep.time, "perf_counter", lambda: clock[0])
-    assert sweep.run_time(plan) == pytest.approx(each, rel=1e-9)
+    monkeypatch.setattr(sweep_rows, "run_point", timed)
+    monkeypatch.setattr(sweep_rows.time, "perf_counter", lambda: clock[0])
+    assert sweep_rows.run_time(plan) == pytest.approx(each, rel=1e-9)
     assert len(made) <= most  # the measurement costs little: of long runs, one
 
 
 def test_a_resumed_sweep_keeps_its_chunks(tmp_path, monkeypatch):
     free = replace(small(), chunk=None)
     times = iter([0.5, 1e-3])  # of a run: three in a chunk; later the machine seems faster
-    monkeypatch.setattr(sweep, "run_time", lambda plan: next(times))
+    monkeypatch.setattr(sweep_store, "run_time", lambda plan: next(times))
     sweep.run_sweep(free, tmp_path, workers=1)
     assert len(list((tmp_path / "data").iterdir())) == 2
-    sweep.sweep_part(tmp_path, 1).unlink()
+    sweep_store.sweep_part(tmp_path, 1).unlink()
     assert sweep.run_sweep(free, tmp_path, workers=1) == 3 and next(times) == 1e-3
     given = replace(small(), chunk=3)  # the same sweep: nothing is left
     assert sweep.run_sweep(given, tmp_path, workers=1) == 0
@@ -757,14 +757,14 @@ def test_results_are_the_same_bits_whatever_the_chunk(tmp_path, monkeypatch):
     for size in (1, 4, 100, None):
         plan, out = replace(small(), chunk=size), tmp_path / str(size)
         sweep.run_sweep(plan, out, workers=1)
-        found.append(columns(sweep.read_sweep(out)))
+        found.append(columns(sweep_store.read_sweep(out)))
     assert found[1:] == found[:1] * 3
 
 
 def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
     """An interruption waits for one chunk a worker, none that stands ready behind them."""
     plan = Sweep("constant", parse_grid("b=10:1000:20log gain.x=1:2:2"), {"t_max": 0.2}, chunk=2)
-    with sweep.claimed(plan, tmp_path) as (_, todo):
+    with sweep_store.claimed(plan, tmp_path) as (_, todo):
         results = sweep.run_chunks(plan, tmp_path, todo, 2)
         assert next(results) == 2
         with contextlib.suppress(KeyboardInterrupt):
@@ -773,7 +773,7 @@ def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
 
 
 def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):
-    real = sweep.run_point
+    real = sweep_rows.run_point
 
     def struck(plan, index, point):
         if index == 2:  # the first of the second chunk
@@ -784,8 +784,8 @@ def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(sweep, "run_point", struck)
     with pytest.raises(KeyboardInterrupt):
         sweep.run_sweep(small(), tmp_path, workers=1)
-    assert sweep.missing_parts(small(), tmp_path) == [2]
+    assert sweep_store.missing_parts(small(), tmp_path) == [2]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     monkeypatch.undo()
     sweep.run_sweep(small(), tmp_path, workers=1)
-    assert len(sweep.read_sweep(tmp_path)) == len(small())
+    assert len(sweep_store.read_sweep(tmp_path)) == len(small())

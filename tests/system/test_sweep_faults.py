@@ -14,7 +14,7 @@ import pytest
 
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.studies import sweep
+from hapticclay.studies import sweep, sweep_store
 from hapticclay.studies.sampling import Sweep, parse_grid
 
 RUNS = 80
@@ -74,7 +74,7 @@ def whole(tmp_path_factory):
     """What every sweep of `command` must come to."""
     out = tmp_path_factory.mktemp("whole")
     sweep.run_sweep(plan(), out, workers=1)
-    return columns(sweep.read_sweep(out))
+    return columns(sweep_store.read_sweep(out))
 
 
 @pytest.fixture
@@ -104,14 +104,14 @@ def test_a_full_disk_is_one_line_and_the_sweep_goes_on_with_room(small_disk, who
     done = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
     one_line_of_a_full_disk(done, "No space left")
     assert not temporary(out)
-    there = len(sweep.read_sweep(out))  # all that is there is valid
+    there = len(sweep_store.read_sweep(out))  # all that is there is valid
     assert 0 < there < RUNS
     again = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
     one_line_of_a_full_disk(again, "No space left")
-    assert len(sweep.read_sweep(out)) >= there
+    assert len(sweep_store.read_sweep(out)) >= there
     subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
     subprocess.run(command(out, workers=workers), capture_output=True, check=True)
-    assert columns(sweep.read_sweep(out)) == whole
+    assert columns(sweep_store.read_sweep(out)) == whole
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(small_disk):
@@ -137,7 +137,7 @@ def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, wor
     one_line_of_a_full_disk(done, "File too large")
     assert not temporary(tmp_path) and not list((tmp_path / "data").iterdir())
     subprocess.run(command(tmp_path, workers=workers), capture_output=True, check=True)
-    assert columns(sweep.read_sweep(tmp_path)) == whole
+    assert columns(sweep_store.read_sweep(tmp_path)) == whole
 
 
 def alive(process):
@@ -171,7 +171,9 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path, how):
         p.wait()
         assert p.returncode == (-how if how == signal.SIGKILL else 128 + how)
         assert until(lambda: not any(map(alive, children)), 5.0)
-    assert sweep.missing_parts(plan(t_max=2.0), tmp_path)  # none of them had gone on to the end
+    assert sweep_store.missing_parts(
+        plan(t_max=2.0), tmp_path
+    )  # none of them had gone on to the end
 
 
 def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
@@ -181,7 +183,7 @@ def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
         said = [line for line in err.splitlines() if " to go" not in line]
         assert p.returncode == 1 and len(said) == 1 and "worker was killed" in said[0]
     assert sweep.run_sweep(plan(t_max=0.3), tmp_path, workers=1) > 0
-    assert len(sweep.read_sweep(tmp_path)) == RUNS
+    assert len(sweep_store.read_sweep(tmp_path)) == RUNS
 
 
 def truncated(file, out):
@@ -217,25 +219,25 @@ def flipped(file, out):
 
 
 def copied(file, out):
-    shutil.copy(sweep.sweep_part(out, 2), file)
+    shutil.copy(sweep_store.sweep_part(out, 2), file)
 
 
 def foreign(file, out):
     other = out.parent / "other"
     sweep.run_sweep(plan("10:1000:4log"), other, workers=1)
-    shutil.copy(sweep.sweep_part(other, 1), file)
+    shutil.copy(sweep_store.sweep_part(other, 1), file)
 
 
 def short(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep._read_part(file).slice(0, 3), file)
+    pq.write_table(sweep_store._read_part(file).slice(0, 3), file)
 
 
 def columnless(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep._read_part(file).drop_columns(["cause"]), file)
+    pq.write_table(sweep_store._read_part(file).drop_columns(["cause"]), file)
 
 
 @pytest.mark.parametrize(
@@ -255,10 +257,10 @@ def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault
     out = tmp_path / "o"
     sweep.run_sweep(plan(), out, workers=1)
     for n in (1, 7):
-        harm(sweep.sweep_part(out, n), out)
+        harm(sweep_store.sweep_part(out, n), out)
     if harm is not short:
         with pytest.raises(ParameterError, match="part-00000[17].parquet"):
-            sweep.read_sweep(out)
+            sweep_store.read_sweep(out)
     capsys.readouterr()
     assert sweep.run_sweep(plan(), out, workers=1) == 8
     said = capsys.readouterr().err
@@ -266,15 +268,15 @@ def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault
         said
         == f"hapticclay: made again: part-000001.parquet ({fault}), part-000007.parquet ({fault})\n"
     )
-    assert columns(sweep.read_sweep(out)) == whole
+    assert columns(sweep_store.read_sweep(out)) == whole
     assert sweep.run_sweep(plan(), out, workers=1) == 0 and not capsys.readouterr().err
 
 
 def test_many_bad_parts_are_one_short_line(tmp_path, capsys):
     sweep.run_sweep(plan(), tmp_path, workers=1)
     for n in range(12):
-        empty(sweep.sweep_part(tmp_path, n), tmp_path)
-    assert len(sweep.begin_sweep(plan(), tmp_path)) == 12
+        empty(sweep_store.sweep_part(tmp_path, n), tmp_path)
+    assert len(sweep_store.begin_sweep(plan(), tmp_path)) == 12
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and said.count(".parquet") == 5 and "7 more" in said
 
@@ -282,11 +284,11 @@ def test_many_bad_parts_are_one_short_line(tmp_path, capsys):
 def test_a_stray_file_among_the_parts_is_refused_and_kept(tmp_path):
     sweep.run_sweep(plan(), tmp_path, workers=1)
     stray = tmp_path / "data" / "part-000001 (copy).parquet"
-    shutil.copy(sweep.sweep_part(tmp_path, 1), stray)
+    shutil.copy(sweep_store.sweep_part(tmp_path, 1), stray)
     with pytest.raises(ParameterError, match="no part of the sweep"):
         sweep.run_sweep(plan(), tmp_path, workers=1)
     with pytest.raises(ParameterError, match="copy"):
-        sweep.read_sweep(tmp_path)
+        sweep_store.read_sweep(tmp_path)
     assert stray.is_file()
 
 
@@ -302,7 +304,7 @@ def test_a_part_that_may_not_be_read_is_refused_not_removed(tmp_path, monkeypatc
     monkeypatch.setattr(type(tmp_path), "read_bytes", denied)
     with pytest.raises(ParameterError, match="part-000003.*Permission denied"):
         sweep.run_sweep(plan(), tmp_path, workers=1)
-    assert sweep.sweep_part(tmp_path, 3).is_file()
+    assert sweep_store.sweep_part(tmp_path, 3).is_file()
 
 
 @pytest.mark.parametrize("other", ["10:1000:40log", "20:1000:40log"])
@@ -323,14 +325,14 @@ def test_of_two_sweeps_started_at_once_one_wins_and_the_other_is_refused(tmp_pat
     assert said.count("\n") == 1
     assert "another sweep is at work" in said or "holds another sweep" in said
     winner = plan(("10:1000:40log", other)[[end[2] for end in ends].index(0)], t_max=0.3)
-    table = sweep.read_sweep(tmp_path)
+    table = sweep_store.read_sweep(tmp_path)
     assert table["run"].to_pylist() == list(range(RUNS))
     assert table["b"].to_pylist() == winner.points(0, RUNS)[:, 0].tolist()
-    assert sweep.begin_sweep(winner, tmp_path) == []
+    assert sweep_store.begin_sweep(winner, tmp_path) == []
 
 
 def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
-    with sweep.claimed(plan(), tmp_path) as (_, todo):
+    with sweep_store.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
         for again in (plan(), plan("1:2:3")):
             with pytest.raises(
@@ -342,7 +344,7 @@ def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
         assert not list(tmp_path.glob("data/*"))
     with pytest.raises(ParameterError, match="holds another sweep"):
         sweep.run_sweep(plan("1:2:3"), tmp_path)
-    with sweep.claimed(plan(), tmp_path) as (_, todo):
+    with sweep_store.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
 
 
@@ -352,7 +354,7 @@ def test_the_lock_of_a_killed_process_holds_nobody_up(tmp_path):
             sweep.run_sweep(plan(t_max=0.3), tmp_path)
         p.kill()
         p.wait()
-        with sweep.claimed(plan(t_max=0.3), tmp_path) as (_, todo):
+        with sweep_store.claimed(plan(t_max=0.3), tmp_path) as (_, todo):
             assert 0 < len(todo) < 20
 
 

@@ -174,7 +174,7 @@ def test_a_law_says_how_it_is_scaled(name):
     for i in (0, 1):
         assert half.hold(i).force == pytest.approx(0.5 * clay.hold(i).force, rel=1e-12)
     if name != "springs":  # their stiffness stays
-        rest, halved = (c.laws[0].forces(0.3, 0.01) for c in (clay, half))
+        rest, halved = (c.laws[0].forces(c.kinds, 0.3, 0.01) for c in (clay, half))
         np.testing.assert_allclose(halved, 0.5 * rest, rtol=1e-12)
 
 

@@ -1,0 +1,401 @@
+"""Clay law of one axis: damping, growth, yielding and springs, constant in each region or cell."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from ..arguments import named
+from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
+from .constants import AXES, B_MAX
+from .flow import Consistency, FlowIndex, YieldForce
+from .spring import Spring
+from .traits import (
+    Law,
+)
+
+OPTIONAL = ("growth", "Fy", "K", "n")  # of each region or cell, beside values
+
+
+class CellLaw:
+    """What the laws of one axis share: damping that is constant in each cell of a grid.
+
+    They have `borders`, `damping`, `rates` and `along`, as `Grid`.
+    """
+
+    @property
+    def lines(self: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lines along x and along y between cells [m]."""
+        return self.borders
+
+    @property
+    def some(self: Any) -> np.ndarray:
+        """Whether each cell between the lines holds clay, shape (n, m)."""
+        Fy, K, _ = self.flows
+        some = (self.damping > 0.0) | (self.rates > 0.0) | (Fy > 0.0) | (K > 0.0)
+        return some | (self.elastic[..., 0] + self.elastic[..., 2] > 0.0)
+
+    @property
+    def elastic(self: Any) -> np.ndarray:
+        """Springs of the cells, see `Profile.elastic`: none."""
+        return np.broadcast_to(Spring().numbers, (*self.damping.shape, 5))
+
+    @property
+    def yields(self: Any) -> bool:
+        """Whether it has a yield force or a consistency anywhere."""
+        return bool(self.Fy or self.K)
+
+    def at(self: Any, x: Any, y: Any) -> np.ndarray:
+        """Damping at some places, growth aside [N.s/m].
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        return self.damping[self.index(x, y)]
+
+    def flows_at(self: Any, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Yield force [N], consistency [N/(m/s)^n] and flow index at some places.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        cell = self.index(x, y)
+        Fy, K, n = (part[cell] for part in self.flows)
+        return Fy, K, n
+
+    def index(self: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Cells of some places; on a line between them, the one beyond it.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+
+        Returns:
+            Indices along x and along y.
+        """
+        at = zip(self.lines, (x, y), strict=True)
+        i, j = (np.searchsorted(edges, place, side="right") for edges, place in at)
+        return i, j
+
+    def forces(self: Any, kinds: Iterable[Law], speed: float, dent: float) -> np.ndarray:
+        """Force of each cell on a tool, growth aside [N], shape (n, m).
+
+        Args:
+            kinds: laws of the clay.
+            speed: of the tool [m/s].
+            dent: how far the tool has gone into the cell [m].
+        """
+        own = [x.force(self, speed, dent) for x in kinds if x.force]
+        return functools.reduce(np.add, own, np.zeros(self.damping.shape))
+
+    def forces_at(
+        self: Any, kinds: Iterable[Law], x: Any, y: Any, speed: float, dent: float
+    ) -> np.ndarray:
+        """As `forces`, at some places.
+
+        Args:
+            kinds: laws of the clay.
+            x: coordinates [m].
+            y: the same along y.
+            speed: of the tool [m/s].
+            dent: how far the tool has gone into the cell [m].
+        """
+        return self.forces(kinds, speed, dent)[self.index(x, y)]
+
+    def within(self: Any, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
+        """Damping of the cells in a box [N.s/m].
+
+        Args:
+            low: its lowest corner [m].
+            high: its highest corner [m].
+        """
+        (i, j), (k, m) = self.index(*low), self.index(*high)
+        return self.damping[i : k + 1, j : m + 1].ravel().tolist()
+
+
+@named
+@dataclass(frozen=True)
+class Profile(CellLaw):
+    """Damping b of one axis as a piecewise constant function of one coordinate.
+
+    Attributes:
+        edges: borders [m], ascending, shape (n,).
+        values: b in each region [N.s/m], shape (n + 1,), 0 to 1e9; region i lies between edges
+            i - 1 and i.
+        along: coordinate that decides, "x" or "y".
+        growth: rate at which b of each region grows from when the handle first enters it
+            [N.s/m per s], shape (n + 1,), 0 to 1e9; empty for none (Sec. 4.2).
+        Fy: yield force of each region [N], as values, 0 to 1e6; empty for none.
+        K: consistency of each region [N/(m/s)^n], as values, 0 to 1e6; empty for none.
+        n: flow index of each region, as values, 0.05 to 4; empty for 1, and without K.
+        springs: spring of each region, along the axis of the law, as values; empty for none.
+    """
+
+    edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
+    along: Literal["x", "y"] = "x"
+    growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[float, ...], YieldForce] = ()
+    K: Annotated[tuple[float, ...], Consistency] = ()
+    n: Annotated[tuple[float, ...], FlowIndex] = ()
+    springs: tuple[Spring, ...] = ()
+
+    def __post_init__(self):
+        check_fields(self, "clay.")
+        regions = range(len(self.edges) + 1)
+        if self.springs and len(self.springs) != len(regions):
+            bound = f"must be {len(regions)} springs, one a region, got {len(self.springs)}"
+            raise ParameterError("clay.springs", self.springs, bound)
+        if not any(x.k or x.k1 for x in self.springs):
+            object.__setattr__(self, "springs", ())
+        for name in ("values", *OPTIONAL):
+            given = getattr(self, name)
+            if len(given) != len(regions) and (given or name == "values"):
+                numbers_of(f"clay.{name}", given, [str(i) for i in regions])  # tells what is amiss
+        check_ascending("clay.edges", self.edges)
+        _leave_out(self)
+
+    @property
+    def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Borders along x and along y [m]."""
+        return (self.edges, ()) if self.along == "x" else ((), self.edges)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """As `Grid.damping`."""
+        return self._cells(self.values)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """As `Grid.rates`."""
+        return self._cells(self.growth or (0.0,) * len(self.values))
+
+    @property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows`."""
+        Fy, K, n = (
+            self._cells(x or (usual,) * len(self.values))
+            for x, usual in zip(*_flow_of(self), strict=True)
+        )
+        return Fy, K, n
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """`Spring.numbers` of each cell, shape (n, m, 5)."""
+        rows = np.array([x.numbers for x in self.springs or (Spring(),) * len(self.values)])
+        return rows[:, None] if self.along == "x" else rows[None]
+
+    def _cells(self, values: tuple[float, ...]) -> np.ndarray:
+        return np.array([values]).T if self.along == "x" else np.array([values])
+
+
+@named
+@dataclass(frozen=True)
+class Grid(CellLaw):
+    """Damping b of one axis on a grid of cells, constant in each.
+
+    A border between cells alike is none: no step ends on it, and no crossing is reported.
+
+    Attributes:
+        x_edges: borders along x [m], ascending, shape (n,).
+        y_edges: borders along y [m], ascending, shape (m,).
+        values: b in each cell [N.s/m], shape (n + 1, m + 1), 0 to 1e9; cell (i, j) lies between
+            x_edges i - 1 and i and y_edges j - 1 and j; the outer cells have no end.
+        growth: rate at which b of each cell grows from when the handle first enters it
+            [N.s/m per s], as values, 0 to 1e9; empty for none.
+        Fy: yield force of each cell [N], as values, 0 to 1e6; empty for none.
+        K: consistency of each cell [N/(m/s)^n], as values, 0 to 1e6; empty for none.
+        n: flow index of each cell, as values, 0.05 to 4; empty for 1, and without K.
+    """
+
+    x_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    y_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+    growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[tuple[float, ...], ...], YieldForce] = ()
+    K: Annotated[tuple[tuple[float, ...], ...], Consistency] = ()
+    n: Annotated[tuple[tuple[float, ...], ...], FlowIndex] = ()
+
+    def __post_init__(self):
+        check_fields(self, "clay.")
+        check_ascending("clay.x_edges", self.x_edges)
+        check_ascending("clay.y_edges", self.y_edges)
+        shape = len(self.x_edges) + 1, len(self.y_edges) + 1
+        for name in ("values", *OPTIONAL):
+            table = getattr(self, name)
+            got = len(table), len(table[0]) if table else 0
+            if got != shape and (name == "values" or table):
+                bound = f"must have shape {shape}, one more than borders each way, has {got}"
+                raise ParameterError(f"clay.{name}", table, bound)
+        _leave_out(self)
+
+    @property
+    def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Borders along x and along y [m]."""
+        return self.x_edges, self.y_edges
+
+    @functools.cached_property
+    def damping(self) -> np.ndarray:
+        """Damping on entry, a line of cells along y for each along x [N.s/m], shape (n, m)."""
+        return np.array(self.values)
+
+    @functools.cached_property
+    def rates(self) -> np.ndarray:
+        """Rates at which it grows [N.s/m per s], as damping."""
+        return np.array(self.growth) if self.growth else np.zeros(self.damping.shape)
+
+    @functools.cached_property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Yield force [N], consistency [N/(m/s)^n] and flow index, each as damping."""
+        shape = self.damping.shape
+        Fy, K, n = (
+            np.array(x) if x else np.full(shape, usual)
+            for x, usual in zip(*_flow_of(self), strict=True)
+        )
+        return Fy, K, n
+
+    @property
+    def along(self) -> str:
+        """Coordinates that decide, "x", "y" or "xy"."""
+        return "".join(a for a, e in zip(AXES, self.borders, strict=True) if e) or "x"
+
+    @classmethod
+    def of_function(
+        cls,
+        b: Callable[[float, float], float],
+        x_edges: Sequence[float],
+        y_edges: Sequence[float],
+        outside: float = 0.0,
+    ) -> Grid:
+        """A grid with the values of a function at the centres of its cells.
+
+        Args:
+            b: damping at a place (x, y) [m] [N.s/m].
+            x_edges: borders along x [m], two or more; the first and the last are the outline.
+            y_edges: the same along y.
+            outside: b beyond the outline [N.s/m].
+
+        Raises:
+            ParameterError: there are fewer borders than two, or the function has a value that is
+                out of bounds.
+        """
+        names = ("clay.x_edges", x_edges), ("clay.y_edges", y_edges)
+        x, y = (
+            numbers_of(field, edges, [str(i) for i in range(len(edges))], unit="m")
+            for field, edges in names
+        )
+        for field, edges in names:
+            if len(edges) < 2:
+                raise ParameterError(field, edges, "must be two borders or more, an outline")
+        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in (x, y)]
+        inner = [[b(at, across) for across in middles[1]] for at in middles[0]]
+        return cls(x, y, _framed(inner, outside))
+
+    @classmethod
+    def of_image(
+        cls,
+        image: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        b: tuple[float, float],
+        outside: float = 0.0,
+    ) -> Grid:
+        """A grid with a cell for each pixel of an image; see also `gray_image`.
+
+        Args:
+            image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
+                that of the largest y.
+            x: where the image begins and ends along x [m].
+            y: the same along y.
+            b: damping at black and at white [N.s/m].
+            outside: b beyond the image [N.s/m].
+
+        Raises:
+            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
+                of bounds.
+        """
+        (x0, x1), (y0, y1) = outline(x, y)
+        inner = pixels(image, b)
+        columns, rows = inner.shape
+        edges = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+        along_x, along_y = (tuple(e.tolist()) for e in edges)
+        return cls(along_x, along_y, _framed(inner, outside))
+
+
+def _flow_of(law: Profile | Grid) -> tuple[Any, tuple[float, float, float]]:
+    """Fy, K and n of a law as given, and what stands for those left out."""
+    return (law.Fy, law.K, law.n), (0.0, 0.0, 1.0)
+
+
+def _leave_out(law: Profile | Grid) -> None:
+    """Empties what changes nothing, so that laws alike are equal; refuses n without any K."""
+    if not law.K and law.n and np.any(np.array(law.n) != 1.0):
+        raise ParameterError("clay.n", law.n, "must be empty without K")
+    for name in ("growth", "Fy", "K"):
+        given = getattr(law, name)
+        if given and not (any(given) if isinstance(law, Profile) else np.any(given)):
+            object.__setattr__(law, name, ())
+    if not law.K and law.n:
+        object.__setattr__(law, "n", ())
+
+
+def outline(
+    x: tuple[float, float], y: tuple[float, float], prefix: str = ""
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Begin and end along x and along y [m], checked.
+
+    Args:
+        x: begin and end along x.
+        y: the same along y.
+        prefix: of their names in errors.
+
+    Raises:
+        ParameterError: they are no two ascending numbers.
+    """
+    spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
+    for field, span in zip(AXES, spans, strict=True):
+        check_ascending(prefix + field, span)
+    return spans
+
+
+def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
+    """Damping of the pixels of an image [N.s/m], from the lowest x and y on, along x first.
+
+    Args:
+        image: brightness from 0 (black) to 1 (white), shape (rows, columns).
+        b: damping at black and at white [N.s/m].
+
+    Raises:
+        ParameterError: the image is no table of numbers from 0 to 1, or b is out of bounds.
+    """
+    gray = np.array(table_of("image", image, 0.0, 1.0))
+    black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
+    if not gray.size:
+        raise ParameterError("image", image, "must have pixels")
+    return ((1.0 - gray) * black + gray * white)[::-1].T
+
+
+def _framed(inner: Any, outside: float) -> Any:
+    """Values of cells, with those of the outer cells around them."""
+    value = number("outside", outside, 0.0, B_MAX, unit="N.s/m")
+    return np.pad(np.asarray(inner), 1, constant_values=value)
+
+
+def check_ascending(field: str, edges: tuple[float, ...]) -> None:
+    """Refuses borders that do not ascend.
+
+    Args:
+        field: name for the error.
+        edges: the borders [m].
+
+    Raises:
+        ParameterError: they do not.
+    """
+    if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+        raise ParameterError(field, edges, "must be strictly ascending")

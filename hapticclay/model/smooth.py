@@ -1,0 +1,241 @@
+"""Damping that changes smoothly with the place, by a cubic B-spline."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ..arguments import named
+from ..errors import Bound, ParameterError, check_fields, pair
+from .cells import CellLaw, outline, pixels
+from .constants import AXES, B_MAX
+
+
+def smooth_damping(table, at, x, y):
+    """Damping at a place by a cubic B-spline in each coordinate; its tangents are continuous.
+
+    Never below the least of its control points nor above the largest.
+
+    Args:
+        table: from `regions.region_table`; at `at` it holds `Smooth.numbers`.
+        at: where in it.
+        x: place, x [m].
+        y: place, y [m].
+
+    Returns:
+        [N.s/m].
+    """
+    most, rows = table[at + 2], table[at + 5]
+    u = (x - table[at]) * table[at + 1]
+    v = (y - table[at + 3]) * table[at + 4]
+    # beyond, all four control points are alike; NaN is put there too
+    u = 0.0 if not u > 0.0 else most if u > most else u
+    v = 0.0 if not v > 0.0 else rows if v > rows else v
+    i, j = int(u), int(v)
+    u, v = u - i, v - j
+    n = int(rows) + 4
+    a = at + 6 + i * n + j
+    b = a + n
+    c = b + n
+    d = c + n
+    w = 1.0 - v
+    k0, k3 = w * w * w, v * v * v
+    k1 = 4.0 - 6.0 * v * v + 3.0 * k3
+    k2 = 6.0 - k0 - k1 - k3
+    w = 1.0 - u
+    h0, h3 = w * w * w, u * u * u
+    h1 = 4.0 - 6.0 * u * u + 3.0 * h3
+    h2 = 6.0 - h0 - h1 - h3
+    return (
+        h0 * (k0 * table[a] + k1 * table[a + 1] + k2 * table[a + 2] + k3 * table[a + 3])
+        + h1 * (k0 * table[b] + k1 * table[b + 1] + k2 * table[b + 2] + k3 * table[b + 3])
+        + h2 * (k0 * table[c] + k1 * table[c + 1] + k2 * table[c + 2] + k3 * table[c + 3])
+        + h3 * (k0 * table[d] + k1 * table[d + 1] + k2 * table[d + 2] + k3 * table[d + 3])
+    ) / 36.0
+
+
+@named
+@dataclass(frozen=True)
+class Smooth(CellLaw):
+    """Damping b of one axis that changes smoothly with the place, by a cubic B-spline.
+
+    The values are control points at the nodes of an even grid: b is a mean of the sixteen around a
+    place, never below the least of them nor above the largest, twice continuously differentiable,
+    and constant from one spacing beyond the outline on. It has no borders: no step ends in it.
+
+    Attributes:
+        x: first and last node along x [m], ascending.
+        y: first and last node along y [m], ascending.
+        values: control points [N.s/m], shape (n, m), 0 to 1e9; b is the same all along an axis with
+            one node.
+    """
+
+    x: Annotated[tuple[float, float], Bound(unit="m")]
+    y: Annotated[tuple[float, float], Bound(unit="m")]
+    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+
+    def __post_init__(self):
+        check_fields(self, "clay.")
+        outline(self.x, self.y, "clay.")
+        if not self.values or not self.values[0]:
+            raise ParameterError("clay.values", self.values, "must have a node or more each way")
+
+    borders = ((), ())
+    growth = Fy = K = springs = ()
+
+    @functools.cached_property
+    def damping(self) -> np.ndarray:
+        """The control points, a line along y for each along x [N.s/m], shape (n, m)."""
+        return np.array(self.values)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """As `Grid.rates`: zeros."""
+        return np.zeros(self.damping.shape)
+
+    @property
+    def flows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows`: it does not yield."""
+        none = np.zeros(self.damping.shape)
+        return none, none, none + 1.0
+
+    def flows_at(self, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Grid.flows_at`: it does not yield.
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        none = np.zeros(np.broadcast(x, y).shape)
+        return none, none, none + 1.0
+
+    @property
+    def along(self) -> str:
+        """As `Grid.along`."""
+        return "".join(a for a, n in zip(AXES, self.damping.shape, strict=True) if n > 1) or "x"
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """What `smooth_damping` takes.
+
+        Along x, then along y: begin [m], nodes per length [1/m], intervals; control points, with
+        those of the outline beyond it: two lines before the first node, three behind the last.
+        """
+        head = []
+        for (low, high), n in zip((self.x, self.y), self.damping.shape, strict=True):
+            per = (n - 1) / (high - low)
+            head += [low - 1.0 / per if per else low, per, n + 1.0]
+        return np.append(head, np.pad(self.damping, ((2, 3), (2, 3)), mode="edge"))
+
+    @property
+    def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Knots along x and along y [m]: the nodes, and one more at each end."""
+        begin_x, per_x, most_x, begin_y, per_y, most_y = self.numbers[:6].tolist()
+        ways = (begin_x, per_x, most_x), (begin_y, per_y, most_y)
+        x, y = (
+            tuple(low + k / per for k in range(int(most) + 1)) if per else ()
+            for low, per, most in ways
+        )
+        return x, y
+
+    @property
+    def some(self) -> np.ndarray:
+        """Whether there is clay between the knots, shape (n + 3, m + 3), or 1 where n or m is."""
+        near = np.pad(self.damping, 3, mode="edge")
+        n, m = (len(e) + 1 for e in self.lines)
+        windows = np.lib.stride_tricks.sliding_window_view(near, (4, 4))[:n, :m]
+        return windows.max(axis=(2, 3)) > 0.0
+
+    def at(self, x: Any, y: Any) -> np.ndarray:
+        """Damping at some places [N.s/m].
+
+        Args:
+            x: coordinates [m].
+            y: the same along y.
+        """
+        numbers: Any = self.numbers
+        table = memoryview(numbers)
+        return np.vectorize(lambda x, y: smooth_damping(table, 0, x, y), otypes=[float])(x, y)
+
+    def forces_at(self, kinds: Any, x: Any, y: Any, speed: float, dent: float) -> np.ndarray:
+        """As `Grid.forces_at`: it is damping alone.
+
+        Args:
+            kinds: has no effect.
+            x: coordinates [m].
+            y: the same along y.
+            speed: of the tool [m/s].
+            dent: has no effect.
+        """
+        return speed * self.at(x, y)
+
+    def within(self, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
+        """Control points of the damping in a box [N.s/m].
+
+        Args:
+            low: its lowest corner [m].
+            high: its highest corner [m].
+        """
+        (i, j), (k, m) = self.index(*low), self.index(*high)
+        last = np.array(self.damping.shape) - 1
+        first, end = np.clip((i - 3, j - 3), 0, last), np.clip((k, m), 0, last) + 1
+        return self.damping[first[0] : end[0], first[1] : end[1]].ravel().tolist()
+
+    @classmethod
+    def of_function(
+        cls,
+        b: Callable[[float, float], float],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        nodes: tuple[int, int],
+    ) -> Smooth:
+        """Smooth clay whose control points are the values of a function at its nodes.
+
+        Args:
+            b: damping at a place (x, y) [m] [N.s/m].
+            x: first and last node along x [m].
+            y: the same along y.
+            nodes: how many there are along x and along y, one or more.
+
+        Raises:
+            ParameterError: an argument, or a value of the function, is out of bounds.
+        """
+        ends = outline(x, y)
+        count = pair("nodes", nodes, 1.0, 1e6)
+        for name, k in zip(AXES, count, strict=True):
+            if k != int(k):
+                raise ParameterError(f"nodes[{name}]", k, "must be a whole number")
+        at_x, at_y = (np.linspace(*e, int(k)).tolist() for e, k in zip(ends, count, strict=True))
+        return cls(*ends, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
+
+    @classmethod
+    def of_image(
+        cls,
+        image: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        b: tuple[float, float],
+    ) -> Smooth:
+        """Smooth clay with a node at the centre of each pixel of an image; see also `gray_image`.
+
+        Args:
+            image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
+                that of the largest y.
+            x: where the image begins and ends along x [m].
+            y: the same along y.
+            b: damping at black and at white [N.s/m].
+
+        Raises:
+            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
+                of bounds.
+        """
+        spans, values = outline(x, y), pixels(image, b)
+        ends = []
+        for (low, high), n in zip(spans, values.shape, strict=True):
+            half = 0.5 * (high - low) / n if n > 1 else 0.0
+            ends.append((low + half, high - half))
+        return cls(ends[0], ends[1], values)  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,138 @@
+"""The rows of a sweep: a run's parameters, outcome and measurements, and the time that it takes."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..model.constants import AXES
+from ..scene.experiments import parameter_unit
+from ..simulation.record import Record
+from ..simulation.simulate import simulate
+from ..theory import gain_limits
+from .sampling import Sweep
+
+CROSSINGS_KEPT = 3  # crossings that have columns of their own
+CHUNK_TIME = 1.5  # of one process, that a chunk should take [s]: an interruption waits for it
+PROBES = 20  # runs that an estimate is made from ...
+PROBE_TIME = 5.0  # ... or fewer after this time [s]
+NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
+RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
+    "run": ("", "number of the run"),
+    "status": ("", "how it ended; refused if a parameter was out of bounds"),
+    "axis": ("", "the unstable axis, empty for none"),
+    "cause": ("", "what happened, or why it was refused"),
+    "end_time": ("s", "simulated time of the end"),
+    "crossing1": ("s", "when the handle crossed a border, of the first three"),
+    "b_x": ("N.s/m", "damping of the stiffest clay that the handle met"),
+    "fe_over_v_x": ("N.s/m", "force of that clay over the velocity, where the speed is steady"),
+    "speed_x": ("m/s", "steady speed in that clay"),
+    "gain_margin_x": ("factor on K", "gain limit of the linear loop in that clay, over K"),
+    "energy_residual": ("of what went through", "what is left over of the energy balance"),
+    "wall_time": ("s", "run time"),
+}
+
+
+def column_told(name: str) -> tuple[str, str]:
+    """Unit and description of a column of the data set, "" where there is none.
+
+    Args:
+        name: of the column: a result, or a parameter.
+    """
+    like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
+    return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
+
+
+def result_row(
+    index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
+) -> dict[str, Any]:
+    """One row of the data set: parameters, outcome and measurements; NaN for none.
+
+    Args:
+        index: number of the run.
+        names: names of its parameters.
+        point: their values.
+        r: its record; None if it was refused.
+        refused: why it was refused.
+    """
+    nan = math.nan
+    out: dict[str, Any] = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
+    out |= {
+        "status": r.outcome.code if r else "refused",
+        "axis": r.outcome.axis if r else "",
+        "cause": r.outcome.cause if r else refused,
+        "end_time": r.outcome.time if r else nan,
+    }
+    times = [c.time for c in r.crossings] if r else []
+    out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(CROSSINGS_KEPT)}
+    for i, axis in enumerate(AXES):
+        deepest = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None) if r else None
+        entry = deepest[axis] if deepest else {}
+        fe = entry.get("steady_fe_over_v") or {}
+        speed = entry.get("steady_speed")
+        out |= {
+            f"b_{axis}": entry.get("b", nan),
+            f"fe_over_v_{axis}": fe.get("mean", nan),
+            f"speed_{axis}": nan if speed is None else speed,
+        }
+        margin = nan
+        clay = r and r.scenario.clay
+        linear = not clay or clay.viscous
+        if r and linear and r.scenario.gain[i] > 0.0:
+            limit = gain_limits.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
+            margin = limit / r.scenario.gain[i]
+        out[f"gain_margin_{axis}"] = margin
+    through = r.energy.get("throughput", 0.0) if r else 0.0
+    out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
+    out["wall_time"] = r.wall_time if r else nan
+    return out
+
+
+def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
+    """Makes one run of a sweep and returns its row.
+
+    Args:
+        sweep: the sweep.
+        index: number of the run.
+        point: its parameters.
+    """
+    names = list(sweep.vary)
+    try:
+        scenario = sweep.run_scenario(point)
+        return result_row(index, names, point, simulate(scenario))
+    except ParameterError as error:
+        return result_row(index, names, point, None, str(error))
+
+
+def run_time(sweep: Sweep) -> float:
+    """Time [s] that a run takes, from one random run if it is long, from a few if it is short.
+
+    Args:
+        sweep: the sweep.
+    """
+    (first,), _ = probed(sweep, 0.0)  # loads and compiles, before its own time begins
+    if first["wall_time"] > CHUNK_TIME:
+        return first["wall_time"]
+    rows, spent = probed(sweep, CHUNK_TIME / 10)
+    return spent / len(rows)
+
+
+def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
+    """Rows of random runs, and the time that they took [s].
+
+    Args:
+        sweep: whose runs.
+        patience: after which there are fewer than PROBES [s].
+    """
+    rows, spent, begin = [], 0.0, time.perf_counter()
+    for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
+        rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))
+        spent = time.perf_counter() - begin
+        if spent > patience:
+            break
+    return rows, spent
