@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import ParameterError, array_of, field_types, integer, number
-from ..model.clay import Profile
+from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.changes import HAND, with_fields
 from ..scene.fields import bounds_at
