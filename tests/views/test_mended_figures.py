@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.model.shapes import Step
 from hapticclay.studies.chart import Chart, curve
 from hapticclay.studies.identification import identify
 from hapticclay.views.chart_plots import chart_plot
@@ -62,13 +61,10 @@ def test_the_least_mass_of_a_loop_that_has_none_is_told():
 
 
 def test_forces_in_clay_that_resists_along_the_motion_are_drawn_along_it():
-    clay = hc.Clay.uniform if hasattr(hc.Clay, "uniform") else None
-    del clay
     law = hc.Profile((), (20.0,), Fy=(1.0,))
     scene = hc.Scenario(
         clay=hc.Clay(law, law, isotropic=True),
         force=(4.0, 3.0),
-        muscle=Step(0.0, (0.0, 0.0)) if False else None,
         t_max=0.05,
         length=None,
         stop_when_unstable=False,
