@@ -63,7 +63,7 @@ ax.plot(
     b, [hc.theory.gain_limit("y", float(i)) for i in b], "--", color="0.3", lw=1, label="gain limit"
 )
 ax.set(xlabel="damping of the clay b [N·s/m]", ylabel="K of y [1/kg]", ylim=(0.08, 4))
-ax.legend(ncols=3, loc="upper center")
+fig.legend(ncols=3, loc="outside upper center")
 plt.show()
 
 # %%
@@ -85,7 +85,7 @@ fig, ax = plt.subplots()
 ax.loglog(b, 100 / (10 + b), "--", color="0.3", lw=1, label="expected, K f/(10 + K b)")
 ax.loglog(steady.b, 100 * steady.speed_x, "o", ms=4, label="simulated")
 ax.set(xlabel="damping of the clay b [N·s/m]", ylabel="steady speed in x [cm/s]")
-ax.legend()
+fig.legend(ncols=2, loc="outside upper center")
 plt.show()
 
 # %%

@@ -23,5 +23,5 @@ for Ts, dash in ((0.5e-3, "-"), (1e-3, "--"), (2e-3, ":")):  # s
     ax.loglog(frequency, found.most, dash, label=f"stiffest wall, Ts = {1e3 * Ts:g} ms")
 ax.plot(frequency, found.free, color="0.3", label="free device")
 ax.set(xlabel="frequency [Hz]", ylabel="|Z| [N·s/m]")
-ax.legend()
+fig.legend(loc="outside upper center", ncols=2)
 plt.show()

@@ -24,5 +24,5 @@ ax.plot([x.x for x in found.found], [x.y for x in found.found], "o", label="runs
 ax.plot(found.worst[1], found.worst[0], "--", label="all hands of the box")
 ax.plot(B, M, "kD", ms=10, mfc="none", label="B/M = 1/s")
 ax.set(xlabel="virtual damping B [N·s/m]", ylabel="least virtual mass M [kg]")
-ax.legend()
+fig.legend(loc="outside upper center", ncols=2)
 plt.show()

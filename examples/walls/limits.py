@@ -18,7 +18,7 @@ plt.style.use("hapticclay.views.figure")
 
 wall = hc.VirtualWall(B=0.8, device=hc.Device(mass=0.1, damper=1.0), Ts=1e-3)  # N.s/m, kg, s
 box = hc.theory.Box(mass=(0.0, 1.0), damper=(0.0, 5.0), spring=(0.0, 0.0))  # hands at the wall
-delays = np.linspace(0.0, 5e-3, 11)  # s
+delays = np.linspace(0.0, 5e-3, 101)  # s: the passive limit rises between whole samples
 late = [replace(wall, delay=float(x)) for x in delays]
 
 fig, ax = plt.subplots()
@@ -33,9 +33,9 @@ for samples in (0, 1):
     one = replace(wall, delay=samples * wall.Ts)
     ax.plot(1e3 * one.delay, hc.walls.jury_limit(one), "ko", ms=5, label="Jury" if samples else "")
     B, K = hc.walls.hulin_boundary(0.1, 1.0, wall.Ts, samples)
-    ax.plot(1e3 * one.delay, np.interp(wall.B, B[: B.argmax()], K[: B.argmax()]), "k+", ms=14)
-ax.plot([], [], "k+", ms=14, label="Hulin's boundary")
+    known = np.interp(wall.B, B[: B.argmax()], K[: B.argmax()])
+    ax.plot(1e3 * one.delay, known, "k+", ms=14, label="Hulin's boundary" if samples else "")
 print("stable at 1 kN/m without delay:", hc.walls.stable_wall(replace(wall, K=1e3)))
 ax.set(xlabel="delay [ms]", ylabel="largest K [N/m]", ylim=(50.0, None))
-ax.legend()
+fig.legend(loc="outside upper center", ncols=2)
 plt.show()

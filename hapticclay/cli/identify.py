@@ -24,7 +24,7 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
 }
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
 SIMULATED_ONLY = ("noise", "map", "quick", "seed", "control")
-MEASURED_ONLY = ("what", "columns", "band", "held")
+MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class IdentifyCommand:
             drives the experiment, for a position or force that is noisy or part of a loop.
         band: Lowest and highest frequency to fit [Hz].
         held: Say that a computer holds the input of the file from sample to sample.
+        paper: Set the equation of the paper beside the file, in table and figure.
         figures: Formats and style of the figures.
     """
 
@@ -65,6 +66,7 @@ class IdentifyCommand:
     columns: tuple[str, ...] = ()
     band: tuple[float, float] | None = None
     held: bool = False
+    paper: bool = False
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -103,7 +105,7 @@ class IdentifyCommand:
         try:
             self._save([result], None)
         finally:  # a full disk must not hide the result
-            print(coefficient_table([result]))
+            print(coefficient_table([result], self.paper))
         print(f"written to {self.out}")
         return 0
 
@@ -145,10 +147,11 @@ class IdentifyCommand:
             "map": found and found.summary(),
         }
         console.save_json(data, self.out / "identify.json")
+        beside = self.paper or not self.csv
         figures = {
             block.figure: Figure(
-                partial(identification_plots.identification_plot, same),
-                partial(response_tables, same),
+                partial(identification_plots.identification_plot, same, beside),
+                partial(response_tables, same, beside),
             )
             for what, block in identification_plots.BLOCKS.items()
             if (same := [r for r in results if r.what == what])
@@ -184,11 +187,12 @@ def column_names(
     return out
 
 
-def coefficient_table(results: Sequence[Identified]) -> str:
-    """Printed and fitted coefficients, for a terminal.
+def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
+    """Fitted coefficients, and the printed ones beside them, for a terminal.
 
     Args:
         results: from `identify`.
+        paper: whether the printed ones are beside them.
     """
     rows = [
         [
@@ -204,9 +208,12 @@ def coefficient_table(results: Sequence[Identified]) -> str:
         for c in r.coefficients
     ]
     head = ["", "axis", "coefficient", "printed", "fitted", "95 % interval", "error"]
+    if not paper:
+        kept = [i for i, name in enumerate(head) if name not in ("printed", "error")]
+        rows, head = [[row[i] for i in kept] for row in rows], [head[i] for i in kept]
     low = min(float(r.coherence.min()) for r in results)
     counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
-    table = console.text_table(rows, head, "lllrrrr")
+    table = console.text_table(rows, head, "lllrrrr"[: len(head)])
     way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
     return f"{table}\nlines: {counts}; lowest coherence {low:.6f}{way}"
 

@@ -1,54 +1,112 @@
-"""`hapticclay reproduce`: the whole paper beside ours."""
+"""`hapticclay reproduce`: the whole paper beside ours, or a classic of haptics."""
 
 from __future__ import annotations
 
+import functools
+import textwrap
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
 
 from ..files import atomic, writable
-from .console import FigureOptions, progress_bar, save_figures
+from .console import FigureOptions, progress_bar, save_figures, text_table
+
+if TYPE_CHECKING:
+    from ..paper.claims import Row
+
+WIDE = 60  # characters of a claim in a row of the terminal
+QUIET_FIGURES = FigureOptions(format=("svg",))
 
 
 @dataclass(frozen=True)
 class ReproduceCommand:
     """Reproduce the paper: every figure and number beside ours, on one page.
 
-    The exit status is 1 if a number that should agree does not.
+    A word behind the command names a classic of haptics instead: colgate1997, hannaford2002,
+    abbott2005, diolaiti2006, hulin2006 or chawda2015. The exit status is 1 if a number that should
+    agree does not.
 
     Attributes:
+        source: The classic; none for the paper of 2002.
         out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
-        quick: Leave out the map of Sh over the workspace.
-        page: Also write the table of numbers alone, as Markdown, to this file.
+        quick: Leave out the map of Sh over the workspace; of a classic, make fewer runs.
+        page: Also write the table of numbers alone, as Markdown, to this file; of a classic with
+            its figures beside it.
         figures: Formats and style of figures/; the report itself has SVG for a screen.
     """
 
-    out: Path = Path("out/paper")
+    source: Annotated[str | None, tyro.conf.Positional] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/paper, or out/CLASSIC)")
+    ] = None
     quick: bool = False
     page: Path | None = None
-    figures: FigureOptions = FigureOptions(format=("svg",))
+    figures: FigureOptions = QUIET_FIGURES
 
     def __call__(self) -> int:
-        writable(self.out)
+        from ..paper.classics import classic
+
+        source = classic(self.source) if self.source is not None else None
+        out = self.out or Path("out") / (self.source or "paper")
+        writable(out)
         from ..paper import report
 
+        def save(figures: dict[str, Any], folder: Path) -> None:
+            save_figures(figures, folder, self.figures)
+            if self.page and self.source:
+                named = {f"{self.source}_{name}": x for name, x in figures.items()}
+                save_figures(named, self.page.parent)
+
+        make: Callable[..., Any] = report.reproduce
+        if source is not None:
+            make = functools.partial(report.reproduce_classic, source)
         with progress_bar(total=0, bar_format="{elapsed} {desc}") as bar:
-            rows = report.reproduce(
-                self.out,
-                self.quick,
-                bar.set_description_str,
-                lambda figures, folder: save_figures(figures, folder, self.figures),
-            )
+            found = make(out, self.quick, bar.set_description_str, save)
+        rows = found if source is None else found.rows
         if self.page:
+            text = report.classic_page(found, source) if source else report.paper_page(rows)
             with atomic(self.page) as f:
-                f.write(report.paper_page(rows).encode())
+                f.write(text.encode())
+        return self._tell(rows, out)
+
+    def _tell(self, rows: Sequence[Row], out: Path) -> int:
+        """Prints what does not agree, of a classic every claim; returns the exit status."""
+        from ..paper.report import format_error, format_number
+
+        if self.source is not None:
+            print(claims_table(rows))
         wrong = [r for r in rows if r.agrees is False]
         for r in wrong:
-            ours = f"{report.format_number(r.ours, r.unit)}, {report.format_error(r)}"
+            ours = f"{format_number(r.ours, r.unit)}, {format_error(r)}"
             print(f"does not agree: {r.what} ({r.where}): {ours}")
         agree = sum(r.agrees is True for r in rows)
         print(
             f"{agree} of {agree + len(wrong)} numbers agree; "
             f"{len(rows) - agree - len(wrong)} more are explained"
         )
-        print(f"report: {(self.out / 'report.html').resolve()}")
+        print(f"report: {(out / 'report.html').resolve()}")
         return 1 if wrong else 0
+
+
+def claims_table(rows: Sequence[Row]) -> str:
+    """The claims of a classic, for a terminal.
+
+    Args:
+        rows: of its table.
+    """
+    from ..paper.report import format_error, format_number, format_verdict
+
+    cells = [
+        [
+            textwrap.fill(r.what, WIDE),
+            format_number(r.expected, r.unit),
+            format_number(r.ours, r.unit),
+            format_error(r),
+            format_verdict(r),
+        ]
+        for r in rows
+    ]
+    return text_table(cells, ["claim", "expected", "ours", "error", "agrees"], "lrrrl")

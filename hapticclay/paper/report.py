@@ -7,7 +7,7 @@ import functools
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,21 @@ from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
 from ..studies import workspace
+from ..studies.chart import Chart
+from ..views.chart_plots import chart_plot
 from ..views.figure import Figure
 from . import claims
 from .claims import STATUSES, Row, Runs
+from .classics.classic import CLASSIC_STATUSES, Classic, Found
 
 LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"
+THE_PAPER = {
+    "heading": "The paper, reproduced",
+    "citation": "M.-G. Her, K.-S. Hsu, T.-S. Lan, M. Karkoub, Haptic Direct-Drive Robot Control "
+    "Scheme in Virtual Reality, Journal of Intelligent and Robotic Systems 35 (2002) 247-264",
+    "notes": (),
+}
 WIDE = 7.0  # [inch] wider figures have panels side by side, and take both columns of the page
 
 
@@ -288,6 +297,18 @@ def paper_page(rows: list[Row]) -> str:
     return template_environment().get_template("paper.md").render(rows=rows, statuses=STATUSES)
 
 
+def classic_page(found: Found, source: Classic) -> str:
+    """Renders the claims of a classic as a Markdown page (docs/classics/).
+
+    Args:
+        found: its rows and charts.
+        source: the classic.
+    """
+    words = {"source": source, "rows": found.rows, "charts": found.charts}
+    template = template_environment().get_template("classic.md")
+    return template.render(words, statuses=CLASSIC_STATUSES)
+
+
 def reproduce(
     out: Path,
     quick: bool = False,
@@ -309,30 +330,83 @@ def reproduce(
     """
     runs = runs or Runs(progress)
     rows = claims.ledger_rows(runs)
-    pictures = []
+    drawn = []
     for p in PICTURES:
         if quick and not p.quick:
             continue
         if progress:
             progress(p.title)
-        figure = Figure(functools.partial(p.draw, runs))
-        svg = figure.svg()
-        with atomic(out / "figures" / f"{p.name}.svg") as f:
-            f.write(svg.encode())
-        if save is not None:
-            save({p.name: figure}, out / "figures")
-        width = re.search(r'width="([\d.]+)pt"', svg)
-        assert width
-        wide = float(width[1]) / 72.0 > WIDE
-        code = base64.b64encode(svg.encode()).decode()
-        pictures.append({"picture": p, "data": code, "wide": wide})
-    found = {"rows": rows, "statuses": STATUSES, "pictures": pictures, "versions": versions()}
+        drawn.append(_drawn(p, Figure(functools.partial(p.draw, runs)), out, save))
+    _write(out, rows, STATUSES, drawn, THE_PAPER)
+    return rows
+
+
+def reproduce_classic(
+    source: Classic,
+    out: Path,
+    quick: bool = False,
+    progress: Callable[[str], None] | None = None,
+    save: Callable[[dict[str, Figure], Path], object] | None = None,
+) -> Found:
+    """Writes report.html (self-contained), report.md, ledger.json and figures/ of a classic.
+
+    Args:
+        source: the classic.
+        out: folder.
+        quick: whether to make fewer runs.
+        progress: called with the title of each step before it begins.
+        save: as in `reproduce`.
+    """
+    found = source.make(quick, progress or (lambda title: None))
+    drawn = []
+    for chart in found.charts:
+        figure = Figure(functools.partial(chart_plot, chart), chart.tables)
+        drawn.append(_drawn(chart, figure, out, save))
+    about = {
+        "heading": source.title,
+        "citation": source.citation,
+        "notes": (source.read, source.method),
+    }
+    _write(out, found.rows, CLASSIC_STATUSES, drawn, about)
+    return found
+
+
+def _drawn(
+    picture: Picture | Chart,
+    figure: Figure,
+    out: Path,
+    save: Callable[[dict[str, Figure], Path], object] | None,
+) -> dict[str, Any]:
+    """Writes a figure of a report; returns what the templates need of it."""
+    svg = figure.svg()
+    with atomic(out / "figures" / f"{picture.name}.svg") as f:
+        f.write(svg.encode())
+    if save is not None:
+        save({picture.name: figure}, out / "figures")
+    width = re.search(r'width="([\d.]+)pt"', svg)
+    assert width
+    return {
+        "picture": picture,
+        "paper": getattr(picture, "paper", ""),
+        "data": base64.b64encode(svg.encode()).decode(),
+        "wide": float(width[1]) / 72.0 > WIDE,
+    }
+
+
+def _write(
+    out: Path,
+    rows: Sequence[Row],
+    statuses: dict[str, str],
+    pictures: list[dict[str, Any]],
+    about: dict[str, Any],
+) -> None:
+    """Writes the report as HTML and Markdown, and the ledger as data."""
+    found = {"rows": rows, "statuses": statuses, "pictures": pictures, "versions": versions()}
     env = template_environment()
     for name in ("report.html", "report.md"):
         with atomic(out / name) as f:
-            f.write(env.get_template(name).render(found).encode())
+            f.write(env.get_template(name).render(found | about).encode())
     table = [{**asdict(r), "error": r.error, "agrees": r.agrees} for r in rows]
     ledger = {"schema": LEDGER_SCHEMA, "versions": versions(), "rows": table}
     with atomic(out / "ledger.json") as f:
         f.write((json.dumps(ledger, indent=1) + "\n").encode())
-    return rows

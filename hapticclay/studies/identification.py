@@ -46,6 +46,7 @@ IDENTIFICATION_BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)} 
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
 AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; Th has none
 MULTISINE_LINES = 40
+COHERENT = 0.5  # least coherence of a line that counts as seen
 # Relative difference of the loop from the fitted form at AMPLITUDE, by runs without noise; SHAPED
 # for Sh where it holds at every pose.
 SETTLING = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}
@@ -214,21 +215,25 @@ class Identified(Result):
         }
 
 
-def response_tables(results: Sequence[Identified]) -> dict[str, dict[str, Any]]:
+def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
     """Returns what a figure of one block shows: the response on each axis, and its equations.
 
     Args:
         results: of one block, on one axis or both.
+        paper: whether the printed equation is one of them.
     """
     unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
         table: dict[str, Any] = {"frequency [Hz]": r.frequency}
-        for name, H in (
-            ("measured", r.response),
-            ("printed", response(r.what, printed_form(r.what, r.axis), r.frequency)),
-            ("fitted", response(r.what, r.values, r.frequency)),
-        ):
+        curves = {
+            "measured": r.response,
+            "printed": response(r.what, printed_form(r.what, r.axis), r.frequency),
+            "fitted": response(r.what, r.values, r.frequency),
+        }
+        if not paper:
+            del curves["printed"]
+        for name, H in curves.items():
             table |= {f"{name}, real [{unit}]": H.real, f"{name}, imaginary [{unit}]": H.imag}
         table |= {f"deviation [{unit}]": r.deviation, "coherence": r.coherence}
         out[r.axis] = table

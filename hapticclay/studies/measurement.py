@@ -23,6 +23,7 @@ from .identification import (
     BLOCK_KINDS,
     COEFFICIENT_NAMES,
     COEFFICIENT_UNITS,
+    COHERENT,
     CONFIDENCE,
     IDENTIFICATION_BAND,
     LINE_FLOOR,
@@ -48,7 +49,6 @@ EXCITED = 1e-6  # least power of a line, as a share of the strongest in the band
 PERIODIC = 3e-5  # largest share of a periodic input's power in the band between its lines
 REPEATED = 0.95  # least autocorrelation at a period
 TRANSIENT_TERMS = 4  # two of a second-order block's start and end, two of sampling
-COHERENT = 0.5  # least coherence of a line that counts as seen
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 

@@ -25,6 +25,7 @@ from .style import (
 DOTS_SHOWN = 6000  # of a panel
 BINS = 24  # of speeds, in which residuals are averaged
 LEAST_IN_BIN = 5
+LEAST_RESIDUAL = 1e-3  # share of the largest force that a panel of residuals shows at least
 LAGS = 60  # of the autocorrelation
 DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 
@@ -65,10 +66,11 @@ def fit_plot(fitted: Fitted) -> Figure:
         chosen = next(c for c in fitted.candidates if c.law == fitted.law)
         told = f"{fitted.law} law" if not fitted.law.endswith("law") else fitted.law
         set_title(law, told, f"Akaike weight {chosen.weight:.2f}")
-        _residual_panel(speed, v, left, "velocity [m/s]")
+        least = LEAST_RESIDUAL * float(np.max(np.abs(f), initial=1e-6))
+        _residual_panel(speed, v, left, "velocity [m/s]", least)
         _binned(speed, fitted)
         speed.legend(loc="upper right", fontsize=points(8))
-        _residual_panel(time, t, left, "time [s]")
+        _residual_panel(time, t, left, "time [s]", least)
         _autocorrelation(lag, fitted)
         figure.align_ylabels([speed, time, lag])
     return figure
@@ -111,10 +113,10 @@ def _typeset(text: str) -> str:
     return text
 
 
-def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str) -> None:
+def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str, least: float) -> None:
     ax.plot(x, left, "o", ms=stroke(1.6), **DOTS)
     ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
-    top = 1.05 * float(np.max(np.abs(left), initial=1e-12))
+    top = 1.05 * float(np.max(np.abs(left), initial=least))
     ax.set(xlabel=label, ylabel="residual [N]", ylim=(-top, 1.5 * top))  # room for the legend
 
 

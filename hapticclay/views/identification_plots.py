@@ -12,6 +12,7 @@ from matplotlib.ticker import MultipleLocator, NullFormatter
 
 from ..model.constants import AXES
 from ..studies.identification import (
+    COHERENT,
     Identified,
     format_coefficient,
     printed_form,
@@ -60,11 +61,14 @@ BLOCKS = {
 HEIGHTS = (2.2, 2.0, 0.8)  # of magnitude, phase and coherence
 
 
-def identification_plot(results: Sequence[Identified]) -> Figure:
-    """Plots magnitude, phase and coherence of one block with its printed equation.
+def identification_plot(results: Sequence[Identified], paper: bool | None = None) -> Figure:
+    """Plots magnitude, phase and coherence of one block.
+
+    The response is left out where its coherence is below 0.5.
 
     Args:
         results: of one block, on one axis or both; a column each.
+        paper: whether to draw the printed equation; None for the simulated arm alone.
     """
     rows, columns = panel_grid(len(results))
     with figure_style():
@@ -77,7 +81,7 @@ def identification_plot(results: Sequence[Identified]) -> Figure:
                 ax.sharey(row[0])
                 ax.tick_params(labelleft=rows > 1)
         for column, result in zip(axes.T, results, strict=True):
-            _response_column(column, result)
+            _response_column(column, result, paper)
         labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
         named = axes if rows > 1 else axes[:, :1]
         for row, label in zip(named, labels, strict=True):
@@ -99,14 +103,17 @@ def identified_plot(result: Identified) -> Figure:
     return identification_plot([result])
 
 
-def _response_column(axes: Sequence[Axes], result: Identified) -> None:
+def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | None) -> None:
     magnitude, phase, coherence = axes
     what, f = result.what, result.frequency
     fine = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
     known, fitted = (
         response(what, x, fine) for x in (printed_form(what, result.axis), result.values)
     )
-    share = result.deviation / np.abs(result.response)
+    seen = result.coherence >= COHERENT
+    measured = result.response[seen]
+    share = result.deviation[seen] / np.abs(measured)
+    beside = result.scenario is not None if paper is None else paper
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
     marks: Any = dict(
         fmt="o",
@@ -119,11 +126,12 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     )
     label = f"{'simulated arm' if result.scenario else 'measured'}, with 95 % bars"
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
-        ax.plot(fine, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
+        if beside:
+            ax.plot(fine, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
         ax.plot(
             fine, part(fitted), color=BLACK, ls=":", lw=stroke(1.2), label="fitted to the points"
         )
-        ax.errorbar(f, part(result.response), e, label=label, **marks)
+        ax.errorbar(f[seen], part(measured), e, label=label, **marks)
     coherence.plot(f, result.coherence, "o", ms=stroke(3.0), color=BLUE)
     coherence.set_xscale("log")
     coherence.set_xlabel("frequency [Hz]")
@@ -132,7 +140,8 @@ def _response_column(axes: Sequence[Axes], result: Identified) -> None:
     phase.yaxis.set_major_locator(MultipleLocator(45.0))
     block = BLOCKS[what]
     equation = block.equations[AXES.index(result.axis)]
-    set_title(magnitude, f"{block.symbol}, {result.axis} axis ({equation})")
+    after = f" ({equation})" if beside else ""
+    set_title(magnitude, f"{block.symbol}, {result.axis} axis{after}", panel=True)
     text = "\n".join(
         unit_text(f"{c.name} {format_coefficient(c)} {c.unit}") for c in result.coefficients
     )

@@ -188,6 +188,7 @@ def least_mass_plot(found: ArmMBK) -> Figure:
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.0))
         ax = figure.add_subplot()
+        absent = []
         for (M, B), color, style, name in (
             (found.worst, VERMILION, "--", every),
             (found.nominal, BLUE, "-", f"{hand_name(loop.operator)}, exact"),
@@ -195,6 +196,8 @@ def least_mass_plot(found: ArmMBK) -> Figure:
             there = np.isfinite(M) & (M > 0.0)
             if np.any(there):
                 ax.plot(B[there], M[there], color=color, ls=style, label=name)
+            else:
+                absent.append(f"{name.partition(',')[0]}: every mass is stable")
         if found.found:
             x, y = [r.x for r in found.found], [r.y for r in found.found]
             ax.plot(x, y, label="border by runs", **_dots(BLUE))
@@ -202,6 +205,8 @@ def least_mass_plot(found: ArmMBK) -> Figure:
         ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
         for side in (ax.xaxis, ax.yaxis):
             plain_ticks(side)
+        for text in absent:  # in the legend, without a mark
+            ax.plot([], [], ls="none", label=text)
         add_legend(figure, ax, 3 if not narrow() else 1)
         how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
         set_title(ax, f"arm, {loop.axis} axis", how, "stable above and to the right")

@@ -21,6 +21,7 @@ from .style import (
     GREEN,
     VERMILION,
     add_legend,
+    along_motion,
     figure_size,
     figure_style,
     set_title,
@@ -106,7 +107,8 @@ def _compensator_damper(scenario: Scenario, i: int) -> float:
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
     """Plots the operator's force during a maneuver, a panel for each run (Fig. 11).
 
-    In clay also the force of the clay, and the time for which clay that yields held the handle.
+    In clay also the force of the clay, and the time for which clay that yields held the handle. In
+    clay that resists along the motion the forces are those along it.
 
     Args:
         records: the runs.
@@ -119,27 +121,37 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
         panels = figure.subplots(len(records), 1, sharex=over == "time", squeeze=False)[:, 0]
         for ax, r in zip(panels, records, strict=True):
             where = r.t if over == "time" else 100.0 * r.p[:, i]
+            clay = r.scenario.clay
+            turned = clay is not None and clay.isotropic
+            part = functools.partial(_along, r, i, turned)
             hand = BLUE
-            if r.scenario.clay is not None:
+            if clay is not None:
                 hand = GREEN
-                ax.plot(where, r.fe[:, i], color=BLUE, lw=stroke(0.9), label="clay, f$_e$")
+                ax.plot(where, part(r.fe), color=BLUE, lw=stroke(0.9), label="clay, f$_e$")
             if r.stops:
                 if over == "time":
                     shade_held(ax, held_spans(r, axis))
                 else:
-                    mark_held(ax, r, i, r.fe[:, i])
-            ax.plot(where, r.fh[:, i], color=hand, lw=stroke(0.9), label="operator, f$_h$")
+                    mark_held(ax, r, i, part(r.fe))
+            ax.plot(where, part(r.fh), color=hand, lw=stroke(0.9), label="operator, f$_h$")
             if r.scenario.muscle is not None:
                 muscle = r.scenario.muscle
                 pieces = np.array_split(r.t, len(r.t) // 4096 + 1)  # it takes (n, lines) of memory
-                uh = r.scenario.force[i] + np.concatenate([muscle(t)[:, i] for t in pieces])
-                ax.plot(where, uh, color=VERMILION, lw=stroke(1.1), ls="--", label="muscle, u$_h$")
-            ax.set_ylabel(f"force along {axis} [N]")
-            set_title(ax, *scenario_parts(r.scenario), r.outcome.code)
+                uh = np.array(r.scenario.force) + np.concatenate([muscle(t) for t in pieces])
+                ax.plot(
+                    where, part(uh), color=VERMILION, lw=stroke(1.1), ls="--", label="muscle, u$_h$"
+                )
+            ax.set_ylabel("force along the motion [N]" if turned else f"force along {axis} [N]")
+            set_title(ax, *scenario_parts(r.scenario), r.outcome.code, panel=len(records) > 1)
             if over != "time" or ax is panels[-1]:
                 ax.set_xlabel("time [s]" if over == "time" else f"position {axis} [cm]")
         add_legend(figure, panels[0])
     return figure
+
+
+def _along(record: Record, i: int, turned: bool, force: np.ndarray) -> np.ndarray:
+    """The part of a force along the motion where the clay resists so, else along an axis [N]."""
+    return along_motion(record.v, force, i)[1] if turned else force[:, i]
 
 
 def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:

@@ -319,17 +319,22 @@ def figure_style(**more: Any) -> Any:
     return matplotlib.rc_context(parameters)
 
 
-def set_title(ax: Axes, *parts: str, **more: Any) -> None:
+def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
     """Puts a title over the axes, in as many lines as keep it within the figure.
+
+    In print only titles that tell panels apart are drawn: the rest stands in the caption.
 
     Args:
         ax: the axes.
         parts: phrases, joined by commas; lines break between them, and between words only where a
             phrase alone is too long.
+        panel: whether it tells this panel from others of the figure.
         more: further arguments of `Axes.set_title`.
     """
     from matplotlib.textpath import TextPath
 
+    if _STYLE.get() != "screen" and not panel:
+        return
     figure, size = ax.figure, points(TITLE_SIZE)
     room = 72.0 * (figure.get_figwidth() - stroke(TITLE_MARGIN))  # type: ignore[union-attr]
 

@@ -147,7 +147,7 @@ def sweep_plot(
                 scale("log")
         ax.set(xlabel=_column_label(x), ylabel=_column_label(y))
         ax.grid(False)
-        set_title(ax, value.replace("_", " "), f"{len(z)} runs")
+        set_title(ax, value.replace("_", " "), f"{len(z)} runs", panel=True)
     return figure
 
 

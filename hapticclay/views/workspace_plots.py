@@ -54,7 +54,7 @@ def workspace_plot(drift: Drift) -> Figure:
                     _mobility_contours(ax, i, top)
                 _workspace_frame(ax)
                 title = ("without inertia shaping", "with inertia shaping")[k]
-                set_title(ax, f"gain of S$_{AXES[i]}$, {title}")
+                set_title(ax, f"gain of S$_{AXES[i]}$, {title}", panel=True)
             bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
             bar.set_label("gain [1/kg] (line: printed)")
             bar.ax.axhline(printed_form("S", AXES[i])[0], color=VERMILION, lw=stroke(2.0))

@@ -1,0 +1,60 @@
+"""Figures of charts: theory as lines, runs as marks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from ..studies.chart import Chart
+from .style import (
+    BLACK,
+    CURVE_STYLES,
+    WHITE,
+    add_legend,
+    figure_size,
+    figure_style,
+    plain_ticks,
+    stroke,
+    unit_text,
+)
+
+MARKS = "osD^vPX"
+
+
+def chart_plot(chart: Chart) -> Figure:
+    """Plots a chart.
+
+    Curves of a kind "line" take the colours of the style in turn; marks take that of the line
+    before them, as runs beside their theory, and are black without one.
+
+    Args:
+        chart: what to plot.
+    """
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 4.4))
+        ax = figure.add_subplot()
+        color, lines, marks = BLACK, 0, 0
+        for c in chart.curves:
+            look: Any = {}
+            if c.kind == "marks":
+                look = dict(ls="none", marker=MARKS[marks % len(MARKS)], mfc=WHITE, zorder=4)
+                look |= dict(ms=stroke(6.5), mew=stroke(1.4), clip_on=False)
+                marks += 1
+            elif c.kind == "dashed" and not c.name:
+                look = dict(ls="--", lw=stroke(1.0))
+            else:
+                color = CURVE_STYLES[lines % len(CURVE_STYLES)][0]
+                look = dict(ls="--" if c.kind == "dashed" else "-")
+                look |= dict(drawstyle="steps-post") if c.kind == "steps" else {}
+                lines += 1
+            ax.plot(c.x, c.y, color=color, label=unit_text(c.name) or "_", **look)
+        for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+            if name in chart.log:
+                getattr(ax, f"set_{name}scale")("log")
+                plain_ticks(axis)
+        if "y" not in chart.log and all((c.y >= 0.0).all() for c in chart.curves):
+            ax.set_ylim(bottom=0.0)
+        ax.set(xlabel=unit_text(chart.x), ylabel=unit_text(chart.y))
+        add_legend(figure, ax, 3)
+    return figure
