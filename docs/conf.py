@@ -54,7 +54,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["gallery/**/*.ipynb", "**/sg_execution_times.rst"]
+exclude_patterns = ["templates", "gallery/**/*.ipynb", "**/sg_execution_times.rst"]
 highlight_language = "none"  # indented blocks are equations and commands
 default_role = "py:obj"  # `name` in a docstring links to the name, where there is one
 myst_heading_anchors = 4
@@ -73,6 +73,18 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 pygments_dark_style = "monokai"
+templates_path = ["templates"]
+html_context = {"versions": [x.split("=", 1) for x in os.environ.get("DOCS_VERSIONS", "").split()]}
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html",
+        "sidebar/search.html",
+        "sidebar/scroll-start.html",
+        "sidebar/navigation.html",
+        "sidebar/versions.html",
+        "sidebar/scroll-end.html",
+    ]
+}
 
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True  # the fields of a part in one list
@@ -85,7 +97,9 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
-SECTIONS = "tutorials runs records clay parts hardware theory walls studies robustness".split()
+SECTIONS = (
+    "tutorials symptoms runs records clay parts hardware theory walls studies robustness".split()
+)
 SOURCES = [*DOCS.parent.glob("examples/*/*.py")]
 FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
 sphinx_gallery_conf = {
