@@ -62,7 +62,8 @@ suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
-    ("py:class", r"hapticclay\.scene\.fields\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.scene\.\w+\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service"),  # of no public name
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
 ]
 linkcheck_timeout = 20
