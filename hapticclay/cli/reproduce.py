@@ -11,7 +11,7 @@ from .console import FigureOptions, progress_bar, save_figures
 
 @dataclass(frozen=True)
 class ReproduceCommand:
-    """Reproduce the paper: every figure and number beside ours, on one page.
+    """Reproduce the paper: every printed figure and number beside the simulated one, on one page.
 
     The exit status is 1 if a number that should agree does not.
 
@@ -19,7 +19,7 @@ class ReproduceCommand:
         out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
         quick: Leave out the map of Sh over the workspace.
         page: Also write the table of numbers alone, as Markdown, to this file.
-        figures: Formats and style of figures/; the report itself has SVG for a screen.
+        figures: Formats and style of figures/; the report itself has SVG figures for a screen.
     """
 
     out: Path = Path("out/paper")

@@ -56,7 +56,7 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
     "fe_over_v_x": ("N.s/m", "force of that clay over the velocity, where the speed is steady"),
     "speed_x": ("m/s", "steady speed in that clay"),
     "gain_margin_x": ("factor on K", "gain limit of the linear loop in that clay, over K"),
-    "energy_residual": ("of what went through", "what is left over of the energy balance"),
+    "energy_residual": ("share of the energy put through", "residual of the energy balance"),
     "wall_time": ("s", "run time"),
 }
 
@@ -308,7 +308,9 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
             f.write(f"{text}\n".encode())
     numbers = {sweep_part(out, n): n for n in range(sweep.chunks)}
     for stray in set(_part_files(out)) - set(numbers):
-        raise ParameterError("part", stray.name, f"is no part of the sweep in {out}: move it away")
+        raise ParameterError(
+            "part", stray.name, f"does not belong to the sweep in {out}: move it away"
+        )
     wanted = parquet_schema(sweep, 0)
     bad = {f: fault for f in _part_files(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
     if bad:
