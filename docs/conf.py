@@ -166,6 +166,27 @@ def list_others(app, docname: str, source: list[str]) -> None:
         source[0] = source[0].replace("(others)", "\n".join(others))
 
 
+@functools.cache
+def terms() -> dict[str, list[str]]:
+    """Pages, and the terms of readers of which they are the first page: docs/terms.txt."""
+    lines = (line.partition(": ") for line in (DOCS / "terms.txt").read_text().splitlines())
+    return {name: told.split("; ") for name, _, told in lines}
+
+
+def index_terms(app, docname: str, source: list[str]) -> None:
+    """Puts the terms of a page into the index, which the search looks up first.
+
+    Args:
+        app: the application.
+        docname: name of the page.
+        source: its text, changed in place.
+    """
+    if docname in terms():
+        title, _, rest = source[0].partition("\n")
+        entries = "\n".join(f"single: ! {term}" for term in terms()[docname])
+        source[0] = f"{title}\n\n```{{index}}\n{entries}\n```\n{rest}"
+
+
 def toctrees(page: Path) -> str:
     """The toctrees of a page.
 
@@ -307,6 +328,7 @@ def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
 
 def setup(app):
     app.connect("source-read", list_others)
+    app.connect("source-read", index_terms)
     app.connect("autodoc-before-process-signature", plain_types)
     app.connect("autodoc-process-signature", plain_defaults)
     app.connect("autodoc-process-docstring", plain_text, priority=400)

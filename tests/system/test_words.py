@@ -18,24 +18,44 @@ WRITTEN = {name: text for name, text in PAGES.items() if name not in ("changelog
 WRITTEN["README"] = (ROOT / "README.md").read_text()
 
 
-def ranked(phrase):
-    """Pages that hold every word of a phrase, best first.
+TERMS = {
+    name: told.split("; ")
+    for name, _, told in (x.partition(": ") for x in (DOCS / "terms.txt").read_text().splitlines())
+}
 
-    The rule is that of the site's own search (Sphinx, searchtools.js): a heading at least half of
-    which is the phrase counts 15 by that share; a word counts 15 in the title and 5 in the text.
-    Pages alike are in the order of how often they name the phrase.
+
+def ranked(phrase):
+    """Pages that a phrase finds, best first.
+
+    The rule is that of the site's own search (Sphinx, searchtools.js): an entry of the index at
+    least half of which is the phrase counts 100 by that share, a heading 15; a page that has every
+    word counts 15 for one in its title and 5 for one in its text.
     """
     phrase, found = phrase.lower(), []
     words = re.findall(r"\w+", phrase)
     for name, text in PAGES.items():
         text = text.lower()
         headings = re.findall(r"^#+ (.*)$", text, re.M)
+        scores = [0]
+        for most, given in ((100, [x.lower() for x in TERMS.get(name, ())]), (15, headings)):
+            named = (x for x in given if phrase in x and len(phrase) >= 0.5 * len(x))
+            scores += [round(most * len(phrase) / len(x)) for x in named]
         if headings and all(word in text for word in words):
-            named = [x for x in headings if phrase in x and len(phrase) >= 0.5 * len(x)]
-            title = max((round(15 * len(phrase) / len(x)) for x in named), default=0)
-            score = title + sum(15 if word in headings[0] else 5 for word in words)
-            found.append((score, text.count(phrase), name))
-    return [name for *_, name in sorted(found, reverse=True)]
+            scores += [15 if word in headings[0] else 5 for word in words]
+        found.append((max(scores), name))
+    return [name for score, name in sorted(found, reverse=True) if score]
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_a_page_has_the_words_of_its_terms(name):
+    for term in TERMS[name]:
+        for word in re.findall(r"\w+", term.lower()):
+            assert word.removesuffix("s") in PAGES[name].lower(), (name, term)
+
+
+def test_a_term_has_one_first_page():
+    every = [term for told in TERMS.values() for term in told]
+    assert len(set(every)) == len(every)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +69,14 @@ def ranked(phrase):
         ("stable in theory", "theory_and_practice"),
         ("velocity filter", "velocity_filter"),
         ("device from data", "identify_device"),
-        ("without a device", "device"),
+        ("test without a device", "device"),
+        ("latency", "fast_enough"),
+        ("virtual coupling", "hardware"),
+        ("unilateral constraint", "springs"),
+        ("event detection", "step"),
+        ("impedance control", "impedance"),
+        ("human-in-the-loop", "view"),
+        ("Z-width", "zwidth"),
     ],
 )
 def test_a_search_finds_its_page_first(phrase, page):
