@@ -39,6 +39,20 @@ PARTS: dict[str, Any] = {
     "parts": parts,
     "scaling": scaling,
 }
+LIMITATIONS = (
+    "Run times are those of one machine, named below, with other programs on it: compare numbers "
+    "within a table, not with those of another machine. Compilation is left out of all run times "
+    "but that of the first call.",
+    "All jobs are the planar arm of the paper in clay. Another arm, contact geometry or a larger "
+    "model was not measured.",
+    "The programs for the other packages are ours, written from the same equations "
+    "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
+    "Settings are a ladder of steps or tolerances. The best setting between two of them may be "
+    "faster than the table says.",
+    "Errors are those against a reference of limited accuracy, stated with each section. An error "
+    "close to that accuracy is an upper bound.",
+    "The real-time behaviour of an operating system, a bus or a device is not part of any number.",
+)
 BEGIN, END = "<!-- recommend: benchmarks/bench.py --readme -->", "<!-- end -->"
 
 
@@ -57,14 +71,15 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     if {"work_precision", "hits"} <= set(data):
         text += [
             "## Which step to take",
-            "hapticclay's fastest setting that keeps an asked error in the times of the border "
-            "crossings, in every cut "
-            "of the next section and in every clay and job of the section on hits.",
+            "hapticclay's fastest setting whose border-crossing times stay within the requested "
+            "error, in every cut of the next section and in every clay and job of the section on "
+            "hits.",
             recommended(data),
         ]
     for name, found in data.items():
         text += PARTS[name].sections(found)
     omissions = [x for found in data.values() for x in found.get("omissions", ())]
+    text += ["## Limitations", "\n".join(f"- {x}" for x in LIMITATIONS)]
     text += ["## Left out", "\n".join(f"- {x}" for x in omissions) or "Nothing.", "## Machine"]
     made: dict[tuple[str, ...], list[str]] = {}
     for name, found in data.items():

@@ -437,20 +437,16 @@ def sections(data: dict[str, Any]) -> list[str]:
     agreed = sum(r["agree"] for r in rows)
     return [
         "## Stiff and extreme",
-        f"{agreed} of {len(rows)} verdicts are those of the reference: the arm in joint space "
-        "under DOP853, or LSODA "
-        "where stiff (1e-10), borders found in both directions, Filippov's sliding motion where a "
-        "border holds the "
-        "handle, torques clipped; sampled scenes as the hybrid system. Its verdict is its own: the "
-        "poles of the loop "
-        "linearised along the way (sigma, the largest real part of an oscillating one), speeds and "
-        "torques of the last "
-        "second. Where hapticclay stops an unstable run as diverged, the reference may say "
-        "unstable or limit cycle: it "
-        "goes on into the torque limits. Position error and peak of kinetic energy (over the "
-        "reference's) are of the "
-        "scenes that are stable; the energy residual is that of the run's own balance over what "
-        "went through it.",
+        f"{agreed} of {len(rows)} verdicts agree with the reference: the arm in joint space, "
+        "solved by DOP853, or by LSODA if stiff (1e-10), with border events in both directions, "
+        "Filippov's sliding motion where a border holds the handle, and clipped torques; sampled "
+        "scenes as the hybrid system. The reference has its own verdict: the poles of the loop "
+        "linearised along the path (sigma, the largest real part of an oscillating one), and the "
+        "speeds and torques of the last second. Where hapticclay ends an unstable run as "
+        "diverged, the reference may say unstable or limit cycle, because it continues into the "
+        "torque limits. Position error and peak of kinetic energy (over that of the reference) "
+        "are for stable scenes. The energy residual is that of the run's energy balance over the "
+        "energy put through.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]
 

@@ -160,9 +160,9 @@ def page(found: list[dict[str, Any]]) -> str:
     return (
         "\n\n".join(
             [
-                "# Laws picked and intervals of `fit`",
-                f"Share of {n} trials in which the right law is picked of five, and in which "
-                "the 95 % interval holds the true parameter; half the median interval and the "
+                "# Laws chosen and intervals of `fit`",
+                f"Share of {n} trials in which the right law of five is chosen, and in which "
+                "the 95 % interval contains the true parameter; half the median interval and the "
                 f"mean error as shares of it. {DURATION:g} s at {RATE:g} Hz, within "
                 f"{1e3 * REACH:g} mm, two rests. By chance alone, two thirds of the shares "
                 f"covered are within {math.sqrt(0.95 * 0.05 / n):.3f} of 0.95; their mean is "

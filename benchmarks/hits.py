@@ -227,17 +227,13 @@ def sections(data: dict[str, Any]) -> list[str]:
     ]
     return [
         "## Hits",
-        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a hit "
-        "at 0.3 m/s and its "
-        "rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, b/10, b), and grazing "
-        "contact at about "
-        "1 cm/s. Largest error, over all clays, of the times at which a border is passed (faster "
-        "than "
-        f"{SLOW:g} m/s), of the position at the end, and relative error of the force on the hand "
-        f"{FELT:g} s after "
-        "the hit. The reference is the matrix exponential. Refused: the explicit method would take "
-        "more than 1000 "
-        "steps a sample.",
+        f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a "
+        "hit at 0.3 m/s and its rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, "
+        "b/10, b), and grazing contact at about 1 cm/s. Largest error over all clays of the "
+        f"border-crossing times (faster than {SLOW:g} m/s), and of the final position, and "
+        f"relative error of the force on the hand {FELT:g} s after the hit. The reference is the "
+        "matrix exponential. Refused: the explicit method would need more than 1000 steps per "
+        "sample.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]
 

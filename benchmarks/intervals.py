@@ -109,10 +109,9 @@ def page(found: list[dict[str, Any]]) -> str:
         "\n\n".join(
             [
                 "# Coverage of the intervals of `identify`",
-                f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval holds "
-                "the printed value, and half the "
-                "median interval as a share of it. By chance alone, two thirds of the shares are "
-                "within "
+                f"Share of {n} seeds whose {100 * identification.CONFIDENCE:g} % interval "
+                "contains the printed value, and half the median interval as a share of it. By "
+                "chance alone, two thirds of the shares are within "
                 f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. Made by `benchmarks/intervals.py`; do "
                 "not edit.",
                 tabulate(

@@ -94,13 +94,14 @@ def page(rows: list[dict[str, Any]], steps: tuple[float, ...] = STEPS) -> str:
     return (
         "\n\n".join(
             [
-                "# Limit cycles in clay that yields",
-                "The y axis, no hand, shaping, motors without limits: a push beyond the threshold "
-                "in clay of one law everywhere. Predicted is the describing function's; the "
-                "columns behind it say how far from it the exact cycle (matrix exponentials) and "
-                f"a run at {1e3 * steps[0]:g} ms lie, and how far the run lies from the exact "
-                "cycle. Made by `benchmarks/limit_cycles.py`; do not edit.",
-                f"Where the prediction is to be trusted, runs are within {100.0 * worst[0]:.2g} % "
+                "# Limit cycles: prediction against runs",
+                "The y axis, no hand, inertia shaping, motors without limits: a push above the "
+                "threshold in clay of one law everywhere. The prediction is that of the "
+                "describing function. The next columns are the deviation from it of the exact "
+                f"cycle (matrix exponentials) and of a run at {1e3 * steps[0]:g} ms, and the "
+                "deviation of the run from the exact cycle. Made by "
+                "`benchmarks/limit_cycles.py`; do not edit.",
+                f"Where the prediction is trusted, runs are within {100.0 * worst[0]:.2g} % "
                 f"of its amplitude and {100.0 * worst[1]:.2g} % of its frequency.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",

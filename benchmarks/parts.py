@@ -163,7 +163,7 @@ def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
     out = [
         "## What each part costs",
-        "A scene holds what it needs and no more: a part that is off costs nothing.",
+        "A part that a scene lacks costs nothing.",
     ]
     for name, title in TITLES.items():
         if name not in data:

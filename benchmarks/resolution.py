@@ -109,14 +109,12 @@ def page(rows: list[dict[str, Any]]) -> str:
         "\n\n".join(
             [
                 "# Force over velocity against resolution",
-                f"The constant cut at {FORCE:g} N, shaped, sampled and held every {1e3 * TS:g} ms: "
-                "fe as the motors hold "
-                f"it over the true velocity, from {100 * WITHIN[0]:g} to {100 * WITHIN[1]:g} cm, "
-                "against b. Velocity is "
-                "the difference of encoder angles over the window; one count there is, at the "
-                "handle, the share in the "
-                "fifth column of the speed. The mean error is that of mean fe over mean v. "
-                "Made by `benchmarks/resolution.py`; do not edit.",
+                f"The constant cut at {FORCE:g} N, with inertia shaping, sampled and held every "
+                f"{1e3 * TS:g} ms: fe as the motors hold it over the true velocity, from "
+                f"{100 * WITHIN[0]:g} to {100 * WITHIN[1]:g} cm, against b. Velocity is the "
+                "difference of encoder angles over the window; the fifth column is the velocity "
+                "of one count over the window as a share of the speed. The mean error is that of "
+                "mean fe over mean v. Made by `benchmarks/resolution.py`; do not edit.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
                 "\n".join(f"- {x}" for x in common.machine()),

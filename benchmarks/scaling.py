@@ -146,12 +146,10 @@ def sections(data: dict[str, Any]) -> list[str]:
         f"{data['cores']} cores of this machine: measured, medians of ratios.",
         table(data["rows"]),
         "![scaling of a sweep](scaling.png)",
-        "Beyond these cores nothing was measured. Chunks do not talk to each other, so what bounds "
-        "many machines is "
-        f"the scheduler, {1e3 * data['task_s']:.2f} ms a task here beside busy workers, and the "
-        "shared folder, "
-        f"{1e-3 * data['chunk_bytes']:.0f} kB a chunk. With chunks of {data['asked_s']:.0f} s that "
-        "gives, at best:",
+        "More cores were not measured. Chunks do not communicate, so many machines are limited "
+        f"by the scheduler, {1e3 * data['task_s']:.2f} ms per task here with busy workers, and by "
+        f"the shared folder, {1e-3 * data['chunk_bytes']:.0f} kB per chunk. With chunks of "
+        f"{data['asked_s']:.0f} s that gives, at best:",
         table(data["projection"]),
     ]
 

@@ -88,14 +88,11 @@ def sections(data: dict[str, Any]) -> list[str]:
     return [
         "## Stiff clay",
         f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. "
-        "Position error after "
-        f"{T:g} s and peak of v² over that of the exact motion (1 is right), against the arm under "
-        "Radau. Broken: an "
-        "error above 1 mm, ten times the energy, or not a number. Rebound: error of the time at "
-        "which a handle that "
-        "has hit the clay at 0.2 m/s leaves it; force: relative error of the clay's force after "
-        "the hit; both against "
-        "the matrix exponential.",
+        f"Position error after {T:g} s, and peak of v² over that of the exact motion (1 is "
+        "exact), against the arm solved by Radau. Broken: an error above 1 mm, ten times the "
+        "energy, or not a number. Rebound: error of the time at which a handle that hit the clay "
+        "at 0.2 m/s leaves it; force: relative error of the clay's force after the hit; both "
+        "against the matrix exponential.",
         tabulate(cells, head, tablefmt="github", disable_numparse=True),
     ]
 

@@ -335,18 +335,17 @@ def stability_map() -> dict[str, float]:
 
 
 TITLES = {
-    "first_call": "The first native call of a process, import of numba included, in processor "
+    "first_call": "The first native call of a process, with the import of numba, in processor "
     "seconds.",
-    "rows": "The closed loop, every sample recorded, against the floor: a bare loop of "
-    "`mj_step` in C over the same "
-    "model, in turns; medians. Ratios hold on a noisy machine, microseconds do not.",
-    "batch": "Batches over the floor on all cores, with which their threads take turns: time, and "
+    "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` "
+    "in C with the same model, measured alternately; medians. On a busy machine the ratios are "
+    "reliable, the microseconds are not.",
+    "batch": "Batches over the floor on all cores, measured alternately: time on the clock, and "
     "processor time.",
-    "linearity": "Time a run, from a small batch to a large one, over the floor in the same way; "
-    "the most memory the "
-    "process has taken so far.",
-    "short": "Short runs from a generator, summaries alone, on all cores: seconds, those of as "
-    "many steps of the bare engine on all cores, and those that making the scenarios takes.",
+    "linearity": "Time per run, from a small batch to a large one, over the floor in the same way; "
+    "peak memory of the process so far.",
+    "short": "Short runs from a generator, summaries only, on all cores: seconds; seconds of as "
+    "many steps of the bare engine on all cores; seconds for making the scenarios.",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 

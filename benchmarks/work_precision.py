@@ -209,7 +209,7 @@ def who_leads(found: list[dict[str, Any]]) -> str:
         + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s")
         for s in spans
     ]
-    return "Fastest, by asked error: " + "; ".join(told) + "."
+    return "Fastest, by requested error:  " + "; ".join(told) + "."
 
 
 def table_of_leaders(found: list[dict[str, Any]]) -> str:
@@ -223,10 +223,10 @@ def table_of_leaders(found: list[dict[str, Any]]) -> str:
         for x in found
     ]
     head = [
-        "asked error [s]",
+        "requested error [s]",
         "fastest",
         "fastest of another package",
-        "takes so many times as long",
+        "run time over that of the fastest",
     ]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
@@ -320,31 +320,27 @@ def sections(data: dict[str, Any]) -> list[str]:
         "## Error against run time",
         "Every package steps the same closed loop: the nonlinear arm, servo, compensator and clay "
         "on both axes, to the "
-        "end of the path. Errors are against the arm in joint space under DOP853 at 1e-12, borders "
-        "as events. "
+        "end of the path. Errors are those against the arm in joint space, solved by DOP853 "
+        "at 1e-12 with borders as events. "
         "The setting is a step [s], or a relative tolerance for adaptive methods.",
         "### Recommended settings",
-        "The fastest setting that keeps the asked error in the crossing times on each of the three "
-        "cuts.",
+        "The fastest setting whose border-crossing times stay within the requested error on each "
+        "of the three cuts.",
         table_of_settings(recommend(rows)),
         "With a MuJoCo model in the loop:",
         table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
-        "### Who is ahead",
+        "### Fastest package",
         who_leads(leaders(rows)),
         table_of_leaders(leaders(rows)),
-        "Points of each package that hapticclay, in continuous time, beats or equals in error and "
-        "run time together, "
-        "with one setting.",
+        "Settings of each package for which one setting of hapticclay (continuous time) is at "
+        "least as good in both error and run time.",
         tabulate(dominance(rows), headers="keys", tablefmt="github"),
         "### Sampled control",
-        "hapticclay's rows `sampled` are another system, the hardware's: measured and held every "
-        "Ts, here Ts = dt. "
-        "What the diagrams show of them is the delay of the hold, half a sample, and borders "
-        "noticed up to a sample "
-        "late, both of first order in Ts: a property of the hardware and not of the numbers. How "
-        "well that system is "
-        "computed is seen against the hybrid system, exact between samples (default cut, largest "
-        "position error up to "
+        "hapticclay's rows `sampled` belong to another system, that of the hardware: measured "
+        "and held every Ts, here Ts = dt. In the diagrams they show the delay of the hold, half "
+        "a sample, and borders noticed up to a sample late, both first-order in Ts. This is a "
+        "property of the hardware, not a numerical error. The numerical error is that against "
+        "the hybrid system, exact between samples (default cut, largest position error up to "
         f"{HYBRID_END:g} s):",
         table_of_hybrid(data["hybrid"]),
     ]
@@ -430,7 +426,14 @@ def table_of_settings(found: list[dict[str, Any]]) -> str:
         ]
         for x in found
     ]
-    head = ["asked error [s]", "package", "method", "setting", "error [s]", "time per simulated s"]
+    head = [
+        "requested error [s]",
+        "package",
+        "method",
+        "setting",
+        "error [s]",
+        "time per simulated s",
+    ]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
 

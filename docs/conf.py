@@ -54,7 +54,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["gallery/**/*.ipynb", "**/sg_execution_times.rst"]
+exclude_patterns = ["templates", "gallery/**/*.ipynb", "**/sg_execution_times.rst"]
 highlight_language = "none"  # indented blocks are equations and commands
 default_role = "py:obj"  # `name` in a docstring links to the name, where there is one
 myst_heading_anchors = 4
@@ -62,7 +62,8 @@ suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
-    ("py:class", r"hapticclay\.scene\.fields\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.scene\.\w+\.T|mujoco\._structs\.MjModel"),
+    ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service"),  # of no public name
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
 ]
 linkcheck_timeout = 20
@@ -73,6 +74,18 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 pygments_dark_style = "monokai"
+templates_path = ["templates"]
+html_context = {"versions": [x.split("=", 1) for x in os.environ.get("DOCS_VERSIONS", "").split()]}
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html",
+        "sidebar/search.html",
+        "sidebar/scroll-start.html",
+        "sidebar/navigation.html",
+        "sidebar/versions.html",
+        "sidebar/scroll-end.html",
+    ]
+}
 
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True  # the fields of a part in one list
@@ -85,7 +98,9 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
-SECTIONS = "tutorials runs records clay parts hardware theory walls studies robustness".split()
+SECTIONS = (
+    "tutorials symptoms runs records clay parts hardware theory walls studies robustness".split()
+)
 SOURCES = [*DOCS.parent.glob("examples/*/*.py")]
 FIRST = ["first_cut.py", "force_over_velocity.py"]  # of their sections; the others by name
 sphinx_gallery_conf = {
@@ -149,6 +164,27 @@ def list_others(app, docname: str, source: list[str]) -> None:
         }
         others = sorted(page.stem for page in DOCS.glob("*.md") if page.stem not in listed)
         source[0] = source[0].replace("(others)", "\n".join(others))
+
+
+@functools.cache
+def terms() -> dict[str, list[str]]:
+    """Pages, and the terms of readers of which they are the first page: docs/terms.txt."""
+    lines = (line.partition(": ") for line in (DOCS / "terms.txt").read_text().splitlines())
+    return {name: told.split("; ") for name, _, told in lines}
+
+
+def index_terms(app, docname: str, source: list[str]) -> None:
+    """Puts the terms of a page into the index, which the search looks up first.
+
+    Args:
+        app: the application.
+        docname: name of the page.
+        source: its text, changed in place.
+    """
+    if docname in terms():
+        title, _, rest = source[0].partition("\n")
+        entries = "\n".join(f"single: ! {term}" for term in terms()[docname])
+        source[0] = f"{title}\n\n```{{index}}\n{entries}\n```\n{rest}"
 
 
 def toctrees(page: Path) -> str:
@@ -292,6 +328,7 @@ def gallery_uses() -> tuple[dict[str, set[str]], collections.Counter]:
 
 def setup(app):
     app.connect("source-read", list_others)
+    app.connect("source-read", index_terms)
     app.connect("autodoc-before-process-signature", plain_types)
     app.connect("autodoc-process-signature", plain_defaults)
     app.connect("autodoc-process-docstring", plain_text, priority=400)

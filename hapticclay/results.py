@@ -85,7 +85,7 @@ class Result:
         return pkgutil.resolve_name(self.drawn_by)(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes all of it, to the last bit, whole or not at all.
+        """Writes the result with all bits, whole or not at all.
 
         Args:
             path: the file, .json.
@@ -171,7 +171,7 @@ def plain(value: Any) -> Any:
         return {"tuple": [plain(x) for x in value]}
     if callable(value) and (name := function_name(value)):
         return name
-    raise ParameterError("value", value, "must be data, to be written to a file")
+    raise ParameterError("value", value, "must be data that can be written to a file")
 
 
 def _array(value: np.ndarray) -> dict[str, Any]:
@@ -213,7 +213,7 @@ def _made(name: str, fields: Mapping[str, Any]) -> Any:
     module, _, kind = name.partition(":")
     found = getattr(importlib.import_module(module), kind) if _is_own(module) else None
     if found is None or not _is_part(found):
-        raise ValueError(f"{one_line(name)} is no part of this package")
+        raise ValueError(f"{one_line(name)} is not a part of this package")
     return found(**fields)
 
 

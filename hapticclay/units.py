@@ -83,7 +83,7 @@ def from_unit(text: str, unit: str) -> float | None:
     told = f"must be a number{f' in {unit}' if unit else ' without a unit'}"
     own, other = parse_unit(unit), parse_unit(given)
     if other is None:
-        raise ValueError(f"{told}; {given!r} is no unit known here")
+        raise ValueError(f"{told}; unknown unit {given!r}")
     if own is None or not unit or own[1] != other[1]:
         raise ValueError(f"{told}, not in {given}")
     try:

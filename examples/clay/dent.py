@@ -2,8 +2,8 @@
 A wall that dents
 =================
 
-A wall pushes back with k times its indentation, gives way for good at its limit, and is left with
-a dent. The area of the loop is the work that it took.
+A wall pushes back with k times its indentation, yields at its limit and keeps a dent. The area of
+the loop is the work that it absorbed.
 """
 
 import matplotlib.pyplot as plt

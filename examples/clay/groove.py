@@ -2,8 +2,8 @@
 A groove that stays
 ===================
 
-A tool takes clay out of a block. A second cut along the groove meets nothing, and one half a width
-beside it meets half the force.
+A tool removes clay from a block. A second cut along the groove meets nothing, and a cut half a
+width beside it meets half the force.
 """
 
 import matplotlib.pyplot as plt

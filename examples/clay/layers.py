@@ -1,9 +1,9 @@
 """
-Layers
-======
+Clay in layers
+==============
 
-A profile gives the clay by layers. The speed in each of them settles at K f/(10 + K b), and a step
-ends on every border.
+``hc.Profile`` describes clay by layers. In each layer the speed settles at K f/(10 + K b), and a
+step ends on every border.
 """
 
 import matplotlib.pyplot as plt

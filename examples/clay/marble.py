@@ -2,8 +2,8 @@
 Marble clay from a function
 ===========================
 
-``Grid.of_function`` asks a function for b at the centre of each cell. Here soft and hard veins run
-across the way of the tool, which is pushed along x and drifts along y.
+``Grid.of_function`` evaluates b(x, y) at the centre of each cell. Here soft and hard veins cross
+the path of the tool, which is pushed along x and drifts along y.
 """
 
 import math

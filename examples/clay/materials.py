@@ -2,8 +2,8 @@
 Materials by name
 =================
 
-``hc.materials.material`` turns the published strength of a clay into the force of a tool in it, and
-``Material.range`` tells how far that number may be off.
+``hc.materials.material`` converts the published strength of a clay into the force on a tool, and
+``Material.range`` gives the uncertainty of that force.
 """
 
 import matplotlib.pyplot as plt

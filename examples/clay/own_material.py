@@ -1,6 +1,6 @@
 """
-A material of your own
-======================
+Your own material
+=================
 
 The strength of a clay, from a vane test in kPa, becomes the yield force of a tool. The force scales
 with the cross-section of the cut and with a bearing factor that depends on its shape.

@@ -1,9 +1,9 @@
 """
-Clay at an angle
-================
+Clay with rotated axes
+======================
 
-Wood resists less along its grain than across it. ``Clay(x, y, angle=...)`` damps along axes of its
-own, so a straight push goes astray: in steady motion (diag(10/K) + B) v = uh.
+Wood resists less along its grain than across it. ``Clay(x, y, angle=...)`` damps along rotated
+axes, so a straight push moves the handle sideways too: in steady motion (diag(10/K) + B) v = uh.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Encoder and filter
 ==================
 
-The angle comes in counts, the velocity from their differences. A longer window or a filter smooths
-it and makes it late. One count at the handle, over the window, is the ripple that is left.
+Angles are rounded to counts, and the velocity is their difference. A longer window or a filter
+smooths it and adds lag. The remaining ripple is one count at the handle, over the window.
 """
 
 import math

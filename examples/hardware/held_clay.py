@@ -2,9 +2,9 @@
 How much clay can motors hold?
 ==============================
 
-Clay that a computer renders is passive up to the physical damping of the handle, whatever the
-sample (``hc.theory.clay_passivity``). That is of all hands and motions; a single run is passive if
-the hand has at no time got back more energy than it put in.
+Clay that a computer renders is passive up to the physical damping of the handle, for any sample
+(``hc.theory.clay_passivity``). This holds for all hands and motions. A single run is passive if the
+hand never received more energy than it put in.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,10 @@
 """
-Passivity observer and controller
-=================================
+Time-domain passivity control
+=============================
 
-Clay that motors hold for a sample gives energy that real clay would take, where b Ts W > 2. An
-observer adds up what it took, and a controller changes the force in time so that it never gives.
+Where b Ts W > 2, clay that motors hold for a sample gives energy that real clay would absorb. An
+observer adds up the absorbed energy, and a controller changes the force in time so that it never
+becomes negative.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,10 @@
 """
-Sampled control, delay and jitter
-=================================
+Sampled control, latency and jitter
+===================================
 
-Hardware measures, computes and holds. With ``control="sampled"`` a run does the same, every Ts, as
-late and as unevenly as ``hc.Hardware`` says. A cut close to its gain limit shows what this costs.
+Hardware measures, computes and holds (zero-order hold). With ``control="sampled"`` a run does the
+same every Ts, with the latency and jitter of ``hc.Hardware``. A cut close to its gain limit shows
+the effect.
 """
 
 import matplotlib.pyplot as plt

@@ -1,9 +1,9 @@
 """
-An arm of your own
-==================
+Your own arm
+============
 
-Lengths and inertias make an arm; the model that the engine steps is made from them. Without inertia
-shaping the arm's own mobility is felt, so the transient at the border of the clay differs.
+Lengths and inertias define an arm; the MuJoCo model is generated from them. Without inertia shaping
+the handle has the arm's own mobility, so the transient at the border of the clay differs.
 """
 
 import matplotlib.pyplot as plt

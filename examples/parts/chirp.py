@@ -1,8 +1,8 @@
 """
-A muscle force of your own
-==========================
+Your own muscle force
+=====================
 
-``Scenario.muscle`` takes steps, ramps, pulses, chirps, multisines, arrays, any function, and sums
+``Scenario.muscle`` can be steps, ramps, pulses, chirps, multisines, arrays, any function, and sums
 of them. A chirp shakes the handle through clay; the amplitude of its speed is that of the loop,
 ``|v/uh|`` at each frequency.
 """

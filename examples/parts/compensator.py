@@ -1,9 +1,9 @@
 """
-A compensator of your own
-=========================
+Your own compensator
+====================
 
-Any proper transfer function up to order 4 takes the place of K/(s² + 10 s). At equal stability
-margin a lead shows the hand more of the clay: ``hc.theory.compare`` finds the gain of each and
+Any proper transfer function up to order 4 can replace K/(s² + 10 s). With the same stability margin
+a lead transmits more of the clay to the hand: ``hc.theory.compare`` finds the gain of each and
 sorts them.
 """
 

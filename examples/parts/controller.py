@@ -1,9 +1,9 @@
 """
-A controller of your own
-========================
+Your own controller
+===================
 
-A function of what is measured takes the place of compensator and servo: PD control of the joints
-towards a target that swings. It is compiled with the run where numba is installed.
+A function of the measured values replaces compensator and servo: PD control of the joints towards
+an oscillating target. It is compiled with the run if numba is installed.
 """
 
 import math

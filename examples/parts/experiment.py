@@ -1,6 +1,6 @@
 """
-An experiment of your own
-=========================
+Your own experiment
+===================
 
 A dataclass with bounds becomes an experiment: a function, options of ``hapticclay run``, names for
 sweeps. A value out of its bounds is refused, and the error names field, value and bound.

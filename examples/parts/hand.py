@@ -1,8 +1,8 @@
 """
-A hand of your own
-==================
+Your own hand
+=============
 
-The person's arm is an impedance, mass s² + damper s + spring, on each axis. It changes what K is
+The person's arm is an impedance, mass s² + damper s + spring, on each axis. It changes which K is
 stable: no hand, the paper's, one that grips, and one that leans on the handle.
 """
 

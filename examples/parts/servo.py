@@ -1,9 +1,9 @@
 """
-A servo of your own
-===================
+Your own servo
+==============
 
-G is how the handle follows the compensator, Sh how far a force pushes it aside. Both are second-
-order and stable, an axis each. A step of the command shows G alone.
+G is the response of the handle to the compensator, Sh its response to a force. Both are
+second-order and stable, one per axis. A step of the command shows G alone.
 """
 
 import matplotlib.pyplot as plt

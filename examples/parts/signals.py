@@ -2,7 +2,7 @@
 All signals
 ===========
 
-What ``Scenario.muscle`` and ``Scenario.command`` take. Each signal is a function of time; sums and
+The signals for ``Scenario.muscle`` and ``Scenario.command``. Each is a function of time; sums and
 multiples of signals are signals.
 """
 

@@ -2,8 +2,8 @@
 A figure for a paper
 ====================
 
-``hc.Figure`` draws a plot again in the width and the sizes of a journal's column, as PDF with its
-fonts, and writes the numbers that it shows beside it.
+``hc.Figure`` draws a plot in the width and text sizes of a journal column, as PDF with embedded
+fonts, and writes its numbers as CSV.
 """
 
 import tempfile

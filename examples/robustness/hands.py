@@ -2,8 +2,8 @@
 A population of hands
 =====================
 
-Published hands, and a population of one's own: a distribution for each of mass, damper and spring,
-and how they go together.
+Published hands, and your own population: a distribution for each of mass, damper and spring, and
+their correlations.
 """
 
 import matplotlib.pyplot as plt

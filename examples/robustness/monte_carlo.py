@@ -2,8 +2,8 @@
 Probability of instability
 ==========================
 
-Hand and delay are random; each run is judged by itself. The interval says what so few runs tell.
-Runs stay in their folder, and the same call goes on where it was interrupted.
+Hand and delay are random; each run is judged by itself. The interval shows how much so few runs can
+say. Runs stay in their folder, and the same call resumes an interrupted study.
 """
 
 import tempfile

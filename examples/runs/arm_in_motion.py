@@ -2,8 +2,8 @@
 The arm behind the handle
 =========================
 
-``hc.build`` is the MuJoCo model that a run steps. Its kinematics, at the angles of the record, put
-the handle where the record has it, to rounding.
+``hc.build`` is the MuJoCo model of a run. Its kinematics, at the joint angles of the record, give
+the recorded position of the handle, within rounding.
 """
 
 import matplotlib.pyplot as plt

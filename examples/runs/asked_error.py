@@ -1,9 +1,9 @@
 """
-An asked error, and its cost
-============================
+A requested error, and its cost
+===============================
 
-``error=`` chooses integrator and step, and confirms the choice by runs at other steps. The times
-at which the handle crosses the borders are then as exact as asked.
+``error=`` chooses integrator and step, and verifies the choice by runs at other steps. The times at
+which the handle crosses the borders then stay within the requested error.
 """
 
 import matplotlib.pyplot as plt
@@ -34,12 +34,12 @@ fig, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3.4))
 left.loglog(asked, asked, "--", color="0.3", lw=1, label="asked")
 left.loglog(asked, [r.error.estimate for r in records], "s", mfc="none", label="estimated")
 left.loglog(asked, reached, "o", ms=4, label="reached")
-left.set(xlabel="asked error [s]", ylabel="error of the border times [s]")
+left.set(xlabel="requested error [s]", ylabel="error of the border times [s]")
 left.legend()
 for name, marker in (("fast", "o"), ("accurate", "s")):
     chosen = [(r.error.asked, 1e3 * r.error.dt) for r in records if r.error.integrator == name]
     if chosen:
         right.loglog(*zip(*chosen, strict=True), marker, label=name)
-right.set(xlabel="asked error [s]", ylabel="chosen step [ms]")
+right.set(xlabel="requested error [s]", ylabel="chosen step [ms]")
 right.legend(title="integrator")
 plt.show()

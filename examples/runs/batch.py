@@ -2,8 +2,9 @@
 A batch on all cores
 ====================
 
-``hc.simulate_batch`` runs scenes in parallel, each to the last bit as ``hc.simulate`` does. The
-scenes may differ in anything; here in the clay. The steady speed is K f/(10 + K b).
+``hc.simulate_batch`` runs scenes in parallel, with results bit-identical to those of
+``hc.simulate``. The scenes may differ in anything; here in the clay. The steady speed is K f/(10 +
+K b).
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Where the energy goes
 =====================
 
-Each run closes its own balance: work of hand and motors, what the clay took, what is stored. What
-is left over is the error of the integration, and falls with the square of the step.
+Each run has an energy balance: work of hand and motors, energy absorbed by the clay, stored energy.
+The residual is the error of the integration; it falls with the square of the step.
 """
 
 import matplotlib.pyplot as plt

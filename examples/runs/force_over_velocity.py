@@ -2,8 +2,8 @@
 Force over velocity
 ===================
 
-What a hand feels as viscosity is force over velocity. The clay's is its damping b, at any
-speed; at a steady speed the hand's is larger by 10/K, the compensator's own damper.
+A hand perceives viscosity as force over velocity. That of the clay is its damping b at any speed;
+at a steady speed that of the hand is larger by 10/K, the compensator's own damper.
 """
 
 import matplotlib.pyplot as plt

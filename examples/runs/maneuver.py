@@ -1,6 +1,6 @@
 """
-A maneuver at a gain too high
-=============================
+A maneuver with too high a gain
+===============================
 
 The paper's test of stability: an arbitrary maneuver through clay, at K = 3 and at K = 25.
 ``hc.out_of_band_ratio`` is the share of the force that lies above the band of the maneuver.

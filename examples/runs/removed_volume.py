@@ -2,9 +2,9 @@
 The volume of a cut
 ===================
 
-``hc.studies.removed`` is what a tool at the handle has taken away, to 0.5 %. A straight cut through
-the slab removes width × depth × length. The tool is round: its front is ahead of the handle by half
-a width.
+``hc.studies.removed`` is the volume that a tool at the handle has removed, within 0.5 %. A straight
+cut through the slab removes width × depth × length. The tool is round: its front is half a width
+ahead of the handle.
 """
 
 import matplotlib.pyplot as plt

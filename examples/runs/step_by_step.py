@@ -1,9 +1,9 @@
 """
-A hand of your own, step by step
-================================
+Your own hand, step by step
+===========================
 
-``hc.Simulation`` makes a step when it is told to, under the force that it is told. Here a hand
-follows a moving target with a spring and a damper, through the clay and back.
+``hc.Simulation`` advances a run step by step, each under a force of yours. Here a hand follows a
+moving target with a spring and a damper, through the clay and back.
 """
 
 import math

@@ -2,8 +2,9 @@
 Identify G from a noisy record
 ==============================
 
-The arm is shaken with a multisine, as the paper's was, and the response is fitted with a second-
-order transfer function. Below: how far the fit is from the measured lines, beside their deviation.
+The arm is excited by a multisine, as in the paper, and the response is fitted with a second-order
+transfer function. Below: the deviation of the fit from the measured lines, and their standard
+deviation.
 """
 
 import matplotlib.pyplot as plt

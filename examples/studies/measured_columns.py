@@ -1,9 +1,9 @@
 """
-Identify from columns of your own
-=================================
+Identify from your own columns
+==============================
 
-``hc.studies.identify_data`` takes time, input and output as they were measured. Here they come from
-a run: a chirp as the command, the position rounded to counts.
+``hc.studies.identify_data`` takes measured time, input and output. Here they come from a run: a
+chirp as the command, the position rounded to counts.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 A sweep, read as a table
 ========================
 
-A sweep runs a space of parameters and writes a Parquet file for each chunk; the same command goes
-on where it was interrupted. pandas, or any other reader, opens the folder.
+A sweep runs a space of parameters and writes a Parquet file for each chunk; the same command
+resumes an interrupted sweep. pandas, or any other reader, opens the folder.
 """
 
 import tempfile

@@ -3,7 +3,7 @@ The largest stable gain
 =======================
 
 ``hc.theory.gain_limit`` is exact: every K below it is stable. Clay that damps can make the loop
-unstable, and a curve ends where motors that are sampled, or late, cannot render the clay at any K.
+unstable. A curve ends where sampled or late motors cannot render the clay at any K.
 """
 
 import matplotlib.pyplot as plt

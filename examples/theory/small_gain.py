@@ -1,10 +1,10 @@
 """
-A condition and the limit
-=========================
+A sufficient condition, and the limit
+=====================================
 
-The paper asks for ``|L| < 1`` (Eq. 11) or ``|G C| < |1/T + Sh|`` (Eq. 13). Both are sufficient,
-neither is necessary: without a hand Eq. 13 keeps a part of the gains, and with the paper's hand,
-against whose spring the compensator integrates, none.
+The paper requires ``|L| < 1`` (Eq. 11) or ``|G C| < |1/T + Sh|`` (Eq. 13). Both are sufficient,
+neither is necessary: without a hand Eq. 13 admits a part of the stable gains, and with the paper's
+hand, against whose spring the compensator integrates, none.
 """
 
 import matplotlib.pyplot as plt

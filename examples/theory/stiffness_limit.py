@@ -2,7 +2,8 @@
 Stiff clay
 ==========
 
-Clay with a stiffness k beside its damping b: how stiff may it be before the loop is unstable?
+Clay with a stiffness k in addition to its damping b: how stiff may it be before the loop is
+unstable?
 """
 
 import matplotlib.pyplot as plt

@@ -27,7 +27,7 @@ print(record.status)
 # The record
 # ----------
 # A run is a :obj:`~hapticclay.Record`: arrays over time, and how it ended. ``record.t`` has n
-# times, and each of the others a row for each of them: place ``p``, velocity ``v``, the forces
+# times; every other array has one row per time: position ``p``, velocity ``v``, the forces
 # ``fh`` of the hand and ``fe`` of the clay, and more. Every border that the handle passed is in
 # ``record.crossings``.
 
@@ -56,16 +56,16 @@ below.legend(loc="center")
 plt.show()
 
 # %%
-# What the hand feels as viscosity is force over velocity. The clay's is b, whatever the speed:
+# A hand perceives viscosity as force over velocity. That of the clay is b at any speed:
 
 inside = record.b[:, 0] > 0.0
 felt = record.ratio(record.fe)[inside, 0]
 print(f"{felt.min():.3f} to {felt.max():.3f} N.s/m")
 
 # %%
-# A clay of your own
-# ------------------
-# :obj:`~hapticclay.Profile` takes the clay by layers. ``hc.with_fields`` makes a changed copy of
+# Your own clay
+# -------------
+# :obj:`~hapticclay.Profile` describes clay by layers. ``hc.with_fields`` makes a changed copy of
 # a scenario, any field by its name; scenarios themselves never change.
 
 layers = hc.Profile(edges=(0.05, 0.08, 0.12), values=(0.0, 40.0, 150.0, 0.0))
@@ -96,8 +96,8 @@ plt.show()
 # Keep it, and be sure of it
 # --------------------------
 # ``record.save(folder)`` writes the record, a summary and the scenario, from which the run can be
-# repeated to the last bit; ``hc.Record.load`` reads them back. And if the times of the crossings
-# matter, ask for an error: step and integrator are then chosen and verified.
+# repeated with bit-identical results; ``hc.Record.load`` reads them back. If the times of the
+# crossings matter, request an error: step and integrator are then chosen and verified.
 
 exact = hc.simulate(scenario, error=1e-8)
 print(exact.error)

@@ -2,12 +2,12 @@
 2. Is it stable, and how far?
 =============================
 
-Motors that help a hand may also push by themselves. You raise the gain K until the loop becomes
-unstable, compute the limit beforehand, and ask what sampling, delay and other hands leave of it.
+A motor-assisted handle can become unstable. You raise the gain K until it does, compute the limit
+beforehand, and see how sampling, latency and other hands lower it.
 """
 
 # %%
-# A run that is unstable is no error: its status says so, and its advice says what would help.
+# An unstable run is not an error: its status says that it diverged, its advice what would help.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -66,7 +66,7 @@ plt.show()
 # %%
 # How far from it?
 # ----------------
-# A verdict carries its margin and what it assumes; ``hc.theory.margins`` has gain, phase, delay and
+# A verdict has its margin and its assumptions; ``hc.theory.margins`` has gain, phase, delay and
 # disk margins.
 
 verdict = hc.theory.coupled_stability("x", 1.0, 90.0)
@@ -75,8 +75,8 @@ margins = hc.theory.margins("x", 1.0, 90.0)
 print(f"phase {np.degrees(margins.phase):.0f}°, delay {1e3 * margins.delay:.0f} ms")
 
 # %%
-# Hardware samples, and is late
-# -----------------------------
+# Hardware samples and has latency
+# --------------------------------
 # Ts is the control sample, delay the time from a measurement to its torque.
 
 for timing in ({}, dict(Ts=0.36e-3), dict(Ts=0.36e-3, delay=0.36e-3), dict(Ts=2e-3, delay=2e-3)):
@@ -89,7 +89,7 @@ for timing in ({}, dict(Ts=0.36e-3), dict(Ts=0.36e-3, delay=0.36e-3), dict(Ts=2e
 # Any hand
 # --------
 # These limits hold without a hand. ``hc.Operator()`` is the paper's hand; ``hc.theory.worst_case``
-# finds the worst hand of a box, and ``hc.theory.passivity`` asks for all passive hands at once.
+# finds the worst hand of a box, and ``hc.theory.passivity`` covers all passive hands.
 
 box = hc.theory.Box(mass=(0.1, 1.0), damper=(1.0, 10.0), spring=(0.0, 300.0))
 worst = hc.theory.worst_case("y", 0.5, 90.0, box)
@@ -102,8 +102,8 @@ for axis, K in (("x", 1.0), ("y", 0.5)):
 
 # %%
 # So y at K = 0.5 is stable with every hand of the box, and some other passive hand makes it
-# unstable. ``hc.theory.design_gain`` turns the question round: the largest K with the margins that
-# you ask for.
+# unstable. ``hc.theory.design_gain`` answers the reverse question: the largest K with
+# requested margins.
 
 K = hc.theory.design_gain("y", 90.0, hc.Operator(), disk_margin=0.5)
 print(f"K = {K:.3f} keeps a disk margin of 0.5")

@@ -2,8 +2,8 @@
 3. Your controller on your arm
 ==============================
 
-You bring an arm, let the paper's loop run on it, then replace its controller by a function of your
-own, on hardware with encoders and a delay.
+You define an arm, let the paper's loop run on it, then replace its controller by your own function,
+on hardware with encoders and latency.
 """
 
 # %%
@@ -29,7 +29,7 @@ print(hc.simulate(cut).status)
 # %%
 # A law
 # -----
-# A controller is a function of what is measured, called once a sample: time, joint angles ``q``
+# A controller is a function of measured values, called once per sample: time, joint angles ``q``
 # and rates ``qd``, the force ``fh`` of the hand, a state that you keep, and parameters. It
 # returns the torques of shoulder and elbow, and the next state. This one is an admittance
 # controller. The hand's force moves a virtual mass with a damper; the joints follow it with PD
@@ -81,8 +81,8 @@ print(record.status)
 
 # %%
 # Outside the clay the handle follows the virtual mass: v = f/D (1 - exp(-D t/M)). In the clay the
-# stiff position loop drags the handle on, and the clay's force is carried by the motors, unfelt.
-# A law that knows no force of the clay cannot show it to the hand.
+# stiff position loop moves the handle on, and the motors carry the force of the clay.
+# A law that does not use the force of the clay cannot transmit it to the hand.
 
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 5.0))
 above.plot(record.t, 100 * record.v[:, 0], label="handle")
@@ -124,8 +124,8 @@ plt.show()
 # Step by step
 # ------------
 # For a controller in another process, or a learned one, step the run yourself: ``hc.Simulation``
-# takes the torque of each sample. The answers are those of ``simulate``, to the last bit, for the
-# same torques.
+# takes the torque of each sample. For the same torques the results are bit-identical to those of
+# ``simulate``.
 
 stepped = hc.with_fields(scenario, {"controller": None, "t_max": 0.2})
 with hc.Simulation(stepped) as sim:

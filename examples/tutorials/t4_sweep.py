@@ -33,14 +33,14 @@ folder = Path(tempfile.mkdtemp())
 print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 
 # %%
-# Interrupt it whenever you like: the same call makes what is missing, and no more.
+# You may interrupt it at any time: the same call makes only the missing runs.
 
 print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 
 # %%
 # Read it
 # -------
-# ``read_sweep`` returns an Arrow table, one row a run; any reader of Parquet opens the folder as
+# ``read_sweep`` returns an Arrow table, one row per run; any reader of Parquet opens the folder as
 # well.
 
 table = hc.studies.read_sweep(folder).to_pandas()
@@ -91,8 +91,8 @@ plt.show()
 # %%
 # Which rows to trust
 # -------------------
-# ``energy_residual`` is what is left over of the energy balance, as a share of what went through:
-# the numerical error of the run. Where it is large, take a smaller dt.
+# ``energy_residual`` is the residual of the energy balance as a share of the energy put through: a
+# measure of the numerical error of the run. Where it is large, use a smaller dt.
 
 worst = table.loc[table.energy_residual.abs().idxmax()]
 print(f"worst: {worst.energy_residual:.1e} at b = {worst.b:g}, K = {worst['gain.y']:g}")

@@ -2,8 +2,8 @@
 Transparency of the arm
 =======================
 
-What the hand feels at the handle of the paper's arm in clay: the share of its force that is
-rendered, and the felt over the rendered impedance.
+Transparency at the handle of the paper's arm in clay: the share of the hand's force that is
+rendered, and the effective over the rendered impedance.
 """
 
 import matplotlib.pyplot as plt

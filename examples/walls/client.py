@@ -3,7 +3,7 @@ A program's wall
 ================
 
 A program renders a wall at 200 Hz on the simulated device. From its messages alone the loop report
-tells the stiffness it rendered, and what its rate and the hand can carry.
+finds the rendered stiffness, and the stiffness that its rate and the hand allow.
 """
 
 import json

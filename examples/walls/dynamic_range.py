@@ -2,7 +2,7 @@
 Dynamic range
 =============
 
-How far apart are the free motion of a device and the stiffest wall that it renders stably?
+What is the ratio of the stiffest wall that a device renders stably to its free motion?
 """
 
 from dataclasses import replace

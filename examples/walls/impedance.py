@@ -3,7 +3,8 @@ Effective impedance
 ===================
 
 What does a wall of 300 N/m feel like at each frequency? A multisine on the running wall measures
-it, beside what theory computes: a spring at first, more damping than B, and the mass of the device.
+it, and theory computes it: a spring at low frequency, more damping than B, and the mass of the
+device.
 """
 
 import matplotlib.pyplot as plt

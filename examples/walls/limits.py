@@ -2,8 +2,8 @@
 Published limits of a wall
 ==========================
 
-How stiff may a wall be over the delay of its force? Hulin's rule is close where the delay is long;
-the passive limit is lower, since it holds for every passive hand. The line of Hulin's boundary and
+How stiff may a wall be over the latency of its force? Hulin's rule is close where the latency is
+long; the passive limit is lower, because it holds for every passive hand. Hulin's boundary and
 Jury's closed form are exact where they apply.
 """
 

@@ -3,7 +3,7 @@ An encoder, and what counts as rest
 ===================================
 
 With friction and an encoder the loop is not linear: a wall counts as stable if it comes to rest
-after a push. ``hc.walls.Press`` says how hard the push is and how much motion is rest.
+after a push. ``hc.walls.Press`` defines the push and the motion that counts as rest.
 """
 
 import matplotlib.pyplot as plt

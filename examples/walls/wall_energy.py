@@ -2,8 +2,9 @@
 Passivity of a wall, by energy
 ==============================
 
-A hand moves a device back and forth at half the sampling frequency, the path that draws the most
-from a wall of K alone. Runs add up the energy that the device takes: from K = 2 b/Ts on it gives.
+A hand moves a device back and forth at half the sampling frequency, the path that extracts the most
+energy from a wall of K alone. Runs add up the energy that the device absorbs: above K = 2 b/Ts it
+returns energy.
 """
 
 from dataclasses import replace

@@ -20,12 +20,12 @@ ERROR_NAMES = {"s": "times of the border crossings", "m": "position"}
 
 @dataclass(frozen=True)
 class AccuracyCommand:
-    """Draw error against run time of an experiment, and name the cheapest setting for each error.
+    """Draw error over run time of an experiment, and list the fastest setting for each error.
 
     The experiment runs at a ladder of steps, with both integrators, and under sampled control.
 
     Attributes:
-        scenario: The experiment, or a scenario file; its dt and integrator are replaced.
+        scenario: The experiment, or a scenario file. Its dt and integrator are ignored.
         out: Folder for accuracy.png, accuracy.md and accuracy.json.
         quick: Run fewer steps, once each.
         figures: Format and style of the figure.
@@ -67,7 +67,7 @@ class AccuracyCommand:
 
 
 def cheapest_tables(found: Ladder, markdown: bool = False) -> str:
-    """The cheapest setting for each asked error, a table a unit.
+    """The fastest setting for each requested error, one table per unit.
 
     Args:
         found: the ladder.
@@ -79,7 +79,13 @@ def cheapest_tables(found: Ladder, markdown: bool = False) -> str:
             [f"{asked:.0e}", x.series, f"{x.dt:.3g}", _error(found, x, unit), f"{x.wall:.2g}"]
             for asked, x in found.cheapest(unit).items()
         ]
-        head = [f"asked error [{unit}]", "integrator", "dt [s]", f"error [{unit}]", "run time [s]"]
+        head = [
+            f"requested error [{unit}]",
+            "integrator",
+            "dt [s]",
+            f"error [{unit}]",
+            "run time [s]",
+        ]
         parts += [f"Cheapest setting by error in the {ERROR_NAMES[unit]}:"]
         parts += [console.text_table(rows, head, "rlrrr", "pipe" if markdown else "simple")]
     left = [f"{e:.1e} {unit}" for unit, e in found.left.items() if e and unit in found.units()]

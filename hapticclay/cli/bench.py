@@ -14,7 +14,7 @@ from ..files import writable
 class BenchCommand:
     """Run the benchmarks of a checkout: accuracy against run time, stiff scenes, throughput.
 
-    The benchmarks are not installed with the package. Peers whose package is missing are listed as
+    The benchmarks are not installed with the package. Packages that are not installed are listed as
     left out. After an interruption, the same command measures only the parts that are missing or
     were measured on other code.
 

@@ -16,13 +16,13 @@ COMPARE_SCHEMA = "hapticclay-compare-1"
 
 @dataclass(frozen=True)
 class CompareCommand:
-    """Set controllers, or bare devices, side by side: key numbers, figures and fields on one page.
+    """Compare controllers, or bare devices, on one page: key numbers, figures and fields.
 
     Attributes:
         source: Two to five scenario files, or files of walls.
         axis: Axis of the arm.
         out: Folder for compare.html (self-contained), compare.json and the figures.
-        figures: Formats and style of the figures; those of the page are for a screen.
+        figures: Formats and style of the figure files; those on the page are for a screen.
     """
 
     source: Annotated[tuple[Path, ...], tyro.conf.Positional]

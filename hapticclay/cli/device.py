@@ -30,31 +30,32 @@ WAIT = 0.1  # [s] between two looks at whether the session is to end
 class DeviceCommand:
     """Serve the simulated arm as a haptic device, or report on the loop of a client.
 
-    Programs for a real device connect over a WebSocket, read where the handle is, and send forces,
-    which move the arm beside a simulated hand. `device serve` runs until Ctrl-C, then writes the
-    record, what was exchanged, and a report: what the client rendered, and what its rate, its delay
-    and this hand can carry. `device report FOLDER` makes the report again.
+    Programs for a real device connect over a WebSocket, read the position of the handle and send
+    forces. The forces move the arm together with a simulated hand. `device serve` runs until
+    Ctrl-C. It then writes the record, the exchanged messages and a report: what the client
+    rendered, and which stiffness its rate, its delay and this hand allow. `device report FOLDER`
+    makes the report again.
 
     Attributes:
         action: serve or report.
-        source: To serve, a scenario file, whose arm, hand and hardware are used; none for the
-            paper's arm and hand. To report, the folder that a session wrote.
-        protocol: inverse is that of a Haply Inverse3, rosbridge has topics of CRTK and of the
-            drivers of a Touch, as JSON for ROS programs.
+        source: To serve: a scenario file, whose arm, hand and hardware are used; by default the
+            paper's arm and hand. To report: the folder of a session.
+        protocol: inverse is that of a Haply Inverse3; rosbridge has topics of CRTK and of a Touch's
+            drivers, as JSON for ROS programs.
         port: Port to listen on, 0 for a free one; by default that of the protocol, 10001 or 9090.
-        host: Address to listen on; a token guards any but this machine's.
-        clock: wall moves the arm in real time; tick moves it by --period at each message, so that
-            the same messages give the same run.
-        period: Of a message with --clock tick [s].
-        hand: Where the hand wants to be: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a
-            CSV file with the columns t, x, y. By default it rests about the start.
+        host: Address to listen on. Any address but that of this machine needs a token.
+        clock: wall moves the arm in real time; tick moves it by --period at each message, so the
+            same messages give the same run.
+        period: Simulated time of a message with --clock tick [s].
+        hand: Target of the hand: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a CSV
+            file with the columns t, x, y. By default the hand rests at the start.
         plane: Plane of the device in which the arm moves.
         buttons: CSV file with the columns t, a, b, c, home (0 or 1): buttons over time.
-        clay: Let the clay of the scenario act beside the client's force.
-        device_id: Of the Inverse3, hexadecimal.
-        grip_id: Of the grip, hexadecimal.
-        largest_force: Longer forces are shortened to this [N].
-        duration: End after this time on the clock of the computer [s]; none for Ctrl-C.
+        clay: Add the clay of the scenario to the client's force.
+        device_id: Identifier of the Inverse3, hexadecimal.
+        grip_id: Identifier of the grip, hexadecimal.
+        largest_force: Larger forces are limited to this [N].
+        duration: End after this time on the computer's clock [s]; None runs until Ctrl-C.
         out: Folder for the record, the exchanges and the report.
         plots: Draw the plots.
         figures: Formats and style of the plots.

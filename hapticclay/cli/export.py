@@ -19,7 +19,8 @@ class ExportCommand:
     Attributes:
         record: The record: its folder, or its record.npz.
         format: nc for xarray and MATLAB, parquet for data frames, csv for spreadsheets, mcap for
-            Foxglove, rrd for Rerun, mat for MATLAB and Octave; else the end of --out tells.
+            Foxglove, rrd for Rerun, mat for MATLAB and Octave. By default the ending of --out
+            decides.
         out: The file; an older one is replaced.
     """
 

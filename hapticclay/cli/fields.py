@@ -22,13 +22,13 @@ WIDTH = 96  # of the text
 class FieldsCommand:
     """List the fields of a scenario: dotted name, default, unit, bounds, and what it is.
 
-    The names serve --set, sweeps and scenario files alike. gain.x is one entry of a pair,
-    clay.x.values.1 one of a longer list; operator and compensator may differ by axis, as in
+    The names are used by --set, sweeps and scenario files. gain.x is one entry of a pair,
+    clay.x.values.1 one of a longer list. operator and compensator may differ by axis, as in
     operator.x.mass.
 
     Attributes:
-        names: Words that the names must contain, any of them, as in arm or servo.x; constant and
-            the like stand for the parameters of an experiment.
+        names: Print only names that contain one of these words, as in arm or servo.x. The name of
+            an experiment, such as constant, prints its parameters.
     """
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()

@@ -30,12 +30,13 @@ class FitCommand:
         source: CSV file of time [s], position [m] and force of the clay on the tool, counted as
             resistance [N]; or the folder of a record, or its record.npz.
         out: Folder for fit.json and fit.png.
-        axis: Axis, of a record only; "path" for along the motion, whatever its direction.
+        axis: Axis of a record; "path" is along the motion, whatever its direction.
         columns: Names in the file, as in t=time p=pos f=force.
-        laws: Candidates: viscous, Coulomb, Bingham, power-law, Herschel-Bulkley; all unless given.
+        laws: Candidate laws: viscous, Coulomb, Bingham, power-law, Herschel-Bulkley; by default
+            all.
         level: Confidence level of the intervals.
-        time: First and last time to take [s].
-        place: Lowest and highest position to take [m].
+        time: First and last time to use [s].
+        place: Lowest and highest position to use [m].
         figures: Format and style of the figure.
     """
 

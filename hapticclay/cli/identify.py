@@ -29,28 +29,31 @@ MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 @dataclass(frozen=True)
 class IdentifyCommand:
-    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6): half a minute.
+    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes half a minute.
 
-    With --csv, identify one of them from measured columns instead, in SI units.
+    With --csv, identify one of them from measured columns in SI units.
 
     Attributes:
         out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png.
-        axis: Axis to identify; with --csv that of the printed equation, x unless given.
-        noise: Add sensor noise: encoders of 65536 counts a turn, a force sensor of 0.02 N rms.
-        map: Also map G and Sh over the workspace, with and without inertia shaping: two minutes
-            more.
+        axis: Axis to identify. With --csv, the axis of the printed equation to compare with, by
+            default x.
+        noise: Add sensor noise: encoders with 65536 counts per turn, a force sensor with 0.02 N
+            rms.
+        map: Also map G and Sh over the workspace, with and without inertia shaping; takes two
+            minutes more.
         quick: Use shorter signals and a coarser map.
         seed: Seed of the signals' phases and of the noise.
-        control: Control of the runs; "sampled" takes some ten minutes, two with --quick.
-        csv: File of measured columns, the names of which are in its first line: time [s], input
-            (for G the command [m], for S and Th the force of the hand on the handle [N]) and
-            output (position of the handle [m]).
-        what: Block of the file, G unless given.
-        columns: Names in the file, as in t=time input=cmd output=pos; reference=NAME adds what
-            drives the experiment, for a position or force that is noisy or part of a loop.
+        control: Control of the runs; "sampled" takes about ten minutes, two with --quick.
+        csv: File of measured columns. Its first line names them: time [s], input (for G the command
+            [m], for S and Th the force of the hand on the handle [N]) and output (position of the
+            handle [m]).
+        what: Block to fit to the file, by default G.
+        columns: Names in the file, as in t=time input=cmd output=pos. reference=NAME adds the
+            signal that drives the experiment; use it if a position or force is noisy or part of a
+            loop.
         band: Lowest and highest frequency to fit [Hz].
-        held: Say that a computer holds the input of the file from sample to sample.
-        paper: Set the equation of the paper beside the file, in table and figure.
+        held: The input of the file is held by a computer from sample to sample.
+        paper: Show the equation of the paper beside the file, in table and figure.
         figures: Formats and style of the figures.
     """
 

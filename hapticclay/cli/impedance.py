@@ -20,24 +20,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ImpedanceCommand:
-    """Measure the impedance that a hand feels, and transparency, beside the computed ones.
+    """Measure impedance and transparency at the hand, and compare them with the computed ones.
 
-    A multisine of the muscles drives the arm of an experiment, or a virtual wall on a bare device,
-    so gently that it stays linear. What is rendered is drawn as a thin line. With an option of a
-    wall, as --K 300 or --mass 0.2, it is a wall.
+    A multisine muscle force excites the arm of an experiment, or a virtual wall on a bare device,
+    with an amplitude so small that it stays linear. The command is drawn as a thin line. An option
+    of a wall, as --K 300 or --mass 0.2, selects a wall.
 
     Attributes:
-        source: File of a wall; or experiment, as in hapticclay run, or a scenario file: its clay is
-            then all around the handle, which is at the nominal pose. By default the constant cut.
-        axis: Axis of the arm, x unless given.
-        b: Clay [N.s/m]; by default that of the experiment with the least gain limit.
+        source: File of a wall; or experiment, as in hapticclay run, or a scenario file. The clay of
+            a scenario is then everywhere around the handle, which is at the nominal pose. By
+            default the constant cut.
+        axis: Axis of the arm, by default x.
+        b: Damping of the clay [N.s/m]; by default the clay of the experiment with the smallest gain
+            limit.
         k: Stiffness of the clay [N/m].
         band: Lowest and highest frequency [Hz].
         lines: Number of frequencies.
-        amplitude: Size of the motion, rms [m].
+        amplitude: Amplitude of the motion, rms [m].
         seed: Seed of the multisine's phases.
         out: Folder for impedance.json, impedance.png and transparency.png.
-        wall: The wall, its device, sampling and hand; --hand is for the arm, too.
+        wall: The wall, its device, sampling and hand; --hand also applies to the arm.
         figures: Format and style of the figures.
     """
 

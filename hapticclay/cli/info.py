@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InfoCommand:
-    """Tell what a saved record holds: scenario, outcome, samples, arrays with units and ranges.
+    """Print what a saved record holds: scenario, outcome, samples, arrays with units and ranges.
 
     Attributes:
         record: The record: its folder, or its record.npz.

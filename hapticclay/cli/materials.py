@@ -30,9 +30,9 @@ def _small_tool(name: str) -> float:
 
 @dataclass(frozen=True)
 class MaterialsCommand:
-    """List the materials that a scenario can name, and the flow of a tool in each.
+    """List the materials that a scenario can name, and the force on a tool in each.
 
-    The force on a tool at the speed v is Fy + K v^n + b v; lowest and highest are those of Fy.
+    The force on a tool at the speed v is Fy + K v^n + b v; lowest and highest are the range of Fy.
 
     Attributes:
         tool_width: Width of the tool [m].

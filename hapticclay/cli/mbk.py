@@ -22,22 +22,22 @@ RENDERED_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
 
 @dataclass(frozen=True)
 class MBKCommand:
-    """Find the virtual masses, dampers and springs that are stable, by theory and by runs.
+    """Find the stable virtual masses, dampers and springs, by theory and by runs.
 
-    For a bare device: over three planes, and its dynamic range. With --arm: the least mass that the
-    arm renders as the admittance of its compensator.
+    For a bare device: borders in three planes, and the dynamic range. With --arm: the least mass
+    that the arm renders as an admittance.
 
     Attributes:
-        source: File of a wall, .toml or .json, which the options change.
-        arm: Axis of the arm, in the place of a bare device; --Ts none is continuous time, and the
-            hand by default Th (19).
+        source: File of a wall, .toml or .json; options override it.
+        arm: Axis of the arm, instead of a bare device. --Ts none is continuous time; by default the
+            hand is Th (19).
         box: Hands at the arm: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
-        columns: Columns of a plane, or dampers of the arm, at which runs look for the border,
-            1 to 100.
-        quick: Draw lines of fewer points, with two such columns.
+        columns: Number of columns of a plane, or of dampers of the arm, at which runs search for
+            the border, 1 to 100.
+        quick: Draw lines with fewer points and two such columns.
         out: Folder for mbk.json and the figures.
-        wall: The device and its sampling, and the K, B and M that the planes keep: by default
-            1000 N/m, 2 N.s/m and 0, on a damper of 0.5 N.s/m.
+        wall: The device and its sampling, and the K, B and M that are constant in a plane: by
+            default 1000 N/m, 2 N.s/m and 0, on a damper of 0.5 N.s/m.
         figures: Format and style of the figures.
     """
 

@@ -31,12 +31,12 @@ class PassivityCommand:
     time, without and with the controller of Hannaford and Ryu), region (K over Ts and delay).
 
     Attributes:
-        source: File of a wall, .toml or .json, which the options change.
-        cut: Scenario file of the arm, and of its clay, held under sampled control; by default the
-            constant cut, and for the clay over time one in clay of 8000 N.s/m.
-        delays: Delays of the region, over Ts.
+        source: File of a wall, .toml or .json; options override it.
+        cut: Scenario file of the arm and its clay, held under sampled control. By default the
+            constant cut; for the energy over time, a cut in clay of 8000 N.s/m.
+        delays: Delays of the region, in units of Ts.
         out: Folder for passivity.json and the figures.
-        quick: Find limits by runs at one Ts alone.
+        quick: Find limits by runs at one Ts only.
         wall: The wall: by default K = 500 N/m on 0.1 kg and 1 N.s/m, at 1 ms and 0.5 ms late.
         figures: Formats and style of the figures.
     """

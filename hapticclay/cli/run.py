@@ -36,11 +36,10 @@ class RunCommand:
         scenario: The experiment, or a scenario file.
         out: Folder for record.npz, scenario.toml, summary.json and the plots.
         every: Keep every n-th sample in the record.
-        error: Largest error to allow, as in 1e-6 (seconds, of the times at which borders are
-            crossed) or 1e-7m (of positions): dt and integrator are then chosen, and verified by
-            runs at other steps.
+        error: Largest allowed error, as in 1e-6 (seconds, of the border-crossing times) or 1e-7m
+            (of positions). dt and integrator are then chosen, and verified by runs at other steps.
         plots: Draw the plots.
-        figures: Their formats and style.
+        figures: Formats and style of the plots.
     """
 
     scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]

@@ -42,22 +42,22 @@ class StabilityCommand:
 
     Attributes:
         axis: Axis of the loop.
-        b: Damping of the clay [N.s/m]; by default 90, and 0 beside --clay Fy=5.
+        b: Damping of the clay [N.s/m]; by default 90, or 0 with --clay Fy=5.
         gain: K of the compensator; by default 1 on x and 0.5 on y.
         Ts: Control sample [s]; None for runs in continuous time.
         delay: From a measurement to the torque computed from it [s].
         num: Numerator of the compensator, descending powers of s.
         den: Denominator of the compensator, descending powers of s.
         G: Gain, damping and stiffness of the position loop G; by default as printed.
-        S: Gain, damping and stiffness of Sh, by default as printed; the gain with
-            --inertia-shaping, else it is that of the arm.
+        S: Gain, damping and stiffness of Sh; by default as printed. Without --inertia-shaping the
+            gain is that of the arm.
         operator: Put the operator's arm Th (Eq. 19) in the loop.
-        inertia_shaping: Let the servo of the runs shape the inertia, so that Sh holds at every
-            pose.
-        clay: Clay that yields, Fy=5 K=2 n=0.5 beside b, or a material, "stiff clay": predict what
-            sticks, and limit cycles.
-        map: Plane of the map: a boundary in K or b over clay, delay or pose; or what a push ends
-            in, over yield force and gain, in Bingham clay of this b.
+        inertia_shaping: Let the servo of the runs shape the inertia, so that Sh is the same at
+            every pose.
+        clay: Clay that yields, as Fy=5 K=2 n=0.5 in addition to b, or a material, "stiff clay":
+            predict sticking and limit cycles.
+        map: Plane of the map: a boundary in K or b over clay, delay or pose; or how a push ends,
+            over yield force and gain, in Bingham clay of this b.
         out: Folder for stability.json and the map.
         quick: Draw a coarse map.
         figures: Format and style of the map.

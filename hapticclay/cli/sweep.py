@@ -32,7 +32,8 @@ MAPPED = ("status", "fe_over_v_x", "speed_x", "end_time")  # columns that are dr
 class SweepCommand:
     """Run an experiment over a space of parameters; resume an interrupted sweep.
 
-    Give either a SPEC.toml or --grid. The results are one Parquet data set, a row a run, and maps.
+    Give either a SPEC.toml or --grid. The results are one Parquet data set with one row per run,
+    and maps.
 
     Attributes:
         spec: TOML file: experiment (or scenario, a file), design, runs, seed, chunk; tables [vary]
@@ -45,10 +46,11 @@ class SweepCommand:
         experiment: Name of an experiment, as in hapticclay run, or a scenario file.
         design: All combinations, a Latin hypercube or a Sobol sequence.
         runs: Number of runs of a Latin hypercube or Sobol sequence.
-        seed: Seed of that sample.
-        chunk: Runs in one file, the most that a killed process loses; by default what takes 1.5 s.
+        seed: Seed of the sample.
+        chunk: Runs per file, which is the most that a killed process loses; by default as many as
+            take 1.5 s.
         out: Folder for sweep.json, data/ and the maps.
-        workers: Processes on this machine; by default one a core.
+        workers: Processes on this machine; by default one per core.
         scheduler: Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786.
         maps: Draw maps over the first two parameters.
         figures: Formats and style of the maps.

@@ -43,8 +43,8 @@ def tool_size(name: str) -> Callable[[], float]:
 class ViewCommand:
     """Pull the handle with the mouse, in a window or a browser; or replay a saved record.
 
-    The muscle force is yours: force, length and t_max of the experiment do not apply. At the end
-    the record, its summary and its plots are written.
+    The mouse sets the muscle force; force, length and t_max of the experiment do not apply. At the
+    end the record, its summary and its plots are written.
 
     Attributes:
         scenario: The experiment, a scenario file, or the folder of a record.
@@ -55,12 +55,12 @@ class ViewCommand:
         out: Folder for record.npz, summary.json and the plots.
         every: Keep every n-th sample in the record.
         plots: Draw the plots.
-        web: Show the session in a browser; needs no display here.
-        host: Address to serve the browser on; a token guards any but this machine's.
-        port: Port to serve the browser on.
+        web: Show the session in a browser; no display is needed on this machine.
+        host: Address of the browser page. Any address but that of this machine needs a token.
+        port: Port of the browser page.
         figures: Formats and style of the plots.
         devices: A device that is the hand, or a server for programs.
-        stream: Send the session, 60 times a second, as JSON over UDP to HOST:PORT, as in
+        stream: Send the session as JSON over UDP to HOST:PORT, 60 times per second, as in
             localhost:9870, for PlotJuggler.
     """
 

@@ -30,7 +30,7 @@ TERMS = 16  # of a series for exp(x) at |x| <= 1/2: the next is below 1e-19
 class Compensator:
     """Shape of the compensator: C = K num(s)/den(s), proper, of order 4 at most.
 
-    Coefficients stand in descending powers of s, as in SciPy and python-control; they are divided
+    Coefficients are in descending powers of s, as in SciPy and python-control; they are divided
     by the first one of den.
 
     Attributes:
@@ -174,7 +174,7 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
     except (TypeError, ValueError):
         raise ParameterError(f"compensator.{name}", given, "must be numbers") from None
     if np.iscomplexobj(x):
-        bound = "must hold the conjugate of each complex number"
+        bound = "must contain the conjugate of each complex number"
         raise ParameterError(f"compensator.{name}", given, bound)
     return tuple(float(c) for c in np.atleast_1d(x))
 

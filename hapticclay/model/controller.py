@@ -25,7 +25,7 @@ from .traits import Trait
 @named
 @dataclass(frozen=True)
 class Servo:
-    """The servo of one axis: what it makes of the commanded displacement and of the hand's force.
+    """The servo of one axis: its response to the commanded displacement and to the hand's force.
 
     Attributes:
         G: closed position loop, handle over compensator output [1/s^2 in its gain] (Eqs. 15, 16).

@@ -62,7 +62,7 @@ def cut(grid, left, relief, x, y, whole, rim, removed):
 
     Args:
         grid: Groove.numbers.
-        left: share of each cell that is left, shape (n, m).
+        left: remaining share of each cell, shape (n, m).
         relief: height of each cell before the first cut [m], shape (n, m).
         x: place of the tool, x [m].
         y: the same, y [m].
@@ -171,7 +171,7 @@ def resistance(rim, x, y):
 @named
 @dataclass(frozen=True)
 class Groove:
-    """A block of clay that stays cut: a tool at the handle removes what stands in its way.
+    """A block of clay that stays cut: a tool at the handle removes the clay that it passes over.
 
     The tool is a disc that cuts down to a floor. The block is a grid of cells; the share of each
     under the tool is removed, and the edge of the tool is spread over two cells to either side. The
@@ -189,7 +189,7 @@ class Groove:
             20 in it.
         heights: of the clay above the floor of the cut [m], a line along y for each cell along x,
             0 to 0.1; empty where it is flat, tool.depth everywhere.
-        left: share of each cell that is left, as heights, 0 to 1; empty for all of it.
+        left: remaining share of each cell, as heights, 0 to 1; empty for a whole block.
     """
 
     x: Annotated[tuple[float, float], Bound(unit="m")]
@@ -221,16 +221,16 @@ class Groove:
             table = getattr(self, name)
             got = len(table), len(table[0]) if table else 0
             if table and got != (n, m):
-                bound = f"must have shape {(n, m)}, a number a cell, has {got}"
+                bound = f"must have shape {(n, m)}, one number per cell, has {got}"
                 raise ParameterError(f"groove.{name}", table, bound)
         if not (self.pressure or self.gradient or self.damping):
             bound = "must be above 0 without gradient and damping: the block would not resist"
             raise ParameterError("groove.pressure", self.pressure, bound)
         if self.hardest > FY_MAX:
-            bound = f"must press with {FY_MAX:g} N at most, presses with {self.hardest:.3g} N"
+            bound = f"must give at most {FY_MAX:g} N, gives {self.hardest:.3g} N"
             raise ParameterError("groove.pressure", self.pressure, bound)
         if self.thickest > B_MAX:
-            bound = f"must damp with {B_MAX:g} N.s/m at most, damps with {self.thickest:.3g} N.s/m"
+            bound = f"must give at most {B_MAX:g} N.s/m, gives {self.thickest:.3g} N.s/m"
             raise ParameterError("groove.damping", self.damping, bound)
 
     @property
@@ -346,7 +346,7 @@ _UNCUT = Refusal(
     "hardware", "must be without passivity controller and coupling in clay that stays cut"
 )
 _BESIDE = Refusal(
-    "clay.groove", "must be None beside laws that yield, grow, spring back or are smooth"
+    "clay.groove", "must be None with laws that yield, grow, spring back or are smooth"
 )
 
 

@@ -172,9 +172,9 @@ class LawCaller:
 
 
 _ALONE = Refusal(
-    "hardware", "must be without passivity controller and coupling where the law is one's own"
+    "hardware", "must be without passivity controller and coupling with your own controller"
 )
-_SAMPLED = Refusal("control", "must be 'sampled' with a controller of one's own")
+_SAMPLED = Refusal("control", "must be 'sampled' with your own controller")
 TRAITS = (
     Trait(
         "own controller", "part", lambda s: s.controller is not None, NO,

@@ -55,7 +55,7 @@ class Samples(Signal):
                 raise ParameterError(f"samples.{name}[{i}]", x[i].tolist(), bound)
         if (np.diff(t) <= 0.0).any():
             i = int(np.argmax(np.diff(t) <= 0.0)) + 1
-            bound = f"times must ascend, and the one before is {t[i - 1]:.12g} s"
+            bound = f"must be later than the time before, {t[i - 1]:.12g} s"
             raise ParameterError(f"samples.t[{i}]", float(t[i]), bound)
         choice("samples.between", self.between, get_args(Between))
         choice("samples.outside", self.outside, get_args(Outside))
@@ -152,15 +152,15 @@ def _csv_number(text: str, column: str, line: int, path: Any) -> float:
 @named
 @dataclass(frozen=True)
 class Function(Signal):
-    """Any function of time; it must be smooth, or a run loses order where it is not.
+    """Any smooth function of time; where it is not smooth, a run loses order.
 
-    A run asks it at the ends of each half step and twice in between, each time once, and takes the
-    cubic through the four values. `mean` of the function itself is by ten values.
+    A run evaluates it at the ends of each half step and twice in between, and uses the cubic
+    through the four values. `mean` of the function itself uses ten values.
 
     Attributes:
-        f: returns (x, y) at a time [s]; it may be asked for many at once, as an array, and then
-            return arrays; a function that does not is asked time by time. It is not asked for
-            times before 0 or after t_max. A signal with a function cannot be written to a file.
+        f: returns (x, y) at a time [s]. It may accept an array of times and return arrays; else it
+            is called with one time after another. It is not called for times before 0 or after
+            t_max. A signal with a function cannot be written to a file.
     """
 
     f: Callable[[Any], Any]

@@ -20,7 +20,7 @@ RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs 
 @named
 @dataclass(frozen=True)
 class Spring:
-    """How clay springs back along one axis, beside its damping.
+    """How clay springs back along one axis, in addition to its damping.
 
     Its rest is where the handle comes into the region: the border that it crosses, or the place at
     which it starts or comes in across a border of the other coordinate. The second spring is
@@ -29,7 +29,7 @@ class Spring:
     Attributes:
         k: stiffness [N/m], 0 to 1e9.
         limit: force beyond which it gives way for good [N], > 0, at most 1e6; None for never.
-        k1: stiffness of a second spring beside it, which relaxes [N/m], 0 to 1e9.
+        k1: stiffness of a second, parallel spring, which relaxes [N/m], 0 to 1e9.
         tau: relaxation time of the second spring [s], > 0, at most 1e5; 1 without k1.
         unilateral: whether the clay is a wall behind the border, which pushes and never pulls; what
             gave way, and where the tool was at the start, is a dent that stays. Else the tool

@@ -60,14 +60,16 @@ def check_scene(s: Any) -> None:
 
 HEAD = """# What can be combined
 
-Each part says what it cannot be combined with; all else can. Table and list are made of these
-answers, by `python -m hapticclay.model.support docs/support.md`. Each cell is tested: one that says
-yes runs, another is refused with the words below.
+The table lists which parts work with which method; the list below it, all pairs that are refused.
+All other pairs can be combined. Each cell is tested: a scene with "yes" runs, a scene with "no" is
+refused with the message below. The page is made by
+`python -m hapticclay.model.support docs/support.md`.
 
 Methods: **fast** and **accurate** integration of continuous control; sampled control with clay
 **held** by the motors, or **physical**. Linear theory (gain limits, margins, poles, impedance)
-knows a part, leaves it out (its limit is that of the scene without the part), or refuses the scene.
-Bounds that depend on numbers, as that of stiff clay, are on the page of the part.
+includes a part (yes), leaves it out (its limit is that of the scene without the part), or refuses
+the scene (no). Bounds that depend on numbers, such as that of stiff clay, are on the page of the
+part.
 """
 
 

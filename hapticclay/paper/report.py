@@ -1,4 +1,4 @@
-"""The report of `hapticclay reproduce`: every figure and number of the paper beside ours."""
+"""The report of `hapticclay reproduce`: every figure and number of the paper and ours."""
 
 from __future__ import annotations
 

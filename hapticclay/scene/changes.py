@@ -19,7 +19,7 @@ HAND = ["mass", "damper", "spring"]  # what a hand is added by
 
 @checked
 def with_fields(part: T, changes: Mapping[str, Any]) -> T:
-    """A part with some fields changed, all at once.
+    """A copy of a part with some fields changed.
 
     Args:
         part: the part, as a scenario.
@@ -69,7 +69,7 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
     named = list(both)
     if named and (old is None or isinstance(old, tuple) and None in old) and named != HAND:
         more = " and ".join(join_names(path, n) for n in HAND if n not in named)
-        bound = f"adds a hand to a scene without one: give {more} as well, 0 for none"
+        bound = f"adds a hand to a scene without one: also give {more}, 0 for none"
         raise ParameterError(join_names(path, named[0]), given[named[0]], bound)
 
 
@@ -90,7 +90,7 @@ def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
             bound = f"must be given once, and {twice.args[0]!r} is given twice"
             raise ParameterError(str(name), value, bound) from None
         except RecursionError:
-            raise ParameterError(str(name), ..., "must not lie so deep") from None
+            raise ParameterError(str(name), ..., "is nested too deeply") from None
     return out
 
 

@@ -232,7 +232,7 @@ class ConstantCut(PathExperiment):
 @named
 @dataclass(frozen=True)
 class VariableCut(PathExperiment):
-    """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at once.
+    """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at the same time.
 
     The clay of each axis depends on the coordinate of that axis.
 

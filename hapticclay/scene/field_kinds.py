@@ -132,7 +132,7 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
     """
     if not known:
         whole = name.rpartition(".")[0]
-        bound = f"{whole} is not given: give it whole, in a file as [[{whole}]], a table a part"
+        bound = f"{whole} is not given: give it as a whole, in a file as [[{whole}]]"
         return ParameterError(name, value, bound)
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))

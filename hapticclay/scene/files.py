@@ -40,7 +40,7 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
     kind = _file_kind(file)
     try:
         if file.exists() and not file.is_file():  # a pipe would be waited for
-            raise ValueError("it is no regular file")
+            raise ValueError("it is not a regular file")
         text = file.read_bytes().decode("utf-8-sig")
         data = tomllib.loads(text) if kind == "TOML" else json.loads(text, object_pairs_hook=_table)
         if not isinstance(data, dict):
@@ -51,7 +51,7 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         fault = " ".join(str(error).split())
         if isinstance(error, UnicodeDecodeError):
-            fault = f"byte {error.start} is no UTF-8"
+            fault = f"byte {error.start} is not UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError("scenario", str(path), bound) from None
     return {"name": file.stem, **with_present_names(data)}
@@ -96,7 +96,7 @@ def write_part(
     try:
         raw = text.encode()
     except UnicodeEncodeError:
-        raise ParameterError("name", data["name"], "must be text that UTF-8 can hold") from None
+        raise ParameterError("name", data["name"], "must be text that UTF-8 can encode") from None
     with atomic(file) as f:
         f.write(raw)
     return file

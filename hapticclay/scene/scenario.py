@@ -95,7 +95,7 @@ class Scenario:
         servo: G and Sh of each axis, (x, y).
         compensator: shape of C, of both axes or a pair (x, y); K/(s^2 + 10 s) as printed. Systems
             of python-control and scipy.signal are taken as well.
-        controller: a sampled controller of one's own in place of compensator and servo; None for
+        controller: your own sampled controller, which replaces compensator and servo; None for
             those.
     """
 

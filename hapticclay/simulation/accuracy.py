@@ -269,7 +269,7 @@ def _divided(Ts: float, dt: float) -> float:
     while Ts / n > dt and Ts / (2 * n) >= SMALLEST:
         n *= 2
     if Ts / n < SMALLEST:
-        bound = f"must be at least {RATIO * SMALLEST:g} s where an error is asked for"
+        bound = f"must be at least {RATIO * SMALLEST:g} s if an error is requested"
         raise ParameterError("Ts", Ts, bound)
     return Ts / n
 

@@ -1,4 +1,4 @@
-"""Many runs at once, on all cores, each with the result it has alone."""
+"""Many runs in parallel on all cores, each with the same result as by itself."""
 
 from __future__ import annotations
 

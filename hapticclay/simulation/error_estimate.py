@@ -13,17 +13,17 @@ class Accuracy:
     """How far a run is from the exact solution, and how far it was allowed to be.
 
     Attributes:
-        asked: the error asked for [unit].
+        asked: the requested error [unit].
         unit: "s", the largest error of the times at which borders are crossed; or "m", of the
             position at the samples.
         estimate: the error of the record [unit]; None where nothing bounds it.
-        reached: whether the estimate is as small as asked.
+        reached: whether the estimate is at most the requested error.
         integrator: that was chosen.
         dt: step of the record [s].
-        order: observed over the last three steps; None where it cannot be told.
+        order: observed over the last three steps; None where it cannot be determined.
         runs: made to choose and to verify.
         wall_time: of all of them [s].
-        note: why there is no estimate, or why it is not as small as asked; else "".
+        note: why there is no estimate, or why it exceeds the requested error; else "".
     """
 
     asked: float
@@ -41,4 +41,4 @@ class Accuracy:
         found = "unknown" if self.estimate is None else f"{self.estimate:.1e} {self.unit}"
         kept = "reached" if self.reached else "not reached"
         how = f"{self.integrator}, dt = {self.dt:.3g} s, {self.runs} runs"
-        return f"{found}, {self.asked:g} {self.unit} asked: {kept} ({how})"
+        return f"{found}, {self.asked:g} {self.unit} requested: {kept} ({how})"

@@ -76,7 +76,7 @@ class Record:
             target of the hand and the gain K, shape (n, 2).
         notes: of sessions, how well they kept real time.
         stops: where clay that yields held the handle still, in order.
-        error: of a run to an asked error, what was asked and reached; else None.
+        error: of a run with a requested error: request and estimate; else None.
         ground: of clay that stays cut, height of what is left of each cell at the end [m], shape
             (n, m), between the `edges` of its Groove; else None.
     """

@@ -42,7 +42,7 @@ def simulate(
     Raises:
         ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
             stiff for its integrator, the record may not fit into memory, the law of its controller
-            is not found, or an error in seconds is asked for without a border to cross.
+            is not found, or an error in seconds is requested without a border to cross.
         RuntimeError: the law of its controller raised an exception (`LawFailed`). What is no error,
             as Ctrl-C, is raised as it is.
     """

@@ -1,4 +1,4 @@
-"""A run step by step, for a loop of one's own around it."""
+"""A run step by step, inside a loop of your own."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Sample(NamedTuple):
 
 @checked
 class Simulation:
-    """A run that makes steps when it is told to, to the same numbers as `simulate`.
+    """A run that you advance step by step, with results bit-identical to those of `simulate`.
 
         with hc.Simulation(scenario) as sim:
             while sim.outcome is None:
@@ -71,16 +71,16 @@ class Simulation:
                 sim.step(force=(1.0 - 10.0 * v[0], 0.0))
         record = sim.record()
 
-    A step leads from one sample to the next, dt later; a border in its way is landed on. As in
-    `simulate` the samples are judged 4095 at a time: a verdict of instability comes late by so many
-    steps at most, and the record ends where it was due; `diverging` tells it sooner.
+    A step leads from one sample to the next, dt later; it ends on a border that it would cross.
+    As in `simulate` the samples are judged 4095 at a time: a verdict of instability is late by at
+    most so many steps, and the record ends where it was due. `diverging` detects it sooner.
 
     A simulation belongs to one thread at a time. It can be pickled and copied; a copy goes on by
     itself.
 
     Args:
         scenario: what to run.
-        engine: as in `simulate`; "auto" compiles once the steps asked for repay it.
+        engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
 
     Raises:
         ParameterError: scenario is of another type, or refused as by `simulate`.
@@ -157,7 +157,7 @@ class Simulation:
 
     @property
     def outcome(self) -> Outcome | None:
-        """How the run ended; None while it goes on."""
+        """How the run ended; None while it is running."""
         return self._run.outcome
 
     @property
@@ -192,7 +192,7 @@ class Simulation:
     def diverging(self) -> bool:
         """Whether the motion so far is unstable by the rules of the monitor.
 
-        It is asked anew each 20 ms of simulated time, and is no verdict: the run goes on.
+        It is evaluated every 20 ms of simulated time. It is not a verdict: the run continues.
         """
         with self._alone() as run:
             if run.outcome is None and run.t >= self._looked + LOOK:
@@ -265,7 +265,7 @@ class Simulation:
             self._untold = 0
 
     def reset(self, scenario: Scenario | None = None) -> None:
-        """Begins anew.
+        """Starts again.
 
         Args:
             scenario: what to run; None for the same.

@@ -34,7 +34,7 @@ LONG_NAMES = {
     "removal_rate": "rate of removal",
     "target": "point that the hand pulls to",
     "gain": "gain K of the compensator",
-    "ground": "height of the clay that is left",
+    "ground": "height of the remaining clay",
 }
 
 

@@ -223,7 +223,9 @@ def _top(scenario: Scenario) -> float:
     Ts = scenario.Ts or scenario.dt
     least = 1e-6 * FINER * 2 ** (HELD_RUNGS - 1)  # 1e-6 s is the smallest step there is
     if Ts < least:
-        raise ParameterError("Ts", Ts, f"must be at least {least:g} s for a ladder of its parts")
+        raise ParameterError(
+            "Ts", Ts, f"must be at least {least:g} s, so that several steps divide it"
+        )
     return Ts / math.ceil(Ts / TOP - 1e-9)
 
 

@@ -43,7 +43,7 @@ WALL_WORDS = frozenset(
 @named
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """One file: what it says, what theory says of it, and its run.
+    """One file: its scenario or wall, the theory of it, and its run.
 
     Attributes:
         name: of the file.
@@ -130,10 +130,10 @@ def compare_files(
         bound = f"must be 2 to {MOST_COMPARED} files, as in hapticclay compare A.toml B.toml"
         raise ParameterError("files", given, bound)
     if len({os.path.realpath(p) for p in paths}) < len(paths):
-        raise ParameterError("files", given, "must be different files: one stands twice")
+        raise ParameterError("files", given, "must be different files: one is named twice")
     kinds = {is_wall_file(p) for p in paths}
     if len(kinds) > 1:
-        bound = "must be all scenarios or all walls: their numbers do not compare"
+        bound = "must be all scenarios or all walls: their numbers cannot be compared"
         raise ParameterError("files", given, bound)
     stems = [Path(p).stem for p in paths]
     names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]

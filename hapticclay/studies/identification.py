@@ -413,7 +413,7 @@ def _multisine(
     lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
-        bound = f"must hold 3 multiples of 1/period = {1.0 / period:.4g} Hz or more"
+        bound = f"must contain at least 3 multiples of 1/period = {1.0 / period:.4g} Hz"
         raise ParameterError("band", (low, high), bound)
     return Multisine(rms, low, high, period, min(lines, most))
 

@@ -1,4 +1,4 @@
-"""The impedance that a hand feels, measured on runs by a multisine, beside the computed one.
+"""The impedance at the hand, measured on runs by a multisine, with the computed one.
 
 The muscles push with a multisine so small that the arm stays linear; after the transient the
 response is taken at its lines over whole periods, as in `identification`.
@@ -45,7 +45,7 @@ Subject = PushedLoop | VirtualWall
 @named
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasuredImpedance(Result):
-    """An impedance measured on a run, beside the computed one at the same lines.
+    """An impedance measured on a run, with the computed one at the same frequencies.
 
     Attributes:
         subject: what was run.
@@ -135,7 +135,7 @@ def measure_impedance(
     amplitude: float = MOTION,
     seed: int = 0,
 ) -> MeasuredImpedance:
-    """Measure the impedance of a loop or a wall by a run, beside the computed one.
+    """Measure the impedance of a loop or a wall by a run, and compute it.
 
     The run begins at the nominal pose. Agreement is limited by the steps of the engine, (omega
     dt)^2/6, by the amplitude over the length of a link, and by what is left of the transient.
@@ -193,7 +193,7 @@ def _check_subject(subject: Subject) -> None:
     """Refuse what no steady response exists of."""
     if isinstance(subject, VirtualWall):
         if subject.unilateral:
-            bound = "must be False: a wall that acts on one side alone is not linear"
+            bound = "must be False: a unilateral wall is not linear"
             raise ParameterError("wall.unilateral", True, bound)
         if not _rough(subject) and not stable_wall(subject):
             bound = (
@@ -209,7 +209,7 @@ def _check_subject(subject: Subject) -> None:
         )
     if not gain_crossings.is_stable(subject.linear):
         limit = gain_limits.gain_limit(subject.linear)
-        bound = f"must leave the loop stable with this hand, which is up to {limit:.4g}"
+        bound = f"must be stable with this hand: at most {limit:.4g}"
         raise ParameterError("K", subject.K, bound)
 
 
@@ -282,5 +282,7 @@ def _notes(subject: Subject, dt: float) -> tuple[str, ...]:
         )
     late = subject.delay / dt
     if abs(late - round(late)) > 1e-6:
-        notes.append("the delay is no multiple of a step: measured fe/fh is late by up to a step")
+        notes.append(
+            "the delay is not a multiple of a step: measured fe/fh is late by up to a step"
+        )
     return tuple(notes)

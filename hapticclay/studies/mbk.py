@@ -190,7 +190,7 @@ def device_mbk(
     band: tuple[float, float] = RANGE_BAND,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> DeviceMBK:
-    """What a bare device renders, over three planes, beside runs at the borders.
+    """What a bare device renders, over three planes, with runs at the borders.
 
     Args:
         wall: device, hand and sampling. The plane of M and B keeps its K, that of M and K its B,
@@ -261,7 +261,7 @@ def arm_mbk(
     samples: int = 24,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> ArmMBK:
-    """The least masses that the arm renders over their damper, beside runs.
+    """The least masses that the arm renders over their damper, with runs.
 
     Args:
         loop: arm, servo, hand and sampling, or a scenario; its own compensator and gain do not

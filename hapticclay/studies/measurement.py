@@ -240,7 +240,7 @@ def identify_data(
     Args:
         data: the columns.
         what: "G" (input: command), "S" (Sh; input: force) or "Th" (input: force).
-        axis: "x" or "y"; of the printed form beside the fitted one.
+        axis: "x" or "y", the axis of the printed equation to compare with.
         band: lowest and highest frequency [Hz], to 0.1/dt; None for what the record holds of (0.15,
             20), Th (0.08, 3).
         held: True for an input that a computer holds from each sample to the next; not for Th.

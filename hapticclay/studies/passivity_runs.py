@@ -37,7 +37,7 @@ WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 @named
 @dataclass(frozen=True, eq=False)
 class IndexOverFrequency:
-    """Damping that a wall, or an arm in clay, shows the hand at each frequency, with runs beside.
+    """Damping to spare of a wall, or of an arm in clay, at each frequency, with runs.
 
     Attributes:
         name: of what was run.
@@ -222,7 +222,7 @@ def energy_over_time(scenario: Scenario) -> EnergyOverTime:
         scenario: a run under sampled control whose clay the motors hold.
 
     Raises:
-        ParameterError: its clay is not held, or its hardware takes no passivity controller.
+        ParameterError: its clay is not held, or its hardware cannot have a passivity controller.
     """
     if scenario.control != "sampled" or scenario.render != "held" or scenario.clay is None:
         bound = "must be 'held' under control = 'sampled', in clay: the controller acts on that"

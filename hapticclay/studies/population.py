@@ -36,7 +36,7 @@ class Hands:
         mass: [kg], a number or its distribution over the population.
         damper: [N.s/m], likewise.
         spring: [N/m], likewise.
-        source: who published the numbers, and where; "" for numbers of one's own.
+        source: who published the numbers, and where; "" for your own numbers.
         spread: what the spread stands for, as "subjects", or "assumed".
         subjects: number of people who were measured, 0 where that is not known.
         correlation: of the normal scores of (mass, damper), (mass, spring) and (damper, spring), -1
@@ -66,7 +66,7 @@ class Hands:
         found = numbers_of("hands.correlation", self.correlation, names, -1.0, 1.0)
         object.__setattr__(self, "correlation", found)
         if np.linalg.eigvalsh(self._correlations).min() < -1e-12:
-            bound = "must be those of three numbers: no such numbers exist"
+            bound = "must be correlations of three numbers: no three numbers have these"
             raise ParameterError("hands.correlation", self.correlation, bound)
 
     @classmethod
@@ -236,7 +236,7 @@ class Band(Result):
         return f"{self.told}: {least}, at {self.x_name} = {self.x[i]:.4g}"
 
     def quantile(self, share: float) -> np.ndarray:
-        """Limit that a share of the hands lies at or below, shape (n,).
+        """Limit that a share of the hands does not exceed, shape (n,).
 
         Args:
             share: 0 to 1.
@@ -363,6 +363,6 @@ def _limit_band(
     for v in progress(values):
         rows.append([limit(v, hand) for hand in drawn])
         nominal.append(limit(v, middle))
-    own = hands.spread or "of one's own"
+    own = hands.spread or "own numbers"
     told = next((k for k, v in POPULATIONS.items() if v == hands), own)
     return Band(*names, np.array(values), np.array(rows), drawn, np.array(nominal), told)

@@ -62,7 +62,7 @@ class Path:
         if len(self.places) < 2:
             raise ParameterError("path.places", self.places, "must be two places or more")
         if self.middles and len(self.middles) != len(self.places):
-            bound = f"must be {len(self.places)} places, one a sample"
+            bound = f"must be {len(self.places)} places, one per sample"
             raise ParameterError("path.middles", self.middles, bound)
 
 

@@ -112,7 +112,7 @@ class Removal:
                 [e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)
             ]
         if np.max((high - low) / self.cell) > 20_000:
-            bound = "the path is too long for a map of the clay"
+            bound = "path too long for a map of the clay"
             raise ParameterError("record", scenario.name, bound)
         lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)

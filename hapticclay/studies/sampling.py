@@ -324,7 +324,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
         data[name] = _flat(with_present_names(data.get(name, {})))
     if "scenario" in data:
         if "experiment" in data or not isinstance(data["scenario"], str):
-            bound = "must be the path of a scenario file, without an experiment beside it"
+            bound = "must be the path of a scenario file; remove the experiment"
             raise ParameterError("scenario", data["scenario"], bound)
         data["scenario"] = read_settings(path.parent / data["scenario"])
     data["vary"] = {k: Range.parse(k, v) for k, v in data["vary"].items()}

@@ -59,7 +59,7 @@ class Drift:
         return {"poses": table}
 
     def ranges(self) -> list[dict[str, Any]]:
-        """Return the range of each coefficient over the poses, beside the printed value."""
+        """Return the range of each coefficient over the poses, and the printed value."""
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
             what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]

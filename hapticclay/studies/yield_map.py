@@ -1,4 +1,4 @@
-"""What a push ends in, over the yield force of the clay and the gain: theory beside runs."""
+"""How a push ends, over the yield force of the clay and the gain: theory and runs."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def yield_map(
     some = np.geomspace(min(GAINS[0], 0.1 * end), 0.99 * end, 30).tolist() if end else []
     _, least = first_failure(rests, some, rtol=0.01) if some else (0.0, 0.0)
     if not 0.0 < least < end:
-        raise ParameterError("map", "gain-yield", "needs a loop that some gains let buzz")
+        raise ParameterError("map", "gain-yield", "no gain gives a limit cycle here")
     top = 1.5 * limit if limit < math.inf else 6.0 * least
     K = np.geomspace(least, min(0.995 * limit, top), lines).tolist()
     K += np.linspace(1.005 * limit, top, lines // 3).tolist() if limit < top else []

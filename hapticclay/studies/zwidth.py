@@ -230,7 +230,7 @@ def zwidth(
     quick: bool = False,
     progress: Share = unshown,
 ) -> ZWidth:
-    """Find the walls that a device renders stably, by runs, beside what theory says.
+    """Find the walls that a device renders stably, by runs and by theory.
 
     A linear loop is stable where the oscillation of a run decays: its growth rate is that of its
     least damped mode, exact but for the step of the engine. With friction, an encoder or a surface
@@ -257,7 +257,7 @@ def zwidth(
     """
     wall = boundary.of_scenario(wall, AXES[0])
     if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
-        raise ParameterError("Ts", None, "must be given: the walls are rendered at samples")
+        raise ParameterError("Ts", None, "is needed: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
     some = None if B is None else _dampings(B)
@@ -288,7 +288,7 @@ def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[
     varied = VARIED_DEVICE if isinstance(wall, VirtualWall) else VARIED_ARM
     field, unit, factor = varied[choice("vary", vary, tuple(varied))]
     if not values:
-        raise ParameterError("values", values, f"must hold a value of {vary} at least")
+        raise ParameterError("values", values, f"must contain at least one value of {vary}")
     walls = [with_fields(wall, {field: x}) for x in values]
     return [(_value_name(vary, attrgetter(field)(w), unit, factor), w) for w in walls]
 

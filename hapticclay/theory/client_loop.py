@@ -129,7 +129,7 @@ def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
-    """Whether the loop is stable: every mode that swings or runs away lies within the unit circle.
+    """Whether the loop is stable: every oscillating or diverging mode is within the unit circle.
 
     Args:
         handle: arm and hand.

@@ -144,7 +144,7 @@ def compare(
 ) -> list[Design]:
     """Compensators at equal margin, the most transparent first.
 
-    The error is that of continuous time; with sampling or delay only gain_margin can be asked for.
+    The error is that of continuous time; with sampling or delay only gain_margin can be requested.
 
     Args:
         loop: the loop, whose own compensator and K do not matter; or axis, b, compensators,

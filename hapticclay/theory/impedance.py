@@ -85,17 +85,17 @@ class Impedance(Result):
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Effective stiffness, -omega Im Z [N/m], (n,); NaN where a mass is felt instead."""
+        """Effective stiffness, -omega Im Z [N/m], (n,); NaN where Z is that of a mass."""
         return np.where(self.Z.imag < 0.0, -self.omega * self.Z.imag, np.nan)
 
     @property
     def mass(self) -> np.ndarray:
-        """Effective mass, Im Z/omega [kg], shape (n,); NaN where a spring is felt instead."""
+        """Effective mass, Im Z/omega [kg], shape (n,); NaN where Z is that of a spring."""
         return np.where(self.Z.imag > 0.0, self.Z.imag / self.omega, np.nan)
 
     @property
     def ratio(self) -> np.ndarray:
-        """Z/Ze, felt over rendered impedance, complex, shape (n,); NaN where Ze = 0."""
+        """Z/Ze, effective over rendered impedance, complex, shape (n,); NaN where Ze = 0."""
         out = np.full(self.Z.shape, complex(np.nan, np.nan))
         return np.divide(self.Z, self.rendered, out=out, where=self.rendered != 0.0)
 

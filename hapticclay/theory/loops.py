@@ -1,4 +1,4 @@
-"""A loop, as an analysis is asked of it: by its parts, of a scenario, or by words.
+"""A loop as the argument of an analysis: its parts, a scenario, or keywords.
 
 The decorator `of_loop` gives every analysis of `theory` these three forms.
 """

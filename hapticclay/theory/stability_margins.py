@@ -1,7 +1,7 @@
 """Stability of one axis at the nominal pose: verdicts, margins, and the worst case over hands.
 
 Frequency responses are ratios of polynomials, so their extremes and crossings are roots of
-polynomials: exact. An uncertain hand is a box of Th, and the loop is judged over all of it.
+polynomials: exact. An uncertain hand is a box of Th; the loop is judged over the whole box.
 """
 
 from __future__ import annotations

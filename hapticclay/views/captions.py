@@ -48,7 +48,7 @@ def scenario_parts(s: Scenario) -> list[str]:
     def pair(x: tuple[float, float]) -> str:
         return f"({x[0]:.3g}, {x[1]:.3g})"
 
-    how = f"K = {pair(s.gain)}" if s.controller is None else "a controller of one's own"
+    how = f"K = {pair(s.gain)}" if s.controller is None else "own controller"
     out = [f"{s.name}: {how}"]
     if s.muscle is None:
         out.append(f"u$_h$ = {pair(s.force)} N")

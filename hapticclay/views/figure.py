@@ -21,7 +21,7 @@ UNDATED: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None},
 
 
 class Figure:
-    """A figure that is drawn anew in each style, and the numbers that it shows.
+    """A figure that can be drawn in every style, and the numbers that it shows.
 
     Args:
         draw: returns the figure of matplotlib in the style of now (`style.figure_style`), or None

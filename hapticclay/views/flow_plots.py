@@ -36,7 +36,7 @@ FLOW_COLORS = (BLUE, GREEN, PURPLE, SKY_BLUE)  # of the regions of clay that yie
 
 
 def force_velocity_plot(record: Record) -> Figure:
-    """Plots the force of clay that yields over the velocity, beside the law of each region.
+    """Plots the force of clay that yields over the velocity, with the law of each region.
 
     Clay that resists along the motion has one panel: force and speed along the motion, negative
     where the handle goes back. Otherwise each axis on which it yields has one, of the clay's own

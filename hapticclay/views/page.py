@@ -461,7 +461,7 @@ def _listening(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family)
     except OSError as error:
         why = error.strerror.lower() if error.strerror else str(error)
-        bound = f"{host} cannot be listened on ({why}): try --port 0, for any"
+        bound = f"cannot listen on {host} ({why}): try --port 0 for any free port"
         raise ParameterError("port", port, bound) from None
 
 

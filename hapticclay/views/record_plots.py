@@ -56,7 +56,7 @@ class RecordPlots:
         return {name: _with_picture(figure) for name, figure in figures.items()}
 
     def velocity(self, axis: str | None = None) -> Figure:
-        """Velocity over position, beside the expected steady speeds (Fig. 8, top; Fig. 10).
+        """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10).
 
         Args:
             axis: "x", "y", or "xy" for a panel each; None for those along which the clay changes.

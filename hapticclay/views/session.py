@@ -1,4 +1,4 @@
-"""Interactive sessions: a person pulls the handle while the run goes on, in slices of a frame.
+"""Interactive sessions: a person pulls the handle of a running simulation, frame by frame.
 
 `Session` is the run, `Replay` plays a record in its place, `Player` advances either in real time,
 and `live_verdict` says whether the loop is stable. Nothing here draws: the window and the page tell
@@ -150,7 +150,7 @@ class Session:
         self.point = None if point is None else self._within_reach(point)
 
     def push(self, force: tuple[float, float]) -> None:
-        """Makes the hand press with a steady force, beside any pull.
+        """Makes the hand press with a constant force, in addition to any pull.
 
         Args:
             force: along x and y [N].

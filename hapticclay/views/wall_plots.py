@@ -57,7 +57,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
     """Plots the region of stable walls, or a family of regions.
 
     Runs are markers and theory is lines. Of a family each region has its runs, the exact line of
-    its linear loop, and, where there is room, its name beside it.
+    its linear loop, and, where there is room, its name.
 
     Args:
         chart: from `zwidth`.

@@ -85,7 +85,7 @@ class Window:
         """
         screens = (os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
         if sys.platform.startswith("linux") and not any(screens):
-            raise ParameterError("display", "", f"there is none: {INSTEAD}")
+            raise ParameterError("display", "", f"no display: {INSTEAD}")
         self.other = True
         while self.other:
             self.other = False

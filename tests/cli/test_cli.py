@@ -64,11 +64,11 @@ def test_a_run_to_an_asked_error_says_what_was_reached(capsys, tmp_path):
         capsys, "run", "constant", "--error", "1e-5m", "--no-plots", "--out", str(tmp_path)
     )
     assert (code, err) == (0, "") and "error: " in out
-    assert "1e-05 m asked: reached (fast, dt = " in out and "why:" not in out
+    assert "1e-05 m requested: reached (fast, dt = " in out and "why:" not in out
     assert hc.Record.load(tmp_path).error.reached
     args = ("--gain", "1", "1", "--error", "1e-5", "--no-plots", "--out", str(tmp_path))
     code, out, _ = run(capsys, "run", "constant", *args)
-    assert code == 0 and "asked: not reached" in out and "why: the loop is unstable" in out
+    assert code == 0 and "requested: not reached" in out and "why: the loop is unstable" in out
 
 
 def test_accuracy_writes_figure_page_and_numbers(capsys, tmp_path):
@@ -626,7 +626,7 @@ def test_a_file_names_its_folder_and_takes_changes(capsys, tmp_path, monkeypatch
         (["run", "--set", "arm.l1=1"], ["give an experiment"]),
         (["run", "none.toml"], ["none.toml", "No such file"]),
         (["run", "good.toml", "--b", "3"], ["--b: no option of run"]),
-        (["run", "folder.toml"], ["folder.toml", "no regular file"]),
+        (["run", "folder.toml"], ["folder.toml", "not a regular file"]),
         (["run", "bad.toml"], ["must be TOML: Invalid value (at line 1, column 5)"]),
         (["run", "typo.toml"], ["arm.l3 = 0.3: no such field", "(in typo.toml)"]),
         (["run", "good.toml", "other.toml"], ["'other.toml': one word too many"]),

@@ -277,7 +277,7 @@ def test_a_pair_may_be_a_list_of_tables(tmp_path):
         ("[arm]\nl1 = 'wide'", "arm.l1 = 'wide': must be a finite number >= 0.001"),
         ("[arm]\nl1 = '3'", "arm.l1 = '3': must be a finite number"),
         ("[arm]\nl1 = '3 kg'", "arm.l1 = '3 kg': must be a number in m, not in kg"),
-        ("[arm]\nl1 = '3 ells'", "arm.l1 = '3 ells': must be a number in m; 'ells' is no unit"),
+        ("[arm]\nl1 = '3 ells'", "arm.l1 = '3 ells': must be a number in m; unknown unit 'ells'"),
         ("[arm]\nl1 = 1979-05-27", "arm.l1 = datetime.date(1979, 5, 27): must be a finite"),
         ("arm = 3", "arm = 3: must be an Arm"),
         ("[[arm]]\nl1 = 3", "arm = [{'l1': 3}]: must be an Arm"),
@@ -322,7 +322,7 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path, text, said):
     [
         ("s.toml", b"a = = 3", "must be TOML: Invalid value (at line 1, column 5)"),
         ("s.toml", b"dt = 1\ndt = 2", "must be TOML: Cannot overwrite a value"),
-        ("s.toml", b"name = '\xff'", "must be TOML: byte 8 is no UTF-8"),
+        ("s.toml", b"name = '\xff'", "must be TOML: byte 8 is not UTF-8"),
         ("s.json", b'{"a": }', "must be JSON: Expecting value: line 1 column 7"),
         ("s.json", b'{"dt": 1, "dt": 2}', "must be JSON: 'dt' is given twice"),
         ("s.json", b"[1]", "must be JSON: it holds no table"),
@@ -342,7 +342,7 @@ def test_what_is_no_scenario_file_is_named(tmp_path, name, raw, said):
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "d.toml").mkdir()
-    for name, said in (("none.toml", "No such file"), ("d.toml", "no regular file")):
+    for name, said in (("none.toml", "No such file"), ("d.toml", "not a regular file")):
         with pytest.raises(ParameterError, match=said):
             hc.Scenario.load(tmp_path / name)
     with pytest.raises(ParameterError, match="must be a regular file, is a folder"):
@@ -772,5 +772,5 @@ def test_a_pipe_is_refused_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "a.toml")
     os.mkfifo(tmp_path / "record.npz")
     for load, file in ((hc.Scenario.load, "a.toml"), (hc.Record.load, "record.npz")):
-        with pytest.raises(ParameterError, match="no regular file"):
+        with pytest.raises(ParameterError, match="not a regular file"):
             load(tmp_path / file)

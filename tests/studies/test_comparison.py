@@ -138,7 +138,7 @@ def test_what_does_not_compare_is_refused(tmp_path):
         comparison.compare_files([scene, wall])
     with pytest.raises(ParameterError, match="2 to 5"):
         comparison.compare_files([wall])
-    with pytest.raises(ParameterError, match="stands twice"):
+    with pytest.raises(ParameterError, match="is named twice"):
         comparison.compare_files([wall, tmp_path / "." / wall.name])
 
 
@@ -147,7 +147,7 @@ def test_what_does_not_compare_is_refused(tmp_path):
     [
         ("", "2 to 5 files"),
         ("a.toml", "2 to 5 files"),
-        ("a.toml a.toml", "one stands twice"),
+        ("a.toml a.toml", "one is named twice"),
         ("a.toml none.toml", "scenario = 'none.toml': must be a file that can be read"),
         ("a.toml wall.toml", "all scenarios or all walls"),
     ],

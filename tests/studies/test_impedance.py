@@ -79,7 +79,7 @@ def test_friction_is_measured_and_noted():
 @pytest.mark.parametrize(
     "subject, message",
     [
-        (PushedLoop(operator=TH, K=6.0), "K = 6.0: must leave the loop stable"),
+        (PushedLoop(operator=TH, K=6.0), "K = 6.0: must be stable with this hand"),
         (hc.VirtualWall(3e4, 2.0, device=DEVICE), "wall.K = 30000.0: must leave the wall stable"),
         (hc.VirtualWall(300.0, 2.0, device=DEVICE, unilateral=True), "must be False"),
         (hc.Device(), "must be a PushedLoop or a VirtualWall"),
@@ -176,5 +176,5 @@ def test_a_scenario_is_a_subject_of_every_study_of_a_loop():
     assert np.array_equal(a.nominal, b.nominal) and a.loop == b.loop
     with pytest.raises(hc.ParameterError, match="axis = 'z'"):
         measure_impedance(cut, "z")
-    with pytest.raises(hc.ParameterError, match="must be given: the walls are rendered at samples"):
+    with pytest.raises(hc.ParameterError, match="is needed: the walls are rendered at samples"):
         hc.walls.zwidth(cut)

@@ -685,7 +685,7 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
         "speed_x": "m/s",
         "wall_time": "s",
         "gain_margin_x": "factor on K",
-        "energy_residual": "of what went through",
+        "energy_residual": "share of the energy put through",
     }
     for name, unit in units.items():
         assert name in table.column_names and sweep_plots._column_label(name).endswith(f" [{unit}]")

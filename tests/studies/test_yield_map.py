@@ -132,7 +132,7 @@ def test_coulomb_clay_has_a_map_too(monkeypatch):
 
 def test_a_loop_that_never_buzzes_has_no_map(monkeypatch):
     monkeypatch.setattr(study, "GAINS", (1e-3, 1e-2))
-    with pytest.raises(hc.ParameterError, match="that some gains let buzz"):
+    with pytest.raises(hc.ParameterError, match="no gain gives a limit cycle"):
         study.yield_map(Y)
 
 

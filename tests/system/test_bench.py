@@ -114,7 +114,7 @@ def test_leaders_are_said_by_the_figures():
     )
     assert (
         wp.who_leads(found)
-        == "Fastest, by asked error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
+        == "Fastest, by requested error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
     )
     assert wp.who_leads(wp.leaders(rows[:2])).endswith("a at 1e-02 to 1e-08 s.")
 

@@ -315,7 +315,7 @@ def test_address_is_one_that_others_can_open():
 def test_taken_or_impossible_port_is_refused(host):
     with (
         socket.create_server((host, 0)) as s,
-        pytest.raises(hc.ParameterError, match="cannot be listened on"),
+        pytest.raises(hc.ParameterError, match="cannot listen on"),
     ):
         Page(Session(hc.constant_cut()), host=host, port=s.getsockname()[1])
     with pytest.raises(hc.ParameterError, match="port = 99999: must be a whole number"):

@@ -15,7 +15,7 @@ from hapticclay.studies.removal import removed
 from hapticclay.views import run_figures, run_plots, stage
 from hapticclay.views.style import clay_color
 
-DOCS = Path(__file__).parents[2] / "docs" / "clay.md"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def grid(values, edges=(0.05, 0.1, 0.15), across=(-0.05, 0.0, 0.05)):
@@ -159,9 +159,8 @@ def test_records_and_scenario_files_keep_clay_to_the_last_bit(tmp_path):
     assert hc.Scenario.load(tmp_path / "clay.toml") == record.scenario
 
 
-# but for the groove, whose block has its own test in test_docs.py
-PAGE = DOCS.read_text().partition("## Groove")[0]
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+PAGES = "".join((DOCS / f"{name}.md").read_text() for name in ("clay", "yielding", "springs"))
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGES, re.S)
 PRINTED = ("finished at", "finished at", "0.0856", "4.9999")
 
 
