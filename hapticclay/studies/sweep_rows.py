@@ -33,7 +33,7 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
     "fe_over_v_x": ("N.s/m", "force of that clay over the velocity, where the speed is steady"),
     "speed_x": ("m/s", "steady speed in that clay"),
     "gain_margin_x": ("factor on K", "gain limit of the linear loop in that clay, over K"),
-    "energy_residual": ("of what went through", "what is left over of the energy balance"),
+    "energy_residual": ("share of the energy put through", "residual of the energy balance"),
     "wall_time": ("s", "run time"),
 }
 

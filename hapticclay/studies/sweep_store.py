@@ -189,7 +189,9 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
             f.write(f"{text}\n".encode())
     numbers = {sweep_part(out, n): n for n in range(sweep.chunks)}
     for stray in set(_part_files(out)) - set(numbers):
-        raise ParameterError("part", stray.name, f"is no part of the sweep in {out}: move it away")
+        raise ParameterError(
+            "part", stray.name, f"does not belong to the sweep in {out}: move it away"
+        )
     wanted = parquet_schema(sweep, 0)
     bad = {f: fault for f in _part_files(out) if (fault := _fault(sweep, numbers[f], f, wanted))}
     if bad:
