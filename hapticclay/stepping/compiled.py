@@ -10,18 +10,20 @@ import contextlib
 import ctypes
 import functools
 import inspect
+import itertools
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
 
 import numba
 from llvmlite import ir
-from numba.core import types
+from numba.core import cgutils, types
 from numba.extending import intrinsic, overload
+from numba.np import arrayobj
 
 from ..model import (
     arm,
@@ -67,6 +69,7 @@ from . import (
     servo,
     springs,
     stiff,
+    vector,
     viscous,
     yielding,
 )
@@ -79,7 +82,7 @@ SOURCES = (
     arm, clay, compensator, controller, flow, groove, hardware, operator, pieces, regions, spring,
     borders, grooves, hand, hits, kick, path, rows, servo, springs, stiff, viscous, yielding,
     engine_step, begin, energy, laws, many, monitor, driver, friction, sampled, sampled_controller,
-    wires, ends, instant, march, modes, search,
+    wires, ends, instant, march, modes, search, vector,
 )  # fmt: skip
 LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -123,6 +126,66 @@ def store(context, address, i, values):  # noqa: ARG001
     return types.none(types.intp, types.intp, numbers), generate
 
 
+def number_at(context: Any, builder: Any, address: Any, i: int, kind: Any) -> Any:
+    """Number i of an array of floats, as one of another type.
+
+    Args:
+        context: of what numba compiles.
+        builder: of LLVM.
+        address: of the array.
+        i: index of the number.
+        kind: the type.
+    """
+    number = builder.load(place_of(builder, address, ir.Constant(ir.IntType(64), i)))
+    return context.cast(builder, number, types.float64, kind)
+
+
+def array_at(context: Any, builder: Any, kind: Any, address: Any, shape: Sequence[Any]) -> Any:
+    """An array over memory that it does not own.
+
+    Args:
+        context: of what numba compiles.
+        builder: of LLVM.
+        kind: its type, in C order.
+        address: of its first element.
+        shape: its lengths.
+    """
+    made = arrayobj.make_array(kind)(context, builder)
+    size = context.get_constant(
+        types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    )
+    strides = [size]
+    for n in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], n))
+    arrayobj.populate_array(
+        made, builder.inttoptr(address, made.data.type), shape=list(shape), strides=strides,
+        itemsize=size, meminfo=None,
+    )  # fmt: skip
+    return made._getvalue()
+
+
+def filled_with(
+    context: Any, builder: Any, kind: Any, value: Any, leaf: Callable[[Any, Any], Any]
+) -> Any:
+    """A value of nested tuples, each of its leaves replaced.
+
+    Args:
+        context: of what numba compiles.
+        builder: of LLVM.
+        kind: its type.
+        value: the value.
+        leaf: a leaf in place of one of a type.
+    """
+    if not isinstance(kind, types.BaseTuple):
+        return leaf(kind, value)
+    kinds: Any = kind
+    parts = [
+        filled_with(context, builder, x, builder.extract_value(value, j), leaf)
+        for j, x in enumerate(kinds)
+    ]
+    return context.make_tuple(builder, kind, parts)
+
+
 @intrinsic
 def fill(context, like, row):  # noqa: ARG001
     """The tuple `like`, its numbers replaced by those at an address, one after the other.
@@ -130,25 +193,115 @@ def fill(context, like, row):  # noqa: ARG001
     Args:
         context: of what numba compiles.
         like: the tuple.
+        row: the address.
     """
 
     def generate(context, builder, signature, arguments):
-        count = iter(range(1 << 20))
+        count = itertools.count()
 
-        def made(kind, value):
-            if isinstance(kind, types.BaseTuple):
-                kinds: Any = kind
-                parts = [made(x, builder.extract_value(value, j)) for j, x in enumerate(kinds)]
-                return context.make_tuple(builder, kind, parts)
+        def leaf(kind, value):
             if not isinstance(kind, types.Float | types.Integer):
                 return value
-            at = ir.Constant(ir.IntType(64), next(count))
-            number = builder.load(place_of(builder, arguments[1], at))
-            return context.cast(builder, number, types.float64, kind)
+            return number_at(context, builder, arguments[1], next(count), kind)
 
-        return made(signature.args[0], arguments[0])
+        return filled_with(context, builder, signature.args[0], arguments[0], leaf)
 
     return like(like, types.intp), generate
+
+
+@intrinsic
+def fill_all(context, like, row, places):  # noqa: ARG001
+    """As `fill`, and its arrays replaced by others.
+
+    Args:
+        context: of what numba compiles.
+        like: the tuple.
+        row: address of the numbers.
+        places: of the arrays, one after the other: address, number of rows and columns.
+    """
+
+    def generate(context, builder, signature, arguments):
+        numbers, arrays = itertools.count(), itertools.count()
+        first = builder.inttoptr(arguments[2], ir.IntType(64).as_pointer())
+
+        def leaf(kind, value):
+            if isinstance(kind, types.Array):
+                at = 3 * next(arrays)
+                found = [
+                    builder.load(builder.gep(first, [ir.Constant(ir.IntType(64), at + j)]))
+                    for j in range(3)
+                ]
+                return array_at(context, builder, kind, found[0], found[1 : 1 + kind.ndim])
+            if isinstance(kind, types.Float | types.Integer):
+                return number_at(context, builder, arguments[1], next(numbers), kind)
+            return value
+
+        return filled_with(context, builder, signature.args[0], arguments[0], leaf)
+
+    return like(like, types.intp, types.intp), generate
+
+
+@intrinsic
+def keep(context, value, row):  # noqa: ARG001
+    """Writes the numbers of a tuple to an address, one after the other: what `fill` reads.
+
+    Args:
+        context: of what numba compiles.
+        value: the tuple.
+        row: the address.
+    """
+
+    def generate(context, builder, signature, arguments):
+        count = itertools.count()
+
+        def leaf(kind, value):
+            if isinstance(kind, types.Float | types.Integer):
+                at = place_of(builder, arguments[1], ir.Constant(ir.IntType(64), next(count)))
+                builder.store(context.cast(builder, value, kind, types.float64), at)
+            return value
+
+        filled_with(context, builder, signature.args[0], arguments[0], leaf)
+        return context.get_dummy_value()
+
+    return types.none(value, types.intp), generate
+
+
+@intrinsic
+def copy_bytes(context, to, source, n):  # noqa: ARG001
+    """Copies bytes.
+
+    Args:
+        context: of what numba compiles.
+        to: address.
+        source: address.
+        n: how many.
+    """
+
+    def generate(context, builder, signature, arguments):  # noqa: ARG001
+        byte = ir.IntType(8).as_pointer()
+        to, source = (builder.inttoptr(x, byte) for x in arguments[:2])
+        cgutils.raw_memcpy(builder, to, source, arguments[2], 1)
+        return context.get_dummy_value()
+
+    return types.none(types.intp, types.intp, types.intp), generate
+
+
+@intrinsic
+def rows_at(context, address):  # noqa: ARG001
+    """The rows of a record at an address.
+
+    Args:
+        context: of what numba compiles.
+        address: of the first.
+    """
+
+    def generate(context, builder, signature, arguments):
+        shape = [context.get_constant(types.intp, x) for x in (run.CHUNK, rows.ROW)]
+        made = array_at(context, builder, signature.return_type[0], arguments[0], shape)
+        return context.make_tuple(builder, signature.return_type, [made])
+
+    # in a tuple: numba lets a function return no array that was not given to it
+    return types.Tuple([types.Array(types.float64, 2, "C")])(types.intp), generate
 
 
 @intrinsic
@@ -212,7 +365,10 @@ OUTLINED = {
     path.step_to_event,
     borders.passed_alike,
 }
-ATOMS = {*OF_LAW.values(), engine_step.put, engine_step.pair, engine_step.numbers_at, many.filled}
+ATOMS = {
+    *OF_LAW.values(), engine_step.put, engine_step.pair, engine_step.numbers_at, many.filled,
+    vector.parts_at, vector.put_state, vector.copied, vector.table_at,
+}  # fmt: skip
 laws_known: set[ModuleType] = set()
 stepped: set[FunctionType] = set()  # functions whose source numba finds
 
@@ -270,6 +426,24 @@ def register_atoms() -> None:
             )
         )
     )
+    overload(vector.parts_at, inline="always")(
+        lambda like, numbers, arrays, k: (
+            lambda like, numbers, arrays, k: fill_all(  # type: ignore[call-arg]
+                like, numbers[k].ctypes.data, arrays[k].ctypes.data
+            )
+        )
+    )
+    overload(vector.put_state, inline="always")(
+        lambda s, states, k: (
+            lambda s, states, k: keep(s, states[k].ctypes.data)  # type: ignore[call-arg]
+        )
+    )
+    overload(vector.copied, inline="always")(
+        lambda to, source, n: lambda to, source, n: copy_bytes(to, source, n)  # type: ignore[call-arg]
+    )
+    overload(vector.table_at, inline="always")(
+        lambda address: lambda address: rows_at(address)  # type: ignore[call-arg]
+    )
 
 
 # ---- entries: all that is called between them is compiled with the same flags --------------------
@@ -290,6 +464,11 @@ def carry(like, blocks, e, runs):
     many.carry(like, blocks, e, runs)
 
 
+def advance_all(like, state, place, x, which, ahead):
+    """vector.advance."""
+    vector.advance(like, state, place, x, which, ahead)
+
+
 def entry(f: Any) -> Any:
     """A function that is compiled when it is first called with its types, or taken from the disk.
 
@@ -305,6 +484,7 @@ def entry(f: Any) -> Any:
 register(SOURCES)
 register_atoms()
 WHOLE_STEPS, ADVANCE, CARRY = entry(run_whole_steps), entry(advance), entry(carry)
+ADVANCE_ALL = entry(advance_all)
 
 
 def library() -> ctypes.CDLL:

@@ -24,7 +24,8 @@ COMPILING_PART = {
 }  # fmt: skip
 # what begins the kind of more than whole steps; times that it takes as long to compile
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
-TIMES = {CARRY: 3.0, COMPLETE: 2.0}
+STEPWISE = "many runs made step by step"
+TIMES = {CARRY: 3.0, COMPLETE: 2.0, STEPWISE: 2.5}
 MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
 
 

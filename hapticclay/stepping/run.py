@@ -118,15 +118,34 @@ PLAIN = Kernel(
 )
 
 
+def at_rest(model: Any, data: Any, s: Scenario) -> None:
+    """Sets an engine to a scenario, at rest.
+
+    Args:
+        model: of the engine.
+        data: of the engine.
+        s: the scenario.
+    """
+    model.opt.timestep = s.dt
+    for i, limit in enumerate(s.torque_limit):
+        model.actuator_ctrlrange[i] = -limit, limit
+    engine.rotate_dampers(model, s)
+    mujoco.mj_resetData(model, data)
+
+
 class NeedsMonitor(Exception):
     """A run without samples that is to be repeated with them, for the monitor."""
 
 
 class EngineStore:
-    """Engines and arrays that run after run uses: engines with clay and without."""
+    """Engines and arrays that run after run uses: engines with clay and without.
 
-    def __init__(self):
-        self.engines: dict[Any, tuple[Any, Any]] = {}
+    Args:
+        engines: those of another store, which then makes no steps meanwhile; None for its own.
+    """
+
+    def __init__(self, engines: dict[Any, tuple[Any, Any]] | None = None):
+        self.engines = {} if engines is None else engines
         self.rows = np.empty((CHUNK, rows.ROW))  # one more where a run ends between samples
         self.crossings = np.empty((CROSSINGS, 4))
         self.stops, self.rendered = np.empty((0, 3)), np.empty((0, 3))
@@ -143,13 +162,8 @@ class EngineStore:
                 del self.engines[next(iter(self.engines))]  # the one longest there
             model = engine.build(s)
             self.engines[key] = model, mujoco.MjData(model)
-        model, data = self.engines[key]
-        model.opt.timestep = s.dt
-        for i, limit in enumerate(s.torque_limit):
-            model.actuator_ctrlrange[i] = -limit, limit
-        engine.rotate_dampers(model, s)
-        mujoco.mj_resetData(model, data)
-        return model, data
+        at_rest(*self.engines[key], s)
+        return self.engines[key]
 
     def room_for(self, parts: Parts) -> None:
         """Makes the arrays for what a scene shows beside its rows.
@@ -243,6 +257,8 @@ class Run:
         brief: keep no samples, for `brief` alone.
         watched: let the monitor look at all rows; else NeedsMonitor is raised where it has to look
             at rows that are not kept.
+        recorded: whether it keeps what the monitor has judged; else its rows since then alone, and
+            after its end `last_row`.
 
     Raises:
         ParameterError: a control callback is installed in the engine, which would interfere.
@@ -263,6 +279,7 @@ class Run:
         store: EngineStore | None = None,
         brief: bool = False,
         watched: bool = False,
+        recorded: bool = True,
     ):
         if mujoco.get_mjcb_control() is not None:
             bound = "the engine must be free of control callbacks"
@@ -287,7 +304,7 @@ class Run:
         self.stops: list[Stop] = []
         self.outcome: monitor.Outcome | None = None
         self.end_time: float | None = None
-        self.without_samples = brief
+        self.without_samples, self.recorded = brief, recorded
         # nothing to report so far; later the monitor may want all rows once more
         self.calm = kernel.quiet is not None and scenario.stop_when_unstable and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
@@ -321,9 +338,13 @@ class Run:
         Args:
             room: largest number of rows.
         """
-        if not self.filled and not (self.without_samples and self.looked):
+        if self.recorded and not self.filled and not (self.without_samples and self.looked):
             self._saved = self.saved()  # of what has been judged
         self._make(room)
+        self.note_end()
+
+    def note_end(self) -> None:
+        """Notes the outcome of a run that is over."""
         code = self.state.status.code
         if code == UNRESOLVED:
             self.give_up()
@@ -348,7 +369,8 @@ class Run:
         if (law := scene.own_law(self.parts)) is not None:
             law.check()
         made = self.state.filled
-        self._note_events(made.crossings, made.stops)
+        if self.recorded:
+            self._note_events(made.crossings, made.stops)
         self.steps += made.steps
         self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
 
@@ -431,6 +453,19 @@ class Run:
         self.data.qpos[:], self.data.qvel[:] = saved.state.body.q, saved.state.body.w
         for x, before in zip(scene.written(self.parts), saved.arrays, strict=True):
             x[:] = before
+
+    def resume(self) -> None:
+        """Takes back an engine that other runs have used meanwhile."""
+        at_rest(self.model, self.data, self.scenario)
+        self.data.qpos[:], self.data.qvel[:] = self.state.body.q, self.state.body.w
+
+    def restart(self) -> None:
+        """Begins anew, without a record; not after `change`, or where it takes signals ahead."""
+        self.restore(self._saved)
+        self.steps = self.looked = 0
+        self.watch = monitor.StabilityMonitor(self.scenario)
+        self.outcome, self.end_time = None, None
+        self.last_row = self.last_rendered = None
 
     def snapshot(self) -> Snapshot:
         """The run with its record, to return to."""
@@ -572,7 +607,7 @@ class Run:
         """Judges the rows since the last look."""
         n = self.filled
         self.state = path.with_filled(self.state, NONE_MADE)
-        if n and self.rendered:
+        if n and self.rendered and self.recorded:
             self.last_rendered = self.store.rendered[n - 1, :2].tolist()
         if self.without_samples and n and self._still_calm(n):
             if self.outcome is not None:
@@ -585,13 +620,22 @@ class Run:
         if self.without_samples:  # the monitor can have all rows so far
             self.without_samples = self.calm = False
         good = self.judge(self.store.rows[:n])
-        if self.outcome is not None and self.end_time is None and good < n:
+        if not self.recorded:
+            self._keep_last(good)
+        elif self.outcome is not None and self.end_time is None and good < n:
             made, crossings, stops = self.steps, list(self.crossings), list(self.stops)
             self.restore(self._saved)  # the ledger ends with the good rows
             while self.filled < good:  # in parts, where borders are many
                 self._make(good)
             self.state = path.with_filled(self.state, NONE_MADE)
             self.steps, self.crossings, self.stops = made, crossings, stops
+
+    def _keep_last(self, good: int) -> None:
+        """Keeps the last of the rows since the last look that are good."""
+        if good:
+            self.last_row = self.store.rows[good - 1].tolist()
+            if self.rendered:
+                self.last_rendered = self.store.rendered[good - 1, :2].tolist()
 
     def look(self, made: np.ndarray) -> tuple[int, monitor.Outcome | None]:
         """Judges the next rows, as StabilityMonitor.look.
@@ -638,7 +682,7 @@ class Run:
                 self.outcome = replace(self.outcome, time=step * self.scenario.dt, step=step)
                 self._cut_events(self.outcome.time)
             self.outcome = self.watch.end(self.outcome)
-        if good:
+        if good and self.recorded:
             keep = np.arange(-self.looked % self.every, good, self.every)
             if self.outcome is not None and (not len(keep) or keep[-1] != good - 1):
                 keep = np.append(keep, good - 1)

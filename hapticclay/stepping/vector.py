@@ -1,0 +1,348 @@
+"""Runs of one kind that one call of compiled code advances, each as far as a loop of the user's asks.
+
+Between calls a run is a row: the numbers of its parts, the addresses of their arrays, and its
+state. `advance` fills them in, makes steps, asks the quick test of the monitor, and puts the state
+back. `run` does the rest of it, seldom: the monitor itself, the end of a run, other numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import many, monitor, path, rows, scene, viscous
+from .engine_step import Engine, pair, put
+from .machine_code import STEPWISE, kind_of
+from .run import CHUNK, EngineStore, Kernel, Run
+from .state import OPEN, Filled
+
+SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the clay [N]
+
+
+# ---- compiled ------------------------------------------------------------------------------------
+
+
+class Place(NamedTuple):
+    """Where one thread makes steps.
+
+    Attributes:
+        engine: the engine; rows of the record and force of the clay lie with each run.
+        limits: of its motors [N.m], shape (2, 2).
+        scratch: room for the arrays that steps write into, while a step is only tried.
+    """
+
+    engine: Engine
+    limits: Any
+    scratch: Any
+
+
+class Vector(NamedTuple):
+    """Runs of one kind, or of several: a row each.
+
+    Attributes:
+        numbers: of their parts, see many.numbers_of, shape (n, m).
+        arrays: of the arrays of their parts: address, and number of rows and columns, shape (n, a).
+        states: numbers of their states, shape (n, l).
+        written: of the arrays that steps write into: address and bytes, shape (n, w).
+        kept: addresses of their rows that have not been judged, and of the force of the clay in
+            them; 1 where b v does not tell that force, else 0, shape (n, 3).
+        until: samples to pause at, shape (n,).
+        looked: samples judged so far, shape (n,).
+        marks: sample, rows not judged and code of each, shape (n, 3).
+        times: now [s], shape (n,).
+        quiet: 1 while the monitor can have nothing to report, shape (n,).
+        swings: see monitor.is_quiet, shape (n, 2, monitor.QUIET).
+        seen: counts of the monitor, shape (n, 4).
+        shown: the present sample, shape (n, SHOWN).
+    """
+
+    numbers: Any
+    arrays: Any
+    states: Any
+    written: Any
+    kept: Any
+    until: Any
+    looked: Any
+    marks: Any
+    times: Any
+    quiet: Any
+    swings: Any
+    seen: Any
+    shown: Any
+
+
+def parts_at(like, numbers, arrays, k):
+    """The parts of run k, of the types of `like`; compiled only."""
+    raise NotImplementedError
+
+
+def put_state(s, states, k):
+    """Keeps the state of run k; compiled only."""
+    raise NotImplementedError
+
+
+def copied(to, source, n):
+    """Copies n bytes from address to address; compiled only."""
+    raise NotImplementedError
+
+
+def table_at(address):
+    """The rows at an address, shape (CHUNK, rows.ROW), alone in a tuple; compiled only."""
+    raise NotImplementedError
+
+
+def engine_of(e, x, k):
+    """The engine, with the rows of run k."""
+    return Engine(
+        e.step, e.model, e.data, e.q, e.w, e.ctrl, e.push, e.timestep, x.kept[k, 0], e.crossings,
+        e.stops, x.kept[k, 1], e.most_crossings, e.most_stops, e.probe,
+    )  # fmt: skip
+
+
+def readied(parts, s, e, limits):
+    """Readies the engine for a run."""
+    put(e.timestep, 0, (parts.time.dt,))
+    put(e.q, 0, s.body.q)
+    put(e.w, 0, s.body.w)
+    for j in range(2):
+        limits[j, 0], limits[j, 1] = -parts.limits[j], parts.limits[j]
+
+
+def swap_written(written, k, scratch, back):
+    """Copies the arrays that steps write into aside, or back."""
+    at = scratch.ctypes.data
+    for j in range(written.shape[1] // 2):
+        address, n = written[k, 2 * j], written[k, 2 * j + 1]
+        if back:
+            copied(address, at, n)
+        else:
+            copied(at, address, n)
+        at += n
+
+
+def judged(parts, x, k, table, first, n):
+    """Asks the quick test of the monitor about the rows made."""
+    limit = parts.limits
+    if x.quiet[k] and n > first:
+        made, swings, seen = table[first:n], x.swings[k], x.seen[k]
+        good = monitor.is_quiet(made, n - first, limit[0], limit[1], swings, seen)
+        x.quiet[k] = 1 if good else 0
+
+
+def show(e, x, k, table, n):
+    """Keeps row n as the present sample, and the force of the clay where b v does not tell it."""
+    for j in range(rows.ROW):
+        x.shown[k, j] = table[n, j]
+    if x.kept[k, 2]:
+        f = pair(e.rendered + 24 * n)
+        x.shown[k, rows.ROW], x.shown[k, rows.ROW + 1] = f[0], f[1]
+
+
+def moved(like, state, place, x, k, ahead):
+    """Advances run k, or tries its next step, for the sample that this would write."""
+    parts, s = parts_at(like, x.numbers, x.arrays, k), many.filled(state, x.states, k)
+    e, first, table = engine_of(place.engine, x, k), s.filled.rows, table_at(x.kept[k, 0])[0]
+    room = min(CHUNK - 1, x.until[k] - x.looked[k])
+    if ahead:
+        room = first + 1
+        swap_written(x.written, k, place.scratch, False)
+    readied(parts, s, e, place.limits)
+    while s.status.code == OPEN and path.has_room(parts.time, s, e, room):
+        s = path.advance(parts, s, e, room)
+        s = path.with_filled(s, Filled(0, s.filled.rows, 0, 0))
+    if ahead:
+        swap_written(x.written, k, place.scratch, True)
+        show(e, x, k, table, first)
+        return
+    put_state(s, x.states, k)
+    judged(parts, x, k, table, first, s.filled.rows)
+    x.times[k] = s.clock.t
+    x.marks[k, 0], x.marks[k, 1], x.marks[k, 2] = s.clock.i, s.filled.rows, s.status.code
+
+
+def advance(like, state, place, x, which, ahead):
+    """Advances runs, one after the other.
+
+    Args:
+        like: parts of their kind.
+        state: of their kind.
+        place: where steps are made.
+        x: the runs.
+        which: their indices.
+        ahead: whether their next step is only tried.
+    """
+    for k in which:
+        moved(like, state, place, x, k, ahead)
+
+
+# ---- which runs, and their rows ------------------------------------------------------------------
+
+
+def arrays_in(part: Any) -> Iterator[np.ndarray]:
+    """The arrays of parts, in the order in which `parts_at` takes them.
+
+    Args:
+        part: the parts of a scene.
+    """
+    if isinstance(part, tuple):
+        for x in part:
+            yield from arrays_in(x)
+    elif isinstance(part, np.ndarray):
+        yield part
+
+
+def is_vectored(run: Run) -> bool:
+    """Whether `advance` makes the steps of a run: not under signals, nor with a law of the user's.
+
+    Args:
+        run: the run.
+    """
+    return run.drives is None and scene.own_law(run.parts) is None
+
+
+def kind_key(run: Run) -> tuple[Any, ...]:
+    """What runs have in common that advance together.
+
+    Args:
+        run: one of them.
+    """
+    s, arrays = run.scenario, arrays_in(run.parts)
+    types = tuple((x.dtype.char, x.ndim) for x in arrays)
+    angle = None if s.clay is None else s.clay.angle
+    return kind_of(run.parts), kind_of(run.state), types, s.arm, angle
+
+
+def unpacked(like: Any, numbers: Iterator[float]) -> Any:
+    """Tuples with other numbers, of the types of `like`.
+
+    Args:
+        like: the tuples.
+        numbers: from many.numbers_of.
+    """
+    if isinstance(like, tuple):
+        made = [unpacked(x, numbers) for x in like]
+        return type(like)._make(made) if hasattr(like, "_make") else tuple(made)
+    return type(like)(next(numbers)) if isinstance(like, float | int) else like
+
+
+class Common:
+    """What runs of all kinds have rows of: the arrays of Vector that do not depend on the kind.
+
+    Args:
+        n: number of runs.
+    """
+
+    def __init__(self, n: int):
+        self.kept = np.zeros((n, 3), np.int64)
+        self.until, self.looked = np.zeros((2, n), np.int64)
+        self.marks, self.times = np.zeros((n, 3), np.int64), np.zeros(n)
+        self.quiet, self.swings = np.zeros(n, np.int64), np.zeros((n, 2, monitor.QUIET))
+        self.seen, self.shown = np.zeros((n, 4), np.int64), np.zeros((n, SHOWN))
+
+
+class RunVector:
+    """The runs of one kind.
+
+    Args:
+        run: one of them.
+        common: rows of all runs.
+        kernel: how compiled steps are made.
+
+    Attributes:
+        kind: what machine code is compiled for.
+        x: their rows; those of runs of other kinds are not used.
+    """
+
+    def __init__(self, run: Run, common: Common, kernel: Kernel):
+        self.parts, self.state, self.scenario = run.parts, run.state, run.scenario
+        self.kind = STEPWISE, kind_of(run.parts), kind_of(run.state)
+        self.at, self.put = many.places(run.state), many.places(run.parts)
+        self.kernel, self.tells = kernel, scene.tells(run.parts)
+        self.written = len(scene.written(run.parts))
+        n, c = len(common.times), common
+        sizes = len(many.numbers_of(run.parts)), len(many.numbers_of(run.state))
+        self.x = Vector(
+            np.zeros((n, sizes[0])), np.zeros((n, 3 * len([*arrays_in(run.parts)])), np.int64),
+            np.zeros((n, sizes[1])), np.zeros((n, 2 * self.written), np.int64), c.kept, c.until,
+            c.looked, c.marks, c.times, c.quiet, c.swings, c.seen, c.shown,
+        )  # fmt: skip
+        self.places: dict[int, tuple[Place, Any]] = {}
+        self.most = 0  # bytes that a run's steps may write into
+
+    def take(self, k: int, run: Run) -> None:
+        """Takes a run over, as it is now.
+
+        Args:
+            k: its index.
+            run: the run.
+        """
+        x, written, store = self.x, scene.written(run.parts), run.store
+        x.numbers[k] = many.numbers_of(run.parts)
+        x.arrays[k] = [
+            n for a in arrays_in(run.parts) for n in (a.ctypes.data, *a.shape, 1)[:3]
+        ]
+        x.written[k] = [n for a in written for n in (a.ctypes.data, a.nbytes)]
+        x.kept[k] = store.rows.ctypes.data, store.rendered.ctypes.data, self.tells
+        self.most = max(self.most, sum(a.nbytes for a in written))
+        self.take_state(k, run)
+
+    def take_state(self, k: int, run: Run) -> None:
+        """Takes the state of a run over.
+
+        Args:
+            k: its index.
+            run: the run.
+        """
+        s, x = run.state, self.x
+        x.states[k] = many.numbers_of(s)
+        x.looked[k], x.times[k] = run.looked, s.clock.t
+        x.marks[k] = s.clock.i, s.filled.rows, s.status.code
+
+    def give(self, k: int, run: Run) -> None:
+        """Gives a run its state back.
+
+        Args:
+            k: its index.
+            run: the run.
+        """
+        run.state = unpacked(self.state, iter(self.x.states[k].tolist()))
+
+    def push(self, which: np.ndarray, force: np.ndarray) -> None:
+        """Sets the constant part of muscle forces.
+
+        Args:
+            which: indices of runs.
+            force: (x, y) of each [N], shape (n, 2).
+        """
+        at = self.put.push.steady[1:3]
+        self.x.numbers[which[:, None], at] = force
+
+    def place(self, thread: int) -> Place:
+        """Where a thread makes steps.
+
+        Args:
+            thread: its index.
+        """
+        found = self.places.get(thread)
+        if found is None or len(found[0].scratch) * 8 < self.most:
+            store = EngineStore() if found is None else found[1][0]
+            model, data = store.engine(self.scenario)
+            e = store.arrays(self.parts, model, data, self.kernel)
+            scratch = np.empty(self.most // 8 + 1)
+            found = Place(e, model.actuator_ctrlrange, scratch), (store, model, data)
+            self.places[thread] = found
+        return found[0]
+
+    def force(self, which: np.ndarray) -> np.ndarray:
+        """Force of the clay in the samples shown [N], shape (n, 2).
+
+        Args:
+            which: indices of runs.
+        """
+        shown = self.x.shown[which]
+        if self.tells:
+            return shown[:, rows.ROW :]
+        v, b = shown[:, 4:6], shown[:, 12:14]
+        return np.column_stack(viscous.force(self.parts.grain, b.T, v.T))
