@@ -54,6 +54,7 @@ from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import out_of_band_ratio as out_of_band_ratio
 from .simulation.record import port_energy as port_energy
 from .simulation.simulate import simulate as simulate
+from .simulation.simulation_batch import SimulationBatch as SimulationBatch
 from .simulation.stepwise import Sample as Sample
 from .simulation.stepwise import Simulation as Simulation
 from .stepping.engine import build as build

@@ -105,9 +105,9 @@ def simulate_batch(
     summaries = choice("keep", keep, KEEP) == "summaries"
     seen: set[Any] = set()
     if isinstance(scenarios, Sequence):  # refused before the first run, if they can be
-        for _ in _checked(scenarios, seen):
+        for _ in checked_scenarios(scenarios, seen):
             pass
-    todo = _checked(scenarios, seen)
+    todo = checked_scenarios(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
     out = _Summaries() if summaries else _Records()
     if not has_numba():
@@ -401,8 +401,16 @@ class _Summaries:
         return self.found
 
 
-def _checked(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
-    """The scenarios; a `Warning` names what is hardly meant in the first WARNED kinds of scene."""
+def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
+    """The scenarios; a `Warning` names what is hardly meant in the first WARNED kinds of scene.
+
+    Args:
+        scenarios: to be looked at.
+        seen: kinds of scene looked at so far.
+
+    Raises:
+        ParameterError: one is no Scenario.
+    """
     for i, s in enumerate(scenarios):
         if not isinstance(s, Scenario):
             raise ParameterError(

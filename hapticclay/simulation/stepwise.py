@@ -304,9 +304,7 @@ class Simulation:
         with self._alone() as run:
             changes: dict[str, Any] = {} if gain is None else {"gain": gain}
             if operator is not None:
-                if not any(run.scenario.operators):
-                    bound = "must be given from the start on: this run has no operator"
-                    raise ParameterError("operator", operator, bound)
+                started_with_operator(run.scenario, operator)
                 changes["operator"] = operator
             if b is not None:
                 changes["clay"] = scaled(self._given.clay, number("b", b, 0.0, 1e6))
@@ -346,6 +344,21 @@ class Simulation:
     def _take_over(self, torque: tuple[float, ...]) -> None:
         self._torque = torque[0], torque[1]
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+
+
+def started_with_operator(scenario: Scenario, operator: object) -> None:
+    """Refuses an operator for a run that began without one.
+
+    Args:
+        scenario: of the run.
+        operator: to be given, for the error.
+
+    Raises:
+        ParameterError: the scenario has none.
+    """
+    if not any(scenario.operators):
+        bound = "must be given from the start on: this run has no operator"
+        raise ParameterError("operator", operator, bound)
 
 
 def scaled(clay: Clay | None, factor: float) -> Clay | None:

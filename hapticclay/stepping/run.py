@@ -305,6 +305,7 @@ class Run:
         self.outcome: monitor.Outcome | None = None
         self.end_time: float | None = None
         self.without_samples, self.recorded = brief, recorded
+        self.last_row: Any = None
         # nothing to report so far; later the monitor may want all rows once more
         self.calm = kernel.quiet is not None and scenario.stop_when_unstable and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
@@ -360,7 +361,7 @@ class Run:
     def _make(self, room: int) -> None:
         ready = max(min(room - self.filled, self.parts.time.last - self.i), 0) + 1
         if self.parts.sampler is not None and self.parts.sampler.chance is not None:
-            self._draw(ready)
+            self.draw(ready)
         if self.drives is not None:
             parts, n = self.drives.prepared(self.parts, self.i, ready)
             self.take(parts)
@@ -374,8 +375,12 @@ class Run:
         self.steps += made.steps
         self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
 
-    def _draw(self, n: int) -> None:
-        """Draws the random effects on the control samples of the next n whole steps."""
+    def draw(self, n: int) -> None:
+        """Draws the random effects on the control samples of the next whole steps.
+
+        Args:
+            n: how many.
+        """
         x, k = self.parts.sampler.chance, self.state.loop.machine.samples.k
         io: Any = self.scenario.hardware
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
@@ -756,6 +761,11 @@ class Run:
         final = (arrays[name] for name in ("p", "v", "fh", "fe", "b"))
         last = [x[-1] if len(x) else (np.nan, np.nan) for x in final]
         return self.outcome, self.steps, tuple(self.crossings), last, self.balance()
+
+    def last_force(self) -> tuple[float, float]:
+        """Force of the clay in `last_row` [N]."""
+        vx, vy, bx, by = *self.last_row[4:6], *self.last_row[12:14]
+        return tuple(self.last_rendered or self._force(bx, by, vx, vy))
 
     def balance(self) -> dict[str, float]:
         """The energy balance, as Record.energy."""

@@ -257,7 +257,7 @@ class RunVector:
 
     def __init__(self, run: Run, common: Common, kernel: Kernel):
         self.parts, self.state, self.scenario = run.parts, run.state, run.scenario
-        self.kind = STEPWISE, kind_of(run.parts), kind_of(run.state)
+        self.kind = self.kind_of(run)
         self.at, self.put = many.places(run.state), many.places(run.parts)
         self.kernel, self.tells = kernel, scene.tells(run.parts)
         self.written = len(scene.written(run.parts))
@@ -271,6 +271,15 @@ class RunVector:
         self.places: dict[int, tuple[Place, Any]] = {}
         self.most = 0  # bytes that a run's steps may write into
 
+    @staticmethod
+    def kind_of(run: Run) -> Any:
+        """What machine code for a run is compiled for.
+
+        Args:
+            run: the run.
+        """
+        return STEPWISE, run.kind, kind_of(run.state)
+
     def take(self, k: int, run: Run) -> None:
         """Takes a run over, as it is now.
 
@@ -280,9 +289,7 @@ class RunVector:
         """
         x, written, store = self.x, scene.written(run.parts), run.store
         x.numbers[k] = many.numbers_of(run.parts)
-        x.arrays[k] = [
-            n for a in arrays_in(run.parts) for n in (a.ctypes.data, *a.shape, 1)[:3]
-        ]
+        x.arrays[k] = [n for a in arrays_in(run.parts) for n in (a.ctypes.data, *a.shape, 1)[:3]]
         x.written[k] = [n for a in written for n in (a.ctypes.data, a.nbytes)]
         x.kept[k] = store.rows.ctypes.data, store.rendered.ctypes.data, self.tells
         self.most = max(self.most, sum(a.nbytes for a in written))

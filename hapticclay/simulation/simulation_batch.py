@@ -1,0 +1,310 @@
+"""Many runs step by step, for learning environments and Monte Carlo loops of one's own."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import ParameterError, array_of, choice, integer, number
+from ..model.operator import Operator
+from ..scene.scenario import Scenario
+from ..stepping.engine import warnings_caught
+from ..stepping.monitor import Outcome
+from .batch import checked_scenarios, cores
+from .engines import ENGINES, NUMBA, has_numba
+from .stepwise import MOST, scaled, started_with_operator
+from .vectored import COLUMNS, VectoredRuns
+
+
+@checked
+class SimulationBatch:
+    """Many runs that make steps when they are told to, each to the numbers of `Simulation`.
+
+        with hc.SimulationBatch([scenario] * 64) as sims:
+            while not sims.ended.all():
+                sims.advance(55, force=policy(sims.p, sims.v))
+                sims.reset(sims.ended)
+
+    Runs may differ in anything. Compiled, all runs of one kind advance in one call on all cores;
+    numbers that a loop reads are arrays over runs, copies each time. No record is kept: a run holds
+    its last 4095 samples at most, for the monitor, half a megabyte.
+
+    A run that has ended stays at its last good sample until `reset`.
+
+    Args:
+        scenarios: what to run, one a run.
+        engine: as in `simulate`; "auto" compiles once the steps asked for repay it.
+        workers: threads of compiled steps; None for one a core.
+
+    Raises:
+        ParameterError: there is no scenario, one is of another type, or is refused as by
+            `simulate`.
+    """
+
+    def __init__(
+        self, scenarios: Sequence[Scenario], *, engine: str = "auto", workers: int | None = None
+    ):
+        engine = choice("engine", engine, ENGINES)
+        if engine == "native" and not has_numba():
+            raise ParameterError("engine", engine, NUMBA)
+        workers = integer("workers", cores() if workers is None else workers, 1, 1024)
+        self._warned: set[Any] = set()
+        given = list(checked_scenarios(scenarios, self._warned))
+        if not given:
+            raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
+        self._lock, self._closed = threading.Lock(), False
+        self._runs = VectoredRuns(given, engine, workers)
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[VectoredRuns]:
+        """The runs, for this thread alone."""
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("another thread uses this batch: give each thread its own")
+        try:
+            if self._closed:
+                raise RuntimeError("the batch is closed")
+            with warnings_caught():
+                yield self._runs
+        finally:
+            self._lock.release()
+
+    def __enter__(self) -> SimulationBatch:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self._runs.runs)
+
+    def close(self) -> None:
+        """Ends the batch, after which no step can be made."""
+        self._closed = True
+        self._runs.close()
+
+    def advance(
+        self,
+        n: int = 1,
+        *,
+        force: Any = None,
+        mask: Any = None,
+    ) -> None:
+        """Makes n steps of each run, fewer where it ends; none where it has ended.
+
+        Args:
+            n: number of steps, at least 1.
+            force: muscle force uh on each handle from this sample on [N], in place of the
+                scenario's constant force, shape (N, 2); None for those in effect.
+            mask: which runs to advance, shape (N,); None for all. The forces of the others are not
+                looked at.
+
+        Raises:
+            ParameterError: a value is no finite number within 1e6, or an array of another shape.
+            RuntimeError: the batch is closed, or another thread uses it.
+        """
+        n = integer("n", n, 1, 1_000_000_000)
+        with self._alone() as runs:
+            chosen = np.ones(len(self), bool) if mask is None else self._mask("mask", mask)
+            which = np.flatnonzero(chosen & ~runs.over)
+            if force is not None:
+                runs.push(which, self._forces(force, chosen)[which])
+            runs.advance(which, n)
+
+    def reset(
+        self,
+        runs: Any = None,
+        scenario: Scenario | Sequence[Scenario] | None = None,
+    ) -> None:
+        """Begins runs anew.
+
+        Args:
+            runs: index of one, indices, or a mask, shape (N,); None for all.
+            scenario: what to run, one for all of these or one each; None for the same as before.
+
+        Raises:
+            ParameterError: there is no such run, or another number of scenarios.
+        """
+        which = self._indices("runs", runs)
+        given: list[Scenario | None] = [None] * len(which)
+        if scenario is not None:
+            several = not isinstance(scenario, Scenario)
+            given = list(_each("scenario", scenario, len(which), several))
+            list(checked_scenarios(given, self._warned))
+        with self._alone() as all_:
+            for k, s in zip(which, given, strict=True):
+                all_.restart(k, s)
+
+    def set(
+        self,
+        runs: Any = None,
+        *,
+        gain: Any = None,
+        operator: Operator | tuple[Operator | None, Operator | None] | Sequence[Any] | None = None,
+        b: Any = None,
+    ) -> None:
+        """Goes on with other numbers from this sample on, in runs that have not ended.
+
+        Args:
+            runs: index of one, indices, or a mask, shape (N,); None for all.
+            gain: K of x and y [1/kg], one pair for all of these runs or shape (n, 2).
+            operator: the operator's arm, as of a Scenario, or a list of one each. A run without one
+                cannot take one.
+            b: as in `Simulation.set`, one for all of these runs or shape (n,).
+
+        Raises:
+            ParameterError: a value is out of its bounds, or an operator is to come or to go.
+        """
+        which = self._indices("runs", runs)
+        n = len(which)
+        one = operator is None or isinstance(operator, Operator | tuple)
+        operators = _each("operator", operator, n, not one)
+        gains = _each("gain", gain, n, gain is not None and np.ndim(gain) == 2)
+        factors = _each("b", b, n, np.ndim(b) == 1)
+        with self._alone() as all_:
+            for k, K, hand, factor in zip(which, gains, operators, factors, strict=True):
+                changes = self._changes(all_, k, K, hand)
+                if factor is not None:
+                    factor = number(f"b[{k}]", factor, 0.0, 1e6)
+                    changes["clay"] = scaled(all_.given[k].clay, factor)
+                if changes:
+                    all_.change(k, lambda s, changes=changes: replace(s, **changes))
+
+    @staticmethod
+    def _changes(runs: VectoredRuns, k: int, gain: Any, operator: Any) -> dict[str, Any]:
+        changes: dict[str, Any] = {} if gain is None else {"gain": gain}
+        if operator is not None:
+            started_with_operator(runs.given[k], operator)
+            changes["operator"] = operator
+        return changes
+
+    # ---- what is told
+
+    def _shown(self, name: str) -> np.ndarray:
+        with self._alone() as runs:
+            at = COLUMNS[name]
+            return runs.show()[:, at : at + 2].copy()
+
+    @property
+    def t(self) -> np.ndarray:
+        """Time of the present sample of each run [s], shape (N,)."""
+        return self._runs.common.times.copy()
+
+    @property
+    def p(self) -> np.ndarray:
+        """Handle positions [m], shape (N, 2), as `Simulation.state`."""
+        return self._shown("p")
+
+    @property
+    def v(self) -> np.ndarray:
+        """Handle velocities [m/s], shape (N, 2)."""
+        return self._shown("v")
+
+    @property
+    def fh(self) -> np.ndarray:
+        """Forces of the operators on the handles [N], shape (N, 2)."""
+        return self._shown("fh")
+
+    @property
+    def fe(self) -> np.ndarray:
+        """Resisting forces of the clay [N], shape (N, 2)."""
+        return self._shown("fe")
+
+    @property
+    def b(self) -> np.ndarray:
+        """Damping of the clay [N.s/m], shape (N, 2)."""
+        return self._shown("b")
+
+    @property
+    def q(self) -> np.ndarray:
+        """Joint angles [rad], shape (N, 2)."""
+        return self._shown("q")
+
+    @property
+    def qd(self) -> np.ndarray:
+        """Joint rates [rad/s], shape (N, 2)."""
+        return self._shown("qd")
+
+    @property
+    def tau(self) -> np.ndarray:
+        """Motor torques [N.m], shape (N, 2)."""
+        return self._shown("tau")
+
+    @property
+    def delta(self) -> np.ndarray:
+        """Compensator outputs [m], shape (N, 2)."""
+        return self._shown("delta")
+
+    @property
+    def ended(self) -> np.ndarray:
+        """Which runs have ended, shape (N,)."""
+        return self._runs.over.copy()
+
+    @property
+    def outcomes(self) -> list[Outcome | None]:
+        """How each run ended; None while it goes on."""
+        return self._runs.outcomes
+
+    @property
+    def diverging(self) -> np.ndarray:
+        """Which motions so far are unstable by the rules of the monitor, shape (N,).
+
+        Asked anew each 20 ms of simulated time, as `Simulation.diverging`; the runs go on.
+        """
+        with self._alone() as runs:
+            return runs.look()
+
+    @property
+    def scenarios(self) -> list[Scenario]:
+        """What is run, with the forces, gains, operators and clay now in effect."""
+        with self._alone() as runs:
+            return [runs.scenario(k) for k in range(len(self))]
+
+    # ---- arguments
+
+    def _mask(self, field: str, value: Any) -> np.ndarray:
+        mask, n = np.asarray(value), len(self)
+        if mask.dtype != bool or mask.shape != (n,):
+            raise ParameterError(field, value, f"must be True or False for each run, shape ({n},)")
+        return mask
+
+    def _indices(self, field: str, value: Any) -> list[int]:
+        """Indices of runs: of one, of several, of a mask, or of all."""
+        n = len(self)
+        if value is None:
+            return list(range(n))
+        given = np.asarray(value)
+        if given.dtype == bool and given.ndim:
+            return np.flatnonzero(self._mask(field, value)).tolist()
+        return [integer(field, x, 0, n - 1) for x in np.atleast_1d(given).tolist()]
+
+    def _forces(self, value: Any, mask: np.ndarray) -> np.ndarray:
+        force, n = array_of("force", value), len(self)
+        if force.shape != (n, 2):
+            raise ParameterError("force", value, f"must be (x, y) of each run, shape ({n}, 2)")
+        bad = mask[:, None] & ~(np.abs(force) <= MOST)
+        for i, j in np.argwhere(bad)[:1].tolist():
+            number(f"force[{i}, {'xy'[j]}]", float(force[i, j]), -MOST, MOST, unit="N")
+        return force
+
+
+def _each(field: str, value: Any, n: int, several: bool) -> Sequence[Any]:
+    """One value a run: those given, or one for all.
+
+    Args:
+        field: name for the error.
+        value: the value, or a sequence of them.
+        n: number of runs.
+        several: whether it is a sequence.
+    """
+    if not several:
+        return [value] * n
+    values = list(value)
+    if len(values) != n:
+        raise ParameterError(field, value, f"must be one, or one for each of {n} runs")
+    return values
