@@ -33,6 +33,7 @@ class AdaptiveGainTask(Task):
 
     steps: ClassVar[int] = 28
     limit: ClassVar[int] = 500
+    strain: ClassVar[float] = 0.5
     actions: ClassVar[tuple[Quantity, ...]] = (
         either_way("change of the gain: K is multiplied by 2^(action / 4)", 1.0),
     )

@@ -39,7 +39,7 @@ class Episodes:
 
     def __init__(self, task: Task, n: int, engine: str):
         self.task, self.n = task, n
-        self.copies = Copies(n, engine)
+        self.copies = Copies(n, engine, task.strain)
         self.memory = task.memory(n)
         self.truth = {name: np.zeros(n) for name in task.ranges}
         bounds = np.array([(q.low, q.high) for q in task.observations])
@@ -88,6 +88,14 @@ class Episodes:
         self.handles = self.copies.handles()
         rewards, ended, info = self.task.judge(self.memory, self.handles, clipped)
         return Period(self.observe(), rewards, ended, info)
+
+    def truth_of(self, i: int) -> Truth:
+        """What was drawn for a copy, by name.
+
+        Args:
+            i: number of the copy.
+        """
+        return {name: float(x[i]) for name, x in self.truth.items()}
 
     def info(self) -> Arrays:
         """What was drawn, by name, shape (n,) each."""

@@ -50,9 +50,8 @@ class Picture:
             episodes: of the task.
             i: number of the copy.
         """
-        truth = {name: float(x[i]) for name, x in episodes.truth.items()}
         p = episodes.handles.p[i]
-        scenario = self._task.scenario(truth)
+        scenario = self._task.scenario(episodes.truth_of(i))
         nodes = episodes.memory["nodes"][i] if "nodes" in episodes.memory else None
         plan = Plan(
             joints_at(scenario, float(p[0]), float(p[1])), np.array(self._path), nodes,

@@ -77,6 +77,7 @@ class Task:
         period: control period [s].
         steps: engine steps in it.
         limit: control periods after which an episode is cut off.
+        strain: share of the torque limit from which on a run counts as unstable.
         actions: quantities of an action.
         observations: quantities of an observation.
         drawn: ranges of what is drawn for each episode.
@@ -86,6 +87,7 @@ class Task:
     ranges: dict[str, Range] = field(init=False)
     steps: ClassVar[int] = 56
     limit: ClassVar[int] = 500
+    strain: ClassVar[float] = 1.0
     actions: ClassVar[tuple[Quantity, ...]]
     drawn: ClassVar[dict[str, Range]]
 

@@ -149,6 +149,36 @@ def test_actions_that_are_no_numbers_or_too_large_stay_within_bounds(action):
     assert env.observation_space.contains(x)
 
 
+def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():
+    """A gain of 30 where `gain_limit` is 4.3; the run itself is watched step by step.
+
+    The motors reach their limits in the growing oscillation. The episode ends no later than 20 ms
+    after the first sample at which they do.
+    """
+    options = {"b": 60.0, "mass": 0.25, "damper": 2.0, "spring": 6.0}
+    env = made("hapticclay/AdaptiveGain-v0")
+    env.reset(seed=0, options=options)
+    inner = env.unwrapped
+    run, m = hc.Simulation(inner.task.scenario(inner._episodes.truth_of(0)), engine="python"), None
+    reached, t = None, 0
+    while True:
+        _, reward, terminated, _, info = env.step(np.ones(1, np.float32))
+        m = inner._episodes.memory
+        push = m["muscle"][0, t] * min((t + 1) / 20, 1.0)
+        run.set(gain=(info["K"], 0.2))
+        for _ in range(inner.task.steps):
+            run.advance(1, force=(push, 0.0))
+            if reached is None and (np.abs(run.state.tau) >= 40.0).any():
+                reached = run.t
+        t += 1
+        if terminated:
+            break
+        assert t < 500
+    assert info["lost"] and info["K"] == 30.0
+    assert reached is None or run.t <= reached + 0.02
+    assert reward == -1.0 - (500 - t)  # what the largest error would have cost
+
+
 def test_a_picture_is_drawn_of_what_moves():
     env = made(render_mode="rgb_array")
     env.reset(seed=0)
