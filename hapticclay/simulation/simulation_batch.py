@@ -18,8 +18,8 @@ from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
 from .batch import checked_scenarios, cores
 from .engines import ENGINES, NUMBA, has_numba
-from .stepwise import MOST, scaled, started_with_operator
-from .vectored import COLUMNS, VectoredRuns
+from .stepwise import COLUMNS, MOST, scaled, started_with_operator
+from .vectored import VectoredRuns
 
 
 @checked

@@ -25,13 +25,16 @@ from ..scene.plausible import warn_of
 from ..scene.scenario import Scenario
 from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
-from ..stepping.run import PLAIN, EngineStore, Run, Snapshot
+from ..stepping.rows import ROW
+from ..stepping.run import PLAIN, EngineStore, Kernel, Run, Snapshot
 from . import record
-from .engines import ENGINES, kernel_for, pays
+from .engines import ENGINES, kernel_for
+from .vectored import repay
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges
 TOLD = 1000  # steps after which to ask anew whether machine code pays
+COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
 LEAST_YIELD = 1e-9  # [N], [N/(m/s)^n] of clay that yields and is scaled down
 
 
@@ -102,7 +105,9 @@ class Simulation:
         if place != self._warned:  # of clay out of reach and the like, once
             warn_of(scenario)
             self._warned = place
-        kernel = PLAIN if self._engine == "auto" else kernel_for(scenario, self._engine)
+        kernel = PLAIN
+        if self._engine == "native":
+            kernel = stepwise_kernel(kernel_for(scenario, self._engine))
         self._run = Run(scenario, 1, kernel, self._store, watched=True)
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
@@ -175,10 +180,10 @@ class Simulation:
         if self._state is None:
             if self._run.outcome is None:
                 with self._alone() as run:
-                    found = {"t": np.array([run.i * run.scenario.dt]), **run.ahead()}
+                    self._state = sample_of(run.i * run.scenario.dt, run.ahead())
             else:
-                found = {name: getattr(self.record(), name) for name in Sample._fields}
-            self._state = Sample(**{name: x[-1] for name, x in found.items()})
+                last = {name: getattr(self.record(), name)[-1] for name in Sample._fields}
+                self._state = Sample(**last)
         return self._state
 
     @property
@@ -253,8 +258,8 @@ class Simulation:
         run = self._run
         self._untold += n
         if self._engine == "auto" and run.kernel is PLAIN and self._untold >= TOLD:
-            if pays(run.scenario, self._untold):
-                run.kernel = kernel_for(run.scenario, "native")
+            if repay(run, self._untold):
+                run.kernel = stepwise_kernel(kernel_for(run.scenario, "native"))
             self._untold = 0
 
     def reset(self, scenario: Scenario | None = None) -> None:
@@ -344,6 +349,29 @@ class Simulation:
     def _take_over(self, torque: tuple[float, ...]) -> None:
         self._torque = torque[0], torque[1]
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+
+
+def sample_of(t: float, row: np.ndarray) -> Sample:
+    """A sample of its row.
+
+    Args:
+        t: its time [s].
+        row: as from Run.ahead.
+    """
+    return Sample(t, *(row[COLUMNS[name] : COLUMNS[name] + 2] for name in Sample._fields[1:]))
+
+
+def stepwise_kernel(kernel: Kernel) -> Kernel:
+    """The kernel for a run that is advanced often, a few steps at a time.
+
+    Args:
+        kernel: that for one which is not.
+    """
+    if kernel is PLAIN:
+        return kernel
+    from ..stepping.compiled import BY_ROWS  # where it is loaded
+
+    return BY_ROWS
 
 
 def started_with_operator(scenario: Scenario, operator: object) -> None:

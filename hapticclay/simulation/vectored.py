@@ -10,19 +10,16 @@ import numpy as np
 
 from ..scene.scenario import Scenario
 from ..stepping import scene
-from ..stepping.machine_code import compile_time, is_kept
 from ..stepping.monitor import Outcome
 from ..stepping.rows import ROW
 from ..stepping.run import CHUNK, PLAIN, EngineStore, Run
 from ..stepping.state import OPEN
 from ..stepping.vector import Common, RunVector, is_vectored, kind_key
-from .engines import LOADING, has_numba, load_compiled, pays, saved_in_a_step
+from . import engines
+from .engines import has_numba, load_compiled
 
 PART = 200_000  # steps of a thread between two looks at the runs, and for Ctrl-C: half a second
 LOOK = 0.02  # [s] of simulated time between two looks at whether a run diverges
-ready: set[Any] = set()  # kinds that are compiled in this process, or loaded
-saved: dict[Any, float] = {}  # time that this would have saved so far, by kind [s]
-COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
 
 
 class VectoredRuns:
@@ -101,9 +98,8 @@ class VectoredRuns:
 
     def _prepare(self, v: RunVector) -> None:
         """Compiles what a kind needs, or takes it from the disk."""
-        with self.compiled.first_call(ready, v.kind, "steps of many runs of this kind"):
-            none = np.empty(0, np.int64)
-            self.compiled.ADVANCE_ALL(v.parts, v.state, v.place(0), v.x, none, False)
+        none = np.empty(0, np.int64)
+        v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, False)
 
     def _sync(self, k: int) -> Run:
         """The run, with its state and force as they are now."""
@@ -246,7 +242,7 @@ class VectoredRuns:
 
     def _work(self, jobs: list[Any], ahead: bool) -> None:
         for _, v, place, part in jobs:
-            self.compiled.ADVANCE_ALL(v.parts, v.state, place, v.x, part, ahead)
+            v.advance(v.parts, v.state, place, v.x, part, ahead)
 
     def _on_threads(self, jobs: list[Any], ahead: bool) -> None:
         """Makes the jobs of each thread; an exception is raised once all are done."""
@@ -265,8 +261,7 @@ class VectoredRuns:
         run, c = self.runs[k], self.common
         run.resume()
         if ahead:
-            for name, x in run.ahead().items():
-                c.shown[k, COLUMNS[name] : COLUMNS[name] + 2] = x[-1]
+            c.shown[k] = run.ahead()
             return
         run.pause = c.until[k]
         run.go(None)
@@ -349,18 +344,7 @@ class VectoredRuns:
             self._choose_kind(ks, n)
 
     def _choose_kind(self, ks: list[int], n: int) -> None:
-        run = self.runs[ks[0]]
-        steps = float(n * len(ks))
-        if not is_vectored(run):
-            compiles = pays(run.scenario, steps)
-        else:
-            kind = RunVector.kind_of(run)
-            saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(run.scenario) * steps
-            time = saved[kind]
-            compiles = kind in ready or (
-                time >= LOADING and (is_kept(kind) or time >= compile_time(kind))
-            )
-        if not compiles:
+        if not repay(self.runs[ks[0]], float(n * len(ks))):
             return
         self.compiled = self.compiled or load_compiled()
         if self.compiled is None:
@@ -369,3 +353,18 @@ class VectoredRuns:
         for k in ks:
             self.runs[k].kernel = self.compiled.KERNEL
             self._place(k)
+
+
+def repay(run: Run, steps: float) -> bool:
+    """Whether machine code repays loading or compiling it, for runs that are advanced in loops.
+
+    Args:
+        run: one of them.
+        steps: how many steps of its kind are about to be made.
+    """
+    if not is_vectored(run):
+        return engines.pays(run.scenario, steps)
+    kind = RunVector.kind_of(run)
+    more = 0.5 * engines.saved_in_a_step(run.scenario) * steps
+    engines.saved[kind] = engines.saved.get(kind, 0.0) + more
+    return engines.repays(kind, engines.saved[kind])

@@ -20,6 +20,7 @@ from types import FunctionType, ModuleType
 from typing import Any, cast
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, overload
@@ -534,6 +535,63 @@ def natively(r: run.Run, room: int) -> None:
             met[kind] = met.get(kind, 0) + 1
 
 
+def row_of(r: run.Run) -> vector.Row:
+    """The row of a run as it is now; compiled what it needs.
+
+    Args:
+        r: the run.
+    """
+    row = r.row
+    if row is None or (row.parts is not r.parts and row.key != vector.kind_key(r)):
+        r.state, r.row = r.state, None
+        row = vector.Row(r, KERNEL)
+        row.advance = advancing(row.vector.kind, *row.arguments, False)
+        r.row = row
+    row.take(r)
+    return row
+
+
+def advancing(kind: Any, *arguments: Any) -> Callable[..., None]:
+    """vector.advance for the types of some arguments, compiled, without a look at them.
+
+    Args:
+        kind: of the runs.
+        *arguments: of that function; of no run.
+    """
+    sizes = [x[:0] if isinstance(x, np.ndarray) else x for x in arguments]
+    with first_call(ready, kind, "steps of this kind, one call at a time"):
+        ADVANCE_ALL(*sizes)
+    types_ = tuple(ADVANCE_ALL.typeof_pyval(x) for x in sizes)
+    return ADVANCE_ALL.overloads[types_].entry_point
+
+
+def by_rows(r: run.Run, room: int) -> None:
+    """Makes steps of a run that is advanced often, a few at a time.
+
+    Args:
+        r: the run.
+        room: rows that it may have.
+    """
+    if not vector.is_vectored(r):
+        natively(r, room)
+        return
+    row_of(r).move(room)
+
+
+def try_step(r: run.Run) -> bool:
+    """Tries the next step of a run, for the row that it would write; whether it could.
+
+    Args:
+        r: the run.
+    """
+    if not vector.is_vectored(r):
+        return False
+    r.draw(1)
+    row = row_of(r)
+    row.advance(*row.arguments, True)
+    return True
+
+
 @functools.cache
 def enough(kind: Any) -> float:
     """How many careful steps of a kind repay the machine code for them.
@@ -632,3 +690,4 @@ def calls(model: Any, data: Any) -> tuple[Any, ...]:
 
 
 KERNEL = run.Kernel(natively, calls, lambda x: x.ctypes.data, QUIET)
+BY_ROWS = KERNEL._replace(advance=by_rows, ahead=try_step)

@@ -77,12 +77,15 @@ class Kernel(NamedTuple):
         calls: mj_step, mj_forward, model and data as these steps call them.
         place: an array as they write into it: a memoryview, or its address.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
+        ahead: tries the next step of a run, called with the run, for the row that it would write;
+            whether it could. None makes the step and goes back.
     """
 
     advance: Callable[[Run, int], None]
     calls: Callable[[Any, Any], tuple[Any, ...]]
     place: Callable[[Any], Any]
     quiet: Callable[..., bool] | None = None
+    ahead: Callable[[Run], bool] | None = None
 
 
 def one_plainly(run: Run, step: Callable[..., State]) -> None:
@@ -265,9 +268,8 @@ class Run:
 
     Attributes:
         parts: the scenario, compiled of its parts.
-        views: the same, for CPython.
+        row: where compiled steps keep the state between calls, vector.Row; None where they do not.
         e: the engine and the arrays that it fills, for CPython.
-        state: between two steps.
         pause: index of the sample to pause at.
     """
 
@@ -288,8 +290,9 @@ class Run:
         self.store = store or EngineStore()
         self.model, self.data = self.store.engine(scenario)
         self._controller: Controller | None = None  # in place of the scenario's
+        self.row: Any = None
         self._equip(scene.parts_of(scenario))
-        self.state: State = scene.start(self.views, scenario, self.e)
+        self.state = scene.start(self.views, scenario, self.e)
         self.drives = _drives(scenario)
         self._noise: hardware.SampleNoise | None = None
         self.steps = 0
@@ -313,19 +316,49 @@ class Run:
         self._saved = self.saved()
 
     @property
+    def state(self) -> State:
+        """Between two steps."""
+        if self.leads:
+            self._state = self.row.given()
+        return self._state
+
+    @state.setter
+    def state(self, s: State) -> None:
+        self._state = s
+        if self.row is not None:
+            self.row.follow()
+
+    @property
+    def leads(self) -> bool:
+        """Whether its row has the state, and `_state` an old one."""
+        return self.row is not None and self.row.leads
+
+    @property
     def t(self) -> float:
         """Now [s]."""
-        return self.state.clock.t
+        return self.row.t if self.leads else self._state.clock.t
 
     @property
     def i(self) -> int:
         """Index of the sample at or before now."""
-        return self.state.clock.i
+        return self.row.marks[0] if self.leads else self._state.clock.i
 
     @property
     def filled(self) -> int:
         """Samples that have not been judged yet."""
-        return self.state.filled.rows
+        return self.row.marks[1] if self.leads else self._state.filled.rows
+
+    @property
+    def code(self) -> int:
+        """How it stands: OPEN and so on."""
+        return self.row.marks[2] if self.leads else self._state.status.code
+
+    @property
+    def views(self) -> Parts:
+        """Its parts, for CPython."""
+        if self._views is None:
+            self._views = scene.viewed(self.parts)
+        return self._views
 
     def b(self) -> tuple[float, float]:
         """Clay of the present region, (x, y) [N.s/m]."""
@@ -346,7 +379,7 @@ class Run:
 
     def note_end(self) -> None:
         """Notes the outcome of a run that is over."""
-        code = self.state.status.code
+        code = self.code
         if code == UNRESOLVED:
             self.give_up()
         elif code == NOT_FINITE:
@@ -360,8 +393,7 @@ class Run:
 
     def _make(self, room: int) -> None:
         ready = max(min(room - self.filled, self.parts.time.last - self.i), 0) + 1
-        if self.parts.sampler is not None and self.parts.sampler.chance is not None:
-            self.draw(ready)
+        self.draw(ready)
         if self.drives is not None:
             parts, n = self.drives.prepared(self.parts, self.i, ready)
             self.take(parts)
@@ -369,11 +401,12 @@ class Run:
         self.kernel.advance(self, room)
         if (law := scene.own_law(self.parts)) is not None:
             law.check()
-        made = self.state.filled
+        made = self.row.made() if self.leads else self._state.filled
         if self.recorded:
             self._note_events(made.crossings, made.stops)
         self.steps += made.steps
-        self.state = path.with_filled(self.state, Filled(0, made.rows, 0, 0))
+        if not self.leads:
+            self.state = path.with_filled(self._state, Filled(0, made.rows, 0, 0))
 
     def draw(self, n: int) -> None:
         """Draws the random effects on the control samples of the next whole steps.
@@ -381,6 +414,8 @@ class Run:
         Args:
             n: how many.
         """
+        if self.parts.sampler is None or self.parts.sampler.chance is None:
+            return
         x, k = self.parts.sampler.chance, self.state.loop.machine.samples.k
         io: Any = self.scenario.hardware
         most = n // self.parts.sampler.ratio + 8  # and a look ahead
@@ -411,7 +446,7 @@ class Run:
             parts: these.
         """
         self.parts: Parts = parts
-        self.views: Parts = scene.viewed(parts)
+        self._views: Any = None
         self._kind = self._native = None
 
     @property
@@ -548,7 +583,12 @@ class Run:
         Args:
             steady: as Push.steady.
         """
+        known = self.row is not None and self.row.parts is self.parts
+        kind, native = self._kind, self._native
         self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
+        self._kind, self._native = kind, native
+        if known:
+            self.row.push(self.parts)
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
@@ -585,19 +625,35 @@ class Run:
         self.outcome = monitor.Outcome("unresolved", at, step, cause=cause, advice=advice)
         self._cut_events(at)
 
-    def ahead(self) -> dict[str, np.ndarray]:
-        """The sample that a step would write now, as `arrays`; the run stays where it is."""
-        n, saved, events = (
-            self.filled,
-            self.saved(),
-            (self.steps, list(self.crossings), list(self.stops)),
-        )
+    def ahead(self) -> np.ndarray:
+        """The row that a step would write now, and the force of the clay in it [N].
+
+        The run stays where it is.
+
+        Returns:
+            rows.ROW numbers, and two.
+        """
+        n = self.filled
+        if self.kernel.ahead is not None and self.kernel.ahead(self):
+            return self._row_and_force(n)
+        saved, events = self.saved(), (self.steps, list(self.crossings), list(self.stops))
         try:
             self._make(n + 1)
-            return self.columns(self.store.rows[n : n + 1], n)
+            return self._row_and_force(n)
         finally:
             self.restore(saved)
             self.steps, self.crossings, self.stops = events
+
+    def _row_and_force(self, n: int) -> np.ndarray:
+        """Row n of those since the last look, and the force of the clay in it [N]."""
+        out = np.empty(rows.ROW + 2)
+        out[: rows.ROW] = self.store.rows[n]
+        if self.rendered:
+            out[rows.ROW :] = self.store.rendered[n, :2]
+        else:
+            vx, vy, bx, by = *out[4:6].tolist(), *out[12:14].tolist()
+            out[rows.ROW :] = self._force(bx, by, vx, vy)
+        return out
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
@@ -727,18 +783,6 @@ class Run:
         if special is None or special.groove is None:
             return None
         return special.groove.relief * special.groove.ground
-
-    def columns(self, made: np.ndarray, first: int) -> dict[str, np.ndarray]:
-        """Rows by the names of Record's arrays, without their times.
-
-        Args:
-            made: shape (n, rows.ROW).
-            first: index of the first one among those not yet judged.
-        """
-        out = self._columns([made])
-        if self.rendered:
-            out["fe"] = self.store.rendered[first : first + len(made), :2].copy()
-        return out
 
     def _columns(self, parts: list[np.ndarray]) -> dict[str, np.ndarray]:
         columns = (np.concatenate([x[:, j : j + 2] for x in parts]) for j in range(0, rows.ROW, 2))

@@ -1,4 +1,4 @@
-"""Runs of one kind that one call of compiled code advances, each as far as a loop of the user's asks.
+"""Runs of one kind that one call of compiled code advances, for a loop of the user's around it.
 
 Between calls a run is a row: the numbers of its parts, the addresses of their arrays, and its
 state. `advance` fills them in, makes steps, asks the quick test of the monitor, and puts the state
@@ -15,8 +15,9 @@ import numpy as np
 from . import many, monitor, path, rows, scene, viscous
 from .engine_step import Engine, pair, put
 from .machine_code import STEPWISE, kind_of
+from .parts import Parts
 from .run import CHUNK, EngineStore, Kernel, Run
-from .state import OPEN, Filled
+from .state import OPEN, Filled, State
 
 SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the clay [N]
 
@@ -47,7 +48,8 @@ class Vector(NamedTuple):
         states: numbers of their states, shape (n, l).
         written: of the arrays that steps write into: address and bytes, shape (n, w).
         kept: addresses of their rows that have not been judged, and of the force of the clay in
-            them; 1 where b v does not tell that force, else 0, shape (n, 3).
+            them; 1 where b v does not tell that force, 1 where crossings and stops are noted, else
+            0; shape (n, 4).
         until: samples to pause at, shape (n,).
         looked: samples judged so far, shape (n,).
         marks: sample, rows not judged and code of each, shape (n, 3).
@@ -151,7 +153,8 @@ def moved(like, state, place, x, k, ahead):
     readied(parts, s, e, place.limits)
     while s.status.code == OPEN and path.has_room(parts.time, s, e, room):
         s = path.advance(parts, s, e, room)
-        s = path.with_filled(s, Filled(0, s.filled.rows, 0, 0))
+        if x.kept[k, 3] == 0:
+            s = path.with_filled(s, Filled(0, s.filled.rows, 0, 0))
     if ahead:
         swap_written(x.written, k, place.scratch, True)
         show(e, x, k, table, first)
@@ -235,7 +238,7 @@ class Common:
     """
 
     def __init__(self, n: int):
-        self.kept = np.zeros((n, 3), np.int64)
+        self.kept = np.zeros((n, 4), np.int64)
         self.until, self.looked = np.zeros((2, n), np.int64)
         self.marks, self.times = np.zeros((n, 3), np.int64), np.zeros(n)
         self.quiet, self.swings = np.zeros(n, np.int64), np.zeros((n, 2, monitor.QUIET))
@@ -269,6 +272,7 @@ class RunVector:
             c.looked, c.marks, c.times, c.quiet, c.swings, c.seen, c.shown,
         )  # fmt: skip
         self.places: dict[int, tuple[Place, Any]] = {}
+        self.advance: Any = None  # vector.advance for them, compiled
         self.most = 0  # bytes that a run's steps may write into
 
     @staticmethod
@@ -291,7 +295,8 @@ class RunVector:
         x.numbers[k] = many.numbers_of(run.parts)
         x.arrays[k] = [n for a in arrays_in(run.parts) for n in (a.ctypes.data, *a.shape, 1)[:3]]
         x.written[k] = [n for a in written for n in (a.ctypes.data, a.nbytes)]
-        x.kept[k] = store.rows.ctypes.data, store.rendered.ctypes.data, self.tells
+        kept = store.rows.ctypes.data, store.rendered.ctypes.data
+        x.kept[k] = *kept, self.tells, run.recorded
         self.most = max(self.most, sum(a.nbytes for a in written))
         self.take_state(k, run)
 
@@ -353,3 +358,79 @@ class RunVector:
             return shown[:, rows.ROW :]
         v, b = shown[:, 4:6], shown[:, 12:14]
         return np.column_stack(viscous.force(self.parts.grain, b.T, v.T))
+
+
+class Row:
+    """A run that is a row by itself, for a Simulation.
+
+    Args:
+        run: the run.
+        kernel: how compiled steps are made.
+
+    Attributes:
+        parts: of the run, as the row has them.
+        leads: whether the row has the state, and the run an old one.
+        marks: sample, rows not judged and code.
+        t: now [s].
+    """
+
+    def __init__(self, run: Run, kernel: Kernel):
+        self.common = Common(1)
+        self.vector = RunVector(run, self.common, kernel)
+        self.key, self.parts, self.leads, self.taken = kind_key(run), None, False, False
+        self.marks, self.t, self.which = [0, 0, OPEN], 0.0, np.zeros(1, np.int64)
+        self.filled = list(self.vector.at.filled)
+        scratch = np.empty(sum(a.nbytes for a in scene.written(run.parts)) // 8 + 1)
+        place = Place(run.native, run.model.actuator_ctrlrange, scratch)
+        v = self.vector
+        self.arguments = v.parts, v.state, place, v.x, self.which
+        self.advance: Any = None  # vector.advance for these arguments, compiled
+
+    def take(self, run: Run) -> None:
+        """Takes over what the run has anew: its parts, its state.
+
+        Args:
+            run: the run.
+        """
+        if self.parts is not run.parts:
+            self.vector.take(0, run)
+            self.parts = run.parts
+        elif not self.taken:
+            self.vector.take_state(0, run)
+        self.taken = True
+
+    def follow(self) -> None:
+        """Notes that the run has another state."""
+        self.leads = self.taken = False
+
+    def push(self, parts: Parts) -> None:
+        """Takes over another muscle force.
+
+        Args:
+            parts: with it, the same else.
+        """
+        at = self.vector.put.push.steady
+        self.vector.x.numbers[0, list(at)] = parts.push.steady
+        self.parts = parts
+
+    def move(self, room: int) -> None:
+        """Makes steps.
+
+        Args:
+            room: rows that the run may have.
+        """
+        x = self.common
+        x.until[0], x.looked[0] = room, 0
+        self.advance(*self.arguments, False)
+        self.marks, self.t, self.leads = x.marks[0].tolist(), float(x.times[0]), True
+
+    def made(self) -> Filled:
+        """What has been made since the last look; then it is but the rows."""
+        states, at = self.vector.x.states, self.filled
+        steps, n, crossings, stops = map(int, states[0, at].tolist())
+        states[0, at] = 0.0, n, 0.0, 0.0
+        return Filled(steps, n, crossings, stops)
+
+    def given(self) -> State:
+        """The state."""
+        return unpacked(self.vector.state, iter(self.vector.x.states[0].tolist()))

@@ -16,7 +16,6 @@ YIELDS = replace(CUT, clay=hc.slab(hc.Flow(Fy=0.5, K=2.0, n=0.5), 0.001, 0.02))
 SOFT = hc.Groove((-0.03, 0.07), (-0.03, 0.03), 5e3, cells=(100, 60), tool=hc.Tool(0.01, 0.005))
 GROOVE = replace(CUT, clay=hc.Clay.of_groove(SOFT))
 KINDS = {
-    "cut": [CUT, replace(CUT, gain=(3.0, 3.0))],
     "operator": [replace(CUT, operator=x) for x in (hc.Operator(), hc.Operator(0.5, 5.0, 9.0))],
     "hardware": [
         replace(HELD, hardware=HARD),
