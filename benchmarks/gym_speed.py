@@ -1,0 +1,145 @@
+"""Environments against the floor: a bare mj_step loop in C of as many engine steps, in turns.
+
+    python -m benchmarks.gym_speed [--out DIR] [--rounds N] [--seconds N]
+
+Ratios hold on a noisy machine, steps per second do not. Also: Gymnasium's own four numbers
+(gymnasium.utils.performance), the time of a reset, and the memory of 1,000 copies. Writes
+gym_speed.json.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium.utils import performance
+
+import hapticclay as hc
+from hapticclay.gym import registry
+
+from . import common
+
+COPIES, MANY = 64, 1000
+PERIODS = 20  # of an environment between two looks at the clock
+
+
+def floor(scenario: hc.Scenario, steps: int) -> float:
+    """Return seconds of as many bare engine steps, looping in C."""
+    model = hc.build(scenario)
+    data = mujoco.MjData(model)
+    data.qpos[:] = (1.9, -1.9)
+    begin = time.perf_counter()
+    mujoco.mj_step(model, data, nstep=steps)
+    return time.perf_counter() - begin
+
+
+def stepped(env: Any, actions: np.ndarray) -> float:
+    """Return seconds of control periods."""
+    begin = time.perf_counter()
+    for action in actions:
+        _, _, ended, cut_off, _ = env.step(action)
+        if np.ndim(ended) == 0 and (ended or cut_off):
+            env.reset()
+    return time.perf_counter() - begin
+
+
+def ratios(env: Any, rounds: int) -> dict[str, float]:
+    """Return steps a second, and the floor's time over the environment's, medians of pairs.
+
+    A floor of all cores is that of one core over the number of cores.
+    """
+    inner, n = env.unwrapped, getattr(env, "num_envs", 1)
+    rng = np.random.default_rng(0)
+    env.reset(seed=0)
+    shape = (PERIODS, *env.action_space.shape)
+    truth = {name: x[0] for name, x in inner._episodes.truth.items()}
+    scenario = inner.task.scenario({name: float(x) for name, x in truth.items()})
+    stepped(env, rng.uniform(-0.2, 0.2, shape).astype(np.float32))
+    found, spent = [], []
+    cores = common.CORES if n > 1 else 1
+    for _ in range(rounds):
+        actions = rng.uniform(-0.2, 0.2, shape).astype(np.float32)
+        bare = floor(scenario, PERIODS * n * inner.task.steps) / cores
+        spent.append(stepped(env, actions))
+        found.append(bare / spent[-1])
+    return {
+        "copies": n,
+        "steps_per_second": PERIODS * n / statistics.median(spent),
+        "share_of_floor": statistics.median(found),
+    }
+
+
+def resets(env: Any, n: int = 50) -> float:
+    """Return seconds of a reset, the median."""
+    spent = []
+    for i in range(n):
+        begin = time.perf_counter()
+        env.reset(seed=i)
+        spent.append(time.perf_counter() - begin)
+    return statistics.median(spent)
+
+
+def memory() -> float:
+    """Return memory of this process [MB]; 0 where the system does not tell."""
+    status = Path("/proc/self/statm")
+    return int(status.read_text().split()[1]) * 4096 / 1e6 if status.is_file() else 0.0
+
+
+def measured(id: str, engine: str, rounds: int, seconds: float, many: int) -> dict[str, Any]:
+    """Return the figures of an environment."""
+    single = gymnasium.make(id, engine=engine, disable_env_checker=True)
+    vector = gymnasium.make_vec(id, num_envs=COPIES if many > COPIES else many, engine=engine)
+    row: dict[str, Any] = {"id": id, "single": ratios(single, rounds)}
+    row["vector"] = ratios(vector, rounds)
+    row["reset_ms"] = 1e3 * resets(single)
+    row["benchmark_step"] = performance.benchmark_step(single, seconds, seed=0)
+    row["benchmark_vector_step"] = performance.benchmark_vector_step(vector, seconds, seed=0)
+    row["benchmark_init"] = performance.benchmark_init(
+        lambda: gymnasium.make(id, engine=engine, disable_env_checker=True), seconds, seed=0
+    )
+    drawn = gymnasium.make(id, engine=engine, render_mode="rgb_array", disable_env_checker=True)
+    drawn.reset(seed=0)
+    row["benchmark_render"] = performance.benchmark_render(drawn, seconds)
+    before = memory()
+    crowd = gymnasium.make_vec(id, num_envs=many, engine=engine)
+    crowd.reset(seed=0)
+    crowd.step(np.zeros(crowd.action_space.shape, np.float32))
+    row["copies_kept"], row["memory_MB"] = many, memory() - before
+    for env in (single, vector, drawn, crowd):
+        env.close()
+    return row
+
+
+def main(argv: list[str] | None = None) -> dict[str, Any]:
+    """Measure, print and write."""
+    parser = common.parser(__doc__)
+    parser.add_argument("--rounds", type=int, default=21)
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--copies", type=int, default=MANY)
+    parser.add_argument("--engine", default="native")
+    parser.add_argument("--ids", nargs="*", default=list(registry.IDS))
+    a = parser.parse_args(argv)
+    rows = []
+    for id in a.ids:
+        row = measured(id, a.engine, a.rounds, a.seconds, a.copies)
+        rows.append(row)
+        one, many = row["single"], row["vector"]
+        print(
+            f"{id}: single {one['steps_per_second']:.0f} steps/s, {one['share_of_floor']:.2f} of "
+            f"the floor; {many['copies']} copies {many['steps_per_second']:.0f} steps/s, "
+            f"{many['share_of_floor']:.2f} of {common.CORES} cores; "
+            f"reset {row['reset_ms']:.2f} ms; "
+            f"{row['copies_kept']} copies {row['memory_MB']:.0f} MB",
+            flush=True,
+        )
+    return common.write(a.out, "gym_speed", {"environments": rows})
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,20 @@
+"""Environments of Gymnasium: hands and controllers that learn at the simulated arm.
+
+    import gymnasium
+    import hapticclay.gym
+
+    env = gymnasium.make("hapticclay/CutLine-v0")
+
+Importing this registers the environments. It needs Gymnasium: pip install 'hapticclay[gym]'.
+"""
+
+import lazy_loader
+
+from ..errors import needing
+
+with needing("hapticclay.gym", "gymnasium", "gym"):
+    from .registry import register_all
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+register_all()

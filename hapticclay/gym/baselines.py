@@ -1,0 +1,302 @@
+"""Baselines that do not learn: a floor, a sensible controller, and the best that theory knows."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+
+from ..errors import choice
+from ..model.constants import C_POLE, GAIN
+from ..model.operator import Operator
+from ..theory.gain_limits import gain_limit
+from . import adaptive_gain, probe_clay
+from .draws import HAND, Truth
+from .follow import MOTION, SPEED
+from .registry import ENTRIES, NAMESPACE
+from .task import FORCE, Task
+
+MARGIN = 0.9  # share of the gain limit that the gains of theory keep
+PD, PD_IN_GROOVE = (1.0, 0.1), (0.5, 0.3)  # [N/mm], [N/(cm/s)]
+PROBED = 150  # control periods after which the hand is identified
+Policy = Callable[[np.ndarray], np.ndarray]  # observations (n, m) -> actions (n, k)
+Maker = Callable[[Any, list[Truth], int], Policy]
+
+
+class Scores(NamedTuple):
+    """What a policy has reached, an episode for each seed.
+
+    Attributes:
+        total: sum of rewards, shape (n,).
+        length: control periods, shape (n,).
+        info: what the last step told, by name, shape (n,) each.
+    """
+
+    total: np.ndarray
+    length: np.ndarray
+    info: dict[str, np.ndarray]
+
+
+def at_random(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """Even random actions.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, of each copy.
+        seed: of the actions.
+    """
+    rng, shape = np.random.default_rng(seed), (len(truths), len(task.actions))
+    return lambda observations: rng.uniform(-1.0, 1.0, shape)
+
+
+def pd_along_line(task: Any, truths: list[Truth], seed: int) -> Policy:
+    """A PD law across the line, and an integral law of the speed along it.
+
+    The last action, which is observed, is the integral.
+
+    Args:
+        task: of a line.
+        truths: numbers drawn, which it does not use.
+        seed: likewise.
+    """
+    names = [q.name for q in task.observations]
+    first, last = names.index(MOTION[0].name), names.index(MOTION[4].name)
+    stiff, damper = PD if names[0].startswith("distance") else PD_IN_GROOVE
+
+    def act(x: np.ndarray) -> np.ndarray:
+        offset = x[:, 0] if first == 1 else x[:, 1] - x[:, 0]  # or too little depth [mm]
+        v, w = x[:, first], x[:, first + 1]
+        along = x[:, last] + 0.2 * (100.0 * SPEED - v) / task.most
+        across = -(stiff * offset + damper * w) / task.most
+        return np.clip(np.stack((along, across), axis=1), -1.0, 1.0)
+
+    return act
+
+
+# ---- the gain --------------------------------------------------------------------------------
+
+
+def _towards(gains: np.ndarray) -> Policy:
+    """Brings the gain to a value and keeps it there."""
+
+    def act(x: np.ndarray) -> np.ndarray:
+        octaves = (np.log10(gains) - x[:, -2]) / math.log10(2.0)
+        return np.clip(octaves / adaptive_gain.RATE, -1.0, 1.0)[:, None]
+
+    return act
+
+
+def oracle_gain(b: float, hand: Operator) -> float:
+    """MARGIN of the gain limit of the loop of x with this hand, at most the task's largest [1/kg].
+
+    Args:
+        b: clay [N.s/m].
+        hand: the hand.
+    """
+    return min(MARGIN * gain_limit("x", b, hand), adaptive_gain.MOST)
+
+
+@functools.cache
+def robust_gain(b: float) -> float:
+    """MARGIN of the least gain limit over the corners of the published hands [1/kg].
+
+    Args:
+        b: clay [N.s/m].
+    """
+    ends = ((HAND[name].low, HAND[name].high) for name in ("mass", "damper", "spring"))
+    return min(oracle_gain(b, Operator(*hand)) for hand in itertools.product(*ends))
+
+
+def oracle(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """The gain of the hand that was drawn, which an agent does not see.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, of each copy.
+        seed: not used.
+    """
+    hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
+    return _towards(np.array([oracle_gain(t["b"], h) for t, h in zip(truths, hands, strict=True)]))
+
+
+def robust(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """The best fixed gain for all hands: that of the worst one.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, of which it knows the clay.
+        seed: not used.
+    """
+    return _towards(np.array([robust_gain(t["b"]) for t in truths]))
+
+
+def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """Raises the gain slowly, and lowers it where the device returns more energy than it has taken.
+
+    The energy is that at the port over the samples seen, less what the virtual mass 1/K stores.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, which it does not use.
+        seed: likewise.
+    """
+    n, dt = adaptive_gain.SAMPLES, task.period
+
+    def act(x: np.ndarray) -> np.ndarray:
+        v, f = 0.01 * x[:, :n], x[:, n : 2 * n]
+        taken = dt * (v[:, :-1] * f[:, :-1]).sum(axis=1)
+        stored = 0.5 * (v[:, 0] ** 2 - v[:, -1] ** 2) / 10.0 ** x[:, -2]
+        return np.where(taken - stored < 0.0, -1.0, 0.02)[:, None]
+
+    return act
+
+
+def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """Holds the robust gain, identifies the hand by least squares, then takes its gain.
+
+    The hand's force is uh - Th p, its muscle's uh three tones of known frequency. The equation is
+    integrated once, so that no velocity is differentiated.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, of which it knows the clay.
+        seed: not used.
+    """
+    gains = np.array([robust_gain(t["b"]) for t in truths])
+    seen: list[np.ndarray] = []
+
+    def act(x: np.ndarray) -> np.ndarray:
+        n = adaptive_gain.SAMPLES
+        seen.append(np.stack((0.01 * x[:, 0], x[:, n]), axis=1).astype(float))
+        if len(seen) == PROBED:
+            told = np.stack(seen)
+            for i, t in enumerate(truths):
+                hand = hand_from(told[:, i, 0], told[:, i, 1], task.period)
+                gains[i] = max(gains[i], oracle_gain(t["b"], hand))
+        return _towards(gains)(x)
+
+    return act
+
+
+def hand_from(v: np.ndarray, fh: np.ndarray, dt: float) -> Operator:
+    """The hand that gave these forces, by least squares, within the published hands.
+
+    Args:
+        v: velocity [m/s], shape (n,), from rest.
+        fh: force on the handle [N], shape (n,).
+        dt: between samples [s].
+    """
+
+    def integral(y: np.ndarray) -> np.ndarray:
+        return np.concatenate(([0.0], np.cumsum(0.5 * dt * (y[1:] + y[:-1]))))
+
+    x = integral(v)
+    t = np.arange(len(v)) * dt
+    waves = [g(2.0 * math.pi * f * t) for f in adaptive_gain.TONES for g in (np.sin, np.cos)]
+    columns = np.stack((-v, -x, -integral(x), np.ones_like(t), *waves), axis=1)
+    on = slice(adaptive_gain.RAMP + 1, None)
+    found = np.linalg.lstsq(columns[on], integral(fh)[on], rcond=None)[0][:3]
+    ends = (HAND[name] for name in ("mass", "damper", "spring"))
+    mass, damper, spring = (
+        min(max(value, r.low), r.high) for value, r in zip(found.tolist(), ends, strict=True)
+    )
+    return Operator(mass, damper, spring)
+
+
+# ---- the clay --------------------------------------------------------------------------------
+
+
+SPEEDS = (4.0, 12.0, -12.0, -4.0)  # [cm/s] along x, one after the other
+
+
+def least_squares(task: Task, truths: list[Truth], seed: int) -> Policy:
+    """Moves to and fro at two speeds, then fits Fy + b |v| to the force of the clay.
+
+    That force is the hand's less what the device takes, (a + 10 v)/K.
+
+    Args:
+        task: the task.
+        truths: numbers drawn, which it does not use.
+        seed: likewise.
+    """
+    seen: list[np.ndarray] = []
+
+    def act(x: np.ndarray) -> np.ndarray:
+        seen.append(np.stack((0.01 * x[:, 2], x[:, 4]), axis=1).astype(float))
+        i = min(len(seen) - 1, task.limit - 1) * len(SPEEDS) // task.limit
+        action = np.zeros((len(x), 4))
+        action[:, 0] = np.clip(x[:, 6] + 0.2 * (SPEEDS[i] - x[:, 2]) / FORCE, -1.0, 1.0)
+        if len(seen) == task.limit:
+            told = np.stack(seen)
+            for k in range(len(x)):
+                action[k, 2:] = probe_clay.answer_of(*_clay_from(told[:, k], task.period))
+        return action
+
+    return act
+
+
+def _clay_from(told: np.ndarray, dt: float) -> tuple[float, float]:
+    """b [N.s/m] and Fy [N] of velocities and forces, shape (n, 2)."""
+    v, f = told.T
+    a = np.gradient(v, dt)
+    calm = (np.abs(a) < 0.2) & (np.abs(v) > 1e-3)
+    if calm.sum() < 3:
+        return probe_clay.MIDDLE
+    v, f, a = v[calm], f[calm], a[calm]
+    clay = np.sign(v) * (f - (a + C_POLE * v) / GAIN[0])
+    columns = np.stack((np.abs(v), np.ones_like(v)), axis=1)
+    b, Fy = np.linalg.lstsq(columns, clay, rcond=None)[0].tolist()
+    return b, Fy
+
+
+BASELINES: dict[str, dict[str, Maker]] = {
+    "CutLine-v0": {"random": at_random, "PD along the line": pd_along_line},
+    "PareEdge-v0": {"random": at_random, "PD along the line": pd_along_line},
+    "AdaptiveGain-v0": {
+        "random": at_random, "passivity observer": passivity_observer, "robust gain": robust,
+        "identify, then set": identify_then_set, "oracle": oracle,
+    },
+    "ProbeClay-v0": {"random": at_random, "least squares": least_squares},
+}  # fmt: skip
+
+
+def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Scores:
+    """Returns of one episode for each seed.
+
+    Args:
+        id: of the environment, as "CutLine-v0".
+        make: of the policy.
+        seeds: of the episodes.
+        **options: of the environment.
+    """
+    name = f"{NAMESPACE}/{choice('id', id, tuple(ENTRIES))}"
+    env: Any = gymnasium.make_vec(name, num_envs=len(seeds), **options).unwrapped
+    observations, info = env.reset(seed=list(seeds))
+    truths = [env.info_of(i) for i in range(len(seeds))]
+    policy = make(env.task, truths, 0)
+    total, length = np.zeros((2, len(seeds)))
+    live = np.ones(len(seeds), bool)
+    last: dict[str, np.ndarray] = {}
+    while live.any():
+        observations, rewards, ended, cut_off, info = env.step(policy(observations))
+        total += np.where(live, rewards, 0.0)
+        length += live
+        for key in (k for k in info if f"_{k}" in info and not k.startswith("_")):
+            last[key] = np.where(live, info[key], last.get(key, info[key]))
+        live &= ~(ended | cut_off)
+    env.close()
+    return Scores(total, length, last)
+
+
+def mean_of(x: np.ndarray) -> tuple[float, float]:
+    """Mean, and half of its 95 % interval by the normal law.
+
+    Args:
+        x: one value an episode.
+    """
+    return float(x.mean()), 1.96 * float(x.std(ddof=1)) / math.sqrt(len(x))

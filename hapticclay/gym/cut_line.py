@@ -1,0 +1,97 @@
+"""`hapticclay/CutLine-v0`: a hand guides the arm through clay along a line, at an even speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..errors import choice
+from ..model.clay import slab
+from ..scene.scenario import Scenario
+from . import lines
+from .draws import HAND, Range, Truth
+from .environment import TaskEnv
+from .follow import AHEAD, MOTION, Follow
+from .quantities import Quantity, either_way
+from .task import Arrays, Handles, scene_of
+from .vector import TaskVectorEnv
+
+LENGTH = 0.10  # [m]
+TOLERANCE = 2e-3  # [m]
+GAIN_SHARE = Range(0.3, 1.0, "", 0.01, 2.0, False, "gain of the device, share of (1, 0.5) 1/kg")
+
+
+@dataclass(frozen=True)
+class CutLineTask(Follow):
+    """Cutting along a line through clay that damps.
+
+    Attributes:
+        shape: of the line: "straight", "arc" or "corner".
+    """
+
+    shape: Literal["straight", "arc", "corner"] = "straight"
+    drawn: ClassVar[dict[str, Range]] = {
+        **HAND,
+        "b": Range(30.0, 120.0, "N.s/m", 0.0, 1e4, True, "damping of the clay"),
+        "gain": GAIN_SHARE,
+        "angle": Range(-0.5, 0.5, "rad", -0.5, 0.5, False, "direction of the line at its begin"),
+        "offset": Range(-3e-3, 3e-3, "m", -0.01, 0.01, False, "start beside the line"),
+    }
+
+    def __post_init__(self):
+        super().__post_init__()
+        choice("shape", self.shape, tuple(lines.SHAPES))
+
+    @property
+    def observations(self) -> tuple[Quantity, ...]:
+        """Quantities of an observation."""
+        return (
+            either_way("distance from the line, positive to its left", 50.0, "mm"),
+            *MOTION,
+            either_way("sine of the turn of the line 5 mm ahead", 1.0),
+        )
+
+    def line(self, truth: Truth) -> np.ndarray:
+        """Nodes of the line [m].
+
+        Args:
+            truth: numbers drawn.
+        """
+        return lines.turned(lines.SHAPES[self.shape](LENGTH), truth["angle"])
+
+    def scenario(self, truth: Truth) -> Scenario:
+        line = self.line(truth)
+        (dx, dy), d = line[1] - line[0], truth["offset"]
+        r = float(np.hypot(dx, dy))
+        start = float(-dy / r * d), float(dx / r * d)
+        return scene_of(truth, name="cut line", clay=slab(truth["b"]), start=start)
+
+    def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
+        return at.across / TOLERANCE
+
+    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
+        at = lines.place(m, h.p, AHEAD)
+        t, u = at.tangent, at.ahead
+        turn = t[:, 0] * u[:, 1] - t[:, 1] * u[:, 0]
+        return np.stack((1000.0 * at.across, *self.motion(m, h, at), turn), axis=1)
+
+
+class CutLine(TaskEnv):
+    """A hand guides the arm through clay along a line, at 5 cm/s.
+
+    Args:
+        shape: of the line: "straight", "arc" or "corner".
+        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        engine: as in `Simulation`: "auto", "python" or "native".
+        render_mode: "human", "rgb_array" or None.
+    """
+
+    task_type = CutLineTask
+
+
+class CutLineVector(TaskVectorEnv):
+    """Many copies of `CutLine`."""
+
+    task_type = CutLineTask

@@ -1,0 +1,108 @@
+"""What differs between episodes: ranges, draws from them, and values given in their place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, choice, number, numbers_of
+
+Truth = dict[str, float]
+
+
+class Range(NamedTuple):
+    """The range of a number that is drawn for each episode.
+
+    Attributes:
+        low: smallest value drawn.
+        high: largest value drawn.
+        unit: its unit; "" for none.
+        least: smallest value allowed.
+        most: largest value allowed.
+        log: whether its logarithm is drawn evenly, else the number itself.
+        what: what it is.
+    """
+
+    low: float
+    high: float
+    unit: str
+    least: float
+    most: float
+    log: bool
+    what: str
+
+
+# Published hands: the ends are those of `POPULATIONS["published range"]`.
+HAND = {
+    "mass": Range(0.25, 0.554, "kg", 0.0, 100.0, True, "mass of the hand"),
+    "damper": Range(2.0, 6.45, "N.s/m", 0.0, 1e4, True, "damper of the hand"),
+    "spring": Range(6.0, 135.0, "N/m", 0.0, 1e5, True, "spring of the hand"),
+}
+
+
+def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) -> dict[str, Range]:
+    """Ranges with other ends.
+
+    Args:
+        ranges: by name.
+        given: pairs (low, high) by name; equal ends fix a number; None for none.
+
+    Raises:
+        ParameterError: there is no such range, or its ends are refused.
+    """
+    found = dict(ranges)
+    for name, ends in (given or {}).items():
+        r = found[choice("ranges", name, tuple(found))]
+        least = r.least
+        low, high = numbers_of(f"ranges.{name}", ends, ("low", "high"), least, r.most)
+        if high < low:
+            raise ParameterError(f"ranges.{name}", ends, "must not end below where it begins")
+        found[name] = r._replace(low=low, high=high)
+    return found
+
+
+def draw(
+    ranges: Mapping[str, Range], rng: np.random.Generator, given: Mapping[str, Any] | None
+) -> Truth:
+    """Numbers of an episode.
+
+    All are drawn, so that those given change no other.
+
+    Args:
+        ranges: by name.
+        rng: generator.
+        given: values in place of those drawn, by name; None for none.
+
+    Raises:
+        ParameterError: a name is unknown, or a value out of its bounds.
+    """
+    found = {}
+    for name, r in ranges.items():
+        found[name] = _spread(r, float(rng.random()))
+    for name, value in (given or {}).items():
+        r = ranges[choice("options", name, tuple(ranges))]
+        found[name] = number(f"options.{name}", value, r.least, r.most, unit=r.unit)
+    return found
+
+
+def _spread(r: Range, u: float) -> float:
+    if r.log and r.low > 0.0:
+        return min(max(r.low * math.exp(u * math.log(r.high / r.low)), r.low), r.high)
+    return r.low + u * (r.high - r.low)
+
+
+def table_of(ranges: Mapping[str, Range]) -> str:
+    """A table of what is drawn, in Markdown.
+
+    Args:
+        ranges: by name.
+    """
+    rows = ["| option | what | drawn from | law | allowed | unit |", "|---|---|---|---|---|---|"]
+    for name, r in ranges.items():
+        law = "log-uniform" if r.log else "uniform"
+        ends = f"{r.low:g} to {r.high:g} | {law} | {r.least:g} to {r.most:g}"
+        rows.append(f"| `{name}` | {r.what} | {ends} | {r.unit or '-'} |")
+    return "\n".join(rows)

@@ -1,0 +1,110 @@
+"""What a picture of an episode shows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..model.arm import inverse_kinematics
+from ..scene.scenario import Scenario
+from ..views.plan_picture import Plan, PlanPicture
+from .episodes import Episodes
+from .task import Task
+
+RADIUS = 0.005  # [m] of the tool where a task has none
+PATH = 2000  # points that are kept
+
+
+class Picture:
+    """A picture of one copy, with the path of its handle.
+
+    Args:
+        task: the task.
+        window: whether to show it in a window.
+    """
+
+    def __init__(self, task: Task, window: bool):
+        self._task, self._plan = task, PlanPicture(window)
+        self._path: list[tuple[float, float]] = []
+
+    def begin(self) -> None:
+        """Begins a new path."""
+        self._path = []
+
+    def note(self, p: np.ndarray) -> None:
+        """Adds a point to the path.
+
+        Args:
+            p: position of the handle [m], shape (2,).
+        """
+        point = float(p[0]), float(p[1])
+        if not self._path or self._path[-1] != point:
+            self._path.append(point)
+        del self._path[:-PATH]
+
+    def drawn(self, episodes: Episodes, i: int = 0) -> np.ndarray | None:
+        """The picture now, shape (height, width, 3), uint8; None where a window shows it.
+
+        Args:
+            episodes: of the task.
+            i: number of the copy.
+        """
+        p = episodes.handles.p[i]
+        scenario = self._task.scenario(episodes.truth_of(i))
+        nodes = episodes.memory["nodes"][i] if "nodes" in episodes.memory else None
+        plan = Plan(
+            joints_at(scenario, float(p[0]), float(p[1])), np.array(self._path), nodes,
+            blocks_of(scenario), RADIUS, view_of(nodes, p), self._title(episodes, i),
+        )  # fmt: skip
+        return self._plan.draw(plan)
+
+    def _title(self, episodes: Episodes, i: int) -> str:
+        m, h = episodes.memory, episodes.handles
+        speed = 100.0 * math.hypot(*h.v[i].tolist())
+        told = f"{speed:.1f} cm/s"
+        return f"K = {m['K'][i]:.2f} 1/kg, {told}" if "K" in m else told
+
+    def close(self) -> None:
+        """Closes the window, if any."""
+        self._plan.close()
+
+
+def joints_at(s: Scenario, x: float, y: float) -> np.ndarray:
+    """Shoulder, elbow and handle [m], shape (3, 2), in the coordinates of p.
+
+    Args:
+        s: the scene.
+        x: of the handle [m].
+        y: the same [m].
+    """
+    ox, oy = s.origin
+    q, _ = inverse_kinematics(ox + x, oy + y, s.arm.links)
+    elbow = s.arm.l1 * math.cos(q) - ox, s.arm.l1 * math.sin(q) - oy
+    return np.array([(-ox, -oy), elbow, (x, y)])
+
+
+def blocks_of(s: Scenario) -> list[tuple[float, float, float, float]]:
+    """Blocks of clay, (x, y, width, height) [m]; none for clay everywhere.
+
+    Args:
+        s: the scene.
+    """
+    if s.clay is None or s.clay.groove is None:
+        return []
+    (x0, x1), (y0, y1) = s.clay.groove.x, s.clay.groove.y
+    return [(x0, y0, x1 - x0, y1 - y0)]
+
+
+def view_of(nodes: np.ndarray | None, p: np.ndarray) -> tuple[float, float, float]:
+    """Middle of the closer view and half its side [m].
+
+    Args:
+        nodes: of the line [m]; None for none.
+        p: position of the handle [m], shape (2,).
+    """
+    if nodes is None:
+        return 0.0, 0.0, max(0.08, 1.1 * float(np.abs(p).max()))
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    middle = 0.5 * (low + high)
+    return float(middle[0]), float(middle[1]), 0.5 * float((high - low).max()) + 0.015

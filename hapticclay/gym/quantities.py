@@ -1,0 +1,59 @@
+"""Quantities of actions and observations: names, bounds and units, and the spaces made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.spaces import Box
+
+
+class Quantity(NamedTuple):
+    """A number of an action or of an observation.
+
+    Attributes:
+        name: what it is.
+        low: smallest value.
+        high: largest value.
+        unit: its unit; "" for none.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+
+
+def either_way(name: str, most: float, unit: str = "") -> Quantity:
+    """A quantity whose bounds are symmetric.
+
+    Args:
+        name: what it is.
+        most: largest value.
+        unit: its unit.
+    """
+    return Quantity(name, -most, most, unit)
+
+
+def box_of(quantities: Sequence[Quantity]) -> Box:
+    """The space of some quantities, shape (n,), float32.
+
+    Args:
+        quantities: ordered.
+    """
+    low = np.array([q.low for q in quantities], np.float32)
+    high = np.array([q.high for q in quantities], np.float32)
+    return Box(low, high, dtype=np.float32)
+
+
+def table_of(quantities: Sequence[Quantity]) -> str:
+    """A table of some quantities in Markdown: number, name, bounds, unit.
+
+    Args:
+        quantities: ordered.
+    """
+    rows = ["| num | name | min | max | unit |", "|---|---|---|---|---|"]
+    for i, q in enumerate(quantities):
+        rows.append(f"| {i} | {q.name} | {q.low:g} | {q.high:g} | {q.unit or '-'} |")
+    return "\n".join(rows)

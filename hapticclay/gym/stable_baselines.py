@@ -1,0 +1,135 @@
+"""A vector environment as Stable-Baselines3 takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from ..errors import ParameterError, needing
+from .registry import NAMESPACE
+from .vector import TaskVectorEnv
+
+with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "gym"):
+    from stable_baselines3.common.vec_env import VecEnv
+
+
+class StableBaselinesVecEnv(VecEnv):
+    """Many copies of a task for algorithms of Stable-Baselines3.
+
+    An episode that is over begins anew in the same step; its last observation is told as
+    `terminal_observation`, and whether it was cut off as `TimeLimit.truncated`.
+
+    Args:
+        env: the vector environment, or the name of one, as "CutLine-v0".
+        num_envs: number of copies, where env is a name.
+        **options: of the environment, where env is a name.
+
+    Raises:
+        ParameterError: env does not begin episodes anew in the same step.
+    """
+
+    def __init__(self, env: TaskVectorEnv | str, num_envs: int = 1, **options: Any):
+        if isinstance(env, str):
+            made = gymnasium.make_vec(
+                f"{NAMESPACE}/{env}", num_envs, autoreset_mode="SAME_STEP", **options
+            )
+            env = made.unwrapped  # type: ignore[assignment]
+        assert isinstance(env, TaskVectorEnv)
+        if env.autoreset_mode is not gymnasium.vector.AutoresetMode.SAME_STEP:
+            bound = "must be 'SAME_STEP' for Stable-Baselines3"
+            raise ParameterError("autoreset_mode", env.autoreset_mode.name, bound)
+        self.env, self.render_mode = env, env.render_mode
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self._actions = np.zeros(env.action_space.shape or (), np.float32)
+
+    def reset(self) -> np.ndarray:
+        """Begins episodes, with the seeds and options that were set."""
+        seeds = self._seeds if any(x is not None for x in self._seeds) else None
+        options = self._options[0] if self._options else None
+        observations, infos = self.env.reset(seed=seeds, options=options or None)
+        self.reset_infos = [_of_copy(infos, i) for i in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        return observations
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keeps the actions for `step_wait`.
+
+        Args:
+            actions: shape (n, k).
+        """
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Makes a control period."""
+        observations, rewards, ended, cut_off, infos = self.env.step(self._actions)
+        over = ended | cut_off
+        told = []
+        for i in range(self.num_envs):
+            if over[i]:
+                info = _of_copy(infos["final_info"], i)
+                info["terminal_observation"] = infos["final_obs"][i]
+            else:
+                info = _of_copy(infos, i)
+            info["TimeLimit.truncated"] = bool(cut_off[i] and not ended[i])
+            told.append(info)
+        return observations, rewards.astype(np.float32), over, told
+
+    def close(self) -> None:
+        """Ends the runs."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A picture of each copy, in mode "rgb_array"."""
+        return self.env.render() or [None] * self.num_envs
+
+    def _indices(self, indices: None | int | Iterable[int]) -> list[int]:
+        return list(self._get_indices(indices))
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the copies, which they share.
+
+        Args:
+            attr_name: its name.
+            indices: of the copies; None for all.
+        """
+        return [getattr(self.env, attr_name) for _ in self._indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Sets an attribute of all copies, which they share.
+
+        Args:
+            attr_name: its name.
+            value: its value.
+            indices: must be None.
+        """
+        if indices is not None:
+            raise ParameterError("indices", indices, "must be None: the copies share attributes")
+        setattr(self.env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Refused: the copies are no environments of their own."""
+        raise ParameterError("method_name", method_name, "must be none: copies have no methods")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Whether a wrapper is around the copies: none is.
+
+        Args:
+            wrapper_class: class of the wrapper.
+            indices: of the copies; None for all.
+        """
+        return [False for _ in self._indices(indices)]
+
+
+def _of_copy(infos: dict[str, Any], i: int) -> dict[str, Any]:
+    """What infos tell of a copy."""
+    return {
+        name: x[i].item()
+        for name, x in infos.items()
+        if not name.startswith(("_", "final")) and infos[f"_{name}"][i]
+    }

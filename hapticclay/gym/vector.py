@@ -1,0 +1,255 @@
+"""A vector environment of Gymnasium: many copies of a task, advanced by one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from ..errors import ParameterError, choice, integer
+from ..simulation.engines import ENGINES
+from .environment import FPS, MODES, numbers_of_copy
+from .episodes import Episodes
+from .quantities import box_of
+from .task import Arrays, Task
+
+MOST_COPIES = 100_000
+
+
+class TaskVectorEnv(VectorEnv):
+    """Many copies of a task. Copy i of seed s makes the same numbers as one environment of s + i.
+
+    Args:
+        num_envs: number of copies, 1 to 100000.
+        max_episode_steps: control periods after which an episode is cut off; None for the task's.
+        autoreset_mode: "NEXT_STEP", "SAME_STEP" or "DISABLED", as a word or a member of
+            `AutoresetMode`.
+        render_mode: "rgb_array" or None.
+        engine: as in `Simulation`: "auto", "python" or "native".
+        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        **options: of the task.
+
+    Raises:
+        ParameterError: an argument is refused.
+    """
+
+    task_type: ClassVar[type[Task]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        engine: str = "auto",
+        ranges: Mapping[str, Any] | None = None,
+        **options: Any,
+    ):
+        self.num_envs = integer("num_envs", num_envs, 1, MOST_COPIES)
+        self.autoreset_mode = mode_of(autoreset_mode)
+        self.metadata = {
+            "render_modes": MODES[1:], "render_fps": FPS, "autoreset_mode": self.autoreset_mode,
+        }  # fmt: skip
+        if render_mode is not None:
+            choice("render_mode", render_mode, MODES[1:])
+        self.render_mode = render_mode
+        self.task = self.task_type(ranges, **options)
+        most = self.task.limit if max_episode_steps is None else max_episode_steps
+        self._most = integer("max_episode_steps", most, 1, 1_000_000_000)
+        self.single_action_space = box_of(self.task.actions)
+        self.single_observation_space = box_of(self.task.observations)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._episodes = Episodes(self.task, num_envs, choice("engine", engine, ENGINES))
+        self._generators: list[np.random.Generator] = []
+        self._seeds: list[int] = []
+        self._count = np.zeros(num_envs, np.int64)
+        self._over = np.ones(num_envs, bool)
+        self._pictures: list[Any] = []
+
+    @property
+    def np_random(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+    ) -> tuple[np.random.Generator, ...]:
+        """The generator of each copy."""
+        return tuple(self._generators)
+
+    @property
+    def np_random_seed(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+    ) -> tuple[int, ...]:
+        """The seed of each copy."""
+        return tuple(self._seeds)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begins episodes.
+
+        Args:
+            seed: of the first copy, the others count on; or one for each; None to go on.
+            options: values in place of those drawn, by name; and "reset_mask", which copies to
+                reset, shape (n,), bool.
+
+        Raises:
+            ParameterError: a name is unknown, a value out of its bounds, or the mask is refused.
+        """
+        given = dict(options or {})
+        mask = self._mask(given.pop("reset_mask", None))
+        self._seed(seed, mask)
+        self._begin(mask, given)
+        return self._episodes.observe(), _masked(self._episodes.info(), mask)
+
+    def _mask(self, given: Any) -> np.ndarray:
+        n = self.num_envs
+        if given is None:
+            return np.ones(n, bool)
+        mask = np.asarray(given)
+        if mask.shape != (n,) or mask.dtype != bool or not mask.any():
+            raise ParameterError("reset_mask", given, f"must be {n} bools, one of them True")
+        return mask
+
+    def _seed(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
+        n = self.num_envs
+        seeds: list[int | None] = [None] * n
+        if isinstance(seed, int | np.integer):
+            seeds = [int(seed) + i for i in range(n)]
+        elif seed is not None:
+            seeds = list(seed)
+        if len(seeds) != n:
+            raise ParameterError("seed", seed, f"must be a number, or {n} of them")
+        if not self._generators:
+            made = [seeding.np_random() for _ in range(n)]
+            self._generators, self._seeds = [x[0] for x in made], [x[1] for x in made]
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
+
+    def _begin(self, mask: np.ndarray, options: Mapping[str, Any] | None) -> None:
+        which = np.flatnonzero(mask).tolist()
+        self._episodes.reset(which, [self._generators[i] for i in which], options)
+        self._count[mask] = 0
+        self._over[mask] = False
+        for i in which if self._pictures else ():
+            self._pictures[i].begin()
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Makes a control period of all copies.
+
+        Args:
+            actions: shape (n, k).
+
+        Raises:
+            ParameterError: the actions have another shape.
+            RuntimeError: there was no reset, or with autoreset "DISABLED" an episode is over.
+        """
+        actions = np.asarray(actions)
+        if actions.shape != self.action_space.shape:
+            bound = f"must have shape {self.action_space.shape}, has {actions.shape}"
+            raise ParameterError("actions", actions, bound)
+        live = ~self._over
+        if not self._generators or (
+            self.autoreset_mode is AutoresetMode.DISABLED and not live.all()
+        ):
+            raise RuntimeError("an episode is over, or none was begun: reset first")
+        found = self._episodes.step(actions, live)
+        self._count += live
+        ended = found.ended & live
+        cut_off = (self._count >= self._most) & live
+        rewards = np.where(live, found.rewards, 0.0)
+        if not live.all():  # with NEXT_STEP: an episode was over before this step
+            self._begin(~live, None)
+        self._over = ended | cut_off
+        infos = self._infos(found.info, live)
+        observations = found.observations if live.all() else self._episodes.observe()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            observations = self._next_episodes(found.observations, infos)
+        return observations, rewards, ended, cut_off, infos
+
+    def _infos(self, info: Arrays, live: np.ndarray) -> dict[str, Any]:
+        everywhere = np.ones(self.num_envs, bool)
+        return _masked(self._episodes.info(), everywhere) | _masked(info, live)
+
+    def _next_episodes(self, last: np.ndarray, infos: dict[str, Any]) -> np.ndarray:
+        """Begins the next episodes where one is over; what was last goes into infos."""
+        over = self._over.copy()
+        final = np.full(self.num_envs, None, object)
+        for i in np.flatnonzero(over).tolist():
+            final[i] = last[i].copy()
+        final_info = {
+            name: np.where(over, x, np.zeros_like(x))
+            for name, x in infos.items()
+            if not name.startswith("_")
+        }
+        final_info |= {f"_{name}": over.copy() for name in list(final_info)}
+        infos |= {"final_obs": final, "_final_obs": over, "final_info": final_info}
+        infos["_final_info"] = over.copy()
+        for name in [x for x in infos if not x.startswith("_") and x not in self.task.ranges]:
+            if not name.startswith("final"):
+                infos[f"_{name}"] = infos[f"_{name}"] & ~over
+        self._begin(over, None)
+        infos |= self._episodes.info()
+        return self._episodes.observe()
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture of each copy seen from above, in mode "rgb_array"."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("give render_mode to gymnasium.make_vec to see pictures")
+            return None
+        from .picture import Picture
+
+        if not self._pictures:
+            self._pictures = [Picture(self.task, False) for _ in range(self.num_envs)]
+        frames = []
+        for i, picture in enumerate(self._pictures):
+            picture.note(self._episodes.handles.p[i])
+            frames.append(picture.drawn(self._episodes, i))
+        return tuple(frames)
+
+    def info_of(self, i: int) -> dict[str, Any]:
+        """What was drawn for a copy.
+
+        Args:
+            i: number of the copy.
+        """
+        return numbers_of_copy(self._episodes.info(), i)
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the runs."""
+        for picture in self._pictures:
+            picture.close()
+        self._pictures = []
+        self._episodes.copies.close()
+
+
+def mode_of(given: str | AutoresetMode) -> AutoresetMode:
+    """A mode of autoreset, itself or by its name.
+
+    Args:
+        given: the mode.
+
+    Raises:
+        ParameterError: there is no such mode.
+    """
+    if isinstance(given, AutoresetMode):
+        return given
+    return AutoresetMode[choice("autoreset_mode", given, [x.name for x in AutoresetMode])]
+
+
+def _masked(info: Arrays, mask: np.ndarray) -> dict[str, Any]:
+    """Numbers of copies as Gymnasium tells them: arrays, and of which copies they are."""
+    found: dict[str, Any] = {}
+    for name, x in info.items():
+        found[name] = np.where(mask, x, np.zeros_like(x))
+        found[f"_{name}"] = mask.copy()
+    return found

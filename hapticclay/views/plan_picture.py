@@ -1,0 +1,130 @@
+"""A picture of the arm and its task from above, as an image or in a window of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import style
+
+SIZE, DPI = (7.2, 3.6), 100.0  # [in], pixels per inch
+FRAME = 1e-3  # [s] that a window gets for its events
+PATH = 600  # points of a path that are drawn
+
+
+class Plan(NamedTuple):
+    """What a picture shows.
+
+    Attributes:
+        joints: shoulder, elbow and handle [m], shape (3, 2).
+        path: of the handle [m], shape (n, 2).
+        line: to be followed [m], shape (k, 2); None for none.
+        blocks: of clay, (x, y, width, height) [m]; () for clay everywhere.
+        radius: of the tool [m].
+        close: middle of the closer view and half its side, (x, y, half) [m].
+        title: above the closer view.
+    """
+
+    joints: np.ndarray
+    path: np.ndarray
+    line: np.ndarray | None
+    blocks: Sequence[tuple[float, float, float, float]]
+    radius: float
+    close: tuple[float, float, float]
+    title: str
+
+
+class PlanPicture:
+    """A picture that is drawn again and again.
+
+    Args:
+        window: whether to show it in a window, where matplotlib has a display.
+    """
+
+    def __init__(self, window: bool):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self._pyplot = _interactive() if window else None
+        with style.styled("screen"):
+            if self._pyplot is not None:
+                self._figure = self._pyplot.figure(figsize=SIZE, dpi=DPI)
+            else:
+                self._figure = Figure(figsize=SIZE, dpi=DPI)
+                FigureCanvasAgg(self._figure)
+            self._axes = self._figure.subplots(1, 2)
+
+    def draw(self, plan: Plan) -> np.ndarray | None:
+        """Draws.
+
+        Args:
+            plan: what to show.
+
+        Returns:
+            Pixels, shape (height, width, 3), uint8; None where a window shows them.
+        """
+        with style.styled("screen"):
+            for ax, closer in zip(self._axes, (False, True), strict=True):
+                ax.clear()
+                _fill(ax, plan, closer)
+            canvas: Any = self._figure.canvas
+            canvas.draw()
+        if self._pyplot is not None:
+            canvas.start_event_loop(FRAME)
+            return None
+        return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+    def close(self) -> None:
+        """Closes the window, if any."""
+        if self._pyplot is not None:
+            self._pyplot.close(self._figure)
+            self._pyplot = None
+
+
+def _interactive() -> Any:
+    """matplotlib.pyplot where it has a display to show windows on; else None."""
+    import matplotlib
+    from matplotlib.backends import BackendFilter, backend_registry
+
+    names = backend_registry.list_builtin(BackendFilter.INTERACTIVE)
+    if matplotlib.get_backend().lower() not in {x.lower() for x in names}:
+        return None
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+def _fill(ax: Any, plan: Plan, closer: bool) -> None:
+    from matplotlib.patches import Circle, Rectangle
+
+    unit = 1000.0 if closer else 100.0
+    ax.grid(False)
+    if not plan.blocks:
+        ax.set_facecolor(style.CLAY_PALE)
+    for x, y, w, h in plan.blocks:
+        ax.add_patch(
+            Rectangle((unit * x, unit * y), unit * w, unit * h, color=style.CLAY_PALE, lw=0)
+        )
+    if plan.blocks:
+        for point in plan.path[-PATH:]:  # what the tool has taken away
+            ax.add_patch(Circle(unit * point, unit * plan.radius, color=ax.get_facecolor(), lw=0))
+    if plan.line is not None:
+        ax.plot(*(unit * plan.line.T), color=style.BLACK, lw=1.0, ls="--", label="line")
+    ax.plot(*(unit * plan.path[-PATH:].T), color=style.BLUE, lw=1.6, label="path")
+    if closer:
+        x, y, half = plan.close
+        ax.set(xlim=(unit * (x - half), unit * (x + half)))
+        ax.set(ylim=(unit * (y - half), unit * (y + half)), xlabel="x [mm]", ylabel="y [mm]")
+        ax.add_patch(
+            Circle(unit * plan.joints[2], unit * plan.radius, fill=False, color=style.VERMILION)
+        )
+        ax.set_title(plan.title, fontsize=9)
+    else:
+        ax.plot(*(unit * plan.joints.T), color=style.GREY, lw=3.0, solid_capstyle="round")
+        ax.plot(*(unit * plan.joints[0]), "o", color=style.BLACK, ms=8)
+        ax.plot(*(unit * plan.joints[1:].T), "o", color=style.BLACK, ms=5)
+        ax.set(xlim=(-40, 18), ylim=(-30, 28), xlabel="x [cm]", ylabel="y [cm]")
+        ax.set_title("shoulder, elbow, handle", fontsize=9)
+    ax.set_aspect("equal")
