@@ -108,7 +108,9 @@ def train(a: argparse.Namespace) -> None:
         steps, spent = (update + 1) * COPIES * HORIZON, time.process_time() - begin
         rows.append((steps, recent, spent))
         if update % 20 == 19 or update == updates - 1:
-            print(f"{steps} steps, return {recent:.2f}, {spent:.0f} s of processor time", flush=True)
+            print(
+                f"{steps} steps, return {recent:.2f}, {spent:.0f} s of processor time", flush=True
+            )
     env.close()
     save(a, agent, scale, rows)
 
