@@ -19,7 +19,7 @@ from ..model.operator import Operator
 from ..studies import workspace
 from ..views.figure import Figure
 from . import claims
-from .claims import STATUSES, Row, Runs
+from .ledger import STATUSES, Row, Runs
 
 LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"
