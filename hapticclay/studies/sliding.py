@@ -30,25 +30,44 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 
 
 class Met(NamedTuple):
-    """Clay at the samples of a record."""
+    """Clay at the samples of a record.
 
-    flows: np.ndarray  # b, Fy, K and n at each, (n, 4)
-    dented: dict[str, np.ndarray]  # where a law resists a tool at rest that has gone into it
+    Attributes:
+        flows: b, Fy, K and n at each, shape (n, 4).
+        dented: where a law resists a tool at rest that has gone into it, by name of the law.
+    """
+
+    flows: np.ndarray
+    dented: dict[str, np.ndarray]
 
 
 class Sliding(NamedTuple):
-    """Samples that slide."""
+    """Samples that slide.
+
+    Attributes:
+        t: their time [s].
+        sign: of their velocity.
+        f: force against the motion [N].
+        p: places of the samples and of those between them [m]; empty where speeds are known.
+        v: speeds [m/s], or the coefficients of the motion.
+        slowest: speed of any [m/s].
+        motion: splines along the places; None where speeds are known.
+        spacing: of their knots [s].
+        force_variance: beside a free curve [N^2]; nan without.
+        position_variance: of a place [m^2].
+        position_correlation: samples of places that count as one.
+    """
 
     t: np.ndarray
-    sign: np.ndarray  # of the velocity
-    f: np.ndarray  # against the motion
-    p: np.ndarray  # and of those between them; empty where speeds are known
-    v: np.ndarray  # speeds, or the coefficients of the motion
-    slowest: float  # speed of any
+    sign: np.ndarray
+    f: np.ndarray
+    p: np.ndarray
+    v: np.ndarray
+    slowest: float
     motion: Motion | None
     spacing: float
-    force_variance: float  # beside a free curve [N^2]; nan without
-    position_variance: float  # [m^2]
+    force_variance: float
+    position_variance: float
     position_correlation: float
 
 
