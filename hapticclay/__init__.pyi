@@ -47,9 +47,9 @@ from .scene.experiments import variable_cut as variable_cut
 from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device
 from .scene.virtual_wall import VirtualWall as VirtualWall
+from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.column_batch import simulate_columns as simulate_columns
-from .simulation.error_estimate import Accuracy as Accuracy
 from .simulation.record import Record as Record
 from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import out_of_band_ratio as out_of_band_ratio

@@ -101,7 +101,7 @@ def auto_engine(request, monkeypatch):
 @pytest.fixture(scope="session")
 def paper_runs():
     """The runs behind the ledger, made once."""
-    from hapticclay.paper.claims import Runs
+    from hapticclay.paper.ledger import Runs
 
     return Runs()
 

@@ -13,7 +13,7 @@ from ..files import atomic, writable
 from . import console
 
 if TYPE_CHECKING:
-    from ..studies.accuracy import Ladder
+    from ..studies.accuracy_ladder import Ladder
 
 ERROR_NAMES = {"s": "times of the border crossings", "m": "position"}
 
@@ -39,7 +39,7 @@ class AccuracyCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..studies.accuracy import accuracy_ladder
+        from ..studies.accuracy_ladder import accuracy_ladder
 
         out = self.out or console.default_folder("accuracy", self.scenario)
         writable(out)
@@ -126,7 +126,7 @@ def accuracy_page(found: Ladder) -> str:
 
 def _error(found: Ladder, x: Any, unit: str) -> str:
     """An error as text; "<" where it is not clear of that of the reference."""
-    from ..studies.accuracy import CLEAR
+    from ..studies.accuracy_ladder import CLEAR
 
     error, left = x.error(unit), found.left[unit]
     if error is None:

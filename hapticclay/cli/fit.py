@@ -51,7 +51,8 @@ class FitCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..studies.fitting import FLOW_LAWS, fit_flow
+        from ..studies.fitting import fit_flow
+        from ..studies.flow_models import FLOW_LAWS
         from ..views.figure import Figure
         from ..views.fit_plots import fit_plot
 

@@ -99,7 +99,8 @@ class IdentifyCommand:
                 raise ParameterError(name, value, bound)
 
     def _measured(self, file: Path) -> int:
-        from ..studies.measurement import COLUMNS, Measurement, identify_data
+        from ..studies.measurement import COLUMNS, Measurement
+        from ..studies.spectral_fit import identify_data
 
         writable(self.out)
         data = Measurement.load(file, column_names(self.columns, COLUMNS))

@@ -15,7 +15,7 @@ from ..files import atomic, writable
 from .console import FigureOptions, progress_bar, save_figures, text_table
 
 if TYPE_CHECKING:
-    from ..paper.claims import Row
+    from ..paper.ledger import Row
 
 WIDE = 60  # characters of a claim in a row of the terminal
 QUIET_FIGURES = FigureOptions(format=("svg",))

@@ -14,7 +14,8 @@ from . import console
 if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
     from ..studies.population import Band
-    from ..studies.robustness import Cost, Instability, Trials
+    from ..studies.robustness import Cost, Instability
+    from ..studies.trials import Trials
 
 ROBUSTNESS_SCHEMA = "hapticclay-robustness-1"
 GRIDS = {"x": "K=1:8:15 b=10:1000:11log", "y": "K=0.2:2:15 b=10:1000:11log"}
@@ -123,8 +124,8 @@ class RobustnessCommand:
         from ..studies.boundary import PushedLoop
         from ..studies.distribution import parse_laws
         from ..studies.population import Hands, hands_of
-        from ..studies.robustness import Trials
         from ..studies.sampling import parse_grid
+        from ..studies.trials import Trials
 
         base: PushedLoop = PushedLoop(
             self.axis,

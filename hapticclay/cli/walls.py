@@ -10,7 +10,7 @@ from ..errors import ParameterError
 
 if TYPE_CHECKING:
     from ..scene.virtual_wall import VirtualWall
-    from ..theory.stability_margins import Box
+    from ..theory.hand_boxes import Box
 
 Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
 Hand = tuple[float, float, float]
@@ -142,7 +142,7 @@ def box_of(hands: HandEnds | None) -> Box | None:
     Args:
         hands: least and largest mass, damper and spring [kg, N.s/m, N/m].
     """
-    from ..theory.stability_margins import Box
+    from ..theory.hand_boxes import Box
 
     if hands is None:
         return None

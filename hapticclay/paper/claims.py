@@ -7,9 +7,7 @@ typed here are the printed ones of model/constants.py, by name.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -35,178 +33,12 @@ from ..model.constants import (
 )
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from ..scene.experiments import GROWTHS, constant_cut, free, stability_test, variable_cut
-from ..simulation.record import Record, out_of_band_ratio
-from ..simulation.simulate import simulate
+from ..scene.experiments import GROWTHS, free
+from ..simulation.record import out_of_band_ratio
 from ..stepping.engine import arm_at
-from ..studies.identification import Identified, identify
-from ..theory import gain_limits, linear_loop, loops, stability_margins
+from ..theory import gain_limits, linear_loop, stability_margins
 from ..theory.loops import Loop
-
-STATUSES = {
-    "given": "printed, and reproduced",
-    "inferred": "not printed, but it follows from what is",
-    "corrected": "printed otherwise; the reading we take, and why",
-    "not recoverable": "not printed, and nothing printed tells it",
-    "contradicted": "printed, and at odds with the printed model",
-}
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row.
-
-    Attributes:
-        what: the quantity.
-        where: its place in the paper.
-        printed: as the paper has it.
-        unit: of expected and ours.
-        expected: value by our reading of the paper; None if there is nothing to compare.
-        ours: value found by the simulator; None if there is nothing to find.
-        tolerance: relative to expected (absolute where that is 0); None if the row need not agree.
-        status: one of STATUSES.
-        reason: why, with the evidence.
-    """
-
-    what: str
-    where: str
-    printed: str
-    unit: str
-    expected: float | None
-    ours: float | None
-    tolerance: float | None
-    status: str
-    reason: str = ""
-
-    def __post_init__(self):
-        for field in ("expected", "ours"):  # plain numbers, not those of NumPy
-            value = getattr(self, field)
-            object.__setattr__(self, field, None if value is None else float(value))
-
-    @property
-    def error(self) -> float | None:
-        """Relative error, absolute where expected is 0; None where there is nothing to compare."""
-        if self.expected is None or self.ours is None:
-            return None
-        return self.ours / self.expected - 1.0 if self.expected else self.ours
-
-    @property
-    def agrees(self) -> bool | None:
-        """Whether the error is within the tolerance; None if the row need not agree."""
-        if self.tolerance is None:
-            return None
-        return self.error is not None and abs(self.error) <= self.tolerance
-
-
-class Runs:
-    """The runs behind rows and figures, each made once, on first use.
-
-    Attributes:
-        progress: called with the name of each run before it is made.
-    """
-
-    def __init__(self, progress: Callable[[str], None] | None = None):
-        """Keep no runs yet.
-
-        Args:
-            progress: called with the name of each run before it is made.
-        """
-        self.progress = progress or (lambda name: None)
-        self._kept: dict[str, Any] = {}
-
-    def _get(self, name: str, make: Callable[[], Any]) -> Any:
-        if name not in self._kept:
-            self.progress(name)
-            self._kept[name] = make()
-        return self._kept[name]
-
-    def constant(self, **kw) -> Record:
-        """A constant cut.
-
-        Args:
-            **kw: as `constant_cut`.
-        """
-        return self._get(f"constant cut {_keywords(kw)}", lambda: simulate(constant_cut(**kw)))
-
-    def variable(self, growth: Any = "30/s", **kw) -> Record:
-        """A variable cut.
-
-        Args:
-            growth: as `variable_cut`.
-            **kw: as `variable_cut`.
-        """
-        return self._get(
-            f"variable cut, growth {growth} {_keywords(kw)}",
-            lambda: simulate(variable_cut(growth, **kw)),
-        )
-
-    def stability(self, gain: float, **kw) -> Record:
-        """A stability test.
-
-        Args:
-            gain: as `stability_test`.
-            **kw: as `stability_test`.
-        """
-        return self._get(
-            f"stability test, K = {gain:g} {_keywords(kw)}",
-            lambda: simulate(stability_test(gain, **kw)),
-        )
-
-    def free(self, **kw) -> Record:
-        """A motion in free space.
-
-        Args:
-            **kw: as `free`.
-        """
-        return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
-
-    def identified(self, what: str, axis: str) -> Identified:
-        """An identification from a single run.
-
-        Args:
-            what: "G", "S" (Sh) or "Th".
-            axis: "x" or "y".
-        """
-        return self._get(
-            f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1)
-        )
-
-
-def _keywords(kw: dict) -> str:
-    return " ".join(f"{k}={v}" for k, v in kw.items())
-
-
-def steady(r: Record, axis: str, k: int, name: str) -> float:
-    """A steady figure of one region of the path.
-
-    Args:
-        r: the record.
-        axis: "x" or "y".
-        k: index of the region along the path.
-        name: of the figure, as in `Record.regions`.
-
-    Returns:
-        The figure, its mean if it is a statistic; NaN where the speed never settled.
-    """
-    value = r.regions(axis)[k][axis][name]
-    value = value["mean"] if isinstance(value, dict) else value
-    return math.nan if value is None else value
-
-
-def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
-    """The rightmost pole of the loop at the nominal pose [1/s], of a pair the one above the axis.
-
-    Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: clay [N.s/m].
-        th: Th; None for Th = 0.
-    """
-    poles = loops.closed_loop_poles(axis, K, b, th)
-    return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
-
-
-TH = Operator()  # Eq. 19
+from .ledger import TH, Row, Runs, rightmost, row, steady
 
 
 def ledger_rows(runs: Runs | None = None) -> list[Row]:
@@ -218,24 +50,6 @@ def ledger_rows(runs: Runs | None = None) -> list[Row]:
     runs = runs or Runs()
     parts = (machine, blocks, constant, variable, largest_gains, maneuver)
     return [each for part in parts for each in part(runs)]
-
-
-def row(
-    cells: str,
-    figures: tuple[float | None, float | None, float | None],
-    status: str,
-    reason: str = "",
-) -> Row:
-    """One row of the table.
-
-    Args:
-        cells: "quantity | place in the paper | as printed | unit".
-        figures: (expected, ours, tolerance), as in `Row`.
-        status: as in `Row`.
-        reason: as in `Row`.
-    """
-    what, where, printed, unit = cells.split(" | ")
-    return Row(what, where, printed, unit, *figures, status, reason)
 
 
 def machine(runs: Runs) -> Iterator[Row]:

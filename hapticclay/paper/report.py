@@ -21,8 +21,8 @@ from ..studies.chart import Chart
 from ..views.chart_plots import chart_plot
 from ..views.figure import Figure
 from . import claims
-from .claims import STATUSES, Row, Runs
 from .classics.classic import CLASSIC_STATUSES, Classic, Found
+from .ledger import STATUSES, Row, Runs
 
 LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"

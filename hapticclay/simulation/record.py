@@ -30,8 +30,8 @@ from ..stepping.monitor import Outcome
 from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
+from .accuracy import Accuracy
 from .columns import ARRAYS, EXTRA, SCALAR
-from .error_estimate import Accuracy
 from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:

@@ -49,7 +49,7 @@ def simulate(
     every = integer("every", every, 1, 1_000_000)
     warn_of(scenario)
     if error is not None:
-        from .accuracy import simulate_within  # only a run that asks for an error pays for it
+        from .asked_error import simulate_within  # only a run that asks for an error pays for it
 
         return simulate_within(scenario, error, every=every, progress=progress, engine=engine)
     return run_once(scenario, every, engine, progress)

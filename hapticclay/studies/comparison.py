@@ -20,7 +20,7 @@ from ..scene.scenario import Scenario
 from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import design, stability_margins, wall_limits
+from ..theory import design, hand_boxes, stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.loops import TIMING, Loop
@@ -28,7 +28,7 @@ from ..theory.mbk import dynamic_range, least_mass
 from .zwidth import ZRegion, zwidth
 
 MOST_COMPARED = 5  # as many looks as curves have
-COMPARED_HANDS = stability_margins.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
+COMPARED_HANDS = hand_boxes.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
 SLOW = 1e-4  # [rad/s] at which motion counts as steady
 FELT_AT = (1.0, 10.0)  # [Hz] at which the table has the impedance, below and above the loop's swing
 RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
@@ -233,7 +233,7 @@ def worst_limit(loop: Loop) -> float:
     Args:
         loop: one axis, in continuous time.
     """
-    return stability_margins.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
+    return hand_boxes.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
 
 
 def _passivity_margin(loop: Loop) -> float:

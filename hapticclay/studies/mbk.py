@@ -15,6 +15,7 @@ from ..files import versions
 from ..results import Result
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
+from ..theory.hand_boxes import Box
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
@@ -24,7 +25,6 @@ from ..theory.mbk import (
     renderable,
     stable_band,
 )
-from ..theory.stability_margins import Box
 from .boundary import PushedLoop, find_crossing, of_scenario, simulated_gain
 from .wall_runs import growth_rates
 

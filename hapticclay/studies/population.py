@@ -16,8 +16,8 @@ from ..results import Result
 from ..scene.virtual_wall import VirtualWall
 from ..theory import wall_limits
 from ..theory.gain_limits import gain_limit
+from ..theory.hand_boxes import Box
 from ..theory.loops import Loop
-from ..theory.stability_margins import Box
 from .distribution import LAWS, Distribution, normal_score
 from .stability_map import Progress
 

@@ -15,8 +15,8 @@ from ..model.constants import TS
 from ..model.operator import Operator
 from ..scene.virtual_wall import VirtualWall
 from ..theory import gain_crossings, gain_limits, wall_limits
+from ..theory.hand_boxes import Box
 from ..theory.roots import bisect
-from ..theory.stability_margins import Box
 from . import boundary
 
 LIMIT_POINTS = 61  # of a line of theory

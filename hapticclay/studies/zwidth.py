@@ -20,7 +20,7 @@ from ..results import Result
 from ..scene.changes import with_fields
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
-from ..theory.stability_margins import Box
+from ..theory.hand_boxes import Box
 from . import boundary
 from .wall_lines import (
     Limit,

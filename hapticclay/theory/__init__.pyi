@@ -11,6 +11,9 @@ from .design import design_gain as design_gain
 from .design import transparency_error as transparency_error
 from .gain_limits import gain_limit as gain_limit
 from .gain_limits import stiffness_limit as stiffness_limit
+from .hand_boxes import Box as Box
+from .hand_boxes import WorstCase as WorstCase
+from .hand_boxes import worst_case as worst_case
 from .impedance import Impedance as Impedance
 from .impedance import loop_impedance as loop_impedance
 from .impedance import loop_response as loop_response
@@ -20,14 +23,11 @@ from .loops import Loop as Loop
 from .loops import closed_loop_poles as closed_loop_poles
 from .relay_cycle import ExactCycle as ExactCycle
 from .relay_cycle import exact_cycles as exact_cycles
-from .stability_margins import Box as Box
 from .stability_margins import Margins as Margins
 from .stability_margins import Nyquist as Nyquist
 from .stability_margins import Verdict as Verdict
-from .stability_margins import WorstCase as WorstCase
 from .stability_margins import coupled_stability as coupled_stability
 from .stability_margins import margins as margins
 from .stability_margins import nyquist as nyquist
 from .stability_margins import small_gain as small_gain
 from .stability_margins import transparency as transparency
-from .stability_margins import worst_case as worst_case

@@ -20,11 +20,11 @@ from ..arguments import checked, named
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
-from . import gain_limits, stability_margins
+from . import gain_limits, hand_boxes
+from .hand_boxes import Box
 from .impedance import frequencies, wall_response
 from .loops import Loop
 from .roots import bisect
-from .stability_margins import Box
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
@@ -204,7 +204,7 @@ def least_mass(
     if box is None:
         limit = gain_limits.gain_limit(loop)
     else:
-        limit = stability_margins.worst_case(loop, box, samples=samples).limit
+        limit = hand_boxes.worst_case(loop, box, samples=samples).limit
     M = math.inf if limit == 0.0 else 1.0 / limit
     return M, decay * M if decay else 0.0
 

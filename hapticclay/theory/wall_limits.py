@@ -20,7 +20,7 @@ from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
 from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_crossings, linear_loop, roots
-from .stability_margins import Box
+from .hand_boxes import Box
 
 MOST_STATES = 600  # of a map whose eigenvalues are asked for
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried

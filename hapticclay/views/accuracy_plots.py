@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..studies.accuracy import CLEAR, SAMPLED, Ladder
+from ..studies.accuracy_ladder import CLEAR, SAMPLED, Ladder
 from .style import (
     BLACK,
     BLUE,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hapticclay.model import constants, operator
-from hapticclay.paper import claims, report
+from hapticclay.paper import ledger, report
 from hapticclay.scene import scenario
 
 SOURCE = Path(scenario.__file__)
@@ -63,7 +63,7 @@ def test_every_row_that_should_agree_does(ledger_rows):
     wrong = [(r.what, r.error) for r in ledger_rows if r.agrees is False]
     assert not wrong
     assert sum(r.agrees is True for r in ledger_rows) > 40
-    assert {r.status for r in ledger_rows} == set(claims.STATUSES)
+    assert {r.status for r in ledger_rows} == set(ledger.STATUSES)
 
 
 @pytest.mark.parametrize(

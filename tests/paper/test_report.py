@@ -7,8 +7,8 @@ import re
 import pytest
 
 from hapticclay.cli import app
-from hapticclay.paper import claims, report
-from hapticclay.paper.claims import Row
+from hapticclay.paper import claims, ledger, report
+from hapticclay.paper.ledger import Row
 
 ROW = Row("a", "Eq. 1", "1", "m", 1.0, 1.001, 1e-2, "given", "why")
 
@@ -50,7 +50,7 @@ def test_numbers_for_tables(x, unit, text):
 def test_runs_are_made_once_and_when_asked(monkeypatch):
     made = []
     monkeypatch.setattr(claims, "simulate", lambda scenario: made.append(scenario) or scenario)
-    runs = claims.Runs()
+    runs = ledger.Runs()
     assert not made
     runs.free()
     runs.free()

@@ -15,7 +15,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.constants import AXES, ORIGIN, TORQUE_LIMIT
-from hapticclay.simulation import accuracy
+from hapticclay.simulation import asked_error, step_comparison
 from tests.oracles import bounces
 from tests.system.test_rooms import loaded
 
@@ -146,7 +146,7 @@ def test_no_crossing_on_the_way_is_said():
 
 def test_an_unstable_scene_is_an_outcome_without_an_estimate():
     r = hc.simulate(hc.constant_cut(gain=(1.0, 1.0)), error=1e-6)
-    assert r.outcome.code == "diverged" and r.error.note == accuracy.UNSTABLE
+    assert r.outcome.code == "diverged" and r.error.note == step_comparison.UNSTABLE
     assert (r.error.estimate, r.error.reached) == (None, False)
 
 
@@ -164,7 +164,7 @@ def test_an_unstable_scene_is_an_outcome_without_an_estimate():
     ],
 )
 def test_an_error_is_a_number_and_a_unit(error, read):
-    assert accuracy.parse_error(error) == read
+    assert asked_error.parse_error(error) == read
 
 
 @pytest.mark.parametrize(
@@ -187,10 +187,10 @@ def test_Ts_that_cannot_be_divided_is_refused():
 @pytest.mark.parametrize("b, fits", [(50.0, True), (1e6, False)])
 def test_small_errors_take_the_accurate_integrator_where_it_fits(b, fits):
     s = hc.constant_cut(b=b, clay=(0.002, 0.01), length=0.009 if fits else 0.003, t_max=0.4)
-    name, dt = accuracy.choices(s, 1e-9, "s")[0]
-    assert name == ("accurate" if fits else "fast") and dt >= accuracy.SMALLEST
+    name, dt = asked_error.choices(s, 1e-9, "s")[0]
+    assert name == ("accurate" if fits else "fast") and dt >= asked_error.SMALLEST
     driven = hc.stability_test(1.0, b=b)
-    assert accuracy.choices(driven, 1e-9, "m")[0][0] == name
+    assert asked_error.choices(driven, 1e-9, "m")[0][0] == name
 
 
 @pytest.mark.parametrize("power", [-9, -7, -5, -3])
@@ -198,14 +198,14 @@ def test_small_errors_take_the_accurate_integrator_where_it_fits(b, fits):
 def test_the_table_of_methods_is_of_the_size_of_what_they_do(power, unit):
     """The first choice is at most 30 times off in the default cut: the table holds medians."""
     s = hc.constant_cut(b=60.0)
-    name, dt = accuracy.choices(s, 10.0**power, unit)[0]
+    name, dt = asked_error.choices(s, 10.0**power, unit)[0]
     r = hc.simulate(s, error=f"1e{power} {unit}")
     assert r.error.reached
     if power < -3:  # beyond, the longest step does better than asked
-        method = accuracy.METHODS[r.error.integrator]
+        method = asked_error.METHODS[r.error.integrator]
         said = method.constants[unit] * r.error.dt**method.order
         assert said / 30.0 < r.error.estimate < 30.0 * said
-    assert name == r.error.integrator and r.error.dt <= accuracy.RATIO * dt
+    assert name == r.error.integrator and r.error.dt <= asked_error.RATIO * dt
 
 
 @pytest.mark.parametrize("unit", ["s", "m"])
@@ -246,7 +246,7 @@ def test_it_is_saved_with_the_record_and_old_records_have_none(tmp_path):
 
 def test_a_refused_finer_step_keeps_what_is_there(monkeypatch):
     """Memory that a finer run would not fit into."""
-    real, made = accuracy.run_once, []
+    real, made = asked_error.run_once, []
 
     def limited(s, *how):
         made.append(s.dt)
@@ -254,7 +254,7 @@ def test_a_refused_finer_step_keeps_what_is_there(monkeypatch):
             raise ParameterError("every", 1, "keep fewer")
         return real(s, *how)
 
-    monkeypatch.setattr(accuracy, "run_once", limited)
+    monkeypatch.setattr(asked_error, "run_once", limited)
     r = hc.simulate(hits.jobs(1e5)["hit"], error=1e-9)  # whose errors are large for their step
     assert not r.error.reached and "keep fewer" in r.error.note and r.error.estimate > 1e-9
     assert r.error.dt == made[2]
@@ -263,43 +263,43 @@ def test_a_refused_finer_step_keeps_what_is_there(monkeypatch):
 def trace(dt, *times, code="finished", speed=0.1, p=()):
     crossings = tuple(hc.Crossing("x", 0.01 * i, t, speed) for i, t in enumerate(times))
     p = np.array(p, float).reshape(-1, 2)
-    return accuracy.Trace(dt, code, crossings, np.arange(len(p)) * 0.1, p)
+    return step_comparison.Trace(dt, code, crossings, np.arange(len(p)) * 0.1, p)
 
 
 def test_three_times_give_the_error_of_the_last():
     """t = 1 + c h^2 exactly: a third of the last difference is what is left."""
     runs = [trace(h, 0.5, 1.0 + 0.3 * h * h) for h in (4e-3, 2e-3, 1e-3)]
-    found = accuracy.compare_times(*runs, order=2)
+    found = step_comparison.compare_times(*runs, order=2)
     assert found.confirmed and found.order == pytest.approx(2.0, abs=1e-6)
     assert found.estimate == pytest.approx(0.3e-6, rel=1e-6)
-    wrong = accuracy.compare_times(*runs, order=4)  # not what the integrator should show
+    wrong = step_comparison.compare_times(*runs, order=4)  # not what the integrator should show
     assert not wrong.confirmed and wrong.estimate == pytest.approx(3.6e-6)
 
 
 def test_three_paths_give_the_error_of_the_first():
     runs = [trace(h, p=[(0.0, 0.0), (0.3 * h * h, 0.0)]) for h in (4e-3, 2e-3, 1e-3)]
-    found = accuracy.compare_positions(*runs, order=2)
+    found = step_comparison.compare_positions(*runs, order=2)
     assert found.confirmed and found.order == pytest.approx(2.0, abs=1e-6)
     assert found.estimate == pytest.approx(4.8e-6, rel=1e-6)
 
 
 def test_runs_that_differ_in_kind_are_not_compared():
     a, b = trace(2e-3, 0.5, 1.0), trace(1e-3, 0.5)
-    assert accuracy.compare_times(a, a, b, order=2).note == accuracy.DIFFERENT
+    assert step_comparison.compare_times(a, a, b, order=2).note == step_comparison.DIFFERENT
     b = trace(1e-3, 0.5, 1.0, code="time limit")
-    assert accuracy.compare_times(a, a, b, order=2).note == accuracy.DIFFERENT
-    assert accuracy.compare_positions(a, a, b, order=2).note == accuracy.DIFFERENT
+    assert step_comparison.compare_times(a, a, b, order=2).note == step_comparison.DIFFERENT
+    assert step_comparison.compare_positions(a, a, b, order=2).note == step_comparison.DIFFERENT
 
 
 def test_rounding_bounds_what_can_be_said():
     """A handle of 1e-3 m/s is for 1e-10 s within the 1e-13 m that tell a border."""
     same = [trace(h, 1.0, speed=1e-3) for h in (4e-3, 2e-3, 1e-3)]
-    found = accuracy.compare_times(*same, order=2)
+    found = step_comparison.compare_times(*same, order=2)
     assert found.final and found.estimate == pytest.approx(1e-10, rel=0.02)
 
 
 def test_a_run_that_asks_for_no_error_does_not_load_it():
-    name = "hapticclay.simulation.accuracy"
+    name = "hapticclay.simulation.asked_error"
     run = "import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01)"
     assert loaded(f"{run})", (name,)) == []
     assert loaded(f"{run}, error=1.0)", (name,)) == [name]

@@ -290,7 +290,7 @@ def test_a_changed_law_changes_both_engines(tmp_path):
         return out.stdout.splitlines()
 
     (python,) = ends("python")
-    law = tmp_path / "hapticclay/model/clay.py"
+    law = tmp_path / "hapticclay/model/damping.py"
     text = law.read_text()
     changed = text.replace("return (L * b0[0], L * b0[1])", "return (L * b0[0], 2.0 * L * b0[1])")
     assert changed != text

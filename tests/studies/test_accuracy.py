@@ -7,7 +7,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.studies import accuracy
+from hapticclay.studies import accuracy_ladder
 from hapticclay.views import accuracy_plots
 from tests.oracles import piecewise_linear
 
@@ -16,7 +16,7 @@ SHAPED = hc.constant_cut(b=90.0, clay=(0.01, 0.02), length=0.03, inertia_shaping
 
 @pytest.fixture(scope="module")
 def ladder():
-    return accuracy.accuracy_ladder(SHAPED, quick=True)
+    return accuracy_ladder.accuracy_ladder(SHAPED, quick=True)
 
 
 def test_errors_are_those_against_the_exact_solution(ladder):
@@ -24,7 +24,7 @@ def test_errors_are_those_against_the_exact_solution(ladder):
     exact, _ = piecewise_linear((0.01, 0.02, 0.03), (0.0, 90.0, 0.0), 1.0, 1.0)
     checked = 0
     for x in ladder.settings:
-        if x.series == accuracy.SAMPLED or not ladder.shown(x, "s"):
+        if x.series == accuracy_ladder.SAMPLED or not ladder.shown(x, "s"):
             continue
         r = hc.simulate(dataclasses.replace(SHAPED, dt=x.dt, integrator=x.series))
         true = np.abs(np.array([c.time for c in r.crossings]) - exact).max()
@@ -45,23 +45,23 @@ def test_the_cheapest_setting_keeps_the_error_and_none_is_cheaper(ladder):
         best = ladder.cheapest(unit)
         assert {1e-2, 1e-6} <= set(best)
         for asked, x in best.items():
-            assert x.series != accuracy.SAMPLED and x.error(unit) <= asked
+            assert x.series != accuracy_ladder.SAMPLED and x.error(unit) <= asked
             cheaper = [y for y in ladder.settings if y.wall < x.wall]
             for y in cheaper:
                 kept = y.error(unit) is not None and y.error(unit) <= asked
-                assert not kept or y.series == accuracy.SAMPLED or not ladder.shown(y, unit)
+                assert not kept or y.series == accuracy_ladder.SAMPLED or not ladder.shown(y, unit)
 
 
 def test_sampled_control_is_off_by_its_hold(ladder):
     """Of first order in Ts, and far above the method's own error."""
-    held = {x.dt: x.position for x in ladder.settings if x.series == accuracy.SAMPLED}
+    held = {x.dt: x.position for x in ladder.settings if x.series == accuracy_ladder.SAMPLED}
     fast = {x.dt: x.position for x in ladder.settings if x.series == "fast"}
     assert all(held[dt] > 20.0 * fast[dt] for dt in held if dt < 0.01)
 
 
 def test_a_sampled_scene_keeps_its_samples():
     s = hc.constant_cut(control="sampled", dt=4e-3, length=0.02, clay=(0.01, 0.015))
-    found = accuracy.accuracy_ladder(s)
+    found = accuracy_ladder.accuracy_ladder(s)
     assert {x.series for x in found.settings} == {"fast"}
     assert [x.dt for x in found.settings] == [4e-3, 2e-3, 1e-3]
     errors = [x.time for x in found.settings]
@@ -71,20 +71,20 @@ def test_a_sampled_scene_keeps_its_samples():
 
 def test_too_stiff_clay_has_no_accurate_settings():
     s = hc.constant_cut(b=1e9, clay=(0.01, 0.02), length=0.015, t_max=0.5)
-    found = accuracy.accuracy_ladder(s, quick=True)
+    found = accuracy_ladder.accuracy_ladder(s, quick=True)
     refused = [x for x in found.settings if x.wall is None]
     assert {x.series for x in refused} == {"accurate"} and "choose 'fast'" in refused[0].status
     assert found.reference.startswith("fast")
 
 
 def test_without_borders_there_are_positions_alone():
-    found = accuracy.accuracy_ladder(hc.stability_test(3.0, t_max=0.2), quick=True)
+    found = accuracy_ladder.accuracy_ladder(hc.stability_test(3.0, t_max=0.2), quick=True)
     assert found.units() == ["m"] and not found.notes
     assert len(accuracy_plots.accuracy_plot(found).axes) == 1
 
 
 def test_an_unstable_loop_is_noted():
-    found = accuracy.accuracy_ladder(hc.constant_cut(gain=(1.0, 1.0)), quick=True)
+    found = accuracy_ladder.accuracy_ladder(hc.constant_cut(gain=(1.0, 1.0)), quick=True)
     assert found.notes and found.left["s"] is None
 
 
@@ -93,10 +93,10 @@ def test_the_figure_has_a_curve_a_method_in_each_panel(ladder):
     assert len(figure.axes) == 2
     for ax in figure.axes:
         names = ax.get_legend_handles_labels()[1]
-        assert {"fast", "accurate", accuracy.SAMPLED} <= set(names)
+        assert {"fast", "accurate", accuracy_ladder.SAMPLED} <= set(names)
         assert "[s]" in ax.get_xlabel() and ax.get_yscale() == ax.get_xscale() == "log"
 
 
 def test_Ts_too_short_is_refused():
     with pytest.raises(ParameterError, match="Ts = 1e-05"):
-        accuracy.accuracy_ladder(hc.constant_cut(control="sampled", dt=1e-5))
+        accuracy_ladder.accuracy_ladder(hc.constant_cut(control="sampled", dt=1e-5))

@@ -19,7 +19,7 @@ from scipy.interpolate import BSpline
 import hapticclay as hc
 from benchmarks import fit_coverage as coverage
 from hapticclay.cli import app
-from hapticclay.studies import fitting, trajectory
+from hapticclay.studies import sliding, trajectory
 from hapticclay.views.fit_plots import fit_plot
 
 FINE = coverage.SENSORS["fine"]
@@ -314,9 +314,9 @@ def test_what_cannot_be_fitted_is_refused():
 
 def test_counts_are_found_in_what_is_quantised():
     x = np.random.default_rng(0).standard_normal(1000)
-    assert fitting.quantum(x) == 0.0 and fitting.quantum(np.ones(9)) == 0.0
-    assert fitting.quantum(0.02 * np.round(x / 0.02)) == pytest.approx(0.02)
-    assert fitting.quantum(3.0 + 1e-4 * np.round(x / 1e-4)) == pytest.approx(1e-4)
+    assert sliding.quantum(x) == 0.0 and sliding.quantum(np.ones(9)) == 0.0
+    assert sliding.quantum(0.02 * np.round(x / 0.02)) == pytest.approx(0.02)
+    assert sliding.quantum(3.0 + 1e-4 * np.round(x / 1e-4)) == pytest.approx(1e-4)
 
 
 def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.theory import linear_loop, loops, stability_margins
+from hapticclay.theory import hand_boxes, linear_loop, loops
 
 
 def spans(high):
@@ -99,7 +99,7 @@ def test_the_rigid_arm_is_the_limit_of_rigid_arms(axis):
 
     Th may be as large as it likes.
     """
-    limit, _ = stability_margins.rigid_limit(hc.theory.Loop(axis))
+    limit, _ = hand_boxes.rigid_limit(hc.theory.Loop(axis))
     assert limit == float("inf")
     for K in (0.1, 1.0, 10.0, 1000.0):
         zeros = np.sort_complex(linear_loop.device_admittance(hc.theory.Loop(axis, K=K))[0].roots())
@@ -120,7 +120,7 @@ def test_a_rigid_arm_limits_a_slower_compensator():
     The zeros of G C + Sh cross, and an arm of 1e9 N/m, 1e8 N.s/m and 1 t confirms it.
     """
     c, arm = hc.Compensator((1.0,), (1.0, 1.0, 0.0)), Operator(1e3, 1e8, 1e9)
-    limit, omega = stability_margins.rigid_limit(hc.theory.Loop("y", compensator=c))
+    limit, omega = hand_boxes.rigid_limit(hc.theory.Loop("y", compensator=c))
     assert 50.0 < omega < 200.0
     assert hc.theory.gain_limit("y", 90.0, arm, compensator=c) == pytest.approx(
         limit, rel=1e-3

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 import hapticclay as hc
 from benchmarks import fit_coverage
 from hapticclay.studies import comparison, passivity_runs
-from hapticclay.studies.accuracy import Ladder, Setting
+from hapticclay.studies.accuracy_ladder import Ladder, Setting
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.impedance import MeasuredImpedance, computed_impedance
 from hapticclay.studies.mbk import ArmMBK, Border, DeviceMBK, arm_mbk, device_mbk
@@ -26,8 +26,8 @@ from hapticclay.studies.wall_lines import Limit
 from hapticclay.studies.workspace import Drift
 from hapticclay.studies.yield_map import YieldCell, YieldMap
 from hapticclay.studies.zwidth import BY_GROWTH, BY_REST, ZRegion, ZWidth
+from hapticclay.theory.hand_boxes import Box
 from hapticclay.theory.loops import Loop
-from hapticclay.theory.stability_margins import Box
 from hapticclay.views import (
     accuracy_plots,
     compare_plots,

@@ -9,7 +9,7 @@ import numpy as np
 from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit, taken_energy, zigzag
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, DAMPER, FRICTION, TS = 0.1, 5.0, 0.05, 1e-3  # kg, N.s/m, N, s

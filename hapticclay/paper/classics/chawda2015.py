@@ -11,7 +11,7 @@ from ...studies.chart import Chart, Curve, curve
 from ...studies.port_energy import passivity_limit
 from ...studies.wall_runs import PRESS, stiffest, unshown
 from ...theory import wall_limits
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, DAMPER, FRICTION, QUANTUM, TS = 0.1, 0.5, 0.05, 2e-5, 1e-3  # kg, N.s/m, N, m, s

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...studies.chart import Chart
-from ..claims import Row, row
+from ..ledger import Row, row
 
 QUOTED, FORMULA, BESIDE = "quoted", "formula", "beside"
 CLASSIC_STATUSES = {

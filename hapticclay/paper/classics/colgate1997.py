@@ -12,7 +12,7 @@ from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit, taken_energy, zigzag
 from ...studies.wall_runs import PRESS, stiffest, unshown
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, Classic, Found, Tell, holds
 
 MASS, DAMPER, TS = 0.1, 2.0, 1e-3  # kg, N.s/m, s

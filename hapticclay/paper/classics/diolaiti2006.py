@@ -13,7 +13,7 @@ from ...studies.port_energy import passivity_limit
 from ...studies.wall_runs import Press, come_to_rest
 from ...theory import wall_limits
 from ...theory.roots import bisect
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, DAMPER, FRICTION, TS = 0.1, 0.1, 0.05, 1e-3  # kg, N.s/m, N, s

@@ -15,7 +15,7 @@ from ...scene.virtual_wall import UPRIGHT, Device, VirtualWall
 from ...simulation.record import Record
 from ...simulation.simulate import simulate
 from ...studies.chart import Chart, curve
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, DAMPER, TS = 1.0, 1.0, 1e-3  # kg, N.s/m, s

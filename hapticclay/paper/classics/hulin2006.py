@@ -11,7 +11,7 @@ from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.wall_runs import PRESS, stiffest, unshown
 from ...theory import wall_limits
-from ..claims import Row, row
+from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, TS = 1.0, 1e-3  # kg, s

@@ -18,17 +18,11 @@ import numpy as np
 from ..errors import ParameterError
 from ..files import versions
 from ..scene.scenario import Scenario
-from ..simulation.accuracy import (
-    METHODS,
-    ROUNDING_LEFT,
-    Trace,
-    choices,
-    compare_positions,
-    compare_times,
-)
+from ..simulation.asked_error import METHODS, choices
 from ..simulation.engines import has_numba
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
+from ..simulation.step_comparison import ROUNDING_LEFT, Trace, compare_positions, compare_times
 
 LADDER_SCHEMA = "hapticclay-accuracy-1"
 TOP = 0.02  # [s] longest step; the others are halves of halves of it

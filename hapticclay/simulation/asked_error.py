@@ -1,0 +1,322 @@
+"""Runs to an asked error: choose integrator and step, run, verify at other steps, refine.
+
+Each choice is run at steps 4h, 2h and h, whose differences tell the error (Richardson): that of the
+border times at h, or that of the positions at 4h. Only a run that asks for an error loads this.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, number
+from ..scene.scenario import Scenario
+from ..stepping.pace import STABLE_STEP, check_explicit, fastest_rate
+from .accuracy import Accuracy
+from .columns import ARRAYS
+from .engines import has_numba
+from .one_run import run_once
+from .record import Record
+from .step_comparison import Comparison, Trace, compare_positions, compare_times, hides_events
+
+UNITS = ("s", "m")
+ROUNDING = 1e-11  # [s], [m] the finest error that can be asked for; runs keep some 1e-12 at best
+SMALLEST = 1e-6  # [s] step, the least of Scenario.dt
+LARGEST = 1e-3  # [s] finest step of three; RATIO times as long, poles of 30 1/s are still resolved
+RATIO = 4  # of the coarsest step of a comparison to the finest
+ROUNDS = 9  # comparisons at most, each at a step at least two times finer
+MARGIN = 0.75  # of the asked error, taken as reached: estimates fall short by so much in 2 %
+DOUBTS = 4  # comparisons that may fail to confirm the order before a plain bound is taken
+LEAST_SAMPLES = 2000  # of a run to t_max at which positions are compared, however few are kept
+
+
+class IntegratorFacts(NamedTuple):
+    """What is known of an integrator before any run.
+
+    Attributes:
+        order: of its error in the step.
+        constants: error over step to the power of the order, by unit.
+        cost: run time of a step, over that of the fast integrator.
+    """
+
+    order: int
+    constants: dict[str, float]
+    cost: float
+
+
+# Measured on 120 cuts and hits like those of tests/simulation/test_accuracy.py, beside their exact
+# solutions: medians, and run times compiled. A scene may have 100 times as much, and is refined.
+METHODS = {
+    "fast": IntegratorFacts(2, {"s": 0.35, "m": 0.5}, 1.0),
+    "accurate": IntegratorFacts(4, {"s": 50.0, "m": 100.0}, 5.0),
+}
+
+
+def parse_error(error: object) -> tuple[float, str]:
+    """Reads an asked error.
+
+    Args:
+        error: seconds, or a text of a number and a unit: "1e-6 s", "1e-7 m".
+
+    Returns:
+        The number, and its unit, "s" or "m".
+
+    Raises:
+        ParameterError: no such number or unit, or less than rounding leaves room for.
+    """
+    value, unit = error, "s"
+    if isinstance(error, str):
+        parts = re.fullmatch(r"\s*([-+.\deE]*?\d\.?|[-+]?(?:nan|inf))\s*([^\W\d]*)\s*", error)
+        unit = (parts and parts[2]) or "s"
+        try:
+            value = float(parts[1]) if parts else None
+        except ValueError:
+            value = None
+        if value is None or unit not in UNITS:
+            bound = "must be a number of seconds, or of metres with its unit, such as '1e-7 m'"
+            raise ParameterError("error", error, bound)
+    return number("error", value, ROUNDING, 1.0, unit=unit), unit
+
+
+def simulate_within(
+    scenario: Scenario,
+    error: float | str,
+    *,
+    every: int = 1,
+    progress: Callable[[float, float], bool | None] | None = None,
+    engine: str = "auto",
+) -> Record:
+    """Runs a scenario with the integrator and the step that keep an asked error.
+
+    Args:
+        scenario: what to run; its integrator and dt are replaced. Sampled control keeps Ts (dt
+            where it is None), and steps divide it.
+        error: as in parse_error.
+        every: keep each every-th sample, and the last.
+        progress: as in simulate, from 0 s on for each of the runs.
+        engine: as in simulate.
+
+    Returns:
+        The record with Record.error: of the finest run for an error in s; for one in m of a run at
+        four times its step, at whose samples positions are compared, if that keeps the error.
+
+    Raises:
+        ParameterError: as simulate; or the scene has no border, so that seconds mean nothing.
+    """
+    asked, unit = parse_error(error)
+    if unit == "s" and not _has_border(scenario):
+        bound = "must be in m, as in '1e-6 m': this scene has no border whose crossing has a time"
+        raise ParameterError("error", error, bound)
+    if scenario.control == "sampled":
+        scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)
+    trial = Trial(scenario, unit, every)
+    trial.progress, trial.engine = progress, engine
+    *others, last = choices(scenario, asked, unit)
+    integrator, dt = next((x for x in others if _is_taken(scenario, *x)), last)
+    trial.scenario = dataclasses.replace(scenario, integrator=integrator)
+    record, found = trial.compare(dt)
+    order, most, doubts = METHODS[trial.scenario.integrator].order, MARGIN * asked, 0
+    for rounds in range(1, ROUNDS + 1):
+        doubts += not found.confirmed
+        # an order that is not seen at so many steps will not be; the estimate then is a bound
+        sure = found.confirmed or doubts > DOUBTS
+        if found.final or (sure and found.estimate is not None and found.estimate <= most):
+            break
+        if rounds == ROUNDS or _finer(dt, found, most, order) < SMALLEST:
+            limit = f"{ROUNDS} steps were tried" if rounds == ROUNDS else "no step is smaller"
+            found = found._replace(note=found.note or limit)
+            break
+        try:
+            dt = _finer(dt, found, most, order)
+            record, found = trial.compare(dt)
+        except ParameterError as refusal:  # of memory: what is there is kept
+            found = found._replace(note=f"the next step was refused, {refusal}")
+            break
+    if found.finest is not None and found.estimate is not None and found.estimate > asked:
+        record, found = trial.finest(dt, found)  # no finer step is left to compare with
+    reached = found.estimate is not None and found.estimate <= asked
+    accuracy = Accuracy(
+        asked=asked,
+        unit=unit,
+        estimate=found.estimate,
+        reached=reached,
+        integrator=integrator,
+        dt=record.scenario.dt,
+        order=found.order,
+        runs=trial.runs,
+        wall_time=trial.wall,
+        note="" if reached else found.note,
+    )
+    return dataclasses.replace(record, error=accuracy)
+
+
+def _has_border(scenario: Scenario) -> bool:
+    clay = scenario.clay
+    return scenario.length is not None or (clay is not None and any(clay.edges))
+
+
+def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
+    """The next step: where the estimate says that its error is as small as it may be."""
+    halvings = 2
+    if found.estimate is not None:
+        wanted = math.ceil(math.log2(max(found.estimate / most, 1.0)) / order)
+        halvings = min(max(wanted, 1), 5 if found.confirmed else 2)
+    possible = math.floor(math.log2(dt / SMALLEST))
+    return dt / 2.0 ** max(min(halvings, possible), 1)
+
+
+def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, float]]:
+    """Integrators for an asked error, the cheapest by METHODS first, and steps of a finest run.
+
+    Args:
+        scenario: what to run; Ts is a number where control is sampled.
+        asked: error [unit].
+        unit: "s" or "m".
+
+    Returns:
+        Pairs of "fast" or "accurate" and a step [s]; the last is of "fast", which takes all scenes.
+
+    Raises:
+        ParameterError: Ts is too short to be divided.
+    """
+    steps = {}
+    for name, method in METHODS.items():
+        wanted = (MARGIN * asked / method.constants[unit]) ** (1.0 / method.order)
+        wanted /= 1 if unit == "s" else RATIO
+        steps[name] = min(max(wanted, SMALLEST), LARGEST)
+    if scenario.control == "sampled":
+        return [("fast", _divided(scenario.Ts or scenario.dt, steps["fast"]))]
+    fast = "fast", steps["fast"]
+    if not has_numba():  # the accurate run in Python takes too long to pay
+        return [fast]
+    # beyond, the explicit method divides its steps, and other steps are no other runs
+    steps["accurate"] = min(
+        steps["accurate"], STABLE_STEP / max(fastest_rate(scenario), STABLE_STEP) / RATIO
+    )
+    cost = {name: METHODS[name].cost / step for name, step in steps.items()}
+    if steps["accurate"] < SMALLEST or cost["fast"] <= cost["accurate"]:
+        return [fast]
+    return [("accurate", steps["accurate"]), fast]
+
+
+def _is_taken(scenario: Scenario, integrator: str, dt: float) -> bool:
+    """Whether an integrator takes a scene at the coarsest step of a comparison."""
+    try:
+        s = dataclasses.replace(scenario, integrator=integrator, dt=RATIO * dt)
+        if integrator == "accurate":
+            check_explicit(s)
+    except ParameterError as refusal:
+        if refusal.field == "integrator":
+            return False
+        raise
+    return True
+
+
+def _divided(Ts: float, dt: float) -> float:
+    """The largest part of Ts that is at most dt and whose RATIO-fold divides Ts too."""
+    most = math.ceil(Ts / (RATIO * LARGEST) - 1e-9)
+    n = RATIO * most
+    while Ts / n > dt and Ts / (2 * n) >= SMALLEST:
+        n *= 2
+    if Ts / n < SMALLEST:
+        bound = f"must be at least {RATIO * SMALLEST:g} s if an error is requested"
+        raise ParameterError("Ts", Ts, bound)
+    return Ts / n
+
+
+class Trial:
+    """Runs of one scenario at several steps, and what they say of each other.
+
+    Args:
+        scenario: what to run, at any step.
+        unit: of the error, "s" or "m".
+        every: samples kept of the record, as in simulate.
+
+    Attributes:
+        progress: as in simulate.
+        engine: as in simulate.
+        runs: made so far.
+        wall: run time of all [s].
+    """
+
+    def __init__(self, scenario: Scenario, unit: str, every: int = 1):
+        self.scenario, self.unit, self.every = scenario, unit, every
+        self.progress: Callable[[float, float], bool | None] | None = None
+        self.engine = "auto"
+        self.runs, self.wall = 0, 0.0
+        self.traces: dict[float, Trace] = {}
+
+    def compare(self, dt: float) -> tuple[Record, Comparison]:
+        """Runs at 4 dt, 2 dt and dt, unless it has, and compares.
+
+        Args:
+            dt: step of the finest run [s].
+
+        Returns:
+            The record, of the finest run for an error in s, of the coarsest for one in m, and the
+            comparison; if a run was interrupted, its record.
+        """
+        traces: dict[float, Trace] = {}
+        kept = dt if self.unit == "s" else RATIO * dt
+        record = None
+        for step in (RATIO * dt, RATIO // 2 * dt, dt):
+            if step in self.traces:
+                traces[step] = self.traces[step]
+                continue
+            r = self._run(step, kept)
+            if r.outcome.code == "interrupted":
+                return r, Comparison(None, None, False, "interrupted", True)
+            record = r if step == kept else record
+            traces[step] = Trace(step, r.outcome.code, r.crossings, r.t, r.p)
+        assert record is not None
+        self.traces = traces if self.unit == "s" else {}  # whose samples are those of one record
+        order = METHODS[record.scenario.integrator].order
+        if self.unit == "s":
+            return record, compare_times(*traces.values(), order=order)
+        compared = compare_positions(*traces.values(), order=order)
+        # decays that no step resolves leave their error in one sample, which may not show it
+        if fastest_rate(self.scenario) * dt > STABLE_STEP and hides_events(*traces.values()):
+            compared = compared._replace(confirmed=False)
+        return self._thinned(record), compared
+
+    def finest(self, dt: float, found: Comparison) -> tuple[Record, Comparison]:
+        """The record of the finest run, in place of the coarsest.
+
+        Args:
+            dt: step of the finest run [s].
+            found: of the comparison.
+        """
+        r = self._run(dt, dt)
+        if r.outcome.code == "interrupted":
+            return r, Comparison(None, None, False, "interrupted", True)
+        return self._thinned(r), found._replace(estimate=found.finest)
+
+    def _run(self, dt: float, kept: float) -> Record:
+        """The run at a step; the one at step `kept` is the record."""
+        if self.unit == "m":
+            every = self._compared(kept) * round(kept / dt)
+        else:
+            every = self.every if dt == kept else 1_000_000  # crossings alone are compared
+        scenario = dataclasses.replace(self.scenario, dt=dt)
+        r = run_once(scenario, every, self.engine, self.progress)
+        self.runs, self.wall = self.runs + 1, self.wall + r.wall_time
+        return r
+
+    def _compared(self, dt: float) -> int:
+        """Samples kept where positions are compared: a divisor of every, enough to see peaks."""
+        most = min(max(1, int(self.scenario.t_max / dt / LEAST_SAMPLES)), 1_000_000 // RATIO)
+        return next(k for k in range(min(most, self.every), 0, -1) if self.every % k == 0)
+
+    def _thinned(self, r: Record) -> Record:
+        """The record with the samples asked for."""
+        ratio = self.every // self._compared(r.scenario.dt) if self.unit == "m" else 1
+        if ratio == 1:
+            return r
+        last = len(r.t) - 1
+        keep = np.unique(np.append(np.arange(0, last + 1, ratio), last))
+        return dataclasses.replace(r, **{name: getattr(r, name)[keep] for name in ARRAYS})

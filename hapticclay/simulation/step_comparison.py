@@ -1,0 +1,164 @@
+"""Runs at three steps compared: the error of the finest, in border times or in positions."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..stepping.run import Crossing
+
+ORDER_GAP = 0.5  # from the order of the integrator, up to which an observed order confirms it
+CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order
+ROUNDING_LEFT = 1e-12  # [s], [m] that is left of rounding at any step
+FINEST_GAP = (
+    1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
+)
+TOLD_APART = 1e-13  # [m] a border is passed when the handle is so far beyond it
+
+
+class Trace(NamedTuple):
+    """What is compared of a run.
+
+    Attributes:
+        dt: its step [s].
+        code: of its outcome.
+        crossings: of borders.
+        t: time of the samples [s], shape (n,).
+        p: position there [m], shape (n, 2).
+    """
+
+    dt: float
+    code: str
+    crossings: tuple[Crossing, ...]
+    t: np.ndarray
+    p: np.ndarray
+
+
+class Comparison(NamedTuple):
+    """What three runs say of the finest one.
+
+    Attributes:
+        estimate: of its error; None where they have nothing to compare.
+        order: observed; None where it cannot be told.
+        confirmed: whether the order is that of the integrator, so that the estimate is sharp.
+        note: what is wrong, "" for nothing.
+        final: whether finer steps would not mend it.
+        finest: of the error of the finest run, where the estimate is of a coarser one.
+    """
+
+    estimate: float | None
+    order: float | None
+    confirmed: bool
+    note: str
+    final: bool = False
+    finest: float | None = None
+
+
+UNSTABLE = "the loop is unstable: errors grow with time, and nothing bounds them"
+DIFFERENT = "from step to step, the runs cross other borders or end otherwise"
+AT_ROUNDING = "rounding: no step does better"
+
+
+def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
+    """The error of the crossing times of the finest of three runs [s].
+
+    Where the differences shrink as the order says, it is the last one over 2^order - 1.
+
+    Args:
+        coarse: at step 4h.
+        middle: at 2h.
+        fine: at h.
+        order: of the integrator.
+    """
+    if _unstable(middle, fine):
+        return Comparison(None, None, False, UNSTABLE, True)
+    first, second = _time_gap(coarse, middle), _time_gap(middle, fine)
+    if second is None:
+        return Comparison(None, None, False, DIFFERENT)
+    if not fine.crossings:
+        return Comparison(None, None, False, "no border was crossed: ask for an error in m", True)
+    # a slow handle is long within the rounding of a border
+    slowest = max(min(abs(c.speed) for c in fine.crossings), TOLD_APART)
+    floor = ROUNDING_LEFT + TOLD_APART / slowest
+    sharp = second / (2.0**order - 1.0)
+    if sharp <= floor:
+        return Comparison(floor, None, True, AT_ROUNDING, True)
+    if not first:
+        return Comparison(second, None, False, "")
+    seen = math.log2(first / second)
+    confirmed = abs(seen - order) <= ORDER_GAP and not _bounces(fine)
+    return Comparison(sharp if confirmed else max(first, second), seen, confirmed, "")
+
+
+def compare_positions(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
+    """The error of the positions of the coarsest of three runs at its samples [m].
+
+    The first sample behind a hit errs by more than others, and by how much depends on where in a
+    step the border lies: differences do not shrink evenly. The finest run has all samples of the
+    coarsest, and 4^-order of its error.
+
+    Args:
+        coarse: at step 4h.
+        middle: at 2h.
+        fine: at h; all with samples at the same times.
+        order: of the integrator.
+    """
+    if _unstable(coarse, fine):
+        return Comparison(None, None, False, UNSTABLE, True)
+    first, second = _position_gap(coarse, fine), _position_gap(middle, fine)
+    if first is None or second is None:
+        return Comparison(None, None, False, DIFFERENT)
+    if first <= ROUNDING_LEFT:
+        return Comparison(ROUNDING_LEFT, None, True, AT_ROUNDING, True)
+    seen = math.log2(first / second - 1.0) if first > second > 0.0 else None
+    confirmed = second <= CLOSER * first
+    sharp = first / (1.0 - 4.0**-order)
+    finest = second / (FINEST_GAP if confirmed else 1.0)
+    return Comparison(
+        sharp if confirmed else max(first, second), seen, confirmed, "", False, finest
+    )
+
+
+def _unstable(a: Trace, b: Trace) -> bool:
+    return {a.code, b.code} <= {"diverged", "limit cycle"}
+
+
+def _bounces(trace: Trace) -> bool:
+    """Whether a border is crossed again within a step, of which the step says little."""
+    last: dict[tuple[str, float], float] = {}
+    found = False
+    for c in trace.crossings:
+        found |= c.time - last.get((c.axis, c.border), -math.inf) < trace.dt
+        last[c.axis, c.border] = c.time
+    return found
+
+
+def hides_events(coarse: Trace, _: Trace, fine: Trace) -> bool:
+    """Whether all runs make the same step from a border to the next sample, with one error.
+
+    Args:
+        coarse: the run at 4h.
+        _: that at 2h.
+        fine: that at h.
+    """
+    return any((-c.time) % coarse.dt < fine.dt for c in fine.crossings)
+
+
+def _time_gap(a: Trace, b: Trace) -> float | None:
+    """Largest difference of crossing times [s]; None if other borders were crossed."""
+    same = [(c.axis, c.border) for c in a.crossings] == [(c.axis, c.border) for c in b.crossings]
+    if not same or a.code != b.code:
+        return None
+    return max(
+        (abs(c.time - d.time) for c, d in zip(a.crossings, b.crossings, strict=True)), default=0.0
+    )
+
+
+def _position_gap(a: Trace, b: Trace) -> float | None:
+    """Largest distance at the samples that both have [m]; None for other ends."""
+    n = min(len(a.t), len(b.t))
+    both = np.abs(a.t[:n] - b.t[:n]) <= 1e-12 * (1.0 + a.t[:n])  # the last sample may be short
+    away = np.linalg.norm(a.p[:n] - b.p[:n], axis=1)[both]
+    return float(away.max(initial=0.0)) if a.code == b.code else None

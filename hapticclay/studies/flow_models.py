@@ -1,0 +1,199 @@
+"""Candidate laws of resistance: fitted one by one, compared, and their intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arguments import named
+from .trajectory import (
+    FIT_RANGES,
+    Flowing,
+    Joint,
+    Minimum,
+)
+
+FLOW_LAWS: dict[str, Flowing] = {  # from simple to rich, named as `Flow.kind`
+    "viscous": Flowing(("b",)),
+    "Coulomb": Flowing(("Fy",)),
+    "Bingham": Flowing(("Fy", "b")),
+    "power law": Flowing(("K", "n")),
+    "Herschel-Bulkley": Flowing(("Fy", "K", "n")),
+}
+FLOW_UNITS = {"Fy": "N", "K": "N/(m/s)^n", "n": "", "b": "N.s/m"}
+PARSIMONY = 6.0  # of AICc: a law needs odds of 20 to 1, exp(6/2), before a simpler one is given up
+TRIAL_INDICES = (0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2)  # flow indices from which fits start
+
+
+@named
+@dataclass(frozen=True)
+class FlowParameter:
+    """One parameter of a law.
+
+    Attributes:
+        name: Fy, K, n or b, as in `Flow`.
+        unit: its unit.
+        value: fitted value.
+        low: lower end of the confidence interval; nan in a law that was not chosen.
+        high: upper end of the confidence interval; nan in a law that was not chosen.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+def to_theta(values: Sequence[float], law: str) -> np.ndarray:
+    """Parameters as `Flowing` takes them.
+
+    Args:
+        values: of the law.
+        law: in FLOW_LAWS.
+    """
+    pairs = zip(FLOW_LAWS[law].names, values, strict=True)
+    return np.array([math.log(max(x, 1e-300)) if name == "K" else x for name, x in pairs])
+
+
+def of_theta(theta: np.ndarray, law: str) -> list[float]:
+    """Parameters of a law of those that `Flowing` takes.
+
+    Args:
+        theta: they.
+        law: in FLOW_LAWS.
+    """
+    pairs = zip(FLOW_LAWS[law].names, theta.tolist(), strict=True)
+    return [math.exp(min(x, 700.0)) if name == "K" else x for name, x in pairs]
+
+
+def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """Parameters from which a fit starts: linear ones solved for, over some flow indices.
+
+    Args:
+        law: in FLOW_LAWS.
+        v: speeds [m/s].
+        f: forces against the motion [N].
+    """
+    names, best = FLOW_LAWS[law].names, None
+    for n in TRIAL_INDICES if "n" in names else (1.0,):
+        columns = {"Fy": np.ones(len(v)), "b": v, "K": v**n}
+        linear = [x for x in names if x != "n"]
+        X = np.stack([columns[x] for x in linear], axis=1)
+        found = np.linalg.lstsq(X, f, rcond=None)[0]
+        a = dict(zip(linear, found.tolist(), strict=True), n=n)
+        if a.get("K", 1.0) <= 0.0:  # the force falls with the speed: almost flat then
+            a["K"] = 1e-3 * float(np.mean(np.abs(f))) / float(np.mean(v)) ** n
+            a["Fy"] = float(np.mean(f))
+            found = np.array([a[x] for x in linear])
+        left = float(np.sum((f - X @ found) ** 2))
+        if best is None or left < best[0]:
+            best = left, [a[x] for x in names]
+    assert best is not None
+    return to_theta(best[1], law)
+
+
+def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
+    """Least sum of squares with Fy and b of 0 or more, and of any sign.
+
+    Args:
+        joint: motion and force.
+        law: in FLOW_LAWS.
+        start: parameters to start from.
+    """
+    flowing = FLOW_LAWS[law]
+    free = found = joint.least(flowing, start)
+    held = np.zeros(len(start), dtype=bool)
+    signed = np.array([x in ("Fy", "b") for x in flowing.names])
+    while (bad := signed & (found.theta < 0.0)).any():
+        held |= bad
+        found = joint.least(flowing, np.where(held, 0.0, found.theta), held.tolist())
+    return found, free
+
+
+def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:
+    """Fit the richest law again from a simpler one that it holds, if that explains more.
+
+    Args:
+        joint: motion and force.
+        found: what was found, by law; that of the richest is replaced.
+    """
+    rich = "Herschel-Bulkley"
+    for law in found:
+        a, least = (
+            dict(zip(FLOW_LAWS[law].names, found[law][0].theta, strict=True)),
+            found[law][0].sum,
+        )
+        if rich not in found or found[rich][0].sum <= least:
+            continue
+        values = a.get("Fy", 0.0), a.get("K", math.log(max(a.get("b", 0.0), 1e-6))), a.get("n", 1.0)
+        again = best_fit(joint, rich, np.array(values))
+        if again[0].sum < found[rich][0].sum:
+            found[rich] = again
+
+
+def student_quantile(level: float, freedom: float) -> float:
+    """Student's quantile of a two-sided interval.
+
+    Args:
+        level: confidence level.
+        freedom: degrees of freedom.
+    """
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + 0.5 * level, max(freedom, 1.0)))
+
+
+def parameter_intervals(
+    joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
+) -> tuple[FlowParameter, ...]:
+    """Where the profile of the sum of squares rises by quantile^2 variance, within the bounds.
+
+    Args:
+        joint: motion and force.
+        law: in FLOW_LAWS.
+        best: the fit within the bounds.
+        free: that with Fy and b of any sign.
+        variance: of a residual.
+        quantile: half width of the interval in standard deviations.
+    """
+    names, out = FLOW_LAWS[law].names, []
+    values = of_theta(best.theta, law)
+    for j, (name, value) in enumerate(zip(names, values, strict=True)):
+        ends = [_crossing(joint, law, free, j, side * quantile, variance) for side in (-1.0, 1.0)]
+        if name == "K":
+            ends = [math.exp(x) for x in ends]
+        low, high = max(min(ends[0], value), 0.0), max(ends[1], value)
+        out.append(FlowParameter(name, FLOW_UNITS[name], value, low, high))
+    return tuple(out)
+
+
+def _crossing(
+    joint: Joint,
+    law: str,
+    free: Minimum,
+    j: int,
+    target: float,
+    variance: float,
+) -> float:
+    """Value of parameter j at which the root of the sum's rise, over its noise, is |target|."""
+    spread, theta = free.spread, free.theta
+    if not spread[j, j] > 0.0:  # at a limit, or without effect
+        return float(theta[j])
+    limits = FIT_RANGES[FLOW_LAWS[law].names[j]]
+    held = [i == j for i in range(len(theta))]
+    step = target * math.sqrt(variance * spread[j, j])
+    for _ in range(8):
+        x = float(np.clip(theta[j] + step, *limits))
+        step = x - float(theta[j])
+        start = theta + spread[:, j] * (step / spread[j, j])
+        start[j] = x
+        rise = joint.least(FLOW_LAWS[law], start, held, free.c).sum - free.sum
+        ratio = math.sqrt(max(rise, 0.0) / variance) / abs(target)
+        if abs(ratio - 1.0) < 0.01 or (x in limits and ratio < 1.0):
+            break
+        step *= float(np.clip(1.0 / max(ratio, 1e-9), 0.3, 2.0))
+    return float(theta[j]) + step

@@ -1,0 +1,281 @@
+"""Samples that slide through clay: of a record, or of columns with their noise."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, choice
+from ..model.constants import AXES
+from ..simulation.record import Record
+from .trajectory import (
+    LEAST_PER_KNOT,
+    Motion,
+    Series,
+    Stretch,
+    chosen_spacing,
+    correlation_time,
+)
+
+LEAST_SLIDING = 50  # samples that slide ...
+FAST = 10.0  # [m/s]: no hand is as fast
+LEAST_SIGNAL = 5.0  # deviations of its own that a velocity must have to be motion ...
+DEVIATIONS = 60  # samples from which the usual deviation is told
+COUNTS = 3.0  # ... and counts of the encoder between knots
+LEAST_STRETCH = 3 * LEAST_PER_KNOT  # samples of a stretch
+STEADY_STEP = 0.05  # largest change of a known velocity in a step; a force is the mean over one
+UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0.42
+
+
+class Met(NamedTuple):
+    """Clay at the samples of a record.
+
+    Attributes:
+        flows: b, Fy, K and n at each, shape (n, 4).
+        dented: where a law resists a tool at rest that has gone into it, by name of the law.
+    """
+
+    flows: np.ndarray
+    dented: dict[str, np.ndarray]
+
+
+class Sliding(NamedTuple):
+    """Samples that slide.
+
+    Attributes:
+        t: their time [s].
+        sign: of their velocity.
+        f: force against the motion [N].
+        p: places of the samples and of those between them [m]; empty where speeds are known.
+        v: speeds [m/s], or the coefficients of the motion.
+        slowest: speed of any [m/s].
+        motion: splines along the places; None where speeds are known.
+        spacing: of their knots [s].
+        force_variance: beside a free curve [N^2]; nan without.
+        position_variance: of a place [m^2].
+        position_correlation: samples of places that count as one.
+    """
+
+    t: np.ndarray
+    sign: np.ndarray
+    f: np.ndarray
+    p: np.ndarray
+    v: np.ndarray
+    slowest: float
+    motion: Motion | None
+    spacing: float
+    force_variance: float
+    position_variance: float
+    position_correlation: float
+
+
+def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
+    """Axis, position, velocity, force, which samples lie inside clay, and the clay at them.
+
+    Args:
+        r: the record.
+        axis: as for `fit_flow`.
+
+    Raises:
+        ParameterError: it has no clay, or none whose law such an axis shows.
+    """
+    clay = r.scenario.clay
+    if clay is None:
+        raise ParameterError("data", r.scenario.name, "must be a record with clay")
+    if clay.blocks:
+        bound = "must be a record without clay that stays cut, which has no law of speed"
+        raise ParameterError("data", r.scenario.name, bound)
+    axis = choice("axis", axis or ("path" if clay.along_motion else "x"), (*AXES, "path"))
+    if clay.angle and axis != "path":
+        raise ParameterError("axis", axis, 'must be "path" in clay with rotated axes')
+    yielding = [x for x in clay.kinds if x.of_velocity and not x.viscous]
+    if axis == "path" and not all(x.along_motion for x in yielding):
+        raise ParameterError("axis", axis, "must be x or y in clay whose axes yield by themselves")
+    index = AXES.index(axis) if axis in AXES else 0
+    law, places = clay.laws[index], tuple(r.p.T)
+    at = law.index(*places)
+    inside = law.some[at]
+    still = {x.name: x.force(law, 0.0, 1.0) for x in clay.kinds if x.force and not x.of_velocity}
+    dented = {name: force[at] > 0.0 for name, force in still.items() if np.any(force)}
+    met = Met(np.array([r.b[:, index], *law.flows_at(*places)]).T, dented)
+    if axis in AXES:
+        return axis, places[index], r.v[:, index], r.fe[:, index], inside, met
+    if not np.array_equal(*r.b.T):
+        raise ParameterError("axis", axis, "must be x or y in clay that damps them differently")
+    speed = np.hypot(*r.v.T)
+    force = np.sum(r.fe * r.v, axis=1)
+    force = np.divide(force, speed, out=np.zeros(len(speed)), where=speed > 0.0)
+    along = np.cumsum(np.append(0.0, np.hypot(*np.diff(r.p, axis=0).T)))
+    return axis, along, speed, force, inside, met
+
+
+def check_met(met: Met, inside: np.ndarray) -> None:
+    """Refuse samples that lie in clays of several laws, or in clay whose force depends on more.
+
+    Args:
+        met: the clay at the samples.
+        inside: which of them are taken.
+
+    Raises:
+        ParameterError: they do.
+    """
+    for name, where in met.dented.items():
+        if np.any(where[inside]):
+            bound = "must lie in clay whose force follows from the velocity alone"
+            raise ParameterError("data", f"samples in clay with {name}", bound)
+    kinds = met.flows[inside]
+    if np.any(np.ptp(kinds, axis=0) > 1e-9 * np.max(np.abs(kinds), axis=0)):
+        low, high = kinds.min(axis=0).tolist(), kinds.max(axis=0).tolist()
+        told = ", ".join(
+            f"{name} {a:g} to {b:g}"
+            for name, a, b in zip(("b", "Fy", "K", "n"), low, high, strict=True)
+            if a < b
+        )
+        bound = "must lie in clay of one law: choose a part of them by time or place"
+        raise ParameterError("data", f"samples with {told}", bound)
+
+
+def of_known_speed(t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
+    """Samples of known velocity that move, and whose velocity changes little in a step.
+
+    Args:
+        t: time [s].
+        v: velocity [m/s].
+        f: force of the clay [N].
+        inside: which samples are taken.
+
+    Raises:
+        ParameterError: there are too few.
+    """
+    change = np.abs(np.diff(v, prepend=v[:1]))
+    change = np.maximum(change, np.append(change[1:], 0.0))
+    speed = np.abs(v)
+    at = inside & (change <= STEADY_STEP * speed) & (speed > 1e-4 * np.max(speed[inside]))
+    if np.count_nonzero(at) < LEAST_SLIDING:
+        raise _too_few(int(np.count_nonzero(at)))
+    sign = np.sign(v[at])
+    speed, none = speed[at], np.zeros(0)
+    slowest = float(speed.min())
+    return Sliding(t[at], sign, sign * f[at], none, speed, slowest, None, 0.0, math.nan, 0.0, 1.0)
+
+
+def _too_few(count: int) -> ParameterError:
+    bound = f"must have {LEAST_SLIDING} samples or more that slide, faster than the noise"
+    return ParameterError("data", f"{count} samples", bound)
+
+
+def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
+    """Stretches that slide, and the splines along them.
+
+    Args:
+        t: time [s].
+        p: position [m].
+        f: force of the clay [N].
+        inside: which samples are taken.
+
+    Raises:
+        ParameterError: there are too few.
+    """
+    p = p - p.mean()
+    runs = [(a, b) for a, b in _runs(inside) if b - a >= LEAST_STRETCH]
+    if not runs:
+        raise _too_few(0)
+    stretches = [Stretch(t[a:b]) for a, b in runs]
+    at = np.concatenate([np.arange(a, b) for a, b in runs])
+    spacing, (variance,) = chosen_spacing([Series(stretches, p[at])])
+    motion = Motion(stretches, spacing)
+    v = np.zeros(len(t))
+    v[at] = motion.velocity(motion.follow(p[at]))
+    margin = math.ceil(spacing / float(np.median(np.diff(t))))
+    slow = _slowest(motion, runs, margin, LEAST_SIGNAL * math.sqrt(variance))
+    slow = np.maximum(slow, COUNTS * quantum(p) / spacing)
+    direction = np.zeros(len(t))
+    direction[at] = np.where(np.abs(v[at]) > slow, np.sign(v[at]), 0.0)
+    pieces = [x for a, b in runs for x in _between_rests(direction, a, b, margin)]
+    # of each piece, where it slides one way
+    slides = [
+        sorted((c + a, d + a) for way in (1.0, -1.0) for c, d in _runs(direction[a:b] == way))
+        for a, b in pieces
+    ]
+    slides = [[x for x in some if x[1] - x[0] >= LEAST_PER_KNOT] for some in slides]
+    pieces = [x for x, some in zip(pieces, slides, strict=True) if some]
+    slides = [some for some in slides if some]
+    single = [x for some in slides for x in some]
+    if sum(b - a for a, b in single) < LEAST_SLIDING:
+        raise _too_few(sum(b - a for a, b in single))
+    stretches = [
+        Stretch(
+            t[a:b], [0.5 * float(t[x[1]] + t[y[0]]) for x, y in zip(some, some[1:], strict=False)]
+        )
+        for (a, b), some in zip(pieces, slides, strict=True)
+    ]
+    at, sliding = (np.concatenate([np.arange(*x) for x in some]) for some in (pieces, single))
+    sign, place = direction[sliding], p[at]
+    force = sign * f[sliding]
+    one_way = [Stretch(t[a:b]) for a, b in single]
+    spacing, (of_p, of_f) = chosen_spacing([Series(stretches, place), Series(one_way, force)])
+    motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
+    c = motion.follow(place)
+    correlation = correlation_time(place - motion.place(c))
+    of_p = max(of_p, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
+    return Sliding(
+        t[sliding],
+        sign,
+        force,
+        place,
+        c,
+        float(slow.min()),
+        motion,
+        spacing,
+        of_f,
+        of_p,
+        correlation,
+    )
+
+
+def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: float) -> np.ndarray:
+    """Speed that counts as motion at each sample of the runs; larger near their ends [m/s]."""
+    pieces = np.cumsum([0] + [b - a for a, b in runs])
+    some = np.unique(np.linspace(0, pieces[-1] - 1, DEVIATIONS).astype(int))
+    out = np.full(pieces[-1], np.median(motion.deviation(some)))
+    for a, b in zip(pieces[:-1].tolist(), pieces[1:].tolist(), strict=True):
+        first, last = motion.deviation(np.array([a, b - 1]))
+        out[a : min(a + margin, b)] = max(first, out[a])
+        out[max(b - margin, a) : b] = max(last, out[b - 1])
+    return sigma * out
+
+
+def _between_rests(
+    direction: np.ndarray, start: int, stop: int, margin: int
+) -> list[tuple[int, int]]:
+    """Parts of a run without rests, which last longer than a knot's width, and its like around."""
+    rests = [(a + start, b + start) for a, b in _runs(direction[start:stop] == 0.0)]
+    out, begin = [], start
+    for a, b in rests:
+        if b - a > margin or a == start or b == stop:
+            out.append((begin, a - margin if b - a > margin else a))
+            begin = b + margin if b - a > margin else b
+    out.append((begin, stop))
+    return [(a, b) for a, b in out if b - a >= LEAST_STRETCH]
+
+
+def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Where a mask holds: (start, stop) of each run."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def quantum(x: np.ndarray) -> float:
+    """Step of which all differences are multiples, of quantised samples; 0 for others.
+
+    Args:
+        x: samples, (n,).
+    """
+    steps = np.diff(np.unique(x))
+    steps = steps[steps > 1e-9 * np.max(np.abs(x), initial=0.0)]  # rounding of the numbers
+    if not len(steps):
+        return 0.0
+    whole = steps / steps.min()
+    return 0.0 if np.any(np.abs(whole - np.round(whole)) > 0.02) else float(steps.min())

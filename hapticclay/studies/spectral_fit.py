@@ -1,0 +1,411 @@
+"""A block identified from columns: spectra of input and output, and the fit to them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import ParameterError, choice, flag, numbers_of
+from ..model.constants import AXES
+from .identification import (
+    BLOCK_KINDS,
+    COEFFICIENT_NAMES,
+    COEFFICIENT_UNITS,
+    COHERENT,
+    CONFIDENCE,
+    IDENTIFICATION_BAND,
+    LINE_FLOOR,
+    MULTISINE_LINES,
+    Coefficient,
+    Identified,
+    printed_form,
+    response,
+)
+from .measurement import Measurement
+
+LEAST_LINES = 20  # of the spectrum in the band, without a period
+LEAST_EXCITED = 5  # lines of a periodic input
+EXCITED = 1e-6  # least power of a line, as a share of the strongest in the band
+PERIODIC = 3e-5  # largest share of a periodic input's power in the band between its lines
+REPEATED = 0.95  # least autocorrelation at a period
+TRANSIENT_TERMS = 4  # two of a second-order block's start and end, two of sampling
+
+NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
+WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
+
+
+@checked
+def identify_data(
+    data: Measurement,
+    what: str = "G",
+    axis: str = "x",
+    *,
+    band: tuple[float, float] | None = None,
+    held: bool = False,
+) -> Identified:
+    """Identify one block from measured columns.
+
+    Any excitation does: whole periods of a periodic one, after the first, are taken where there are
+    two or more; else the whole record, whose start and end are fitted too. What moves the handle
+    otherwise, and for Th the muscle force uh, must be independent of the input, or of the reference
+    if there is one.
+
+    Args:
+        data: the columns.
+        what: "G" (input: command), "S" (Sh; input: force) or "Th" (input: force).
+        axis: "x" or "y", the axis of the printed equation to compare with.
+        band: lowest and highest frequency [Hz], to 0.1/dt; None for what the record holds of (0.15,
+            20), Th (0.08, 3).
+        held: True for an input that a computer holds from each sample to the next; not for Th.
+
+    Returns:
+        As `identify`, without scenario; `realisations` is 1 and `periods` 0 without a period.
+
+    Raises:
+        ParameterError: the record is too short for the band, the input has no power in it, the
+            output does not follow, or no such block fits.
+    """
+    choice("what", what, BLOCK_KINDS)
+    choice("axis", axis, AXES)
+    if flag("held", held) and what == "Th":
+        raise ParameterError("held", held, 'must be False for "Th", whose input is a position')
+    u, y = (data.output, -data.input) if what == "Th" else (data.input, data.output)
+    signals = np.array((u if data.reference is None else data.reference, u, y))
+    low, high = _band(what, band, data.dt, len(u))
+    n = _period(signals[0], high * data.dt)
+    periods = len(u) // n - 1 if n else 0
+    spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, held)
+    _check_coherence(spectrum)
+    try:
+        with np.errstate(all="ignore"):  # of what cannot be fitted
+            fitted = _fit_spectrum(what, spectrum, data.reference is not None)
+            frequency, H, deviation, coherence = _shown(spectrum, fitted)
+        if not np.all(np.isfinite(np.concatenate((fitted.value, fitted.half, deviation)))):
+            raise np.linalg.LinAlgError("no bounded intervals")
+    except (np.linalg.LinAlgError, ValueError) as error:
+        bound = f"must be that of a block of the form of {what}; none fits ({error})"
+        raise ParameterError("output", f"{len(spectrum.y)} lines", bound) from None
+    rows = zip(
+        COEFFICIENT_NAMES[what],
+        COEFFICIENT_UNITS[what],
+        printed_form(what, axis),
+        fitted.value.tolist(),
+        fitted.half.tolist(),
+        strict=True,
+    )
+    coefficients = tuple(Coefficient(a, b, c, x, x - h, x + h) for a, b, c, x, h in rows)
+    if all(c.high < 0.0 for c in coefficients[: 3 if what == "Th" else 1]):
+        bound = "must not be negative: input or output has the wrong sign (fh is on the handle)"
+        raise ParameterError(coefficients[0].name, float(f"{coefficients[0].value:.4g}"), bound)
+    return Identified(
+        what,
+        axis,
+        frequency,
+        H,
+        deviation,
+        coherence,
+        coefficients,
+        None,
+        None,
+        0,
+        periods,
+        1,
+        data.name,
+    )
+
+
+def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
+    """The band asked for, or the usual one as far as the samples hold it."""
+    limit = 0.1 / dt
+    if band is None:
+        low, high = IDENTIFICATION_BAND[what]
+        low, high = max(low, 1.0 / (n * dt)), min(high, limit)
+    else:
+        low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
+    if (high - low) * n * dt < LEAST_LINES:
+        bound = (
+            f"must hold {LEAST_LINES} multiples of 1/duration = {1.0 / (n * dt):.3g} Hz or more: "
+            "the record is too short, or its step too long"
+        )
+        raise ParameterError("band", (float(f"{low:.4g}"), float(f"{high:.4g}")), bound)
+    return low, high
+
+
+def _period(u: np.ndarray, high: float) -> int:
+    """Samples in a period of u, of which it has three or more; 0 for none.
+
+    Args:
+        u: the signal, (n,).
+        high: highest frequency that matters, in lines of a sample.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.signal import find_peaks
+
+    n = len(u)
+    x = (u - u.mean()) / np.ptp(u)
+    size = next_fast_len(2 * n, real=True)
+    power = np.concatenate(([0.0], np.cumsum(x * x)))
+    lag = np.arange(n // 3 + 2)
+    both = np.sqrt(power[n - lag] * (power[n] - power[lag]))  # of u before and after
+    power_of_lines = np.abs(np.asarray(rfft(x, size))) ** 2
+    share = np.asarray(irfft(power_of_lines, size))[: len(lag)] / np.maximum(both, 1e-9 * power[n])
+    for peak in find_peaks(share, height=REPEATED)[0][:20].tolist():
+        near = [k for k in (peak - 1, peak, peak + 1) if k <= n // 3]
+        left, period = min((_between_lines(x, k, high), k) for k in near)
+        if left <= PERIODIC:
+            return period
+    return 0
+
+
+def _between_lines(x: np.ndarray, period: int, high: float) -> float:
+    """Share of the power, after the first period, up to `high`, that is not of this period."""
+    count = len(x) // period - 1
+    samples = count * period
+    power = np.abs(np.fft.rfft(x[-samples:])[: math.floor(high * samples) + 1]) ** 2
+    power[0] = 0.0
+    return float(1.0 - power[::count].sum() / max(power.sum(), 1e-300))
+
+
+class _Spectrum(NamedTuple):
+    """Discrete Fourier transforms at the excited lines, (n,) each.
+
+    Reference, input and output; frequency [Hz]; mean step [s]; count of terms of start and end.
+    """
+
+    frequency: np.ndarray
+    r: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    dt: float
+    terms: int
+
+
+def _spectrum(
+    signals: np.ndarray, dt: float, band: tuple[float, float], periods: int, held: bool
+) -> _Spectrum:
+    """Spectra of reference, input and output at the lines of a band that the reference excites."""
+    samples = signals.shape[1]
+    every, duration = max(periods, 1), samples * dt
+    first, last = math.ceil(band[0] * duration - 1e-9), math.floor(band[1] * duration + 1e-9)
+    bins = np.arange(first, last + 1)
+    bins = bins[bins % every == 0]
+    r, u, y = np.fft.rfft(signals - signals.mean(axis=1, keepdims=True))[:, bins] / samples
+    rms = float(np.std(signals[0]))
+    power = np.abs(r) ** 2
+    strong = power > EXCITED * max(power.max(initial=0.0), LINE_FLOOR * rms**2 / max(len(bins), 1))
+    least = LEAST_EXCITED if periods else LEAST_LINES
+    if np.count_nonzero(strong) < least:
+        bound = (
+            f"must have power at {least} lines or more from {band[0]:.3g} to {band[1]:.3g} Hz; "
+            f"it has at {np.count_nonzero(strong)}"
+        )
+        raise ParameterError("input", f"rms {rms:.3g}", bound)
+    frequency = bins[strong] / duration
+    if held:
+        u = u * np.exp(-1j * np.pi * bins / samples) * np.sinc(bins / samples)
+    terms = 0 if periods else TRANSIENT_TERMS
+    return _Spectrum(frequency, r[strong], u[strong], y[strong], dt, terms)
+
+
+def _check_coherence(x: _Spectrum) -> None:
+    """Refuse an output that follows the reference at few lines, before any form is fitted."""
+    uu, yy = (_near(np.abs(a) ** 2) for a in (x.r, x.y))
+    coherence = np.abs(_near(x.y * x.r.conj())) ** 2 / (uu * np.maximum(yy, 1e-300))
+    seen = np.count_nonzero(coherence >= COHERENT)
+    if seen < LEAST_EXCITED:
+        worst = int(np.argmin(coherence))
+        bound = (
+            f"must follow the input: coherence must be {COHERENT:g} at {LEAST_EXCITED} lines or "
+            f"more, is at {seen}; the lowest is {coherence[worst]:.2g} at "
+            f"{x.frequency[worst]:.3g} Hz"
+        )
+        raise ParameterError("output", f"coherence {np.median(coherence):.2g}", bound)
+
+
+class _Fitted(NamedTuple):
+    """Coefficients, half of their intervals, and what is left of the output at each line."""
+
+    value: np.ndarray
+    half: np.ndarray
+    model: np.ndarray  # response of the fitted form
+    known: np.ndarray  # the part of the input that the reference causes
+    left: np.ndarray
+    noise: np.ndarray  # standard deviation of what is left
+
+
+def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
+    """Fit a block, and the terms of start and end, to an output.
+
+    Least squares of the output, each line weighted by its noise; with a reference, the instrumental
+    variables that it gives. The intervals come from what is left at each line (HC3 of MacKinnon,
+    White 1985), so that weights need not be right, with Student's t of as many degrees of freedom
+    as lines decide the coefficient (Satterthwaite 1946). LinAlgError where nothing fits.
+    """
+    from scipy.special import stdtrit
+
+    known = x.u if not instrument else x.r * (_near(x.u * x.r.conj()) / _near(np.abs(x.r) ** 2))
+    theta, left = _start(what, x), x.y
+    noise = np.full(len(x.y), float(np.std(x.y)))
+    for _ in range(WEIGHT_ROUNDS):
+        theta = _least(what, x, theta, noise)
+        if instrument:
+            theta = _settle(what, x, known, theta, noise)
+        if not np.all(np.isfinite(theta)) or (what != "Th" and min(theta[1:3]) <= 0.0):
+            raise np.linalg.LinAlgError("no stable block")
+        left = _misfit(what, x, theta)
+        spent = len(left) / (len(left) - 0.5 * len(theta))
+        floor = LINE_FLOOR * np.abs(x.y)
+        noise = np.sqrt(spent * _near(np.abs(left) ** 2) + floor**2)
+    columns, tools = (_slopes(what, x, u, theta) for u in (x.u, known))
+    J, Z = (_parts(c.T / noise).T for c in (columns, tools))
+    size = np.linalg.norm(J, axis=0)
+    # how far what is left at each line moves the coefficients, (p, 2 lines)
+    gain = np.linalg.solve(Z.T @ J / size, Z.T) / size[:, None]
+    hat = np.einsum("lp,pl->l", J, gain).reshape(2, -1).mean(axis=0)
+    own = 0.5 * (np.abs(left) / noise / (1.0 - np.minimum(hat, 0.9))) ** 2
+    shares = np.square(gain).reshape(len(theta), 2, -1).sum(axis=1) * own
+    variance = shares.sum(axis=1)
+    freedom = 2.0 * variance**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
+    half = stdtrit(np.maximum(freedom, 1.0), 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
+    # nothing is known of what happens between samples
+    lost = response(what, theta[:3], x.frequency) * x.u * (2.0 * np.pi * x.frequency * x.dt) ** 2
+    half = np.hypot(half, gain @ _parts(lost / 6.0 / noise))[:3]
+    model = response(what, theta[:3], x.frequency)
+    return _Fitted(theta[:3], half, model, known, left, noise)
+
+
+def _near(a: np.ndarray) -> np.ndarray:
+    """Mean of each value and its neighbours, fewer where there are few lines."""
+    half, at = min(max(len(a) // 4, 2), NEIGHBOURS), np.arange(len(a))
+    total = np.concatenate(([0.0], np.cumsum(a)))
+    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(a))
+    return (total[high] - total[low]) / (high - low)
+
+
+def _parts(e: np.ndarray) -> np.ndarray:
+    return np.concatenate((e.real, e.imag), axis=-1)
+
+
+def _terms(x: _Spectrum) -> np.ndarray:
+    """Powers of s of the terms of start and end, scaled, (lines, terms)."""
+    return (1j * x.frequency / x.frequency[-1])[:, None] ** np.arange(x.terms)
+
+
+def _denominator(what: str, theta: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """That of the block, scaled to the highest line."""
+    s = 2j * np.pi * f
+    return (
+        np.ones_like(s) if what == "Th" else (s * s + theta[1] * s + theta[2]) / np.abs(s[-1]) ** 2
+    )
+
+
+def _misfit(what: str, x: _Spectrum, theta: np.ndarray) -> np.ndarray:
+    """Output without the block's and without what start and end leave, (lines,)."""
+    edge = _terms(x) @ theta[3:] / _denominator(what, theta, x.frequency)
+    return x.y - response(what, theta[:3], x.frequency) * x.u - edge
+
+
+def _slopes(what: str, x: _Spectrum, u: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Derivatives of the output for an input u by the coefficients, (lines, 3 + terms)."""
+    s = 2j * np.pi * x.frequency
+    edge = _terms(x) / _denominator(what, theta, x.frequency)[:, None]
+    if what == "Th":
+        return np.column_stack((s * s * u, s * u, u, edge))
+    A = s * s + theta[1] * s + theta[2]
+    out = theta[0] / A * u + edge @ theta[3:]
+    return np.column_stack((u / A, -s * out / A, -out / A, edge))
+
+
+def _start(what: str, x: _Spectrum) -> np.ndarray:
+    """Start of the fit: linear least squares, for G and S at the best of some denominators."""
+    f = x.frequency
+    s = 2j * np.pi * f
+    if what == "Th":
+        return _solve(np.column_stack((s * s * x.u, s * x.u, x.u, _terms(x))), x.y)[0]
+    best, least = np.zeros(3 + x.terms), math.inf
+    for omega in 2.0 * np.pi * np.geomspace(f[0], f[-1], 12):
+        for ratio in (0.3, 0.7, 2.0):
+            theta = np.array((0.0, 2.0 * ratio * omega, omega**2) + x.terms * (0.0,))
+            columns = _slopes(what, x, x.u, theta)[:, [0, *range(3, 3 + x.terms)]]
+            (theta[0], *theta[3:]), cost = _solve(columns, x.y)
+            if cost < least:
+                best, least = theta, cost
+    return best
+
+
+def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
+    """Real least squares of complex equations: unknowns, and what is left, squared."""
+    A = _parts(columns.T).T
+    size = np.linalg.norm(A, axis=0)
+    A = A / size
+    found = np.linalg.lstsq(A, _parts(y), rcond=None)[0]
+    return found / size, float(np.sum((_parts(y) - A @ found) ** 2))
+
+
+def _least(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Least squares of what is left, each line weighted by its noise."""
+    from scipy.optimize import least_squares
+
+    size = 1.0 / np.linalg.norm(_slopes(what, x, x.u, theta) / noise[:, None], axis=0)
+
+    def slope(z: np.ndarray) -> np.ndarray:
+        return -_parts((_slopes(what, x, x.u, z * size) * size).T / noise).T
+
+    derivative: Any = slope
+    found = least_squares(
+        lambda z: _parts(_misfit(what, x, z * size) / noise),
+        theta / size,
+        derivative,
+        method="lm",
+        xtol=1e-12,
+        ftol=1e-14,
+    )
+    return found.x * size
+
+
+def _settle(
+    what: str, x: _Spectrum, known: np.ndarray, theta: np.ndarray, noise: np.ndarray
+) -> np.ndarray:
+    """Steps to where what is left has no part along the columns of the known part of the input."""
+    for _ in range(100):
+        J, Z = (_parts(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
+        size = np.linalg.norm(Z, axis=0)
+        left = _parts(_misfit(what, x, theta) / noise)
+        step = np.linalg.lstsq((Z / size).T @ J / size, (Z / size).T @ left, rcond=None)[0] / size
+        theta = theta + step
+        if np.all(np.abs(step[:3]) <= 1e-9 * np.abs(theta[:3])):
+            break
+    return theta
+
+
+def _shown(x: _Spectrum, found: _Fitted) -> tuple[np.ndarray, ...]:
+    """Frequency, response, its deviation and coherence, averaged over up to 40 bands.
+
+    In a band, what is left is projected on what the block makes of the input: a mean response that
+    does not depend on how the response bends within the band.
+    """
+    edges = np.geomspace(x.frequency[0], x.frequency[-1], MULTISINE_LINES + 1)
+    place = np.clip(np.searchsorted(edges, x.frequency, "right") - 1, 0, MULTISINE_LINES - 1)
+    if x.terms == 0:  # of a period, each line by itself
+        place = np.arange(len(x.frequency))
+    _, place = np.unique(place, return_inverse=True)
+
+    def total(a: np.ndarray) -> np.ndarray:
+        out = np.zeros(place[-1] + 1, dtype=a.dtype)
+        np.add.at(out, place, a)
+        return out
+
+    count = total(np.ones(len(place)))
+    frequency = total(x.frequency) / count
+    made = found.model * found.known
+    size = total(np.abs(made) ** 2)
+    middle = np.interp(frequency, x.frequency, found.model.real) + 1j * np.interp(
+        frequency, x.frequency, found.model.imag
+    )
+    response_ = middle * (1.0 + total(made.conj() * found.left) / size)
+    deviation = np.abs(middle) * np.sqrt(total(np.abs(made * found.noise) ** 2)) / size
+    coherence = size / (size + total(found.noise**2))
+    return frequency, response_, deviation, coherence

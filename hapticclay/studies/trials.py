@@ -1,0 +1,336 @@
+"""Random trials of a loop or a wall, and which of them are unstable."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+import math
+import multiprocessing
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import ParameterError, integer, number
+from ..files import versions
+from ..model.constants import AXES
+from ..scene.changes import nested, with_fields
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import VirtualWall
+from ..simulation.batch import simulate_batch
+from . import boundary, growth, wall_runs
+from .boundary import PushedLoop
+from .distribution import Distribution
+from .population import HAND, Hands, hands_of, open_uniform
+from .sampling import MOST_RUNS, Range
+
+SCHEMA = "hapticclay-trials-1"
+TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
+SAMPLE_PUSH = 1e-7  # [m] a sample: of a wall, far above rounding and far below the arm's length
+ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
+LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
+SPAN_STEPS = 200.0  # of a repeated run, at least
+WALL_SPANS = (1.0, 4.0)  # of a wall's run, then of the one that repeats it
+WALL_TOLD = 0.01  # a wall's run that changes by a smaller share of itself is repeated
+WALL_BATCH = 100  # walls that run together, for their samples take room in memory
+NOT_RUN = -1  # in place of 0, stable, and 1, unstable
+
+
+@checked
+@dataclass(frozen=True)
+class Trials:
+    """Random runs of a loop, or of a virtual wall: what is fixed, what varies, and how.
+
+    A wall must be linear: no surface, friction or encoder. `zwidth` judges the others, by rest.
+
+    Parameters have dotted names: those of the base ("b", "K", "delay", "pose.x", "operator.mass",
+    "servo.G.damping"; of a wall "K", "B", "device.damper"), else those of the scenario of its runs
+    ("hardware.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
+
+    Attributes:
+        base: what does not vary: a PushedLoop or a VirtualWall. Its own push does not matter.
+        vary: distributions by name; the numbers are independent.
+        hands: population of the hand, or its name in POPULATIONS; None for the hand of the base.
+        grid: one or two parameters with a range of values each, lists or with a count; each
+            combination is a cell.
+        runs: number of runs, of each cell where there is a grid.
+        push: velocity of the handle at the start [m/s], 1e-9 to 1; None for one that leaves the
+            motion linear: TRIAL_PUSH, of a wall SAMPLE_PUSH a sample. Larger ones show what
+            friction, encoder and torque limits of an arm do, and take longer.
+        seed: of the generator, 0 to 2^32 - 1.
+        chunk: runs that are stored together, the most that a killed process loses.
+    """
+
+    base: PushedLoop | VirtualWall
+    vary: dict[str, Distribution] = field(default_factory=dict)
+    hands: str | Hands | None = None
+    grid: dict[str, Range] = field(default_factory=dict)
+    runs: int = 1000
+    push: float | None = None
+    seed: int = 0
+    chunk: int = 1000
+
+    def __post_init__(self):
+        for name, law in self.vary.items():
+            if not isinstance(law, Distribution):
+                raise ParameterError(name, law, "must be a Distribution")
+        for name, values in self.grid.items():
+            if not isinstance(values, Range) or not (values.values or values.n):
+                raise ParameterError(name, values, "must be a Range with a count, or a list")
+        if self.hands is not None:
+            object.__setattr__(self, "hands", hands_of(self.hands))
+        if len(self.grid) > 2:
+            raise ParameterError("grid", list(self.grid), "must have two parameters at most")
+        if len(set(self.names)) < len(self.names):
+            raise ParameterError("names", self.names, "must each be given once")
+        if not self.vary and self.hands is None:
+            raise ParameterError("vary", self.vary, "must hold a distribution, or give hands")
+        if self.push is not None:
+            push = number("push", self.push, 1e-9, 1.0, unit="m/s")
+            object.__setattr__(self, "push", push)
+        integer("seed", self.seed, 0, 2**32 - 1)
+        integer("chunk", self.chunk, 1, 100_000)
+        integer("runs", self.runs, 1, MOST_RUNS)
+        integer("runs", len(self), 1, MOST_RUNS)
+        self.scenario(self.middle(), 0.1)  # refuses an unknown name
+
+    def __len__(self) -> int:
+        return self.runs * self.cells
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the grid, 1 without one."""
+        return math.prod(len(r.grid()) for r in self.grid.values())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters of a run: of the grid, the hand, and what varies."""
+        hand = tuple(f"operator.{n}" for n in HAND) if self.hands else ()
+        return (*self.grid, *hand, *self.vary)
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-len(self) // self.chunk)
+
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one chunk.
+
+        Args:
+            number: of the chunk, from 0.
+        """
+        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
+
+    def points(self, number: int) -> np.ndarray:
+        """Parameters of the runs of one chunk, shape (runs, names).
+
+        Run i lies in cell i modulo the number of cells, so that all cells fill evenly.
+
+        Args:
+            number: of the chunk, from 0.
+        """
+        runs = np.array(self.chunk_runs(number))
+        rng = np.random.default_rng([self.seed, number])
+        columns = []
+        if self.grid:
+            axes = [r.grid() for r in self.grid.values()]
+            index = np.unravel_index(runs % self.cells, [len(x) for x in axes])
+            columns += [x[i] for x, i in zip(axes, index, strict=True)]
+        if isinstance(self.hands, Hands):
+            columns += list(self.hands.spread_over(open_uniform(rng, (len(runs), 3))).T)
+        u = open_uniform(rng, (len(runs), len(self.vary)))
+        columns += [law.spread(x) for law, x in zip(self.vary.values(), u.T, strict=True)]
+        return np.column_stack(columns)
+
+    def middle(self) -> dict[str, float]:
+        """The parameters of a run in the middle: medians, and the first cell."""
+        hand = self.hands.median if isinstance(self.hands, Hands) else None
+        return (
+            {name: float(r.grid()[0]) for name, r in self.grid.items()}
+            | {f"operator.{n}": getattr(hand, n) for n in HAND if hand}
+            | {name: law.median for name, law in self.vary.items()}
+        )
+
+    def loop(self, values: Mapping[str, float]) -> PushedLoop | VirtualWall:
+        """The base with some of its parameters changed.
+
+        Args:
+            values: parameters by name; those of the scenario are left out.
+        """
+        return with_fields(self.base, self._split(values)[0])
+
+    def scenario(self, values: Mapping[str, float], t_max: float) -> Scenario:
+        """The scenario of one run.
+
+        Args:
+            values: its parameters, by name.
+            t_max: its length [s].
+
+        Raises:
+            ParameterError: there is no such parameter, a value is out of its bounds, or a wall is
+                not linear.
+        """
+        own, others = self._split(values)
+        base = with_fields(self.base, own)
+        if isinstance(base, PushedLoop):
+            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(
+                t_max, stop_when_unstable=False
+            )
+        else:
+            push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
+            scenario = base.scenario(t_max, push=push, steps=wall_runs.growth_steps(base))
+        made = with_fields(scenario, others) if others else scenario
+        if isinstance(base, VirtualWall):
+            hardware = made.hardware
+            rough = hardware and (hardware.encoder or any(hardware.friction))
+            if base.unilateral or rough:
+                bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
+                raise ParameterError("base", base, bound)
+        return made
+
+    def _split(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters of the base, and of the scenario."""
+        fields = {f.name for f in dataclasses.fields(self.base)}
+        own = {k: v for k, v in values.items() if next(iter(nested({k: v}))) in fields}
+        return own, {k: v for k, v in values.items() if k not in own}
+
+    @property
+    def axis(self) -> str:
+        """Axis of the motion."""
+        return self.base.axis if isinstance(self.base, PushedLoop) else "x"
+
+    def described(self) -> dict[str, Any]:
+        """The trials as data."""
+        kind = type(self.base).__name__
+        return {"schema": SCHEMA, "kind": kind, **dataclasses.asdict(self)}
+
+    def digest(self) -> str:
+        """Fingerprint of the trials and of the release that runs them."""
+        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    # What `sweep` asks of that which it stores.
+
+    def blank_row(self) -> dict[str, Any]:
+        """A row of the data set, for the types of its columns."""
+        return {"run": 0, **dict.fromkeys(self.names, 0.0), "unstable": 0, "longer": False}
+
+    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
+        """Makes the runs of a chunk; a row each.
+
+        Args:
+            number: of the chunk, from 0.
+        """
+        points = self.points(number)
+        # A worker is one of several processes, one a core.
+        threads = None if multiprocessing.parent_process() is None else 1
+        unstable, longer = judge(self, points, threads)
+        values = points.tolist()
+        return [
+            {"run": run, **dict(zip(self.names, values[i], strict=True)),
+             "unstable": int(unstable[i]), "longer": bool(longer[i])}
+            for i, run in enumerate(self.chunk_runs(number))
+        ]  # fmt: skip
+
+
+def judge(
+    trials: Trials, points: np.ndarray, threads: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Makes runs and tells which are unstable.
+
+    A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
+    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. That
+    of a wall is as long, and is read, as `wall_runs.growth_rates` does, at the wall's own samples;
+    where it hardly changes in size it is repeated, four times as long. A run that ends early, or
+    drives the motors into their limits from so small a push, is unstable.
+
+    Args:
+        trials: what the runs are of.
+        points: their parameters, shape (runs, trials.names).
+        threads: as in `simulate_batch`.
+
+    Returns:
+        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of reach),
+        shape (runs,); whether it was repeated, shape (runs,).
+    """
+    if isinstance(trials.base, VirtualWall):
+        return _judge_walls(trials, points, threads)
+    unstable = np.full(len(points), NOT_RUN)
+    rate = np.full(len(points), np.nan)
+    short: dict[int, Scenario] = {}
+    steps = np.zeros(len(points), dtype=int)
+    for i, row in enumerate(points.tolist()):
+        with contextlib.suppress(ParameterError):
+            made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
+            # Odd, so that half the sampling frequency does not fold onto zero.
+            steps[i] = 2 * round(0.5 * growth.GROWTH_SAMPLE / made.dt) + 1
+            short[i] = replace(
+                made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
+            )
+    axis = AXES.index(trials.axis)
+    for every in np.unique(steps[steps > 0]).tolist():
+        members = np.flatnonzero(steps == every)
+        scenarios = [short[i] for i in members.tolist()]
+        records = simulate_batch(scenarios, threads=threads, every=every)
+        v = np.full((len(members), growth.MOTION_SAMPLES), np.nan)
+        for k, record in enumerate(records):
+            if len(record.v) > growth.MOTION_SAMPLES:
+                v[k] = record.v[1 : growth.MOTION_SAMPLES + 1, axis]
+            else:  # it ended before its time
+                rate[members[k]] = math.inf
+        dt = np.array([s.dt for s in scenarios])
+        for step in np.unique(dt).tolist():
+            some = members[dt == step]
+            found = growth.short_growth(v[dt == step], every * step)
+            rate[some] = np.where(np.isnan(found), rate[some], found)
+    longer = np.isnan(rate) & (steps > 0)
+    unstable[steps > 0] = rate[steps > 0] > 0.0
+    again = np.flatnonzero(longer).tolist()
+    spans = [max(boundary.GROWTH_SPAN, SPAN_STEPS * short[i].dt) for i in again]
+    runs = [replace(short[i], t_max=t) for i, t in zip(again, spans, strict=True)]
+    for i, record in zip(again, simulate_batch(runs, threads=threads), strict=True):
+        ended = record.outcome.code in ENDED
+        unstable[i] = ended or growth.growth_rate(record, trials.axis) > 0.0
+    return unstable, longer
+
+
+def _judge_walls(
+    trials: Trials, points: np.ndarray, threads: int | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `judge`, of walls."""
+    unstable, longer = np.full(len(points), NOT_RUN), np.zeros(len(points), dtype=bool)
+    walls: dict[int, VirtualWall] = {}
+    runs: dict[int, Scenario] = {}
+    for i, row in enumerate(points.tolist()):
+        values = dict(zip(trials.names, row, strict=True))
+        with contextlib.suppress(ParameterError):
+            runs[i], wall = trials.scenario(values, 1.0), trials.loop(values)
+            assert isinstance(wall, VirtualWall)
+            walls[i] = wall
+    # Those with as many steps a sample run together: their records keep one step of so many.
+    steps = {i: round(walls[i].Ts / run.dt) for i, run in runs.items()}
+    for every in sorted(set(steps.values())):
+        members = [i for i in runs if steps[i] == every]
+        for first in range(0, len(members), WALL_BATCH):
+            left = members[first : first + WALL_BATCH]
+            for span in WALL_SPANS:
+                read = {i: wall_runs.growth_reading(walls[i], span) for i in left}
+                jobs = [replace(runs[i], t_max=read[i][0] * walls[i].Ts) for i in left]
+                undecided = []
+                records = simulate_batch(jobs, threads=threads, every=every)
+                for i, job, record in zip(left, jobs, records, strict=True):
+                    if record.outcome.code in (*ENDED, *LOST):
+                        unstable[i] = True
+                        continue
+                    rate = growth.growth_of_run(record, *read[i][1:])
+                    unstable[i] = rate > 0.0
+                    if abs(rate) * job.t_max < WALL_TOLD:
+                        undecided.append(i)
+                left = undecided
+                if span == WALL_SPANS[0]:
+                    longer[left] = True
+    return unstable, longer

@@ -1,0 +1,216 @@
+"""The hand of a box that leaves a loop the least margin, and a rigid hand."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..arguments import named
+from ..errors import (
+    ParameterError,
+    field_types,
+    flag,
+    integer,
+    number,
+    numbers_of,
+)
+from ..model.operator import Operator
+from . import gain_crossings, linear_loop, roots
+from .loops import Loop, of_loop
+from .roots import first_failure
+from .stability_margins import LINEAR, Verdict
+
+# ---- the worst case over hands -------------------------------------------------------------------
+
+
+@named
+@dataclass(frozen=True)
+class Box:
+    """Ranges of Th, and whether a rigid arm is among them.
+
+    Attributes:
+        mass: (low, high) [kg].
+        damper: (low, high) [N.s/m].
+        spring: (low, high) [N/m].
+        rigid: True adds an arm that cannot move, Th = infinity.
+    """
+
+    mass: tuple[float, float] = (0.25, 0.25)
+    damper: tuple[float, float] = (2.0, 2.0)
+    spring: tuple[float, float] = (6.0, 6.0)
+    rigid: bool = False
+
+    def __post_init__(self):
+        for field, (_, bound) in field_types(Operator).items():
+            unit = bound.unit if bound else ""
+            given = getattr(self, field)
+            low, high = numbers_of(f"box.{field}", given, ("low", "high"), 0.0, unit=unit)
+            if high < low:
+                raise ParameterError(f"box.{field}", (low, high), "must have low <= high")
+            object.__setattr__(self, field, (low, high))
+            Operator(**{field: high})
+        flag("box.rigid", self.rigid)
+
+    def corners(self) -> list[Operator]:
+        """Return the eight corners, each once."""
+        corners = sorted(set(itertools.product(self.mass, self.damper, self.spring)))
+        return [Operator(*x) for x in corners]
+
+    def sample(self, n: int, seed: int = 0) -> list[Operator]:
+        """Draw members uniformly.
+
+        Args:
+            n: number of members.
+            seed: of the generator.
+        """
+        x = np.random.default_rng(seed).uniform(size=(n, 3))
+        low, high = np.array([self.mass, self.damper, self.spring]).T
+        return [Operator(*row) for row in (low + x * (high - low)).tolist()]
+
+
+@named
+@dataclass(frozen=True)
+class WorstCase:
+    """The worst hand of a box.
+
+    Attributes:
+        verdict: whether every hand of the box is stable, its margin the worst gain limit over K.
+        limit: largest K up to which every hand is stable.
+        hand: one that stops being stable there; None if it is the rigid arm.
+    """
+
+    verdict: Verdict
+    limit: float
+    hand: Operator | None
+
+
+def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
+    """A hand of the box that puts a pole on the imaginary axis.
+
+    Exact (zero exclusion; Barmish, New Tools for Robustness of Linear Systems, 1994). The
+    closed-loop polynomial is A + E Th, so the pole s = j omega needs one value Th = -A/E. The
+    values of the box at omega are a rectangle, spring - mass omega^2 by omega damper: -A/E lies in
+    it where four polynomials in omega^2 have the right sign.
+
+    Args:
+        loop: the loop with its K, in continuous time; its own hand does not matter.
+        box: the hands.
+
+    Returns:
+        (hand, frequency [rad/s]), or None if no hand of the box does.
+    """
+    A = linear_loop.characteristic(replace(loop, operator=None))
+    E = linear_loop.device_admittance(loop)[0]
+    for edge in _critical_ends(A, E, box):
+        return edge
+    AE = roots.cross_spectrum(-A, E).coef
+    R, X = Polynomial(AE.real[::2]), Polynomial(AE.imag[1::2])
+    Q = roots.squared_magnitude(E)  # -A/E = R/Q + j omega X/Q
+    (m0, m1), (d0, d1), (k0, k1) = box.mass, box.damper, box.spring
+    tests = [X - d0 * Q, d1 * Q - X, R - Polynomial([k0, -m1]) * Q, Polynomial([k1, -m0]) * Q - R]
+    edges = np.unique(np.concatenate([roots.positive_roots(t) for t in tests]))
+    sizes = [Polynomial(np.abs(t.coef)) for t in tests]
+    for x in np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))).tolist():
+        # Where an edge of the box is met, to 1e-9 of the terms that cancel there.
+        if all(t(x) >= -1e-9 * size(x) for t, size in zip(tests, sizes, strict=True)):
+            return _member(box, float(R(x) / Q(x)), float(X(x) / Q(x)), x)
+    return None
+
+
+def _critical_ends(A: Polynomial, E: Polynomial, box: Box) -> Iterator[tuple[Operator, float]]:
+    """Hands that put a pole at 0, by their spring, or at infinity, by their mass."""
+    lows = {f: getattr(box, f)[0] for f in ("mass", "damper", "spring")}
+    for field, end, at, power in (("spring", 0, 0.0, 0), ("mass", -1, math.inf, 2)):
+        low, high = getattr(box, field)
+        if A.coef[end] and E.coef[end] and (not power or A.degree() == E.degree() + power):
+            needed = -A.coef[end] / E.coef[end]
+            if low <= needed <= high:
+                yield Operator(**lows | {field: float(needed)}), at
+
+
+def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, float]:
+    """The hand of the box whose value at omega^2 = x is real + j omega damper."""
+    lowest = max(box.mass[0], (box.spring[0] - real) / x)
+    highest = min(box.mass[1], (box.spring[1] - real) / x)
+    mass = min(max(0.5 * (lowest + highest), box.mass[0]), box.mass[1])
+    spring = min(max(real + mass * x, box.spring[0]), box.spring[1])
+    return Operator(mass, min(max(damper, box.damper[0]), box.damper[1]), spring), math.sqrt(x)
+
+
+def rigid_limit(loop: Loop) -> tuple[float, float]:
+    """Largest K that is stable with an arm that cannot move, Th to infinity.
+
+    The closed-loop poles tend to the zeros of G C + Sh, so the limit is that of its numerator,
+    whatever the clay. The paper's remark below Eq. 13, that no compensator serves a rigid arm, is a
+    property of its sufficient condition, not of the loop.
+
+    Args:
+        loop: the loop, in continuous time; clay, hand and K do not matter.
+
+    Returns:
+        (K, omega [rad/s]).
+    """
+    driven = linear_loop.device_admittance(replace(loop, K=1.0))[0]
+    passive = linear_loop.device_admittance(replace(loop, K=0.0))[0]
+    return roots.first_crossing(passive, driven - passive)
+
+
+@of_loop("K", "b", "box", timing=True)
+def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
+    """The lowest gain limit over a box of hands.
+
+    In continuous time without delay it is exact: K rises from zero until `critical_hand` finds one.
+    With sampling or delay it is the least over the corners and random members, and the verdict's
+    method says so.
+
+    Args:
+        loop: the loop with its K > 0, whose own hand does not matter; or axis, K, b, box, and other
+            parts by name.
+        box: the hands.
+        samples: random members tried with sampling or delay, 0 to 10000.
+    """
+    K = number("K", loop.gain, 0.0, above=True)
+    timed = loop.Ts is not None or loop.delay > 0.0
+    if timed:
+        members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))
+        found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in members]
+        limit, omega, hand = min(found, key=lambda x: x[0])
+        how = f"sampled: the corners and {samples} random members, no proof for those between"
+    else:
+        limit, omega, hand = _exact_worst_case(loop, box)
+        how = "zero exclusion, its value set a rectangle at every frequency: exact"
+    if box.rigid:
+        rigid, rigid_omega = rigid_limit(loop)
+        if rigid < limit:
+            limit, omega, hand = rigid, rigid_omega, None
+        how += "; the rigid arm by the zeros of G C + Sh"
+        how += ", in continuous time" if timed else ", exact"
+    assumptions = (LINEAR, f"hand in {box}")
+    verdict = Verdict(K < limit, limit / K, omega, assumptions, how, "worst gain limit over K")
+    return WorstCase(verdict, limit, hand)
+
+
+def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | None]:
+    corners = box.corners()
+
+    def stable(K: float) -> bool:
+        tried = replace(loop, operator=corners[0], K=K)
+        return linear_loop.stable(tried) and not critical_hand(tried, box)
+
+    found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in corners]
+    limit, omega, worst = min(found, key=lambda x: x[0])
+    top = min(limit, 1e6)
+    if limit == 0.0 or (limit == math.inf and stable(top)):
+        return limit, math.nan, worst
+    # A window narrower than 20 % in K may be missed, but no limit of a corner.
+    grid = [*np.geomspace(1e-4 * top, top, 49)[:-1].tolist(), (1.0 + 1e-6) * top]
+    high = first_failure(stable, grid, below=0.0)[1]
+    if high < (1.0 - 1e-7) * limit:  # `critical_hand` is that sharp
+        critical = critical_hand(replace(loop, K=high), box)
+        return high, critical[1] if critical else math.nan, critical[0] if critical else worst
+    return limit, omega, worst
