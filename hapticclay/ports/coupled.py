@@ -133,6 +133,7 @@ class DeviceHand:
             x, y = flat(sample.position, self.plane)
             self._offset = start[0] - x, start[1] - y
             self._take(sample)
+        client.grow_anew()
 
     def _settle(self) -> float:
         """Median of the time between two answers [s]."""
