@@ -191,7 +191,7 @@ def write_report(
     found = loop_report(exchanges, scenario)
     try:
         found.save(folder / "loop.json")
-        if figures is not None:
+        if figures is not None and found.line_K:  # without a wall there is nothing to show
             _draw(found, folder, figures)
     finally:  # a full disk must not hide the result
         print(report_table(found))
