@@ -110,7 +110,8 @@ class DeviceOptions:
     @contextlib.contextmanager
     def _server(self, session: Any) -> Iterator[None]:
         from ..ports.server import DeviceServer
-        from ..ports.service import Inverse3, Service
+        from ..ports.service import Service
+        from ..ports.sessions import Inverse3
         from ..views.device_sessions import LiveDevice
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)

@@ -131,7 +131,7 @@ class DeviceClient:
             self._socket.close()
         self.lost = self.lost or "closed"
 
-    def grow_anew(self) -> None:
+    def restart_ramp(self) -> None:
         """Lets forces grow from nothing again, from now on."""
         self._full_at = self._time(time.perf_counter()) + self.limits.ramp
 
