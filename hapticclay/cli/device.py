@@ -101,7 +101,7 @@ class DeviceCommand:
     def _server(self) -> Any:
         from ..ports.buttons import ButtonScript
         from ..ports.server import serve
-        from ..ports.service import PORTS, Inverse3
+        from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
         shown = Inverse3(

@@ -110,7 +110,8 @@ class DeviceOptions:
     @contextlib.contextmanager
     def _server(self, session: Any) -> Iterator[None]:
         from ..ports.server import DeviceServer
-        from ..ports.service import Inverse3, Service
+        from ..ports.service import Service
+        from ..ports.sessions import Inverse3
         from ..views.device_sessions import LiveDevice
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
@@ -191,7 +192,7 @@ def write_report(
     found = loop_report(exchanges, scenario)
     try:
         found.save(folder / "loop.json")
-        if figures is not None:
+        if figures is not None and found.line_K:  # without a wall there is nothing to show
             _draw(found, folder, figures)
     finally:  # a full disk must not hide the result
         print(report_table(found))

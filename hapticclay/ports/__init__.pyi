@@ -16,4 +16,4 @@ from .report import LoopReport as LoopReport
 from .report import loop_report as loop_report
 from .server import DeviceServer as DeviceServer
 from .server import serve as serve
-from .service import Inverse3 as Inverse3
+from .sessions import Inverse3 as Inverse3

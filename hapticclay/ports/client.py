@@ -131,6 +131,10 @@ class DeviceClient:
             self._socket.close()
         self.lost = self.lost or "closed"
 
+    def restart_ramp(self) -> None:
+        """Lets forces grow from nothing again, from now on."""
+        self._full_at = self._time(time.perf_counter()) + self.limits.ramp
+
     def exchange(self, force: Vector = NOTHING) -> DeviceSample | None:
         """Sends a force and waits for the state, at the rate of the limits.
 

@@ -20,7 +20,7 @@ from ..simulation.stepwise import Simulation
 from .client import PLAIN, DeviceClient, DeviceSample, Limits
 from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
-from .planes import PLANES, flat, lifted
+from .planes import PLANES, to_plane, to_space
 
 SETTLING = 50  # exchanges without force, in which the period of the device is measured
 LONGEST = 3600.0  # [s] of a session
@@ -130,9 +130,10 @@ class DeviceHand:
         self._offset = 0.0, 0.0
         self.place, self.rate, self.held, self.t = start, (0.0, 0.0), False, 0.0
         if sample := client.exchange():
-            x, y = flat(sample.position, self.plane)
+            x, y = to_plane(sample.position, self.plane)
             self._offset = start[0] - x, start[1] - y
             self._take(sample)
+        client.restart_ramp()
 
     def _settle(self) -> float:
         """Median of the time between two answers [s]."""
@@ -155,7 +156,7 @@ class DeviceHand:
         push = NOTHING
         if self.held:
             x, y = self.coupling.force(self.place, self.rate, p, v)
-            push = lifted((-x, -y), self.plane)
+            push = to_space((-x, -y), self.plane)
         sample = self.client.exchange(push)
         self.held = sample is not None
         if sample is not None:
@@ -175,9 +176,9 @@ class DeviceHand:
         return self.held
 
     def _take(self, sample: DeviceSample) -> None:
-        x, y = flat(sample.position, self.plane)
+        x, y = to_plane(sample.position, self.plane)
         self.place = x + self._offset[0], y + self._offset[1]
-        self.rate, self.held, self.t = flat(sample.velocity, self.plane), True, sample.t
+        self.rate, self.held, self.t = to_plane(sample.velocity, self.plane), True, sample.t
 
     def notes(self) -> dict[str, object]:
         """What a record says of the device."""

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 from . import inverse
 
 if TYPE_CHECKING:
-    from .service import Service, Session
+    from .sessions import Host, Session
 
 
-class InverseSpeech:
+class InverseProtocol:
     """The protocol of the Inverse service, versions 3.1 to 3.5."""
 
     name, pushes = "inverse", False
 
-    def greet(self, service: Service, session: Session) -> list[str]:
+    def greet(self, service: Host, session: Session) -> list[str]:
         """The inventory.
 
         Args:
@@ -24,7 +24,7 @@ class InverseSpeech:
         """
         return [inverse.frame_text(frame_of(service, session, full=True))]
 
-    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]:
+    def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
         """One frame, whatever the message is.
 
         Args:
@@ -39,10 +39,10 @@ class InverseSpeech:
         for name in sorted(others):
             service.count(f"a client drives {name}, this device is {shown.device_id}")
         session.profile = message.profile or session.profile
-        service.obey(session, message.command(shown.device_id))
+        service.apply(session, message.command(shown.device_id))
         return [inverse.frame_text(frame_of(service, session, message.full))]
 
-    def due(self, service: Service, session: Session) -> list[str]:
+    def due(self, service: Host, session: Session) -> list[str]:
         """Nothing: the service speaks when it is spoken to.
 
         Args:
@@ -51,7 +51,7 @@ class InverseSpeech:
         """
         return []
 
-    def inventory(self, service: Service) -> dict[str, Any]:
+    def inventory(self, service: Host) -> dict[str, Any]:
         """The devices of each kind, as plain data.
 
         Args:
@@ -61,7 +61,7 @@ class InverseSpeech:
         return {kind: found[kind] for kind in inverse.DEVICES}
 
 
-def frame_of(service: Service, session: Session | None, full: bool) -> inverse.Frame:
+def frame_of(service: Host, session: Session | None, full: bool) -> inverse.Frame:
     """The state of the device.
 
     Args:

@@ -7,7 +7,7 @@ from .commands import NOTHING, Pair, Vector
 PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that are x and y of the arm
 
 
-def flat(v: Vector, plane: str) -> Pair:
+def to_plane(v: Vector, plane: str) -> Pair:
     """What a vector of the cursor has in the plane of the arm.
 
     Args:
@@ -18,7 +18,7 @@ def flat(v: Vector, plane: str) -> Pair:
     return v[i], v[j]
 
 
-def across(v: Vector, plane: str) -> float:
+def normal_component(v: Vector, plane: str) -> float:
     """What a vector of the cursor has across the plane of the arm.
 
     Args:
@@ -28,7 +28,7 @@ def across(v: Vector, plane: str) -> float:
     return v[3 - sum(PLANES[plane])]
 
 
-def lifted(v: Pair, plane: str, rest: Vector = NOTHING) -> Vector:
+def to_space(v: Pair, plane: str, rest: Vector = NOTHING) -> Vector:
     """A vector of the arm's plane as one of the cursor.
 
     Args:

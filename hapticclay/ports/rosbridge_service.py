@@ -11,7 +11,7 @@ from .commands import IDLE
 from .rosbridge import LEVELS, PUBLISHED, TAKEN, Operation
 
 if TYPE_CHECKING:
-    from .service import Service, Session
+    from .sessions import Host, Session
 
 MOST_TOPICS = 100  # that a client may subscribe to
 
@@ -59,7 +59,7 @@ class Subscriptions:
                 table.pop(operation.topic, None)
 
 
-class RosbridgeSpeech:
+class RosbridgeProtocol:
     """The protocol of rosbridge v2, with topics of CRTK and of the drivers of the Touch."""
 
     name, pushes = "rosbridge", True
@@ -67,7 +67,7 @@ class RosbridgeSpeech:
     def __init__(self):
         self._epoch = time.time()
 
-    def greet(self, service: Service, session: Session) -> list[str]:
+    def greet(self, service: Host, session: Session) -> list[str]:
         """Nothing: a client subscribes first.
 
         Args:
@@ -77,7 +77,7 @@ class RosbridgeSpeech:
         session.memory = Subscriptions()
         return []
 
-    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]:
+    def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
         """Status messages, answers of services, and what is due after a command.
 
         Args:
@@ -94,7 +94,7 @@ class RosbridgeSpeech:
             return self._status(service, session, "error", text, operation)
         return act(self, service, session, operation)
 
-    def due(self, service: Service, session: Session) -> list[str]:
+    def due(self, service: Host, session: Session) -> list[str]:
         """Topics of a client with a state that it has not been sent.
 
         Args:
@@ -118,7 +118,7 @@ class RosbridgeSpeech:
             out.append(rosbridge.publish_text(topic, msg))
         return out
 
-    def inventory(self, service: Service) -> dict[str, Any]:
+    def inventory(self, service: Host) -> dict[str, Any]:
         """Topics and their types, as plain data.
 
         Args:
@@ -128,7 +128,7 @@ class RosbridgeSpeech:
 
     # ---- operations
 
-    def _subscribe(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _subscribe(self, service: Host, session: Session, x: Operation) -> list[str]:
         kind, kept = rosbridge.kind_of(x.topic, PUBLISHED), session.memory
         wrong = _wrong_type(x, PUBLISHED.get(kind, ""))
         if x.compression not in ("none", "None"):
@@ -144,11 +144,11 @@ class RosbridgeSpeech:
         kept.sent.pop(x.topic, None)
         return self.due(service, session)
 
-    def _unsubscribe(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _unsubscribe(self, service: Host, session: Session, x: Operation) -> list[str]:
         session.memory.remove(x)
         return []
 
-    def _advertise(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _advertise(self, service: Host, session: Session, x: Operation) -> list[str]:
         kind = rosbridge.kind_of(x.topic, TAKEN)
         if wrong := _wrong_type(x, TAKEN.get(kind, "")):
             return self._status(service, session, "error", wrong, x)
@@ -157,23 +157,23 @@ class RosbridgeSpeech:
             return self._status(service, session, "warning", text, x)
         return []
 
-    def _unadvertise(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _unadvertise(self, service: Host, session: Session, x: Operation) -> list[str]:
         """A client that stops publishing a command stops commanding."""
         if rosbridge.kind_of(x.topic, TAKEN) and session.command != IDLE:
             session.command = IDLE
         return []
 
-    def _publish(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _publish(self, service: Host, session: Session, x: Operation) -> list[str]:
         kind = rosbridge.kind_of(x.topic, TAKEN)
         if not kind:
             text = f"nobody listens to {x.topic}"
             return self._status(service, session, "warning", text, x)
         command, left_out = rosbridge.command_of(kind, x.msg)
         told = self._status(service, session, "error", left_out, x) if left_out else []
-        service.obey(session, command)
+        service.apply(session, command)
         return [*told, *self.due(service, session)]
 
-    def _call_service(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _call_service(self, service: Host, session: Session, x: Operation) -> list[str]:
         values = self._called(service, x)
         if values is None:
             text = f"Service {x.topic} does not exist"
@@ -181,7 +181,7 @@ class RosbridgeSpeech:
             return [rosbridge.response_text(x, text, False)]
         return [rosbridge.response_text(x, values, True)]
 
-    def _called(self, service: Service, x: Operation) -> dict[str, Any] | None:
+    def _called(self, service: Host, x: Operation) -> dict[str, Any] | None:
         """What a service returns; None for a service that there is not."""
         both = PUBLISHED | TAKEN
         if x.topic == "/rosapi/topics":
@@ -192,14 +192,14 @@ class RosbridgeSpeech:
             return {"time": rosbridge.ros_time(self._epoch + service.device.t)}
         return None
 
-    def _set_level(self, service: Service, session: Session, x: Operation) -> list[str]:
+    def _set_level(self, service: Host, session: Session, x: Operation) -> list[str]:
         if x.topic not in LEVELS:
             return self._status(service, session, "error", f"no level {x.topic}", x)
         session.memory.level = x.topic
         return []
 
     def _status(
-        self, service: Service, session: Session, level: str, text: str, to: Operation
+        self, service: Host, session: Session, level: str, text: str, to: Operation
     ) -> list[str]:
         """A status message, for a client that wants those of its level."""
         service.count(text)
@@ -209,14 +209,14 @@ class RosbridgeSpeech:
 
 
 OPERATIONS = {
-    "subscribe": RosbridgeSpeech._subscribe,
-    "unsubscribe": RosbridgeSpeech._unsubscribe,
-    "advertise": RosbridgeSpeech._advertise,
-    "unadvertise": RosbridgeSpeech._unadvertise,
-    "publish": RosbridgeSpeech._publish,
-    "call_service": RosbridgeSpeech._call_service,
-    "set_level": RosbridgeSpeech._set_level,  # the name in rosbridge_library
-    "set_status_level": RosbridgeSpeech._set_level,  # and in its specification
+    "subscribe": RosbridgeProtocol._subscribe,
+    "unsubscribe": RosbridgeProtocol._unsubscribe,
+    "advertise": RosbridgeProtocol._advertise,
+    "unadvertise": RosbridgeProtocol._unadvertise,
+    "publish": RosbridgeProtocol._publish,
+    "call_service": RosbridgeProtocol._call_service,
+    "set_level": RosbridgeProtocol._set_level,  # the name in rosbridge_library
+    "set_status_level": RosbridgeProtocol._set_level,  # and in its specification
 }
 
 

@@ -23,7 +23,8 @@ from ..simulation.record import Record
 from .device import SimulatedDevice, Trajectory
 from .exchanges import Exchanges
 from .inverse import LARGEST_MESSAGE
-from .service import PLAIN, Inverse3, Service
+from .service import Service
+from .sessions import PLAIN, Inverse3
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 CLOCKS = ("wall", "tick")
@@ -150,7 +151,7 @@ class DeviceServer:
         try:
             for text in texts:
                 await connection.send(text)
-            if self.service.speech.pushes:
+            if self.service.protocol.pushes:
                 pushing = asyncio.create_task(self._push(connection, number))
             async for data in connection:
                 for text in self.service.answer(number, data):

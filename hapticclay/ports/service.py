@@ -10,26 +10,19 @@ from __future__ import annotations
 
 import logging
 import math
-import re
 import threading
 import time
 from collections import Counter
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, Protocol
+from typing import Any
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
-from ..scene.scenario import Scenario
-from .buttons import ButtonScript
-from .commands import IDLE, NOTHING, Command, Pair, Vector
-from .driven_arm import LARGEST_FORCE, LIMP, Drive, Sensed
+from .commands import IDLE, NOTHING, Command, Vector
+from .driven_arm import LIMP, Drive
 from .exchanges import Exchange, ExchangeLog
 from .inverse import Cursor
-from .planes import across, flat, lifted
+from .planes import normal_component, to_plane, to_space
+from .sessions import PLAIN, Device, Inverse3, Session, WireProtocol
 
 REST: Vector = (0.08, -0.15, 0.14)  # [m] where an Inverse3 has its cursor at rest: handle at p = 0
-ID = re.compile("[0-9A-F]{1,16}")
-PORTS = {"inverse": 10_001, "rosbridge": 9090}  # where clients look for each protocol
 # [s] without a message after which a client's command no longer acts: with the thread's turn, 50 ms
 PATIENCE = 0.048
 LATE = 0.1  # [s] behind the clock from which on time is skipped
@@ -40,101 +33,6 @@ LOOK = 0.002  # [s] between two looks at the clients of a device that something 
 LOG = logging.getLogger("hapticclay.ports")
 
 
-@named
-@dataclass(frozen=True)
-class Inverse3:
-    """What the simulated device shows itself as.
-
-    Attributes:
-        device_id: of the Inverse3, 1 to 16 hexadecimal digits.
-        grip_id: of the grip, 1 to 16 hexadecimal digits.
-        plane: "xy" or "xz", plane of the cursor in which the arm moves.
-        buttons: of the grip, over time.
-        largest_force: longer forces are shortened to this length [N], > 0, at most 1e3.
-        protocol: "inverse", of the Haply Inverse service, or "rosbridge", topics of ROS as JSON.
-    """
-
-    device_id: str = "04EA"
-    grip_id: str = "F00D"
-    plane: Literal["xy", "xz"] = "xy"
-    buttons: ButtonScript = ButtonScript()
-    largest_force: Annotated[float, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
-    protocol: Literal["inverse", "rosbridge"] = "inverse"
-
-    def __post_init__(self):
-        check_fields(self)
-        for name in ("device_id", "grip_id"):
-            if not ID.fullmatch(getattr(self, name)):
-                bound = "must be 1 to 16 hexadecimal digits, as 04EA"
-                raise ParameterError(name, getattr(self, name), bound)
-
-
-PLAIN = Inverse3()
-
-
-class Device(Protocol):
-    """What a service drives: a `SimulatedDevice`, or the arm of a session that a person watches.
-
-    Attributes:
-        paced: whether something else than the clock of the service moves it.
-    """
-
-    paced: bool
-
-    @property
-    def t(self) -> float: ...
-    @property
-    def sensed(self) -> Sensed: ...
-    @property
-    def force(self) -> Pair: ...
-    @property
-    def torques(self) -> Pair: ...
-    @property
-    def ended(self) -> str: ...
-    @property
-    def scenario(self) -> Scenario: ...
-    def drive(self, drive: Drive) -> Pair: ...
-    def advance(self, samples: int | None = None) -> None: ...
-
-
-@dataclass
-class Session:
-    """A client that is connected.
-
-    Attributes:
-        number: 1 for the first client, and so on.
-        command: its newest one.
-        heard: when its last command came [s].
-        log: its exchanges.
-        profile: name that it gave itself.
-        memory: what its protocol keeps.
-    """
-
-    number: int
-    command: Command = IDLE
-    heard: float = -math.inf
-    log: ExchangeLog = field(default_factory=ExchangeLog)
-    profile: str = ""
-    memory: Any = None
-
-
-class Speech(Protocol):
-    """A protocol: reads what a client sends, and writes what it is sent.
-
-    Attributes:
-        name: of the protocol.
-        pushes: whether clients are sent states that they have not asked for.
-    """
-
-    name: str
-    pushes: bool
-
-    def greet(self, service: Service, session: Session) -> list[str]: ...
-    def answer(self, service: Service, session: Session, data: str | bytes) -> list[str]: ...
-    def due(self, service: Service, session: Session) -> list[str]: ...
-    def inventory(self, service: Service) -> dict[str, Any]: ...
-
-
 class Service:
     """Clients, their commands, and the clock.
 
@@ -142,7 +40,7 @@ class Service:
         device: what is driven.
         clock: "tick" or "wall".
         inverse3: what the device shows itself as.
-        speech: the protocol.
+        protocol: that clients speak.
         notices: what was left out of messages, and how often.
         skipped: control samples that the wall clock left out, since the computer was late.
         samples: control samples that it made.
@@ -164,7 +62,7 @@ class Service:
         """
         self.device, self.clock, self.notices = device, clock, Counter[str]()
         self.inverse3, self._plane = inverse3, inverse3.plane
-        self.speech = speech_of(inverse3.protocol)
+        self.protocol = protocol_of(inverse3.protocol)
         self.skipped = self.samples = 0
         self._sessions: dict[int, Session] = {}
         self._logs: dict[int, ExchangeLog] = {}
@@ -189,7 +87,7 @@ class Service:
                 gone = [k for k in self._logs if k not in self._sessions]
                 if gone:
                     del self._logs[min(gone, key=lambda k: self._logs[k].count)]
-            return number, self.speech.greet(self, session)
+            return number, self.protocol.greet(self, session)
 
     def leave(self, number: int) -> None:
         """A client has gone, and its command with it.
@@ -209,7 +107,7 @@ class Service:
             data: its message, text or binary, whatever it is.
         """
         with self._lock:
-            return self.speech.answer(self, self._sessions[number], data)
+            return self.protocol.answer(self, self._sessions[number], data)
 
     def due(self, number: int) -> list[str]:
         """What to send a client that has not asked.
@@ -219,9 +117,9 @@ class Service:
         """
         with self._lock:
             session = self._sessions.get(number)
-            return [] if session is None else self.speech.due(self, session)
+            return [] if session is None else self.protocol.due(self, session)
 
-    def obey(self, session: Session, command: Command) -> None:
+    def apply(self, session: Session, command: Command) -> None:
         """Takes a client's command; with the clock "tick", the first client's moves the device.
 
         Args:
@@ -231,8 +129,8 @@ class Service:
         device = self.device
         session.command, session.heard = command, time.monotonic()
         force = command.force or NOTHING
-        x, y = flat(force, self._plane)
-        z = across(force, self._plane)
+        x, y = to_plane(force, self._plane)
+        z = normal_component(force, self._plane)
         if z:
             self.count("force across the plane of the arm is recorded and cannot act")
         began = device.t
@@ -260,7 +158,7 @@ class Service:
     def inventory(self) -> dict[str, Any]:
         """What the device shows itself as, as plain data."""
         with self._lock:
-            return self.speech.inventory(self)
+            return self.protocol.inventory(self)
 
     def count(self, notice: str) -> None:
         """Counts what was left out of a message, and says it the first time.
@@ -285,12 +183,12 @@ class Service:
             for s in self._sessions.values()
             if self.clock == "tick" or now - s.heard < PATIENCE
         ]
-        forces = [flat(c.force, self._plane) for c in fresh if c.force is not None]
+        forces = [to_plane(c.force, self._plane) for c in fresh if c.force is not None]
         torques = [c.torques for c in fresh if c.torques is not None]
-        targets = [flat(c.target, self._plane) for c in fresh if c.target is not None]
+        targets = [to_plane(c.target, self._plane) for c in fresh if c.target is not None]
         target = None
         if targets:  # the newest client's
-            (x, y), (x0, y0) = targets[-1], flat(REST, self._plane)
+            (x, y), (x0, y0) = targets[-1], to_plane(REST, self._plane)
             target = x - x0, y - y0
         return Drive(
             (sum(f[0] for f in forces), sum(f[1] for f in forces)),
@@ -306,9 +204,9 @@ class Service:
         """
         seen, device, plane = self.device.sensed, self.device, self._plane
         return Cursor(
-            lifted(seen.position, plane, REST),
-            lifted(seen.velocity, plane),
-            lifted(device.force, plane),
+            to_space(seen.position, plane, REST),
+            to_space(seen.velocity, plane),
+            to_space(device.force, plane),
             mode,
             (math.degrees(seen.angles[0]), math.degrees(seen.angles[1])),
             (math.degrees(seen.rates[0]), math.degrees(seen.rates[1])),
@@ -358,16 +256,16 @@ class Service:
             time.sleep(0.0 if due else 0.25 * sample)
 
 
-def speech_of(protocol: str) -> Speech:
+def protocol_of(protocol: str) -> WireProtocol:
     """The protocol of a name.
 
     Args:
         protocol: "inverse" or "rosbridge".
     """
     if protocol == "rosbridge":
-        from .rosbridge_service import RosbridgeSpeech
+        from .rosbridge_service import RosbridgeProtocol
 
-        return RosbridgeSpeech()
-    from .inverse_service import InverseSpeech
+        return RosbridgeProtocol()
+    from .inverse_service import InverseProtocol
 
-    return InverseSpeech()
+    return InverseProtocol()

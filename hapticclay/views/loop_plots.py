@@ -52,7 +52,8 @@ def loop_plot(report: LoopReport) -> Figure:
             xlim=(-0.04 * right, right),
             ylim=(0.0, top),
         )
-        add_legend(figure, ax, 2)
+        if told:
+            add_legend(figure, ax, 2)
         set_title(ax, *_parts(report, told))
     return figure
 

@@ -17,7 +17,7 @@ from hapticclay.model.constants import NOMINAL
 from hapticclay.ports import Coupled, Limits, Trajectory, connect, render, serve
 from hapticclay.ports.client import MOST_MISSED, allowed
 from hapticclay.ports.client_log import ClientLog, Exchanged
-from hapticclay.ports.coupled import SETTLING
+from hapticclay.ports.coupled import SETTLING, DeviceHand
 from hapticclay.ports.inverse import Cursor, Frame, frame_text
 from hapticclay.ports.service import REST
 from tests.ports.conftest import SCENE
@@ -83,6 +83,19 @@ def test_the_force_grows_over_the_ramp():
     expected = [min(1.0, 0.1 * k) * 2.0 for k in range(15)]
     assert [f[0] for f in sent[:15]] == pytest.approx(expected, abs=1e-12)
     assert sent[15] == (0.0, 0.0, 0.0)  # at the end
+
+
+def test_the_force_of_a_hand_grows_once_its_period_is_known():
+    """K times 10 mm, in even steps from nothing, however long the period was measured."""
+    limits = Limits(period=0.01, ramp=0.1)
+    with device(lambda k, f: STILL) as (url, sent), connect(url, limits) as client:
+        hand = DeviceHand(client, Coupled(K=200.0), (0.0, 0.0))
+        before = len(sent)
+        for _ in range(12):
+            hand.exchange((0.01, 0.0), (0.0, 0.0))
+    assert sent[:before] == [(0.0, 0.0, 0.0)] * (SETTLING + 1)
+    expected = [min(1.0, 0.1 * k) * 2.0 for k in range(12)]
+    assert [f[0] for f in sent[before : before + 12]] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("answer", [None, "rubbish", '{"inverse3":[]}'])

@@ -14,6 +14,7 @@ from hapticclay.ports.device import SimulatedDevice
 from hapticclay.ports.report import fit_wall
 from hapticclay.ports.service import REST, Service
 from hapticclay.theory.client_loop import Handle, rendered_stiffness_limit
+from hapticclay.views.loop_plots import loop_plot
 from tests.ports.conftest import tick
 
 SCENE = hc.Scenario(operator=hc.Operator(0.25, 2.0, 60.0), force=(0.0, 0.0), length=None)
@@ -76,6 +77,23 @@ def test_what_is_no_wall_is_not_told(change, note):
     r = loop_report(change(swinging(640.0, 0.0, 1)), SCENE)
     assert math.isnan(r.K) and r.verdict == "not told" and note in r.note
     assert r.note in r.headline()
+
+
+def test_a_report_without_a_wall_has_a_figure_too(tmp_path):
+    r = loop_report(dataclasses.replace(e := swinging(640.0, 0.0, 1), asked=0.0 * e.asked), SCENE)
+    (axes,) = loop_plot(r).axes
+    assert "0 messages had a force" in axes.get_title(loc="left") + axes.get_title()
+
+
+def test_age_and_z_width():
+    """The line of limits at its ends: the limit without damping, and nothing at the largest B."""
+    r = loop_report(swinging(640.0, 4.0, 2), SCENE)
+    assert r.age == pytest.approx(r.delay / PERIOD)
+    handle = Handle.of(SCENE, normal=r.normal)
+    K, B, most = r.z_width
+    assert rendered_stiffness_limit(handle, B, PERIOD, r.delay) == pytest.approx(K, rel=1e-2)
+    assert K > r.limit > r.line_K[0] > 0.0 and r.line_K[-1] == 0.0 and 0.0 < B < most
+    assert rendered_stiffness_limit(handle, 1.2 * most, PERIOD, r.delay) == 0.0
 
 
 def test_too_few_messages_are_refused():

@@ -121,6 +121,22 @@ def test_the_clay_acts_beside_the_program():
     assert 0.0 < went[1] < 0.5 * went[0]
 
 
+def test_keys_change_the_clay_of_a_served_arm_and_choose_another_scene():
+    session = ServedSession(hc.constant_cut(b=90.0), stiffness=10.0)
+    window = Window(session)
+    session.pull((0.12, 0.0))
+    for key in (262, 265, ord("2")):  # right, up, the variable cut
+        session.arm.drive(Drive(force=(2.0, 0.0)))
+        for _ in range(20):
+            session.advance(SERVED_SPAN)
+        before = session.damping
+        window.look([key], (0.1, 0.0))
+        assert session.damping == (1.25 * before if key == 262 else before if key == 265 else 1.0)
+        session.advance(SERVED_SPAN)
+        assert not session.ended
+    assert session.given.name == "variable" and session.arm.force == (0.0, 0.0)
+
+
 def test_accurate_scenes_are_refused():
     with pytest.raises(ParameterError, match="session"):
         ServedSession(dataclasses.replace(FREE, integrator="accurate"))
