@@ -183,7 +183,7 @@ def index_terms(app, docname: str, source: list[str]) -> None:
     """
     if docname in terms():
         title, _, rest = source[0].partition("\n")
-        entries = "\n\n".join(f"```{{index}} single: ! {x}\n```" for x in terms()[docname])
+        entries = "\n\n".join(f"```{{index}} ! single: {x}\n```" for x in terms()[docname])
         source[0] = f"{title}\n\n{entries}\n\n{rest}"
 
 
