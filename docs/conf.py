@@ -183,8 +183,8 @@ def index_terms(app, docname: str, source: list[str]) -> None:
     """
     if docname in terms():
         title, _, rest = source[0].partition("\n")
-        entries = "\n".join(f"single: ! {term}" for term in terms()[docname])
-        source[0] = f"{title}\n\n```{{index}}\n{entries}\n```\n{rest}"
+        entries = "\n\n".join(f"```{{index}} ! single: {x}\n```" for x in terms()[docname])
+        source[0] = f"{title}\n\n{entries}\n\n{rest}"
 
 
 def toctrees(page: Path) -> str:

@@ -91,8 +91,8 @@ class atomic:
         path: the file.
 
     Raises:
-        ParameterError: the file cannot be written, is no regular file, or is one that the command
-            reads from; nothing is left behind.
+        ParameterError: the file cannot be written, is not a regular file, or is one that the
+            command reads from; no temporary file remains.
     """
 
     def __init__(self, path: Path):

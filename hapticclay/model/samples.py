@@ -55,7 +55,7 @@ class Samples(Signal):
                 raise ParameterError(f"samples.{name}[{i}]", x[i].tolist(), bound)
         if (np.diff(t) <= 0.0).any():
             i = int(np.argmax(np.diff(t) <= 0.0)) + 1
-            bound = f"must be later than the time before, {t[i - 1]:.12g} s"
+            bound = f"times must ascend; the time before is {t[i - 1]:.12g} s"
             raise ParameterError(f"samples.t[{i}]", float(t[i]), bound)
         choice("samples.between", self.between, get_args(Between))
         choice("samples.outside", self.outside, get_args(Outside))

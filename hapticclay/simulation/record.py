@@ -426,7 +426,7 @@ class Record:
         file = file / "record.npz" if file.is_dir() else file
         try:
             if file.exists() and not file.is_file():  # a pipe would be waited for
-                raise ValueError("it is no regular file")
+                raise ValueError("it is not a regular file")
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:

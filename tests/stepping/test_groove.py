@@ -373,7 +373,7 @@ def test_what_it_does_not_go_with_is_refused():
         hc.Profile((), (0.0,), growth=(1.0,)),
         hc.Smooth((0.0, 0.1), (0.0, 0.1), [[10.0]]),
     ):
-        with pytest.raises(ParameterError, match=r"clay.groove.*beside laws"):
+        with pytest.raises(ParameterError, match=r"clay.groove.*with laws"):
             hc.Clay(law, soft, groove=BLOCK)
     with pytest.raises(ParameterError, match="integrator .* 'fast' in clay that stays cut"):
         grooved(BLOCK, integrator="accurate")

@@ -134,7 +134,7 @@ def test_fully_correlated_hands_move_together():
     [
         (dict(mass=-1.0), "hands.mass"),
         (dict(mass=Distribution("normal", 1.0, 0.1)), "no negative values"),
-        (dict(correlation=(1.0, 1.0, -1.0)), "no such numbers"),
+        (dict(correlation=(1.0, 1.0, -1.0)), "no three numbers have these"),
         (dict(correlation=(2.0, 0.0, 0.0)), "<= 1"),
     ],
 )

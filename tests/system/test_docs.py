@@ -291,6 +291,15 @@ def test_start_page_says_what_it_prints(block, tmp_path):
     assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
 
 
+def test_the_home_page_says_what_its_ten_lines_print(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "index.md").read_text(), re.S)
+    out = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert len(list(filter(str.strip, code.splitlines()))) <= 10
+    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # ([^:\n]*)", code) != []
+
+
 @pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", START, re.M))
 def test_start_page_commands_run(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

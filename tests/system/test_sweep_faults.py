@@ -285,7 +285,7 @@ def test_a_stray_file_among_the_parts_is_refused_and_kept(tmp_path):
     sweep.run_sweep(plan(), tmp_path, workers=1)
     stray = tmp_path / "data" / "part-000001 (copy).parquet"
     shutil.copy(sweep_store.sweep_part(tmp_path, 1), stray)
-    with pytest.raises(ParameterError, match="no part of the sweep"):
+    with pytest.raises(ParameterError, match="does not belong to the sweep"):
         sweep.run_sweep(plan(), tmp_path, workers=1)
     with pytest.raises(ParameterError, match="copy"):
         sweep_store.read_sweep(tmp_path)
