@@ -578,18 +578,18 @@ def by_rows(r: run.Run, room: int) -> None:
     row_of(r).move(room)
 
 
-def try_step(r: run.Run) -> bool:
-    """Tries the next step of a run, for the row that it would write; whether it could.
+def try_step(r: run.Run) -> np.ndarray | None:
+    """Tries the next step of a run: the row that it would write, see run.Kernel.
 
     Args:
         r: the run.
     """
     if not vector.is_vectored(r):
-        return False
+        return None
     r.draw(1)
     row = row_of(r)
     row.advance(*row.arguments, True)
-    return True
+    return row.common.shown[0].copy()
 
 
 @functools.cache

@@ -77,15 +77,16 @@ class Kernel(NamedTuple):
         calls: mj_step, mj_forward, model and data as these steps call them.
         place: an array as they write into it: a memoryview, or its address.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
-        ahead: tries the next step of a run, called with the run, for the row that it would write;
-            whether it could. None makes the step and goes back.
+        ahead: tries the next step of a run, called with the run: the row that it would write, and
+            the force of the clay where b v does not tell it; None if it cannot. Without it the run
+            makes the step and goes back.
     """
 
     advance: Callable[[Run, int], None]
     calls: Callable[[Any, Any], tuple[Any, ...]]
     place: Callable[[Any], Any]
     quiet: Callable[..., bool] | None = None
-    ahead: Callable[[Run], bool] | None = None
+    ahead: Callable[[Run], np.ndarray | None] | None = None
 
 
 def one_plainly(run: Run, step: Callable[..., State]) -> None:
@@ -633,10 +634,13 @@ class Run:
         Returns:
             rows.ROW numbers, and two.
         """
-        n = self.filled
-        if self.kernel.ahead is not None and self.kernel.ahead(self):
-            return self._row_and_force(n)
-        saved, events = self.saved(), (self.steps, list(self.crossings), list(self.stops))
+        if self.kernel.ahead is not None and (found := self.kernel.ahead(self)) is not None:
+            return self._with_force(found)
+        n, saved, events = (
+            self.filled,
+            self.saved(),
+            (self.steps, list(self.crossings), list(self.stops)),
+        )
         try:
             self._make(n + 1)
             return self._row_and_force(n)
@@ -646,14 +650,15 @@ class Run:
 
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last look, and the force of the clay in it [N]."""
-        out = np.empty(rows.ROW + 2)
-        out[: rows.ROW] = self.store.rows[n]
-        if self.rendered:
-            out[rows.ROW :] = self.store.rendered[n, :2]
-        else:
-            vx, vy, bx, by = *out[4:6].tolist(), *out[12:14].tolist()
-            out[rows.ROW :] = self._force(bx, by, vx, vy)
-        return out
+        told = self.store.rendered[n, :2] if self.rendered else (0.0, 0.0)
+        return self._with_force(np.concatenate((self.store.rows[n], told)))
+
+    def _with_force(self, row: np.ndarray) -> np.ndarray:
+        """A row with the force of the clay behind it, which is there where b v does not tell it."""
+        if not self.rendered:
+            vx, vy, bx, by = *row[4:6].tolist(), *row[12:14].tolist()
+            row[rows.ROW], row[rows.ROW + 1] = self._force(bx, by, vx, vy)
+        return row
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
