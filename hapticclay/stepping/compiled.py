@@ -545,7 +545,7 @@ def row_of(r: run.Run) -> vector.Row:
     if row is None or (row.parts is not r.parts and row.key != vector.kind_key(r)):
         r.state, r.row = r.state, None
         row = vector.Row(r, KERNEL)
-        row.advance = advancing(row.vector.kind, *row.arguments, False)
+        row.advance = advancing(row.vector.kind, *row.arguments, vector.STEPS)
         r.row = row
     row.take(r)
     return row
@@ -587,9 +587,7 @@ def try_step(r: run.Run) -> np.ndarray | None:
     if not vector.is_vectored(r):
         return None
     r.draw(1)
-    row = row_of(r)
-    row.advance(*row.arguments, True)
-    return row.common.shown[0].copy()
+    return row_of(r).sample()
 
 
 @functools.cache

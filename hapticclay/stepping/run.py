@@ -575,7 +575,8 @@ class Run:
         Args:
             force: (x, y) [N].
         """
-        self.scenario = replace(self.scenario, force=force)
+        self.scenario = copy.copy(self.scenario)  # the rest of it has been checked
+        object.__setattr__(self.scenario, "force", force)
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
@@ -584,12 +585,12 @@ class Run:
         Args:
             steady: as Push.steady.
         """
-        known = self.row is not None and self.row.parts is self.parts
+        row = self.row if self.row is not None and self.row.parts is self.parts else None
         kind, native = self._kind, self._native
         self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
         self._kind, self._native = kind, native
-        if known:
-            self.row.push(self.parts)
+        if row is not None:
+            row.push(self.parts)
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
