@@ -26,6 +26,7 @@ import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.files import atomic
 from hapticclay.model.constants import CLAY_X as CLAY
 from hapticclay.simulation import batch, engines
 
@@ -319,6 +320,64 @@ def short_runs(n: int, control: str) -> dict[str, Any]:
     }
 
 
+def drawn_columns(n: int, control: str) -> tuple[hc.Scenario, dict[str, np.ndarray]]:
+    """The same as columns, but for the start: a scenario, and what n runs of it differ in."""
+    own: Any = dict(hardware=hc.Hardware(delay=1e-3)) if control == "sampled" else {}
+    base = hc.constant_cut(start=(0.02, 0.0), operator=hc.Operator(), control=control, **own)
+    mass, damper, spring, b, gain, delay = np.random.default_rng(n).random((6, n))
+    columns = {
+        "operator.mass": 0.1 + mass, "operator.damper": 1.0 + damper,
+        "operator.spring": 2.0 + 8.0 * spring, "clay.x.values.1": 10.0 + 190.0 * b,
+        "gain.x": 0.2 + 0.8 * gain,
+    }  # fmt: skip
+    columns |= {"hardware.delay": 1e-3 * (1.0 - delay)} if control == "sampled" else {}
+    return lasting(base, SHORT_STEPS), columns
+
+
+def column_runs(sizes: list[int], control: str) -> list[dict[str, Any]]:
+    """Runs of columns: processor time over that of their engine steps alone, before and after."""
+    base, few = drawn_columns(100, control)
+    warm([hc.with_fields(base, {n: float(x[0]) for n, x in few.items()})])
+    rows = []
+    for n in sizes:
+        base, columns = drawn_columns(n, control)
+        before = floor(base, 20_000, time.process_time)
+        wall, spent = timed(hc.simulate_columns, base, columns)
+        bare = 0.5 * (before + floor(base, 20_000, time.process_time)) * SHORT_STEPS * n
+        rows.append(
+            {
+                "runs": n,
+                "control": control,
+                "runs_a_second": n / float(wall),
+                "over_floor_cpu": float(spent) / bare,
+                "floor_us_a_run": 1e6 * bare / n,
+                "us_a_run": 1e6 * float(spent) / n,
+                "peak_MiB": memory(),
+            }
+        )
+    return rows
+
+
+def draw(rows: list[dict[str, Any]], out: Path) -> None:
+    """Processor time of a run over the number of runs, beside the floor."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    ax = figure.add_subplot()
+    for control, color in (("continuous", "#0072B2"), ("sampled", "#D55E00")):
+        some = [r for r in rows if r["control"] == control]
+        n = [r["runs"] for r in some]
+        ax.plot(n, [r["us_a_run"] for r in some], "o-", color=color, label=f"{control} control")
+        ax.plot(n, [r["floor_us_a_run"] for r in some], "--", color=color, lw=1.0)
+    ax.plot([], [], "--", color="0.4", lw=1.0, label="mj_step alone")
+    ax.set(xscale="log", xlabel="runs in a call [1]", ylim=(0.0, None))
+    ax.set(ylabel=f"processor time of a run of {SHORT_STEPS} steps [µs]")
+    ax.grid(color="0.9")
+    ax.legend(frameon=False, fontsize=9)
+    with atomic(out / "throughput.png") as f:
+        figure.savefig(f, dpi=150)
+
+
 def stability_map() -> dict[str, float]:
     """50 dampings by 20 gains, 2 s each: seconds, and how many are unstable."""
     grid = [(b, k) for b in np.geomspace(5.0, 500.0, 50) for k in np.linspace(0.2, 6.0, 20)]
@@ -346,6 +405,8 @@ TITLES = {
     "peak memory of the process so far.",
     "short": "Short runs from a generator, summaries only, on all cores: seconds; seconds of as "
     "many steps of the bare engine on all cores; seconds for making the scenarios.",
+    "columns": "Runs of 100 steps drawn as columns, summaries only: processor time over that of "
+    "as many steps of the bare engine.\n\n![runs of columns](throughput.png)",
     "map": "A stability map: 50 dampings by 20 gains, 2 s each.",
 }
 
@@ -388,6 +449,10 @@ def main(
         data["batch"] = batches(sizes + full * [(16384, LONG)], 1 if quick else min(rounds, 5))
         runs = SHORT_QUICK if quick else SHORT
         data["short"] = [short_runs(runs, "continuous"), short_runs(runs // 10, "sampled")]
+        sizes = [10**k for k in range(2, 5 if quick else 7)]
+        data["columns"] = [row for x in ("continuous", "sampled") for row in column_runs(sizes, x)]
+        out.mkdir(parents=True, exist_ok=True)
+        draw(data["columns"], out)
     if native and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]

@@ -9,9 +9,9 @@ import os
 import sys
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -131,6 +131,9 @@ def simulate_batch(
         count = max(min(threads, len(first)), 1)
         on_threads(parts, make, out.put, count, pool.stop)
     return out.all()
+
+
+Part = TypeVar("Part", bound=Sized)
 
 
 class Job(NamedTuple):
@@ -474,8 +477,8 @@ def cores() -> int:
 
 
 def on_threads(
-    parts: Iterable[list[Job]],
-    make: Callable[[list[Job]], Any],
+    parts: Iterable[Part],
+    make: Callable[[Part], Any],
     put: Callable[[int, Any], None],
     threads: int,
     stop: threading.Event,

@@ -36,9 +36,8 @@ def simulate_columns(
     """Runs a scenario with columns of numbers in place of some of its fields.
 
     The results are those of `simulate_batch([with_fields(base, row) ...], keep="summaries")`, bit
-    for bit. Where gain, force, velocity, the operator's arm or the damping of clay vary, no
-    scenario is made for a run, which saves half of the time that short runs take; other fields
-    vary as well, at the cost of a scenario each.
+    for bit. Where gain, force, velocity, the operator's arm, the damping of clay or the delay vary,
+    no scenario is made for a run; other fields vary as well, at the cost of a scenario each.
 
         hands = {"operator.mass": mass, "operator.damper": damper}  # arrays, shape (n,)
         steady = hc.simulate_columns(hc.constant_cut(operator=hc.Operator()), hands)["v"]
@@ -91,6 +90,8 @@ class Columns:
         self.key = kind_key(self.like)
         self.places = [places_of(name, self.like) for name in self.columns]
         self.is_plain = self.key is not None and all(self.places)
+        if "hardware.delay" in self.columns:  # whose bound depends on the sample: the longest tells
+            self.scenario(int(self.columns["hardware.delay"].argmax()))
 
     def __len__(self) -> int:
         return self.n
@@ -124,31 +125,30 @@ class Columns:
         values = one.values and [np.repeat(x, n, axis=0) for x in one.values]
         hands = None if one.hands is None else np.repeat(one.hands, n, axis=0)
         tiled = {x: np.repeat(getattr(one, x), n, axis=0) for x in ("gain", "force", "starts")}
-        into = tiled | {
-            "hands": hands,
-            "clay.x": values and values[0],
-            "clay.y": values and values[1],
-        }
+        delays = np.repeat(np.array(one.delays, float), n)
+        into = tiled | {"hands": hands, "delays": delays}
+        into |= {f"clay.{axis}": x for axis, x in zip(AXES, values or (), strict=False)}
         both = zip(self.columns.values(), self.places, strict=True)
         for x, places in sorted(both, key=lambda each: -len(each[1])):  # a pair, then its entries
             for name, index in places:
                 into[name][(slice(None), *index)] = x[first:end]
         return Draws(
             tiled["gain"], tiled["force"], np.repeat(one.origin, n, axis=0), tiled["starts"],
-            [{servo: range(n)} for servo in self.like.servo], hands, one.delays * n, values,
+            [{servo: range(n)} for servo in self.like.servo], hands, delays, values,
         )  # fmt: skip
 
     def of_kind(self, d: Draws) -> np.ndarray:
-        """Which draws are of the kind of the first one: clay as stiff, alike along both axes.
+        """Which draws are of the kind of the first one: as it delayed, with clay as stiff.
 
         Args:
             d: the draws.
         """
-        one = draws_of([self.like])
+        one, good = draws_of([self.like]), np.ones(len(d.gain), bool)
+        if len(d.delays):
+            good &= (d.delays > 0.0) == (one.delays[0] > 0.0)
         if d.values is None or not any(name.startswith("clay.") for name in self.columns):
-            return np.ones(len(d.gain), bool)
+            return good
         x, y, (x1, y1) = *d.values, one.values
-        good = np.ones(len(x), bool)
         if x.shape == y.shape:
             good &= (x == y).all(axis=1) == (x1 == y1).all()
         most, most1 = (np.maximum(a.max(axis=1), b.max(axis=1)) for a, b in ((x, y), (x1, y1)))
@@ -174,6 +174,8 @@ def places_of(name: str, base: Scenario) -> list[Place]:
         return [(PAIRS[head], (first + i,)) for i in axes]
     if head == "operator" and all(base.operators) and len(rest) == 1:
         return [("hands", (i, HAND.index(rest[0]))) for i in axes]
+    if name == "hardware.delay" and base.hardware is not None:
+        return [("delays", ())]
     law = base.clay.laws[axes[0]] if head == "clay" and base.clay and len(axes) == 1 else None
     if type(law) is Profile and rest[:1] == ["values"] and len(rest) == 2:
         return [(f"clay.{AXES[axes[0]]}", (int(rest[1]),))]

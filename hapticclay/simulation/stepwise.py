@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -59,6 +58,9 @@ class Sample(NamedTuple):
     qd: np.ndarray
     tau: np.ndarray
     delta: np.ndarray
+
+
+PLACES = [slice(COLUMNS[name], COLUMNS[name] + 2) for name in Sample._fields[1:]]
 
 
 @checked
@@ -114,17 +116,9 @@ class Simulation:
         self._record: record.Record | None = None
         self._looked, self._diverging = -math.inf, False
 
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[Run]:
+    def _alone(self) -> _Alone:
         """The run, for this thread alone."""
-        if not self._lock.acquire(blocking=False):
-            raise RuntimeError("another thread uses this simulation: give each thread its own")
-        try:
-            if self._closed:
-                raise RuntimeError("the simulation is closed")
-            yield self._run
-        finally:
-            self._lock.release()
+        return _Alone(self)
 
     def __enter__(self) -> Simulation:
         return self
@@ -354,6 +348,29 @@ class Simulation:
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
 
 
+class _Alone:
+    """The run of a simulation for one thread, for a `with`: a generator would take a step's time.
+
+    Args:
+        sim: the simulation.
+    """
+
+    def __init__(self, sim: Simulation):
+        self.sim = sim
+
+    def __enter__(self) -> Run:
+        sim = self.sim
+        if not sim._lock.acquire(blocking=False):
+            raise RuntimeError("another thread uses this simulation: give each thread its own")
+        if sim._closed:
+            sim._lock.release()
+            raise RuntimeError("the simulation is closed")
+        return sim._run
+
+    def __exit__(self, *error: object) -> None:
+        self.sim._lock.release()
+
+
 def sample_of(t: float, row: np.ndarray) -> Sample:
     """A sample of its row.
 
@@ -361,7 +378,7 @@ def sample_of(t: float, row: np.ndarray) -> Sample:
         t: its time [s].
         row: as from Run.ahead.
     """
-    return Sample(t, *(row[COLUMNS[name] : COLUMNS[name] + 2] for name in Sample._fields[1:]))
+    return Sample(t, *[row[place] for place in PLACES])
 
 
 def stepwise_kernel(kernel: Kernel) -> Kernel:

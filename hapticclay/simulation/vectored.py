@@ -14,7 +14,7 @@ from ..stepping.monitor import Outcome
 from ..stepping.rows import ROW
 from ..stepping.run import CHUNK, PLAIN, EngineStore, Run
 from ..stepping.state import OPEN
-from ..stepping.vector import Common, RunVector, is_vectored, kind_key
+from ..stepping.vector import BOTH, STEPS, TRY, Common, RunVector, is_vectored, kind_key
 from . import engines
 from .engines import has_numba, load_compiled
 
@@ -41,7 +41,7 @@ class VectoredRuns:
     def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int):
         n = len(scenarios)
         self.engine, self.workers, self.engines = engine, workers, dict[Any, Any]()
-        self.compiled = load_compiled() if engine == "native" else None
+        self.compiled: Any = load_compiled() if engine == "native" else None
         self.common, self.over = Common(n), np.zeros(n, bool)
         self.given, self.changed = list(scenarios), np.zeros(n, bool)
         self.force, self.steady = np.zeros((n, 2)), np.zeros((n, 2))
@@ -50,7 +50,7 @@ class VectoredRuns:
         self.of: list[RunVector | None] = [None] * n
         self.asked = 0  # steps since the last question whether machine code pays
         self.pool: ThreadPoolExecutor | None = None
-        self.is_shown = False
+        self.is_shown = self.is_tried = self.is_asked = False
         stores = [EngineStore(self.engines) for _ in scenarios]
         self.runs = [self._new(s, x) for s, x in zip(scenarios, stores, strict=True)]
         for k in range(n):
@@ -77,7 +77,7 @@ class VectoredRuns:
         c.times[k], c.marks[k], c.looked[k] = 0.0, (0, 0, OPEN, 0, 0, 0), 0
         if self.compiled or self.of[k]:
             self._place(k)
-        self.is_shown = False
+        self._unshow()
 
     def _place(self, k: int) -> None:
         """Puts a run among those of its kind, where they are compiled."""
@@ -92,14 +92,14 @@ class VectoredRuns:
             self._take(k)
 
     def _take(self, k: int) -> None:
-        v = self.of[k]
+        v: Any = self.of[k]
         v.take(k, self.runs[k])
         v.push(np.array([k]), self.steady[[k]])
 
     def _prepare(self, v: RunVector) -> None:
         """Compiles what a kind needs, or takes it from the disk."""
         none = np.empty(0, np.int64)
-        v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, False)
+        v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
 
     def _sync(self, k: int) -> Run:
         """The run, with its state and force as they are now."""
@@ -149,7 +149,8 @@ class VectoredRuns:
             return
         run = self._sync(k)
         run.change(change(run.scenario))
-        self.changed[k], self.is_shown = True, False
+        self.changed[k] = True
+        self._unshow()
         if self.of[k]:
             self._place(k)
 
@@ -166,7 +167,8 @@ class VectoredRuns:
         which, force = which[other], force[other]
         if not len(which):
             return
-        self.force[which], self.is_shown = force, False
+        self.force[which] = force
+        self._unshow()
         for k in which.tolist():
             muscle = self.given[k].muscle
             self.steady[k] = self.force[k]
@@ -196,19 +198,27 @@ class VectoredRuns:
         if not len(which):
             return
         self._choose(which, n)
-        self.is_shown = False
+        self._unshow()
         for v, ks in self._groups(which):
             if v is not None:
                 self._draw(v, ks, n)
+        # whoever has asked for samples will ask for the next
+        both = self.is_asked and len(which) == len(self.over) - self.over.sum()
         goal, left = self.common.marks[:, 0] + n, which
         while len(left):
             part = max(1, self.workers * PART // len(left))
             self.common.until[left] = np.minimum(goal[left], self.common.marks[left, 0] + part)
-            self._move(left, False)
+            last = both and (self.common.until[left] == goal[left]).all()
+            self._move(left, BOTH if last else STEPS)
             marks = self.common.marks[left]
             for k in left[(marks[:, 2] != OPEN) | (marks[:, 1] >= CHUNK - 1)].tolist():
                 self._settle(k)
             left = left[~self.over[left] & (self.common.marks[left, 0] < goal[left])]
+        self.is_tried, self.is_asked = both, False
+
+    def _unshow(self) -> None:
+        """Notes that a run has changed, and with it its sample."""
+        self.is_shown = self.is_tried = False
 
     def _draw(self, v: RunVector, which: np.ndarray, n: int) -> None:
         """Draws the random effects of the next n steps, and of the one that is then tried."""
@@ -223,8 +233,8 @@ class VectoredRuns:
             if run.parts is not before:
                 self._take(k)
 
-    def _move(self, which: np.ndarray, ahead: bool) -> None:
-        """Makes steps up to `until`, or tries the next one."""
+    def _move(self, which: np.ndarray, ahead: int) -> None:
+        """Makes steps up to `until`, tries the next one, or both."""
         jobs = []
         for v, ks in self._groups(which):
             if v is None:
@@ -240,11 +250,11 @@ class VectoredRuns:
         elif jobs:
             self._on_threads(jobs, ahead)
 
-    def _work(self, jobs: list[Any], ahead: bool) -> None:
+    def _work(self, jobs: list[Any], ahead: int) -> None:
         for _, v, place, part in jobs:
             v.advance(v.parts, v.state, place, v.x, part, ahead)
 
-    def _on_threads(self, jobs: list[Any], ahead: bool) -> None:
+    def _on_threads(self, jobs: list[Any], ahead: int) -> None:
         """Makes the jobs of each thread; an exception is raised once all are done."""
         if self.pool is None:
             self.pool = ThreadPoolExecutor(self.workers)
@@ -256,18 +266,18 @@ class VectoredRuns:
             for x in futures:
                 x.result()
 
-    def _one(self, k: int, ahead: bool) -> None:
+    def _one(self, k: int, ahead: int) -> None:
         """Moves a run that is advanced alone."""
         run, c = self.runs[k], self.common
         run.resume()
-        if ahead:
-            c.shown[k] = run.ahead()
-            return
-        run.pause = c.until[k]
-        run.go(None)
-        c.quiet[k], c.times[k], c.marks[k, :3] = 0, run.t, (run.i, run.filled, run.code)
+        if ahead != TRY:
+            run.pause = c.until[k]
+            run.go(None)
+            c.quiet[k], c.times[k], c.marks[k, :3] = 0, run.t, (run.i, run.filled, run.code)
         if run.outcome is not None:
             self._end(k, run)
+        elif ahead != STEPS:
+            c.shown[k] = run.ahead()
 
     def _settle(self, k: int) -> None:
         """Judges the rows of a compiled run: they are full, or it is over."""
@@ -297,15 +307,15 @@ class VectoredRuns:
     def show(self) -> np.ndarray:
         """The present samples, shape (n, SHOWN)."""
         if not self.is_shown:
-            live = np.flatnonzero(~self.over)
-            for v, ks in self._groups(live):
-                if v is not None:
+            live = self._groups(np.flatnonzero(~self.over))
+            vectors = [(v, ks) for v, ks in live if v is not None]
+            if not self.is_tried:
+                for v, ks in vectors:
                     self._draw(v, ks, 1)
-            self._move(live, True)
-            for v, ks in self._groups(live):
-                if v is not None:
-                    self.common.shown[ks, ROW:] = v.force(ks)
-            self.is_shown = True
+                self._move(np.flatnonzero(~self.over), TRY)
+            for v, ks in vectors:
+                self.common.shown[ks, ROW:] = v.force(ks)
+            self.is_shown = self.is_asked = True
         return self.common.shown
 
     def look(self) -> np.ndarray:

@@ -547,7 +547,7 @@ def row_of(r: run.Run) -> vector.Row:
     if row is None or (row.parts is not r.parts and row.key != vector.kind_key(r)):
         r.state, r.row = r.state, None
         row = vector.Row(r, KERNEL)
-        row.advance = advancing(row.vector.kind, *row.arguments, False)
+        row.advance = advancing(row.vector.kind, *row.arguments, vector.STEPS)
         r.row = row
     row.take(r)
     return row
@@ -580,18 +580,16 @@ def by_rows(r: run.Run, room: int) -> None:
     row_of(r).move(room)
 
 
-def try_step(r: run.Run) -> bool:
-    """Tries the next step of a run, for the row that it would write; whether it could.
+def try_step(r: run.Run) -> np.ndarray | None:
+    """Tries the next step of a run: the row that it would write, see run.Kernel.
 
     Args:
         r: the run.
     """
     if not vector.is_vectored(r):
-        return False
+        return None
     r.draw(1)
-    row = row_of(r)
-    row.advance(*row.arguments, True)
-    return True
+    return row_of(r).sample()
 
 
 @functools.cache

@@ -3,13 +3,11 @@
 MuJoCo is imported whatever MUJOCO_GL says: a run draws nothing, and views report their own errors.
 """
 
-import contextlib
 import copy
 import ctypes
 import functools
 import math
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,16 +41,17 @@ def mjcf_folder() -> Path:
     return checkout if (checkout / "arm.xml").is_file() else package / "mjcf"
 
 
-@contextlib.contextmanager
-def warnings_caught() -> Iterator[list[str]]:
-    """Collects the engine's warnings instead of letting it write MUJOCO_LOG.TXT."""
-    caught: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(caught.append)
-    try:
-        yield caught
-    finally:
-        mujoco.set_mju_user_warning(before)
+class warnings_caught:
+    """Collects the engine's warnings instead of letting it write MUJOCO_LOG.TXT, for a `with`."""
+
+    def __enter__(self) -> list[str]:
+        caught: list[str] = []
+        self.before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(caught.append)
+        return caught
+
+    def __exit__(self, *error: object) -> None:
+        mujoco.set_mju_user_warning(self.before)
 
 
 @checked

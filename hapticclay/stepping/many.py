@@ -415,10 +415,12 @@ def draws_of(jobs: Sequence[Scenario]) -> Draws:
         for i in (0, 1):
             for k, s in enumerate(jobs):
                 servo[i].setdefault(s.servo[i], []).append(k)
-    columns = ([s.gain for s in jobs], [s.force for s in jobs], [s.origin for s in jobs])
+    gain, force, origin = (
+        np.array([getattr(s, name) for s in jobs], float) for name in ("gain", "force", "origin")
+    )
     starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
     delays = [s.hardware.delay for s in jobs if s.hardware]
-    return Draws(*(np.array(x, float) for x in columns), starts, servo, hands, delays, values)
+    return Draws(gain, force, origin, starts, servo, hands, delays, values)
 
 
 class Patterns:

@@ -77,15 +77,16 @@ class Kernel(NamedTuple):
         calls: mj_step, mj_forward, model and data as these steps call them.
         place: an array as they write into it: a memoryview, or its address.
         quiet: monitor.is_quiet, compiled; None asks the monitor itself.
-        ahead: tries the next step of a run, called with the run, for the row that it would write;
-            whether it could. None makes the step and goes back.
+        ahead: tries the next step of a run, called with the run: the row that it would write, and
+            the force of the clay where b v does not tell it; None if it cannot. Without it the run
+            makes the step and goes back.
     """
 
     advance: Callable[[Run, int], None]
     calls: Callable[[Any, Any], tuple[Any, ...]]
     place: Callable[[Any], Any]
     quiet: Callable[..., bool] | None = None
-    ahead: Callable[[Run], bool] | None = None
+    ahead: Callable[[Run], np.ndarray | None] | None = None
 
 
 def one_plainly(run: Run, step: Callable[..., State]) -> None:
@@ -574,7 +575,8 @@ class Run:
         Args:
             force: (x, y) [N].
         """
-        self.scenario = replace(self.scenario, force=force)
+        self.scenario = copy.copy(self.scenario)  # the rest of it has been checked
+        object.__setattr__(self.scenario, "force", force)
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
@@ -583,12 +585,12 @@ class Run:
         Args:
             steady: as Push.steady.
         """
-        known = self.row is not None and self.row.parts is self.parts
+        row = self.row if self.row is not None and self.row.parts is self.parts else None
         kind, native = self._kind, self._native
         self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
         self._kind, self._native = kind, native
-        if known:
-            self.row.push(self.parts)
+        if row is not None:
+            row.push(self.parts)
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
@@ -633,10 +635,13 @@ class Run:
         Returns:
             rows.ROW numbers, and two.
         """
-        n = self.filled
-        if self.kernel.ahead is not None and self.kernel.ahead(self):
-            return self._row_and_force(n)
-        saved, events = self.saved(), (self.steps, list(self.crossings), list(self.stops))
+        if self.kernel.ahead is not None and (found := self.kernel.ahead(self)) is not None:
+            return self._with_force(found)
+        n, saved, events = (
+            self.filled,
+            self.saved(),
+            (self.steps, list(self.crossings), list(self.stops)),
+        )
         try:
             self._make(n + 1)
             return self._row_and_force(n)
@@ -646,14 +651,15 @@ class Run:
 
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last look, and the force of the clay in it [N]."""
-        out = np.empty(rows.ROW + 2)
-        out[: rows.ROW] = self.store.rows[n]
-        if self.rendered:
-            out[rows.ROW :] = self.store.rendered[n, :2]
-        else:
-            vx, vy, bx, by = *out[4:6].tolist(), *out[12:14].tolist()
-            out[rows.ROW :] = self._force(bx, by, vx, vy)
-        return out
+        told = self.store.rendered[n, :2] if self.rendered else (0.0, 0.0)
+        return self._with_force(np.concatenate((self.store.rows[n], told)))
+
+    def _with_force(self, row: np.ndarray) -> np.ndarray:
+        """A row with the force of the clay behind it, which is there where b v does not tell it."""
+        if not self.rendered:
+            vx, vy, bx, by = *row[4:6].tolist(), *row[12:14].tolist()
+            row[rows.ROW], row[rows.ROW + 1] = self._force(bx, by, vx, vy)
+        return row
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""

@@ -19,6 +19,7 @@ from .parts import Parts
 from .run import CHUNK, EngineStore, Kernel, Run
 from .state import OPEN, Filled, State
 
+STEPS, TRY, BOTH = range(3)  # what a call does
 SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the clay [N]
 
 
@@ -168,6 +169,11 @@ def moved(like, state, place, x, k, ahead):
     x.marks[k, 0], x.marks[k, 1], x.marks[k, 2] = s.clock.i, s.filled.rows, s.status.code
 
 
+def has_events(x, k):
+    """Whether crossings or stops of the last call wait to be read: to try a step spoils them."""
+    return x.kept[k, 3] == 1 and x.marks[k, 4] + x.marks[k, 5] > 0
+
+
 def advance(like, state, place, x, which, ahead):
     """Advances runs, one after the other.
 
@@ -177,10 +183,12 @@ def advance(like, state, place, x, which, ahead):
         place: where steps are made.
         x: the runs.
         which: their indices.
-        ahead: whether their next step is only tried.
+        ahead: STEPS makes steps, TRY tries the next one, BOTH does one after the other.
     """
     for k in which:
-        moved(like, state, place, x, k, ahead)
+        for tried in range(1 if ahead == TRY else 0, 1 if ahead == STEPS else 2):
+            if tried == 0 or ahead == TRY or not has_events(x, k):
+                moved(like, state, place, x, k, tried == 1)
 
 
 # ---- which runs, and their rows ------------------------------------------------------------------
@@ -373,6 +381,7 @@ class Row:
     Attributes:
         parts: of the run, as the row has them.
         leads: whether the row has the state, and the run an old one.
+        shows: whether the present sample is known.
         marks: see Vector.marks.
         t: now [s].
     """
@@ -381,6 +390,7 @@ class Row:
         self.common = Common(1)
         self.vector = RunVector(run, self.common, kernel)
         self.key, self.parts, self.leads, self.taken = kind_key(run), None, False, False
+        self.shows = self.asked = False
         self.marks, self.t, self.which = [0] * 6, 0.0, np.zeros(1, np.int64)
         scratch = np.empty(sum(a.nbytes for a in scene.written(run.parts)) // 8 + 1)
         place = Place(run.native, run.model.actuator_ctrlrange, scratch)
@@ -396,14 +406,14 @@ class Row:
         """
         if self.parts is not run.parts:
             self.vector.take(0, run)
-            self.parts = run.parts
+            self.parts, self.shows = run.parts, False
         elif not self.taken:
             self.vector.take_state(0, run)
         self.taken = True
 
     def follow(self) -> None:
         """Notes that the run has another state."""
-        self.leads = self.taken = False
+        self.leads = self.taken = self.shows = False
 
     def push(self, parts: Parts) -> None:
         """Takes over another muscle force.
@@ -413,7 +423,7 @@ class Row:
         """
         at = self.vector.put.push.steady
         self.vector.x.numbers[0, list(at)] = parts.push.steady
-        self.parts = parts
+        self.parts, self.shows = parts, False
 
     def move(self, room: int) -> None:
         """Makes steps.
@@ -423,8 +433,18 @@ class Row:
         """
         x = self.common
         x.until[0], x.looked[0] = room, 0
-        self.advance(*self.arguments, False)
+        self.shows = self.asked  # whoever has asked for a sample will ask for the next
+        self.asked = False
+        self.advance(*self.arguments, BOTH if self.shows else STEPS)
         self.marks, self.t, self.leads = x.marks[0].tolist(), float(x.times[0]), True
+        self.shows = self.shows and not any(self.marks[4:])
+
+    def sample(self) -> np.ndarray:
+        """The row that a step would write now, and the force of the clay, see Vector.shown."""
+        if not self.shows:
+            self.advance(*self.arguments, TRY)
+        self.shows = self.asked = True
+        return self.common.shown[0].copy()
 
     def made(self) -> Filled:
         """What the last call has made, and the rows so far."""

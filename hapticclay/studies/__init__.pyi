@@ -1,6 +1,7 @@
 # Questions that take many runs: public names, and the modules they come from.
 
 from .boundary import PushedLoop as PushedLoop
+from .column_runs import run_columns as run_columns
 from .comparison import Compared as Compared
 from .comparison import Comparison as Comparison
 from .comparison import compare_files as compare_files

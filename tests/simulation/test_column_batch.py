@@ -44,6 +44,9 @@ def test_columns_give_the_bits_of_scenarios(base, monkeypatch):
     monkeypatch.setattr(column_batch, "PART", 20 * base.t_max / base.dt)  # several parts
     monkeypatch.setattr(column_batch.batch.Plan, "_repay", lambda self, key, jobs: True)
     given = columns()
+    if base.hardware:
+        given["hardware.delay"] = np.random.default_rng(1).uniform(0.0, 1e-3, N)
+        given["hardware.delay"][7] = 0.0  # of another kind
     assert column_batch.Columns(base, given).is_plain
     assert_same(hc.simulate_columns(base, given, threads=2), by_objects(base, given))
 
@@ -90,6 +93,8 @@ def test_bad_columns_are_refused_at_the_door(field, given, monkeypatch):
 
 @pytest.mark.plain
 def test_what_a_scenario_refuses_is_told_with_its_row():
+    with pytest.raises(ParameterError, match=r"hardware.delay\[1\]"):  # 100 samples, before a run
+        column_batch.Columns(SAMPLED, {"hardware.delay": [1e-3, 0.9]})
     given = {"start.x": [0.0, 0.25], "length": [0.01, 0.2]}
     with pytest.raises(ParameterError, match=r"length\[1\]"):
         hc.simulate_columns(SHORT, given)

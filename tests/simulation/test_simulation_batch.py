@@ -123,7 +123,7 @@ def test_what_is_told_is_a_copy():
     ("field", "call"),
     [
         ("scenarios", lambda b: hc.SimulationBatch([])),
-        ("scenarios[1]", lambda b: hc.SimulationBatch([CUT, 1])),
+        ("scenarios[1]", lambda b: hc.SimulationBatch([CUT, None])),  # type: ignore[list-item]
         ("workers", lambda b: hc.SimulationBatch([CUT], workers=0)),
         ("force", lambda b: b.advance(force=[1.0, 2.0])),
         ("force[1, y]", lambda b: b.advance(force=[[1.0, 2.0], [0.0, np.nan]])),

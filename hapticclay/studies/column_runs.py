@@ -1,0 +1,153 @@
+"""Runs that differ in columns of numbers, as a data set on disk that survives anything."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import integer
+from ..files import versions
+from ..model.constants import AXES
+from ..scene.plain_data import plain_data
+from ..scene.scenario import Scenario
+from ..simulation.column_batch import Columns, simulate_columns
+from . import sweep
+
+SCHEMA = "hapticclay-columns-1"
+CHUNK = 10_000  # runs of a file: a second or two of short ones
+ENDS = "p", "v", "fh", "fe", "b"  # of a summary, a column an axis
+
+
+@checked
+def run_columns(
+    base: Scenario,
+    columns: Mapping[str, Any],
+    out: str | os.PathLike[str],
+    *,
+    chunk: int = CHUNK,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> int:
+    """Runs a scenario with columns of numbers in place of some fields, and stores the ends.
+
+    As `simulate_columns`, chunk by chunk on processes or on a cluster: each chunk is a Parquet file
+    in the folder, so that memory holds one chunk a process, and the same call makes those that an
+    interruption left. `read_sweep` reads the folder.
+
+    Args:
+        base: as in `simulate_columns`.
+        columns: as in `simulate_columns`.
+        out: the folder.
+        chunk: runs of a file, the most that a killed process loses.
+        workers: processes on this machine; None for one a core.
+        scheduler: address of a dask scheduler to use instead.
+        progress: called with the number of runs of each finished chunk.
+
+    Returns:
+        The number of runs made.
+
+    Raises:
+        ParameterError: as by `simulate_columns`; or the folder holds other runs, or cannot be
+            written, or a package is missing.
+        ChildProcessError: a worker here was killed.
+        ConnectionError: the scheduler has gone.
+    """
+    plan, folder, done = ColumnRuns(base, columns, chunk), Path(out), 0
+    with sweep.claimed(plan, folder) as (_, todo):
+        results = sweep.run_chunks(plan, folder, todo, workers, scheduler)
+        with contextlib.closing(results):
+            for n in results:
+                done += n
+                if progress:
+                    progress(n)
+    return done
+
+
+class ColumnRuns:
+    """Runs as `sweep` stores them, see sweep.Stored.
+
+    Args:
+        base: as in `run_columns`.
+        columns: as in `run_columns`.
+        chunk: as in `run_columns`.
+    """
+
+    def __init__(self, base: Scenario, columns: Mapping[str, Any], chunk: int):
+        self.chunk = integer("chunk", chunk, 1, 1_000_000)
+        drawn = Columns(base, columns)  # refuses bad ones
+        self.base, self.columns = base, drawn.columns
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def chunks(self) -> int:
+        """Number of files."""
+        return -(-len(self) // self.chunk)
+
+    def chunk_runs(self, number: int) -> range:
+        """The runs of one file.
+
+        Args:
+            number: of the file, from 0.
+        """
+        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
+
+    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
+        """Makes the runs of one file; a row each.
+
+        Args:
+            number: of the file, from 0.
+        """
+        runs = self.chunk_runs(number)
+        part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
+        # a worker is one of several processes, one a core
+        threads = None if multiprocessing.parent_process() is None else 1
+        made = table_of_ends(simulate_columns(self.base, part, threads=threads))
+        table = {"run": list(runs), **{name: x.tolist() for name, x in part.items()}, **made}
+        return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+
+    def blank_row(self) -> dict[str, Any]:
+        """A row, for the types of its columns."""
+        ends = {f"{name}_{axis}": 0.0 for name in ENDS for axis in AXES}
+        first = {"run": 0, **dict.fromkeys(self.columns, 0.0), "status": "", "axis": ""}
+        return {**first, "end_time": 0.0, "steps": 0, **ends, "energy_residual": 0.0}
+
+    def described(self) -> dict[str, Any]:
+        """All of it as data; of the columns their names and a fingerprint."""
+        values = hashlib.sha256()
+        for x in self.columns.values():
+            values.update(x.tobytes())
+        told = {"base": plain_data(self.base), "columns": list(self.columns), "runs": len(self)}
+        return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": values.hexdigest()}
+
+    def digest(self) -> str:
+        """Fingerprint of the runs, and of the release that makes them."""
+        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def table_of_ends(made: np.ndarray) -> dict[str, list[Any]]:
+    """Columns of summaries.
+
+    Args:
+        made: an array of SUMMARY.
+    """
+    through = np.where(made["throughput"] > 0.0, made["throughput"], np.nan)
+    out = {
+        "status": made["code"], "axis": made["axis"], "end_time": made["time"],
+        "steps": made["steps"],
+    }  # fmt: skip
+    out |= {f"{name}_{axis}": made[name][:, i] for name in ENDS for i, axis in enumerate(AXES)}
+    out |= {"energy_residual": np.abs(made["residual"]) / through}
+    return {name: x.tolist() for name, x in out.items()}
