@@ -49,6 +49,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "materials": "hapticclay.cli.materials:MaterialsCommand",
     "view": "hapticclay.cli.view:ViewCommand",
     "device": "hapticclay.cli.device:DeviceCommand",
+    "gym": "hapticclay.cli.gym:GymCommand",
     "video": "hapticclay.cli.video:VideoCommand",
     "info": "hapticclay.cli.info:InfoCommand",
     "export": "hapticclay.cli.export:ExportCommand",

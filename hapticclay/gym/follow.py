@@ -14,7 +14,8 @@ from .task import FORCE, Arrays, Command, Handles, Judged, Task, saturated
 
 SPEED = 0.05  # [m/s] along the line
 AHEAD = 5e-3  # [m]
-END, LOST = 10.0, -25.0  # rewards
+END, LOST = 10.0, -50.0  # rewards
+SLOW = 4.0  # to which the cost of a wrong speed saturates, so that haste does not pay
 SETTLING = 25  # control periods that the success does not count
 
 PUSH = (
@@ -110,7 +111,7 @@ class Follow(Task):
         speed = lines.along_across(at.tangent, h.v)[0]
         change = actions - m["action"]
         late = speed / SPEED - 1.0
-        cost = 0.5 * saturated(error * error) + 0.5 * saturated(late * late)
+        cost = 0.5 * saturated(error * error) + 0.5 * SLOW * saturated(late * late / SLOW)
         cost += 0.01 * (change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1])
         reward = 100.0 * (at.s - m["s"]) - cost
         lost = h.diverged | ~(at.distance <= self.far)
