@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from . import lines
 from .draws import Truth
@@ -70,6 +71,7 @@ class Follow(Task):
         """
         raise NotImplementedError
 
+    @override
     def memory(self, n: int) -> Arrays:
         sums = {name: np.zeros(n) for name in ("errors", "speeds", "squares")}
         return {
@@ -78,6 +80,7 @@ class Follow(Task):
             "depth_at_end": np.ones(n), "tangent": np.zeros((n, 2)),
         }  # fmt: skip
 
+    @override
     def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
         for name in ("errors", "speeds", "squares", "s", "action", "count"):
             m[name][i] = 0.0
@@ -86,6 +89,7 @@ class Follow(Task):
         lines.lay(m, i, self.line(truth))
         m["tangent"][i] = m["tangents"][i, 0]
 
+    @override
     def command(self, m: Arrays, actions: np.ndarray) -> Command:
         t = m["tangent"]
         a, b = self.most * actions[:, 0], self.most * actions[:, 1]
@@ -105,6 +109,7 @@ class Follow(Task):
         left = m["length"] - at.s
         return [100.0 * v, 100.0 * w, f, g, last[:, 0], last[:, 1], 100.0 * left, m["gain"]]
 
+    @override
     def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
         at = lines.place(m, h.p, AHEAD)
         error = self.error(m, at)
