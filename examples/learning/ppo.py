@@ -59,7 +59,7 @@ class Agent(nn.Module):
     def __init__(self, n: int, k: int):
         super().__init__()
         self.policy, self.value = layers(n, k, 0.01), layers(n, 1, 1.0)
-        self.spread = nn.Parameter(torch.full((k,), -0.7))
+        self.spread = nn.Parameter(torch.full((k,), -1.6))
 
     def law(self, x: torch.Tensor) -> torch.distributions.Normal:
         return torch.distributions.Normal(self.policy(x), self.spread.exp())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from ..model.clay import slab
 from ..scene.scenario import Scenario
@@ -54,9 +55,11 @@ class AdaptiveGainTask(Task):
             Quantity("damping of the clay / 60 N.s/m", 0.0, 20.0),
         )  # fmt: skip
 
+    @override
     def scenario(self, truth: Truth) -> Scenario:
         return scene_of(truth, name="adaptive gain", clay=slab(truth["b"]), gain=(FIRST, GAIN_Y))
 
+    @override
     def memory(self, n: int) -> Arrays:
         return {
             "muscle": np.zeros((n, CYCLE)), "count": np.zeros(n, np.int64), "K": np.ones(n),
@@ -64,6 +67,7 @@ class AdaptiveGainTask(Task):
             "errors": np.zeros(n),
         }  # fmt: skip
 
+    @override
     def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
         t = np.arange(CYCLE) * (28 * DT)
         phases = rng.uniform(0.0, 2.0 * math.pi, len(TONES))
@@ -72,6 +76,7 @@ class AdaptiveGainTask(Task):
         m["count"][i], m["K"][i], m["b"][i], m["errors"][i] = 0, FIRST, truth["b"], 0.0
         m["v"][i] = m["f"][i] = 0.0
 
+    @override
     def command(self, m: Arrays, actions: np.ndarray) -> Command:
         factors = np.array([math.pow(2.0, RATE * a) for a in actions[:, 0].tolist()])
         m["K"] = np.minimum(np.maximum(m["K"] * factors, LEAST), MOST)
@@ -81,10 +86,12 @@ class AdaptiveGainTask(Task):
         gain = np.stack((m["K"], nothing + GAIN_Y), axis=1)
         return Command(np.stack((push, nothing), axis=1), gain)
 
+    @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
         told = np.array([math.log10(x) for x in m["K"].tolist()])
         return np.concatenate((m["v"], m["f"], told[:, None], m["b"][:, None] / 60.0), axis=1)
 
+    @override
     def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
         m["count"] = m["count"] + 1
         for name, now in (("v", 100.0 * h.v[:, :1]), ("f", h.fh[:, :1])):

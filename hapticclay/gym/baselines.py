@@ -287,7 +287,8 @@ def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Score
         total += np.where(live, rewards, 0.0)
         length += live
         for key in (k for k in info if f"_{k}" in info and not k.startswith("_")):
-            last[key] = np.where(live, info[key], last.get(key, info[key]))
+            found = np.asarray(info[key])
+            last[key] = np.asarray(np.where(live, found, last.get(key, found)))
         live &= ~(ended | cut_off)
     env.close()
     return Scores(total, length, last)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
+from typing_extensions import override
 
 from ..errors import choice
 from ..model.clay import slab
@@ -61,6 +62,7 @@ class CutLineTask(Follow):
         """
         return lines.turned(lines.SHAPES[self.shape](LENGTH), truth["angle"])
 
+    @override
     def scenario(self, truth: Truth) -> Scenario:
         line = self.line(truth)
         (dx, dy), d = line[1] - line[0], truth["offset"]
@@ -68,9 +70,11 @@ class CutLineTask(Follow):
         start = float(-dy / r * d), float(dx / r * d)
         return scene_of(truth, name="cut line", clay=slab(truth["b"]), start=start)
 
+    @override
     def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
         return at.across / TOLERANCE
 
+    @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
         at = lines.place(m, h.p, AHEAD)
         t, u = at.tangent, at.ahead

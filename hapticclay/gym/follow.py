@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from . import lines
 from .draws import Truth
@@ -14,7 +15,8 @@ from .task import FORCE, Arrays, Command, Handles, Judged, Task, saturated
 
 SPEED = 0.05  # [m/s] along the line
 AHEAD = 5e-3  # [m]
-END, LOST = 10.0, -25.0  # rewards
+END, LOST = 10.0, -50.0  # rewards
+SLOW = 4.0  # to which the cost of a wrong speed saturates, so that haste does not pay
 SETTLING = 25  # control periods that the success does not count
 
 PUSH = (
@@ -69,6 +71,7 @@ class Follow(Task):
         """
         raise NotImplementedError
 
+    @override
     def memory(self, n: int) -> Arrays:
         sums = {name: np.zeros(n) for name in ("errors", "speeds", "squares")}
         return {
@@ -77,6 +80,7 @@ class Follow(Task):
             "depth_at_end": np.ones(n), "tangent": np.zeros((n, 2)),
         }  # fmt: skip
 
+    @override
     def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
         for name in ("errors", "speeds", "squares", "s", "action", "count"):
             m[name][i] = 0.0
@@ -85,6 +89,7 @@ class Follow(Task):
         lines.lay(m, i, self.line(truth))
         m["tangent"][i] = m["tangents"][i, 0]
 
+    @override
     def command(self, m: Arrays, actions: np.ndarray) -> Command:
         t = m["tangent"]
         a, b = self.most * actions[:, 0], self.most * actions[:, 1]
@@ -104,13 +109,14 @@ class Follow(Task):
         left = m["length"] - at.s
         return [100.0 * v, 100.0 * w, f, g, last[:, 0], last[:, 1], 100.0 * left, m["gain"]]
 
+    @override
     def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
         at = lines.place(m, h.p, AHEAD)
         error = self.error(m, at)
         speed = lines.along_across(at.tangent, h.v)[0]
         change = actions - m["action"]
         late = speed / SPEED - 1.0
-        cost = 0.5 * saturated(error * error) + 0.5 * saturated(late * late)
+        cost = 0.5 * saturated(error * error) + 0.5 * SLOW * saturated(late * late / SLOW)
         cost += 0.01 * (change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1])
         reward = 100.0 * (at.s - m["s"]) - cost
         lost = h.diverged | ~(at.distance <= self.far)

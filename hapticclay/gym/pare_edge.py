@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from ..model.clay import Clay
 from ..model.groove import Groove
@@ -65,6 +66,7 @@ class PareEdgeTask(Follow):
         end = truth["depth"] - truth["depth_at_end"]
         return np.array([(0.0, 0.0), (APPROACH, 0.0), (APPROACH + LENGTH, end)])
 
+    @override
     def scenario(self, truth: Truth) -> Scenario:
         edge = truth["depth"] - RADIUS  # of the block, along y
         x, y = (APPROACH, APPROACH + LENGTH + BEYOND), (edge - WIDTH, edge)
@@ -92,10 +94,12 @@ class PareEdgeTask(Follow):
         here = target(at.s)
         return here - at.across, here, target(at.s + AHEAD)
 
+    @override
     def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
         depth, target, _ = self.depths(m, at)
         return (depth - target) / (SHARE * target)
 
+    @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
         at = lines.place(m, h.p, AHEAD)
         depths = (1000.0 * d for d in self.depths(m, at))

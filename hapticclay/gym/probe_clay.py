@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from ..model.clay import slab
 from ..model.flow import Flow
@@ -53,27 +54,33 @@ class ProbeClayTask(Task):
             Quantity("time left", 0.0, self.limit * self.steps * DT, "s"),
         )
 
+    @override
     def scenario(self, truth: Truth) -> Scenario:
         clay = slab(Flow(Fy=truth["Fy"], b=truth["b"]))
         return scene_of(truth, name="probe clay", clay=clay)
 
+    @override
     def memory(self, n: int) -> Arrays:
         return {
             "count": np.zeros(n, np.int64), "action": np.zeros((n, 2)), "b": np.ones(n),
             "Fy": np.ones(n),
         }  # fmt: skip
 
+    @override
     def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
         m["count"][i], m["action"][i] = 0, 0.0
         m["b"][i], m["Fy"][i] = truth["b"], truth["Fy"]
 
+    @override
     def command(self, m: Arrays, actions: np.ndarray) -> Command:
         return Command(FORCE * actions[:, :2])
 
+    @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
         left = (self.limit - m["count"]) * (self.steps * DT)
         return np.concatenate((1000.0 * h.p, 100.0 * h.v, h.fh, m["action"], left[:, None]), axis=1)
 
+    @override
     def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
         m["count"] = m["count"] + 1
         m["action"] = actions[:, :2].copy()

@@ -113,7 +113,17 @@ class StableBaselinesVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Refused: the copies are no environments of their own."""
+        """Refused: the copies are no environments of their own.
+
+        Args:
+            method_name: name of the method.
+            *method_args: for it.
+            indices: of the copies.
+            **method_kwargs: for it.
+
+        Raises:
+            ParameterError: always.
+        """
         raise ParameterError("method_name", method_name, "must be none: copies have no methods")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

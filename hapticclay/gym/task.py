@@ -81,6 +81,7 @@ class Task:
         actions: quantities of an action.
         observations: quantities of an observation.
         drawn: ranges of what is drawn for each episode.
+        ranges: the same, with the ends that were given.
     """
 
     given: Mapping[str, Any] | None = None

@@ -12,7 +12,8 @@ from hapticclay.views import style
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted((ROOT / "examples" / "tutorials").glob("*.py"))
-EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS})
+LEARNING = {*(ROOT / "examples" / "learning").glob("*.py")}  # need torch, and minutes
+EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS} - LEARNING)
 PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
 

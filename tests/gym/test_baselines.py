@@ -1,0 +1,76 @@
+"""Baselines: what they know is right, and better knowledge earns more."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import hapticclay as hc
+from hapticclay.gym import adaptive_gain, baselines, probe_clay
+
+
+def test_the_robust_gain_is_below_that_of_each_published_hand():
+    """A hundred hands from the population, whose corners it is made of."""
+    for hand in hc.studies.POPULATIONS["published range"].sample(100, seed=0):
+        assert baselines.robust_gain(40.0) <= baselines.oracle_gain(40.0, hand) * (1 + 1e-12)
+
+
+def test_a_hand_is_identified_from_its_own_equation():
+    """A mass on a damper and a spring under known tones, solved by SciPy to 1e-10.
+
+    The device at its other side grows lighter from 0.5 to 0.7 s, as where K rises: tones alone
+    cannot tell the hand from its muscle. Trapezoids of 10 ms err by h^2 w^2/12, 0.5 % at the 25
+    rad/s of the fastest transient; the fit may amplify that sixfold.
+    """
+    m, d, k, dt = 0.4, 4.0, 60.0, 0.01
+    tones = [2.0 * math.pi * f for f in adaptive_gain.TONES]
+
+    def push(t):
+        return sum(3.0 * np.sin(w * t + i) for i, w in enumerate(tones))
+
+    def lightness(t):
+        return 1.0 + 3.0 * np.clip((t - 0.5) / 0.2, 0.0, 1.0)  # K [1/kg]
+
+    def acceleration(t, x, v):
+        K = lightness(t)
+        return (push(t) - (d + 10.0 / K) * v - k * x) / (m + 1.0 / K)
+
+    t = np.arange(150) * dt
+    x, v = solve_ivp(
+        lambda t, y: (y[1], acceleration(t, *y)), (0.0, t[-1]), (0.0, 0.0), t_eval=t,
+        rtol=1e-10, atol=1e-12, max_step=dt,
+    ).y  # fmt: skip
+    fh = push(t) - m * acceleration(t, x, v) - d * v - k * x
+    found = baselines.hand_from(v, fh, dt)
+    assert found.mass == pytest.approx(m, rel=0.03)
+    assert found.damper == pytest.approx(d, rel=0.03)
+    assert found.spring == pytest.approx(k, rel=0.03)
+
+
+def test_an_answer_names_the_clay_exactly():
+    """log10 and powers of 10, to rounding of some eps."""
+    x, y = probe_clay.answer_of(87.0, 2.2)
+    assert 50.0 * 10.0 ** (0.8 * x) == pytest.approx(87.0, rel=1e-14)
+    assert 1.5 * 10.0 ** (0.8 * y) == pytest.approx(2.2, rel=1e-14)
+
+
+def test_the_pd_law_follows_the_line_where_random_actions_do_not():
+    found = {
+        name: baselines.returns("CutLine-v0", maker, range(3), engine="python")
+        for name, maker in baselines.BASELINES["CutLine-v0"].items()
+    }
+    assert found["PD along the line"].info["is_success"].all()
+    assert not found["random"].info["is_success"].any()
+
+
+def test_least_squares_names_the_clay_within_a_tenth():
+    """Finite differences of velocities that are calm; both numbers, in two episodes."""
+    found = baselines.returns("ProbeClay-v0", baselines.least_squares, range(2), engine="python")
+    assert (found.total > -0.2).all()
+
+
+def test_means_have_intervals_of_the_normal_law():
+    mean, half = baselines.mean_of(np.array([1.0, 2.0, 3.0, 4.0]))
+    assert mean == 2.5
+    assert half == pytest.approx(1.96 * math.sqrt(5.0 / 3.0) / 2.0, rel=1e-15)
