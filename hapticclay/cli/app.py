@@ -44,6 +44,7 @@ COMMANDS = {  # a command is a dataclass of its options; calling it returns the 
     "fit": "hapticclay.cli.fit:FitCommand",
     "impedance": "hapticclay.cli.impedance:ImpedanceCommand",
     "mbk": "hapticclay.cli.mbk:MBKCommand",
+    "lab": "hapticclay.cli.lab:LabCommand",
     "bench": "hapticclay.cli.bench:BenchCommand",
     "fields": "hapticclay.cli.fields:FieldsCommand",
     "materials": "hapticclay.cli.materials:MaterialsCommand",

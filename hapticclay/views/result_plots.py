@@ -27,6 +27,8 @@ PLOTS = {  # by class of the result: module here, and function
     "Instability": "robustness_plots:instability_plot",
     "Design": "result_plots:design_plot",
     "LoopReport": "loop_plots:loop_plot",
+    "Lab": "chart_plots:lab_plot",
+    "StaircaseRun": "chart_plots:staircase_plot",
     "Comparison": "compare_plots:main_overlay",
 }
 DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]
