@@ -43,6 +43,10 @@ def result(name):
             hc.studies.Draw(5),
         ),
         "Instability": lambda: hc.studies.monte_carlo(trials),
+        "Lab": lambda: hc.studies.lab("jnd", quick=True),
+        "StaircaseRun": lambda: hc.studies.run_staircase(
+            hc.studies.Staircase(), hc.studies.Observer()
+        ),
         "Design": lambda: hc.theory.compare(
             "x", 90.0, [hc.Compensator()], HAND, disk_margin=0.5
         )[0],
@@ -51,7 +55,7 @@ def result(name):
 
 NAMES = (
     "ZWidth", "Impedance", "MeasuredImpedance", "DeviceMBK", "ArmMBK", "Identified", "Fitted",
-    "Band", "Instability", "Design",
+    "Band", "Instability", "Design", "Lab", "StaircaseRun",
 )  # fmt: skip
 
 

@@ -64,8 +64,8 @@ class ReproduceCommand:
         if source is not None:
             make = functools.partial(report.reproduce_classic, source)
         with progress_bar(total=0, bar_format="{elapsed} {desc}") as bar:
-            found = make(out, self.quick, bar.set_description_str, save)
-        rows = found if source is None else found.rows
+            found: Any = make(out, self.quick, bar.set_description_str, save)
+        rows: Any = found if source is None else found.rows
         if self.page:
             text = report.classic_page(found, source) if source else report.paper_page(rows)
             with atomic(self.page) as f:

@@ -16,6 +16,8 @@ from .identification import Noise as Noise
 from .identification import identify as identify
 from .impedance import MeasuredImpedance as MeasuredImpedance
 from .impedance import measure_impedance as measure_impedance
+from .labs import Lab as Lab
+from .labs import lab as lab
 from .measurement import Measurement as Measurement
 from .population import POPULATIONS as POPULATIONS
 from .population import Band as Band
@@ -33,6 +35,11 @@ from .sampling import Range as Range
 from .sampling import Sweep as Sweep
 from .sampling import parse_grid as parse_grid
 from .spectral_fit import identify_data as identify_data
+from .staircase import Observer as Observer
+from .staircase import Staircase as Staircase
+from .staircase import StaircaseRun as StaircaseRun
+from .staircase import run_staircase as run_staircase
+from .staircase import staircase_mean as staircase_mean
 from .sweep import run_sweep as run_sweep
 from .sweep_store import read_sweep as read_sweep
 from .trials import Trials as Trials

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -58,7 +57,7 @@ class Chart:
         }
 
 
-def curve(name: str, x: Sequence[float], y: Sequence[float], kind: CurveKind = "line") -> Curve:
+def curve(name: str, x: Any, y: Any, kind: CurveKind = "line") -> Curve:
     """A curve of two sequences of numbers.
 
     Args:

@@ -175,13 +175,14 @@ def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     if isinstance(wall, boundary.PushedLoop):  # whose limit is a scan
         fine = []
     B = np.unique([*fine, *grid]).tolist()
-    walls = [wall_at(wall, 0.0, x) for x in B]
     parts: list[Limit] = []
 
-    def line(name: str, kind: str, law: Callable[[Any], float], note: str) -> None:
-        K = [law(w) for w in walls]
+    def line(
+        name: str, kind: str, law: Callable[[Any], float], note: str, places: Sequence[float] = B
+    ) -> None:
+        K = [law(wall_at(wall, 0.0, x)) for x in places]
         if any(x > 0.0 for x in K):
-            parts.append(Limit(name, kind, tuple(B), tuple(K), note))
+            parts.append(Limit(name, kind, tuple(places), tuple(K), note))
 
     if isinstance(wall, boundary.PushedLoop):
         line("exact, linear loop", "exact", exact_limit, "sampled loop at the nominal pose")
@@ -196,6 +197,7 @@ def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
         wall_limits.colgate_schenkel_limit,
         "passive: stable in every passive hand"
         + (", but for the quantum" * bool(wall.device.quantum)),
+        np.unique([*B, *np.linspace(0.0, min(wall.device.damper, B[-1]), LIMIT_POINTS)]).tolist(),
     )
     if wall.velocity == "difference" and wall.velocity_window == 1 and wall.velocity_filter is None:
         note = "linear rule, for (b + B) Ts and K Ts^2 far below the mass"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from ..studies.chart import Chart
+from ..studies.chart import Chart, curve
+from ..studies.labs import Lab
+from ..studies.staircase import StaircaseRun
 from .style import (
     BLACK,
     CURVE_STYLES,
-    WHITE,
     add_legend,
     figure_size,
     figure_style,
@@ -38,7 +40,7 @@ def chart_plot(chart: Chart) -> Figure:
         for c in chart.curves:
             look: Any = {}
             if c.kind == "marks":
-                look = dict(ls="none", marker=MARKS[marks % len(MARKS)], mfc=WHITE, zorder=4)
+                look = dict(ls="none", marker=MARKS[marks % len(MARKS)], mfc="none", zorder=4)
                 look |= dict(ms=stroke(6.5), mew=stroke(1.4), clip_on=False)
                 marks += 1
             elif c.kind == "dashed" and not c.name:
@@ -58,3 +60,28 @@ def chart_plot(chart: Chart) -> Figure:
         ax.set(xlabel=unit_text(chart.x), ylabel=unit_text(chart.y))
         add_legend(figure, ax, 3)
     return figure
+
+
+def lab_plot(found: Lab) -> Figure:
+    """Plots the first chart of a lab.
+
+    Args:
+        found: from `lab`.
+    """
+    return chart_plot(found.charts[0])
+
+
+def staircase_plot(found: StaircaseRun) -> Figure:
+    """Plots the levels of a staircase over its trials, the turns marked.
+
+    Args:
+        found: from `run_staircase`.
+    """
+    trials, at = np.arange(len(found.levels)), found.turns[found.staircase.skipped :]
+    ends, mean = trials[[0, -1]], [found.estimate] * 2
+    curves = (
+        curve(found.staircase.words, trials, found.levels, "steps"),
+        curve("turns that count", at, found.levels[at], "marks"),
+        curve("their mean", ends, mean, "dashed"),
+    )
+    return chart_plot(Chart("staircase", "", "", "trial", "difference", curves))

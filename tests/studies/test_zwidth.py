@@ -286,3 +286,13 @@ def test_tables_hold_what_the_figure_shows():
     one = zwidth_plot(zwidth(BARE, B=(0.0, 1.0, 50.0))).axes[0]
     labels = one.get_legend_handles_labels()[1]
     assert "Colgate, Schenkel 1997 (sufficient)" in labels and "runs: limit of stability" in labels
+
+
+def test_the_passive_line_has_points_enough_to_be_drawn_smoothly():
+    lines = wall_lines.theory_limits(BARE, 150.0, (0.0, 150.0))
+    passive = next(x for x in lines if x.name.startswith("Colgate"))
+    inside = [B for B in passive.B if B <= BARE.device.damper]
+    assert len(inside) >= wall_lines.LIMIT_POINTS
+    assert np.diff(inside).max() <= 0.02 * BARE.device.damper
+    # a straight line between its points: 2 (b - B)/Ts
+    assert passive.at(0.2) == pytest.approx(2.0 * (BARE.device.damper - 0.2) / BARE.Ts)

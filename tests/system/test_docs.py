@@ -89,7 +89,7 @@ def test_the_groove_page_says_what_it_prints():
     assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
 
-@pytest.mark.parametrize("page", ["figures.md", "passivity.md", "robustness.md"])
+@pytest.mark.parametrize("page", ["figures.md", "labs.md", "passivity.md", "robustness.md"])
 def test_snippets_of_the_page_run_and_print_its_numbers(page, tmp_path):
     text = (ROOT / "docs" / page).read_text()
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
@@ -101,7 +101,9 @@ def test_snippets_of_the_page_run_and_print_its_numbers(page, tmp_path):
         assert any(float(x) == pytest.approx(float(said), rel=1e-3) for x in printed), said
 
 
-FIGURE_PAGES = ("zwidth", "impedance", "passivity", "robustness", "compare", "figures")
+FIGURE_PAGES = (
+    "zwidth", "impedance", "passivity", "robustness", "compare", "figures", "classics", "labs",
+)  # fmt: skip
 LINES = [
     line
     for page in FIGURE_PAGES

@@ -16,7 +16,7 @@ from hapticclay.views.style import along_motion, set_title, styled
 
 @pytest.fixture(scope="module")
 def identified():
-    return identify("x", "G", realisations=1, periods=1, lines=12, period=2.5, band=(0.5, 10.0))
+    return identify("x", "G", realisations=1, periods=2, lines=12, period=2.5, band=(0.5, 10.0))
 
 
 def _labels(figure):

@@ -84,7 +84,7 @@ def _passive_is_stable(tell: Tell) -> Row:
 def _plane(found: list[tuple[str, VirtualWall, float]]) -> Chart:
     """The passive walls in the plane of B and K."""
     B = np.linspace(-DAMPER, DAMPER, 101)
-    at = [(w.B, K) for _, w, K in found if w.device == WALL.device and w.Ts == TS]
+    same = [(w.B, K) for _, w, K in found if w.device == WALL.device and w.Ts == TS]
     return Chart(
         "plane",
         "Passive walls",
@@ -94,7 +94,9 @@ def _plane(found: list[tuple[str, VirtualWall, float]]) -> Chart:
         "virtual stiffness K [N/m]",
         (
             curve("b = K Ts/2 + |B|", B, [bound(replace(WALL, B=x)) for x in B]),
-            curve("runs: worst path of a hand", *zip(*at, strict=True), "marks"),
+            curve(
+                "runs: worst path of a hand", [x for x, _ in same], [K for _, K in same], "marks"
+            ),
         ),
     )
 

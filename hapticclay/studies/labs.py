@@ -1,0 +1,338 @@
+"""Four labs for a course on haptics: a wall and its rate, Z-width, delay, and a JND."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..errors import choice
+from ..model.shapes import Constant
+from ..results import Result
+from ..scene.scenario import Scenario
+from ..scene.virtual_wall import Device, VirtualWall
+from ..simulation.batch import simulate_batch
+from ..theory import wall_limits
+from .chart import Chart, curve
+from .port_energy import passivity_limit
+from .staircase import Observer, Staircase, run_staircase, staircase_mean
+from .wall_runs import PRESS, stiffest, unshown
+
+MASS, DAMPER, TS = 0.1, 0.5, 1e-3  # kg, N.s/m, s
+WALL = VirtualWall(device=Device(MASS, DAMPER), Ts=TS)
+RATES = (0.5e-3, 1e-3, 2e-3, 4e-3)  # [s]
+DAMPERS = (0.25, 0.5, 1.0)  # [N.s/m]
+DAMPINGS = (0.0, 5.0, 20.0, 60.0, 120.0)  # [N.s/m]
+DELAYS = (0.0, 0.5, 1.0, 2.0, 4.0)  # samples
+STEPS = 8  # engine steps a sample of paths that draw energy
+SHOWN = 0.6  # [s] of the run that is shown live
+BEYOND = 1.05  # K of that run over the limit
+PUSH = 0.05  # [m/s] with which it meets the wall
+
+STIFFNESS, FORCE, PRESSED = 500.0, 2.0, 0.4  # N/m, N, s: of the wall whose changes are judged
+SETTLED = 0.25  # share of such a run in which the indentation is read
+CHANGES = np.linspace(0.0, 0.4, 9)  # of stiffness at which the indentation is found by runs
+ROUGH = Device(MASS, 2.0, quantum=1e-4)  # a device whose encoder hides part of a change
+OBSERVER = Observer(0.08, 0.03)
+STAIRCASES = (  # the rules, of small steps: a large one shifts the point of convergence
+    Staircase(down=2, fall=0.004, rise=0.004, reversals=60, skipped=10),
+    Staircase(down=3, fall=0.004, rise=0.004, reversals=60, skipped=10),
+    Staircase(down=1, fall=0.002, rise=0.006, reversals=60, skipped=10),
+)
+TRIED, QUICK_TRIED = 100, 30  # staircases whose mean is taken
+
+Tell = Callable[[str], None]
+
+
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class Lab(Result):
+    """A lab: its task and questions, what its runs gave, and a run to look at.
+
+    Attributes:
+        name: of the lab.
+        title: in a few words.
+        task: what is done.
+        questions: to be answered by whoever does it.
+        found: the answer to the first of them, in one line.
+        columns: its table, by column.
+        charts: its figures.
+        scene: a run that shows the effect live.
+    """
+
+    drawn_by = "hapticclay.views.chart_plots:lab_plot"
+
+    name: str
+    title: str
+    task: str
+    questions: tuple[str, ...]
+    found: str
+    columns: dict[str, tuple]
+    charts: tuple[Chart, ...]
+    scene: Scenario
+
+    def headline(self) -> str:
+        """What was found, in one line."""
+        return f"{self.title}: {self.found}"
+
+    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+        """The table of the lab, then the curves of its figures."""
+        out: dict[str, dict[str, Sequence[Any]]] = {self.name: dict(self.columns)}
+        for chart in self.charts:
+            out |= {f"{chart.name}: {name}": table for name, table in chart.tables().items()}
+        return out
+
+
+def _limits(walls: Sequence[VirtualWall]) -> list[float]:
+    """Largest stable K of each wall by runs, searched for from the linear rule [N/m]."""
+    around = [wall_limits.hulin_limit(w) for w in walls]
+    return [stiffest([w], [K], K, PRESS, unshown)[0] for w, K in zip(walls, around, strict=True)]
+
+
+def _swinging(wall: VirtualWall, K: float) -> Scenario:
+    """A run of a wall just beyond a limit, to be looked at."""
+    return replace(wall, K=BEYOND * K).scenario(SHOWN, push=PUSH)
+
+
+def wall_lab(quick: bool, tell: Tell) -> Lab:
+    """A wall and its rate: how stiff may it be, over the control sample?
+
+    Args:
+        quick: fewer rates.
+        tell: called with the name of each step.
+    """
+    rates = RATES[1::2] if quick else RATES
+    tell("stable walls")
+    walls = [replace(WALL, Ts=T) for T in rates]
+    stable = _limits(walls)
+    tell("passive walls")
+    passive = [passivity_limit(w, STEPS) for w in walls]
+    exact = [wall_limits.stiffness_band(w)[1] for w in walls]
+    ms = [1e3 * T for T in rates]
+    chart = Chart(
+        "rate", "Largest stiffness over the control sample",
+        "Lines: 2 b/Ts, and b/(Ts/2) of the linear rule, which are the same without delay and B.",
+        "control sample Ts [ms]", "largest stiffness K [N/m]",
+        (
+            curve("2 b/Ts", ms, [2.0 * DAMPER / T for T in rates]),
+            curve("runs: stable", ms, stable, "marks"),
+            curve("runs: passive", ms, passive, "marks"),
+        ),
+        "xy",
+    )  # fmt: skip
+    product = [K * T for K, T in zip(stable, rates, strict=True)]
+    return Lab(
+        "wall", "A wall and its rate",
+        f"A device of {MASS:g} kg and {DAMPER:g} N.s/m renders a spring K without damping.",
+        (
+            "K Ts is nearly the same for all rates. What is it, and why?",
+            "How does the limit change with the mass? Try it, then find the mass in the formula.",
+            "Stable without a hand and passive in every hand: why are they so close here?",
+        ),
+        f"K Ts = {min(product):.4g} to {max(product):.4g} N.s/m, b is {DAMPER:g}",
+        {
+            "Ts [ms]": tuple(ms), "stable K by runs [N/m]": tuple(stable),
+            "exact [N/m]": tuple(exact), "passive K by runs [N/m]": tuple(passive),
+        },
+        (chart,), _swinging(walls[-1], stable[-1]),
+    )  # fmt: skip
+
+
+def zwidth_lab(quick: bool, tell: Tell) -> Lab:
+    """The Z-width: which K and B does a device render stably?
+
+    Args:
+        quick: one damper and three values of B.
+        tell: called with the name of each step.
+    """
+    dampers, dampings = (DAMPERS[1:2], DAMPINGS[:4:2]) if quick else (DAMPERS, DAMPINGS)
+    rows: list[tuple[float, float, float, float]] = []
+    curves, areas = [], []
+    for b in dampers:
+        tell(f"b = {b:g} N.s/m")
+        walls = [replace(WALL, B=B, device=Device(MASS, b)) for B in dampings]
+        found, line = _limits(walls), np.linspace(0.0, dampings[-1], 61)
+        exact = [wall_limits.stiffness_band(w)[1] for w in walls]
+        rows += zip([b] * len(walls), dampings, found, exact, strict=True)
+        edge = [wall_limits.stiffness_band(replace(walls[0], B=float(x)))[1] for x in line]
+        curves += [
+            curve(f"b = {b:g} N.s/m, exact", line, edge),
+            curve("", dampings, found, "marks"),
+        ]
+        areas.append(float(np.trapezoid(found, dampings)))
+    chart = Chart(
+        "zwidth", "Z-width", "Walls below a line are stable; marks are limits found by runs.",
+        "virtual damping B [N.s/m]", "virtual stiffness K [N/m]", tuple(curves),
+    )  # fmt: skip
+    names = ("b [N.s/m]", "B [N.s/m]", "stable K by runs [N/m]", "exact [N/m]")
+    top = max(rows, key=lambda r: r[2])
+    return Lab(
+        "zwidth", "Z-width",
+        "The same device renders a spring K with a damper B whose velocity is a difference.",
+        (
+            "Virtual damping first helps, then harms. Which part of the loop makes it harm?",
+            "Double the physical damper: by how much does the largest K grow, at B = 0 and at its "
+            "best B?",
+            "Which of the walls inside of the region are not passive (b > K Ts/2 + |B|)?",
+        ),
+        f"largest K {top[2]:.4g} N/m at B = {top[1]:g} N.s/m; area {max(areas):.3g} N^2.s/m^2",
+        dict(zip(names, map(tuple, zip(*rows, strict=True)), strict=True)),
+        (chart,), _swinging(replace(WALL, B=top[1]), top[2]),
+    )  # fmt: skip
+
+
+def delay_lab(quick: bool, tell: Tell) -> Lab:
+    """Delay and passivity: what does a late force cost?
+
+    Args:
+        quick: two delays.
+        tell: called with the name of each step.
+    """
+    delays = DELAYS[::2][:2] if quick else DELAYS
+    walls = [replace(WALL, delay=d * TS) for d in delays]
+    tell("stable walls")
+    stable = _limits(walls)
+    tell("passive walls")
+    passive = [passivity_limit(w, STEPS) for w in walls]
+    fine = np.linspace(0.0, delays[-1], 201)
+    late = [replace(WALL, delay=float(d) * TS) for d in fine]
+    chart = Chart(
+        "delay", "Largest stiffness over the delay",
+        "Stable without a hand, and passive in every hand; lines are theory, marks runs.",
+        "delay [samples]", "largest stiffness K [N/m]",
+        (
+            curve("stable: b/(Ts/2 + delay)", fine, [wall_limits.hulin_limit(w) for w in late]),
+            curve("runs: stable", delays, stable, "marks"),
+            curve("passive: Colgate, Schenkel", fine,
+                  [wall_limits.colgate_schenkel_limit(w) for w in late]),
+            curve("runs: passive", delays, passive, "marks"),
+        ),
+        "y",
+    )  # fmt: skip
+    return Lab(
+        "delay", "Delay and passivity",
+        "The force of the wall comes late: a bus, a second computer, a network.",
+        (
+            "How many samples of delay halve the stable stiffness? Derive it from the rule.",
+            "Between whole samples the passive limit rises again. What does a force that changes "
+            "between two samples do to the worst path of a hand?",
+            "Which device would you change to win back one sample: mass, damper or rate?",
+        ),
+        f"from {delays[0]:g} to {delays[-1]:g} samples: stable K {stable[0]:.4g} to "
+        f"{stable[-1]:.4g} N/m, passive K {passive[0]:.4g} to {passive[-1]:.4g} N/m",
+        {
+            "delay [samples]": tuple(delays), "stable K by runs [N/m]": tuple(stable),
+            "rule [N/m]": tuple(wall_limits.hulin_limit(w) for w in walls),
+            "passive K by runs [N/m]": tuple(passive),
+        },
+        (chart,), _swinging(walls[-1], stable[-1]),
+    )  # fmt: skip
+
+
+def pressed_wall(change: float, device: Device) -> Scenario:
+    """The run in which a hand presses a wall of STIFFNESS (1 + change) with FORCE.
+
+    Args:
+        change: of the stiffness, as a share.
+        device: that renders it.
+    """
+    K = STIFFNESS * (1.0 + change)
+    damping = 0.5 * math.sqrt(K * device.mass)
+    wall = VirtualWall(K=K, B=damping, device=device, Ts=TS)
+    return wall.scenario(PRESSED, muscle=Constant((FORCE, 0.0)), steps=4)
+
+
+def felt_changes(device: Device) -> np.ndarray:
+    """Change of stiffness that a hand feels at CHANGES: force over indentation, by runs.
+
+    Args:
+        device: that renders the walls.
+    """
+    depths = []
+    for record in simulate_batch(pressed_wall(float(x), device) for x in CHANGES):
+        x = record.p[:, 0]
+        depths.append(float(np.mean(x[-math.ceil(SETTLED * len(x)) :])))
+    return depths[0] / np.array(depths) - 1.0
+
+
+def jnd_lab(quick: bool, tell: Tell) -> Lab:
+    """A just-noticeable difference of stiffness, by staircases on an observer that is known.
+
+    Args:
+        quick: fewer staircases.
+        tell: called with the name of each step.
+    """
+    tell("rendered stiffness")
+    felt = felt_changes(replace(ROUGH, quantum=0.0))
+    rough = felt_changes(ROUGH)
+    runs = QUICK_TRIED if quick else TRIED
+    rows = []
+    for s in STAIRCASES:
+        tell(s.words)
+        mean, error = staircase_mean(s, OBSERVER, runs)
+        rows.append((s.words, 100.0 * s.share, OBSERVER.difference(s.share), mean, error))
+    one = run_staircase(
+        STAIRCASES[0], OBSERVER, stimulus=lambda x: float(np.interp(x, CHANGES, felt))
+    )
+    trials = np.arange(len(one.levels))
+    goal = OBSERVER.difference(STAIRCASES[0].share)
+    x = np.linspace(0.0, 0.2, 201)
+    staircase = Chart(
+        "staircase", "One staircase",
+        "The change of stiffness in each trial; dashed: noticed in 70.7 % of trials.",
+        "trial", "change of stiffness",
+        (
+            curve("1 up, 2 down", trials, one.levels, "steps"),
+            curve("70.7 % of the observer", trials[[0, -1]], [goal, goal], "dashed"),
+        ),
+    )  # fmt: skip
+    function = Chart(
+        "observer", "Psychometric function",
+        "The observer's function is known; marks are where the mean staircase ends.",
+        "change of stiffness", "share of trials in which it is noticed",
+        (
+            curve("observer", x, [OBSERVER.notices(float(v)) for v in x]),
+            curve("staircases", [r[3] for r in rows], [0.01 * r[1] for r in rows], "marks"),
+        ),
+    )  # fmt: skip
+    names = ("rule", "noticed [%]", "of the observer", "by staircases", "standard error")
+    lost = float(np.max(np.abs(rough - felt)))
+    return Lab(
+        "jnd", "Just-noticeable difference",
+        f"A hand presses a wall of {STIFFNESS:g} N/m with {FORCE:g} N and says whether a second "
+        f"one is stiffer. The observer is simulated: threshold {100.0 * OBSERVER.threshold:g} %, "
+        f"spread {100.0 * OBSERVER.spread:g} %.",
+        (
+            "Why does '1 up, 2 down' not end at 50 %? Derive 70.7 % and 79.4 %.",
+            "Make the steps five times as large. Does the mean still end there?",
+            "An encoder of 0.1 mm changes what is felt. Which changes can no rule find?",
+        ),
+        f"70.7 % at {rows[0][3]:.4f}, known {goal:.4f}; the encoder hides up to "
+        f"{100.0 * lost:.2g} % of stiffness",
+        dict(zip(names, map(tuple, zip(*rows, strict=True)), strict=True)),
+        (staircase, function), pressed_wall(0.0, ROUGH),
+    )  # fmt: skip
+
+
+LABS: dict[str, Callable[[bool, Tell], Lab]] = {
+    "wall": wall_lab,
+    "zwidth": zwidth_lab,
+    "delay": delay_lab,
+    "jnd": jnd_lab,
+}
+
+
+@checked
+def lab(name: str, quick: bool = False, tell: Tell | None = None) -> Lab:
+    """Make the runs of a lab.
+
+    Args:
+        name: "wall", "zwidth", "delay" or "jnd".
+        quick: whether to make fewer runs.
+        tell: called with the name of each step before it begins; None for nothing.
+    """
+    return LABS[choice("name", name, tuple(LABS))](quick, tell or (lambda step: None))
