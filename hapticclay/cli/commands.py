@@ -6,11 +6,11 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-PARSER = ("app", "commands", "console", "walls", "words")  # modules that are no command
+SHARED = ("app", "commands", "console", "device_options", "walls", "words")  # no commands
 COMMANDS = {
     name: f"{__package__}.{name}"
     for _, name, _ in pkgutil.iter_modules([str(Path(__file__).parent)])
-    if name not in PARSER
+    if name not in SHARED
 }
 """Module of each command by its name. It has a class NameCommand, upper and lower case alike, a
 dataclass of the options; calling it returns the exit status."""
