@@ -8,7 +8,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.column_runs import ColumnRuns, run_columns
-from hapticclay.studies.sweep import read_sweep
+from hapticclay.studies.sweep_store import read_sweep
 
 pytest.importorskip("pyarrow")
 pytestmark = pytest.mark.plain
