@@ -273,7 +273,7 @@ def test_units_of_one_kind_are_taken(unit, x):
         (lambda: hc.slab("90 m"), "must be a number in N.s/m, not in m"),
         (lambda: hc.variable_cut(growth="30 N"), "must be a number in N.s/m per s, not in N"),
         (lambda: hc.variable_cut(growth="30/d"), "did you mean '30/s'"),
-        (lambda: hc.Scenario(dt="1 furlong"), "must be a number in s; 'furlong'"),
+        (lambda: hc.Scenario(dt="1 furlong"), "must be a number in s; unknown unit 'furlong'"),
         (lambda: hc.Compensator((1.0,), (1.0, "3 m")), "must be a number without a unit"),
         (lambda: hc.studies.drift_map("8 s"), "spacing = '8 s': must be a number in m, not in s"),
     ],

@@ -25,18 +25,18 @@ HANDS_HEAD = ["hands", "mass [kg]", "damper [N.s/m]", "spring [N/m]", "subjects"
 
 @dataclass(frozen=True)
 class RobustnessCommand:
-    """Judge a loop over a population of hands, and whatever else varies.
+    """Analyse a loop over a population of hands and other random parameters.
 
     Draws the gain limit as a band over the hands, and the probability of instability over a plane,
-    from runs that judge themselves. A study that was interrupted goes on with the same command.
+    from runs that are judged one by one. The same command resumes an interrupted study.
 
     Attributes:
         axis: Axis of the loop.
-        b: Damping of the clay [N.s/m], where the grid does not vary it.
-        gain: K of the compensator, where nothing varies it.
+        b: Damping of the clay [N.s/m], if the grid does not vary it.
+        gain: K of the compensator, if nothing varies it.
         Ts: Control sample [s]; None for continuous time.
         delay: From a measurement to the torque computed from it [s], with --Ts.
-        inertia_shaping: Let the servo shape the inertia, so that Sh holds at every pose.
+        inertia_shaping: Let the servo shape the inertia, so that Sh is the same at every pose.
         hands: Name of a population; hapticclay robustness --list prints them.
         variation: Take log-normal hands around the population's hand of medians, with this
             standard deviation over the mean: an assumption.
@@ -44,13 +44,13 @@ class RobustnessCommand:
             normal and log-normal (mean, standard deviation), uniform and log-uniform (low, high).
         grid: One or two parameters with their values, as in "K=1:8:15 b=10:1000:11log"; "" for
             none.
-        runs: Runs of each cell of the grid; without a grid, of all.
+        runs: Runs per cell of the grid; without a grid, of the study.
         seed: Seed of the random numbers.
-        chunk: Runs that are stored together, the most that a killed process loses.
+        chunk: Runs that are stored together, which is the most that a killed process loses.
         out: Folder for the runs, robustness.json and the figures.
-        workers: Processes on this machine; by default one a core.
+        workers: Processes on this machine; by default one per core.
         band: Draw the gain limit over clay as a band, of this many hands; 0 for none.
-        list: Print the populations, and nothing else.
+        list: Print the populations and exit.
         figures: Formats and style of the figures.
     """
 
