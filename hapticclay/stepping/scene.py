@@ -198,7 +198,8 @@ def sampler(s: Scenario, controller, clay, special):
     physical = (None, None) if is_held(s) else (clay, special)
     told = is_held(s) and (io or (not own and special is not None and rows.tells(special)))
     first: Any = ratio, Ts, *physical, 1 if told else None, memory, state_space, own, None
-    return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else (None,) * 11))
+    none = (None,) * (len(p_.Sampler._fields) - len(first))
+    return p_.Sampler(*first, *(hardware_parts(s, io, Ts) if io else none))
 
 
 def hardware_parts(s: Scenario, io, Ts):
