@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.scene.plausible import implausible
-from hapticclay.simulation.batch import _checked
+from hapticclay.simulation.batch import checked_scenarios
 
 FAR = dataclasses.replace(hc.constant_cut(t_max=0.01), clay=hc.slab(90.0, 5.0, 15.0))
 HEAVY = dataclasses.replace(hc.free(t_max=0.01), operator=hc.Operator(250.0))
@@ -29,7 +29,7 @@ HEAVY = dataclasses.replace(hc.free(t_max=0.01), operator=hc.Operator(250.0))
 def test_what_is_hardly_meant_is_a_warning(scenario, told):
     for make in (
         lambda s: hc.simulate(s, engine="python"),
-        lambda s: list(_checked([s], set())),
+        lambda s: list(checked_scenarios([s], set())),
         hc.Simulation,
     ):
         with pytest.warns(hc.Warning, match=told):
@@ -83,7 +83,7 @@ def test_the_line_of_the_user_is_named():
     odd = dataclasses.replace(hc.constant_cut(t_max=0.01), operator=hc.Operator(mass=250.0))
     calls = (
         lambda: hc.simulate(odd, engine="python"),
-        lambda: list(_checked([odd], set())),
+        lambda: list(checked_scenarios([odd], set())),
         lambda: hc.Simulation(odd).close(),
     )
     for call in calls:
