@@ -323,7 +323,8 @@ def short_runs(n: int, control: str) -> dict[str, Any]:
 def drawn_columns(n: int, control: str) -> tuple[hc.Scenario, dict[str, np.ndarray]]:
     """The same as columns, but for the start: a scenario, and what n runs of it differ in."""
     own: Any = dict(hardware=hc.Hardware(delay=1e-3)) if control == "sampled" else {}
-    base = hc.constant_cut(start=(0.02, 0.0), operator=hc.Operator(), control=control, **own)
+    base = hc.constant_cut(start=(0.02, 0.0), operator=hc.Operator(), control=control)
+    base = dataclasses.replace(base, **own)
     mass, damper, spring, b, gain, delay = np.random.default_rng(n).random((6, n))
     columns = {
         "operator.mass": 0.1 + mass, "operator.damper": 1.0 + damper,

@@ -19,6 +19,7 @@ from . import engines
 from .engines import has_numba, load_compiled
 
 PART = 200_000  # steps of a thread between two looks at the runs, and for Ctrl-C: half a second
+VECTORS = 16  # kinds from which on those that no run has are let go
 LOOK = 0.02  # [s] of simulated time between two looks at whether a run diverges
 
 
@@ -86,6 +87,9 @@ class VectoredRuns:
         if is_vectored(run):
             key = kind_key(run)
             if key not in self.vectors:
+                if len(self.vectors) >= VECTORS:  # those of kinds that no run has any more
+                    kept = [(x, v) for x, v in self.vectors.items() if any(v is y for y in self.of)]
+                    self.vectors = dict(kept)
                 self.vectors[key] = RunVector(run, self.common, self.compiled.KERNEL)
                 self._prepare(self.vectors[key])
             self.of[k] = self.vectors[key]

@@ -67,6 +67,21 @@ def test_compiled_runs_of_one_kind_are_those_of_simulations(name):
 
 
 @fast
+def test_kinds_that_no_run_has_are_let_go():
+    """As of an arm that is drawn anew at each reset."""
+    scene = KINDS["operator"][0]
+    with hc.SimulationBatch([scene] * 2, engine="native") as batch:
+        for k in range(40):
+            batch.reset(0, replace(scene, arm=hc.Arm(l1=0.25 + 1e-4 * k)))
+        assert len(batch._runs.vectors) <= 16
+        batch.advance(40)
+        single = [hc.Simulation(s, engine="python") for s in batch.scenarios]
+        for sim in single:
+            sim.advance(40)
+        assert_alike(batch, single)
+
+
+@fast
 def test_verdicts_come_when_a_simulation_has_them():
     """Over several looks of the monitor: an unstable run, one that grows slowly, one that ends."""
     cut = replace(CUT, operator=hc.Operator(0.3, 0.0, 0.0), t_max=6.0, length=None)
