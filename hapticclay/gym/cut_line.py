@@ -14,7 +14,7 @@ from ..scene.scenario import Scenario
 from . import lines
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
-from .follow import AHEAD, MOTION, Follow
+from .follow import MOTION, Follow
 from .quantities import Quantity, either_way
 from .task import Arrays, Handles, scene_of
 from .vector import TaskVectorEnv
@@ -76,7 +76,7 @@ class CutLineTask(Follow):
 
     @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
-        at = lines.place(m, h.p, AHEAD)
+        at = self.beside(m, h)
         t, u = at.tangent, at.ahead
         turn = t[:, 0] * u[:, 1] - t[:, 1] * u[:, 0]
         return np.stack((1000.0 * at.across, *self.motion(m, h, at), turn), axis=1)

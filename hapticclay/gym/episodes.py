@@ -72,8 +72,10 @@ class Episodes:
 
     def observe(self) -> np.ndarray:
         """Observations now, within their bounds, shape (n, m), float32."""
-        found = np.nan_to_num(self.task.observe(self.memory, self.handles))
-        return np.clip(found, self._low, self._high).astype(np.float32)
+        found = self.task.observe(self.memory, self.handles)
+        found = np.minimum(np.maximum(found, self._low), self._high).astype(np.float32)
+        found[np.isnan(found)] = 0.0
+        return found
 
     def step(self, actions: np.ndarray, live: np.ndarray) -> Period:
         """Makes a control period.
@@ -82,7 +84,8 @@ class Episodes:
             actions: shape (n, k); beyond -1 to 1 they count as the nearest end.
             live: which copies go on, shape (n,); what is returned of the others has no meaning.
         """
-        clipped = np.clip(np.nan_to_num(np.asarray(actions, np.float64)), -1.0, 1.0)
+        clipped = np.minimum(np.maximum(np.asarray(actions, np.float64), -1.0), 1.0)
+        clipped[np.isnan(clipped)] = 0.0
         command = self.task.command(self.memory, clipped)
         self.copies.advance(self.task.steps, command, live)
         self.handles = self.copies.handles()

@@ -87,6 +87,7 @@ class Follow(Task):
         for name in ("gain", "depth", "depth_at_end"):
             m[name][i] = truth.get(name, 1.0)
         lines.lay(m, i, self.line(truth))
+        m["at"] = None
         m["tangent"][i] = m["tangents"][i, 0]
 
     @override
@@ -94,6 +95,17 @@ class Follow(Task):
         t = m["tangent"]
         a, b = self.most * actions[:, 0], self.most * actions[:, 1]
         return Command(np.stack((t[:, 0] * a - t[:, 1] * b, t[:, 1] * a + t[:, 0] * b), axis=1))
+
+    def beside(self, m: Arrays, h: Handles) -> lines.Place:
+        """The handles beside their lines, as `judge` has found them; anew after a reset.
+
+        Args:
+            m: of the task.
+            h: handles.
+        """
+        if m["at"] is None:
+            m["at"] = lines.place(m, h.p, AHEAD)
+        return m["at"]
 
     def motion(self, m: Arrays, h: Handles, at: lines.Place) -> list[np.ndarray]:
         """The observations of MOTION.
@@ -111,7 +123,7 @@ class Follow(Task):
 
     @override
     def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
-        at = lines.place(m, h.p, AHEAD)
+        at = m["at"] = lines.place(m, h.p, AHEAD)
         error = self.error(m, at)
         speed = lines.along_across(at.tangent, h.v)[0]
         change = actions - m["action"]

@@ -101,7 +101,7 @@ class PareEdgeTask(Follow):
 
     @override
     def observe(self, m: Arrays, h: Handles) -> np.ndarray:
-        at = lines.place(m, h.p, AHEAD)
+        at = self.beside(m, h)
         depths = (1000.0 * d for d in self.depths(m, at))
         return np.stack((*depths, *self.motion(m, h, at)), axis=1)
 

@@ -21,7 +21,7 @@ from .quantities import Quantity
 
 DT = 3.5714286e-4  # [s] 56 of them are 20 ms, and no step is longer than the paper's 0.36 ms
 FORCE = 30.0  # [N] of the muscle at an action of 1
-Arrays = dict[str, np.ndarray]
+Arrays = dict[str, Any]  # a row for each copy
 
 
 class Handles(NamedTuple):
