@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import copysign, exp, inf, sqrt, tau
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from . import flow
-from .traits import LEFT_OUT, YES, Refusal, Trait
+from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
 STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
 JOINTS = ("shoulder", "elbow")
@@ -415,23 +415,71 @@ class SampleNoise:
 _UNSAMPLED = Refusal("hardware", "must be None unless control is 'sampled'")
 _SAMPLED = {"fast": _UNSAMPLED, "accurate": _UNSAMPLED}
 _HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
+
+
+def _told_difference(x: Hardware) -> list[Told]:
+    window = [Told("over {} samples", (float(x.velocity_window),))] * (x.velocity_window > 1)
+    cutoff = x.velocity_filter
+    low_pass = [] if cutoff is None else [Told("low-pass {}", (cutoff,), "Hz")]
+    return [Told("velocity by difference"), *window, *low_pass]
+
+
+def _told_converters(x: Hardware) -> list[Told]:
+    bits = {"A/D": x.adc_bits, "D/A": x.dac_bits}
+    return [Told(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
+
+
+PARTS = (  # name, whether hardware has it, what linear theory makes of it, what refuses it, words
+    ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {},
+     lambda x: told_values("jitter {}", (x.jitter,), "s rms")),
+    ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {},
+     lambda x: told_values("dropout probability {}", (x.dropout_probability,))),
+    ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {},
+     lambda x: told_values("encoder {}", (x.encoder,), "counts per turn")),
+    ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {},
+     _told_difference),
+    ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}, _told_converters),
+    ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {},
+     lambda x: told_values("force noise {}", (x.force_noise,), "N rms")),
+    ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {},
+     lambda x: told_values("force filter {}", (x.force_filter,), "Hz")),
+    ("delay", lambda x: x.delay > 0.0, YES, {},
+     lambda x: told_values("delay {}", (x.delay,), "s")),
+    ("joint friction", lambda x: any(x.friction), LEFT_OUT, {},
+     lambda x: [Told(f"joint friction ({x.friction[0]:.4g}, {x.friction[1]:.4g})", (), "N.m")]),
+    ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD,
+     lambda x: [Told("passivity controller")]),
+    ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD,
+     lambda x: [
+         Told("virtual coupling {}", (x.coupling.spring,), "N/m"),
+         Told("{}", (x.coupling.damper,), "N.s/m"),
+     ]),
+)  # fmt: skip
+
+
+def _trait(name: str, of: Any, theory: str, refuses: dict[str, Refusal], words: Any) -> Trait:
+    """The trait of scenes whose hardware has a part."""
+    return Trait(
+        name,
+        "part",
+        lambda s: s.hardware is not None and of(s.hardware),
+        theory,
+        _SAMPLED | refuses,
+        lambda s: words(s.hardware),
+    )
+
+
+def hardware_words(scenario: Any) -> str:
+    """What the hardware of a scenario adds, with units; "ideal" where it adds nothing.
+
+    Args:
+        scenario: has hardware.
+    """
+    found = [told.text() for x in present(scenario, TRAITS[1:]) for told in x.words(scenario)]
+    return ", ".join(found) or "ideal"
+
+
 TRAITS = (
     Trait("hardware", "part", lambda s: s.hardware is not None, YES, _SAMPLED),
-    *(
-        Trait(name, "part", lambda s, of=of: s.hardware is not None and of(s.hardware), theory,
-              _SAMPLED | own)
-        for name, of, theory, own in (
-            ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {}),
-            ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {}),
-            ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {}),
-            ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {}),
-            ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}),
-            ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {}),
-            ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {}),
-            ("delay", lambda x: x.delay > 0.0, YES, {}),
-            ("joint friction", lambda x: any(x.friction), LEFT_OUT, {}),
-            ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD),
-            ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD),
-        )
-    ),
-)  # fmt: skip
+    *(_trait(*part) for part in PARTS),
+)

@@ -14,6 +14,10 @@ LEAST = 1e-9  # [N], [N/(m/s)^n] of clay that is scaled down and goes on to resi
 YES, LEFT_OUT, NO = "yes", "left out", "no"  # what linear theory makes of a part
 
 
+def _none(*_: Any) -> tuple[Any, ...]:
+    return ()
+
+
 @dataclass(frozen=True)
 class Refusal:
     """Why two parts cannot be combined.
@@ -38,6 +42,7 @@ class Trait:
         theory: whether linear theory knows it: "yes"; "left out", so that a gain limit is that of
             the scene without it; or "no", so that the scene is refused.
         refuses: what it cannot be combined with, by name of the other.
+        words: of what `has` is asked of, its quantities.
     """
 
     name: str
@@ -45,6 +50,7 @@ class Trait:
     has: Callable[[Any], bool]
     theory: str = YES
     refuses: Mapping[str, Refusal] = field(default_factory=dict)
+    words: Callable[[Any], Sequence[Told]] = _none
 
 
 class Told(NamedTuple):
@@ -150,10 +156,6 @@ class Soft(NamedTuple):
     instead: str = ""
 
 
-def _none(*_: Any) -> tuple[Any, ...]:
-    return ()
-
-
 def _as_it_is(clay: Any, _: float) -> Any:
     return clay
 
@@ -170,7 +172,6 @@ class Law(Trait):
         along_motion: whether its force has the direction of the motion; else each axis has its own.
         varies: what the damping of a region varies over, "time" or "place"; "" for one number.
         columns: quantities of a stretch beside its damping, which `at` returns.
-        words: of clay, its quantities over the whole scene.
         at: of the law of one axis and a place (x, y) [m], values of `columns`.
         here: of clay and a place (x, y) [m], quantities of both axes there.
         force: of the law of one axis, a speed [m/s] and an indentation [m], force of each cell at
@@ -189,7 +190,6 @@ class Law(Trait):
     along_motion: bool = False
     varies: str = ""
     columns: tuple[Column, ...] = ()
-    words: Callable[[Any], Sequence[Told]] = _none
     at: Callable[[Any, Any], Sequence[float]] = _none
     here: Callable[[Any, Any], Sequence[Told]] = _none
     force: Callable[[Any, float, float], Any] | None = None

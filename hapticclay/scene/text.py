@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..display import one_line
+from ..model.hardware import hardware_words
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
@@ -37,9 +38,10 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     rows.append(("ends at", f"{goal}{s.t_max:g} s"))
     plain = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
     own = [name for name, default in plain.items() if getattr(s, name) != default]
-    own += ["hardware"] * (s.hardware is not None)
     if own:
-        rows.append(("of its own", ", ".join(own)))
+        rows.append(("replaced", ", ".join(own)))
+    if s.hardware is not None:
+        rows.append(("hardware", hardware_words(s)))
     return rows
 
 

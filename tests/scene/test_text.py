@@ -8,6 +8,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.display import html_table, one_line
+from hapticclay.scene.text import scenario_rows
 
 
 class Page(html.parser.HTMLParser):
@@ -102,7 +103,8 @@ def test_what_the_lines_say(record):
     assert "clay: b = 90 N.s/m, control: continuous, fast" in repr(record.scenario)
     assert "b = 1 to 70 N.s/m" in repr(every["parts"])
     assert "muscle: Step" in repr(every["parts"]) and "y: none" in repr(every["parts"])
-    assert "of its own: arm, hardware" in repr(every["parts"])
+    assert "replaced: arm" in repr(every["parts"])
+    assert "hardware: delay 0.0001 s" in repr(every["parts"])
     assert "Fy = 5 N, K = 2 N/(m/s)^n, n = 0.5, b = 20 N.s/m" in repr(every["yields"])
     assert "permanent cut, up to" in repr(every["groove"])
     assert "spring k = 1000 N/m" in repr(every["springs"])
@@ -129,3 +131,23 @@ def test_texts_of_users_are_escaped(record):
 def test_one_line_cuts_long_texts():
     assert one_line(" a\n b\tc ") == "a b c"
     assert one_line("x" * 61) == "x" * 57 + "..." and one_line("x" * 60) == "x" * 60
+
+
+@pytest.mark.parametrize(
+    "hardware,words",
+    [
+        (hc.Hardware(), "ideal"),
+        (hc.Hardware(encoder=8192, delay=3.6e-4), "encoder 8192 counts per turn, delay 0.00036 s"),
+        (
+            hc.Hardware(velocity="difference", velocity_window=4, velocity_filter=200.0),
+            "velocity by difference, over 4 samples, low-pass 200 Hz",
+        ),
+        (hc.Hardware(adc_bits=12, dac_bits=16), "A/D 12 bits, D/A 16 bits"),
+        (hc.Hardware(friction=(0.1, 0.02)), "joint friction (0.1, 0.02) N.m"),
+        (hc.Hardware(coupling=hc.Coupling(800.0, 5.0)), "virtual coupling 800 N/m, 5 N.s/m"),
+        (hc.Hardware(passivity=True, jitter=1e-5), "jitter 1e-05 s rms, passivity controller"),
+    ],
+)
+def test_hardware_says_its_quantities(hardware, words):
+    scenario = hc.with_fields(hc.constant_cut(control="sampled"), {"hardware": hardware})
+    assert dict(scenario_rows(scenario))["hardware"] == words
