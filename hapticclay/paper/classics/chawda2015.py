@@ -61,11 +61,12 @@ def _trade_off(quick: bool, tell: Tell) -> tuple[list[Row], tuple[Curve, ...]]:
             _words(cutoffs, smooth),
         ),
         holds(
-            "with an encoder there is an ideal cut-off, neither the lowest nor none | abstract | "
+            "at B = 10 N.s/m, with an encoder, a middle cut-off is best | abstract | "
             "there exists such an ideal cut-off frequency",
             rough[best] > MARGIN * max(rough[0], rough[-1]),
             QUOTED,
-            f"{_words(cutoffs, rough)}; fc = {FRICTION:g} N, Delta = {1e6 * QUANTUM:g} um",
+            f"{_words(cutoffs, rough)}; fc = {FRICTION:g} N, Delta = {1e6 * QUANTUM:g} um; the "
+            "edge is ragged",
         ),
     ]
     if not quick:

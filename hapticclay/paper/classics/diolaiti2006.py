@@ -21,7 +21,7 @@ WALL = VirtualWall(device=Device(MASS, DAMPER, FRICTION), Ts=TS)
 STIFF, QUICK_STIFF = (1000.0, 2000.0, 4000.0, 8000.0), (8000.0,)  # [N/m]
 THRESHOLD = 0.03  # share: harmonics that a describing function leaves out, and a bisection to 2 %
 BRACKET = 1.02  # ratio of two speeds that a search ends between
-SPAN = 1.5  # it begins within this ratio about where the describing function says
+SPAN = 2.0  # ratio of its ends to the scale 2 fc/(K Ts), which knows no describing function
 ROUGH = Device(MASS, 0.5, 0.02, 5e-5)  # a device with an encoder, passive up to 800 N/m
 BUZZ = 2.0  # [N.s/m] virtual damping at which a buzz of ROUGH is above 1 um
 
@@ -52,13 +52,13 @@ def threshold(wall: VirtualWall) -> float:
     return 4.0 * d.friction / (math.pi * (damping_needed(wall) - d.damper))
 
 
-def held_speed(wall: VirtualWall, around: float) -> float:
+def held_speed(wall: VirtualWall) -> float:
     """Largest speed at the start from which a wall comes to rest, by runs [m/s].
 
     Args:
-        wall: with its K and friction.
-        around: where the search begins [m/s].
+        wall: with its K and friction; 2 fc/(K Ts) is the scale around which the search begins.
     """
+    around = 2.0 * wall.device.friction / (wall.K * wall.Ts)
     low, high = around / SPAN, around * SPAN
     while high > BRACKET * low:
         middle = math.sqrt(low * high)
@@ -76,7 +76,7 @@ def _thresholds(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
         tell(f"speed that friction holds: K = {K:g} N/m")
         wall = replace(WALL, K=K)
         expected = threshold(wall)
-        found.append(held_speed(wall, expected))
+        found.append(held_speed(wall))
         rows.append(
             row(
                 f"largest speed that comes to rest, K = {K:g} N/m | describing function analysis | "
