@@ -63,6 +63,7 @@ def test_the_command_prints_the_baselines(capsys):
 
 def test_the_command_records_a_data_set(tmp_path, monkeypatch, capsys):
     minari = pytest.importorskip("minari")
+    pytest.importorskip("jax")  # which its writing of data sets needs
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     line = "gym dataset ProbeClay-v0 --episodes 2 --engine python --name hapticclay/test/a-v0"
     monkeypatch.setattr("hapticclay.gym.dataset.SCORED", 2)
