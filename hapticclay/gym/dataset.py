@@ -61,12 +61,16 @@ def record(
         for made in (at_random, maker)
     ]
     with needing("a data set", "minari[create]", "minari"):
-        return env.create_dataset(
+        made = env.create_dataset(
             dataset_id=name,
             algorithm_name=f"{BASELINE[id]}, noise {noise:g}",
             author="The hapticclay authors",
+            author_email="none given",
+            eval_env=f"{NAMESPACE}/{id}",
             code_permalink=f"hapticclay {__version__}: hapticclay/gym/dataset.py",
             description=f"{BASELINE[id]} in {NAMESPACE}/{id} of hapticclay {__version__}",
             ref_min_score=min(scores),
             ref_max_score=max(scores),
         )
+    env.close()
+    return made
