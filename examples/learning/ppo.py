@@ -108,9 +108,8 @@ def train(a: argparse.Namespace) -> None:
         steps, spent = (update + 1) * COPIES * HORIZON, time.process_time() - begin
         rows.append((steps, recent, spent))
         if update % 20 == 19 or update == updates - 1:
-            print(
-                f"{steps} steps, return {recent:.2f}, {spent:.0f} s of processor time", flush=True
-            )
+            told = f"{spent:.0f} s of processor time"
+            print(f"{steps} steps, return {recent:.2f}, {told}", flush=True)
     env.close()
     save(a, agent, scale, rows)
 

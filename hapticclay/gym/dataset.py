@@ -40,7 +40,7 @@ def record(
     Raises:
         ParameterError: an argument is refused, or Minari is not installed.
     """
-    with needing("a data set", "minari", "gym"):
+    with needing("a data set", "minari", "minari"):
         import minari
 
     maker = BASELINES[id][BASELINE[choice("id", id, tuple(BASELINE))]]
@@ -60,11 +60,17 @@ def record(
         mean_of(returns(id, made, range(SCORED), engine=engine).total)[0]
         for made in (at_random, maker)
     ]
-    return env.create_dataset(
-        dataset_id=name,
-        algorithm_name=f"{BASELINE[id]}, noise {noise:g}",
-        author="The hapticclay authors",
-        description=f"{BASELINE[id]} in {NAMESPACE}/{id} of hapticclay {__version__}",
-        ref_min_score=min(scores),
-        ref_max_score=max(scores),
-    )
+    with needing("a data set", "minari[create]", "minari"):
+        made = env.create_dataset(
+            dataset_id=name,
+            algorithm_name=f"{BASELINE[id]}, noise {noise:g}",
+            author="The hapticclay authors",
+            author_email="none given",
+            eval_env=f"{NAMESPACE}/{id}",
+            code_permalink=f"hapticclay {__version__}: hapticclay/gym/dataset.py",
+            description=f"{BASELINE[id]} in {NAMESPACE}/{id} of hapticclay {__version__}",
+            ref_min_score=min(scores),
+            ref_max_score=max(scores),
+        )
+    env.close()
+    return made

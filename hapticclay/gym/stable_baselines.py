@@ -12,7 +12,7 @@ from ..errors import ParameterError, needing
 from .registry import NAMESPACE
 from .vector import TaskVectorEnv
 
-with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "gym"):
+with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "sb3"):
     from stable_baselines3.common.vec_env import VecEnv
 
 
