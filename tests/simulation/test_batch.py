@@ -138,7 +138,8 @@ def test_runs_of_one_kind_are_made_together_and_others_are_left():
 def columns(jobs):
     """Numbers, tables and memory of runs of one kind, and of each alone."""
     pattern = many.Pattern(jobs[0])
-    parts = pattern.roomy(jobs)
+    draws = many.draws_of(jobs)
+    parts = pattern.roomy(draws.delays)
     found = [scene.parts_of(s) for s in jobs]
     assert {kind_of(x) for x in found} == {kind_of(parts)} == {pattern.scene}
     assert {kind_of(scene.blocks(x, s)) for x, s in zip(found, jobs, strict=True)} == {
@@ -146,7 +147,7 @@ def columns(jobs):
     }
     memory = [[] if x.sampler is None else x.sampler.memory for x in found]
     alone = [many.numbers_of(x) for x in found], [x.table for x in found], memory
-    together = pattern.numbers(jobs), pattern.tables(jobs), pattern.memory(jobs)
+    together = pattern.numbers(draws), pattern.tables(draws), pattern.memory(draws)
     for x in found:
         sizes = zip(map(len, scene.written(parts)), map(len, scene.written(x)), strict=True)
         assert all(room >= needed for room, needed in sizes)
@@ -209,8 +210,8 @@ def test_machine_code_is_compiled_where_the_runs_of_its_kind_repay_it(monkeypatc
 class NoLane:
     """In place of many.Lane."""
 
-    def group(self, pattern, jobs):
-        assert len(jobs) == 1
+    def group(self, pattern, draws):
+        assert len(draws.gain) == 1
 
 
 def test_steps_are_compiled_for_the_kinds_of_runs_made_alone_that_repay_them(monkeypatch):
