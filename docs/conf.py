@@ -64,6 +64,7 @@ nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
     ("py:class", r"hapticclay\.scene\.\w+\.T|mujoco\._structs\.MjModel"),
     ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service"),  # of no public name
+    ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
 ]
 linkcheck_timeout = 20

@@ -68,8 +68,8 @@ class DeviceSample(NamedTuple):
     """
 
     t: float
-    position: Vector
-    velocity: Vector
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
     buttons: frozenset[str]
 
 
@@ -135,7 +135,7 @@ class DeviceClient:
         """Lets forces grow from nothing again, from now on."""
         self._full_at = self._time(time.perf_counter()) + self.limits.ramp
 
-    def exchange(self, force: Vector = NOTHING) -> DeviceSample | None:
+    def exchange(self, force: tuple[float, float, float] = NOTHING) -> DeviceSample | None:
         """Sends a force and waits for the state, at the rate of the limits.
 
         Args:
