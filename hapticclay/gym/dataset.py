@@ -41,7 +41,7 @@ def record(
         ParameterError: an argument is refused, or Minari is not installed.
     """
     with needing("a data set", "minari", "minari"):
-        import minari
+        import minari  # pyright: ignore[reportMissingImports]
 
     maker = BASELINES[id][BASELINE[choice("id", id, tuple(BASELINE))]]
     episodes = integer("episodes", episodes, 1, 100_000)

@@ -13,7 +13,7 @@ from .registry import NAMESPACE
 from .vector import TaskVectorEnv
 
 with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "sb3"):
-    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 
 
 class StableBaselinesVecEnv(VecEnv):
