@@ -206,6 +206,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
         "scaling.png",
         "stiffness.json",
         "throughput.json",
+        "throughput.png",
         "work_precision.json",
     ]
     data = bench.load(tmp_path / "o")
