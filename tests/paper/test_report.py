@@ -49,7 +49,7 @@ def test_numbers_for_tables(x, unit, text):
 
 def test_runs_are_made_once_and_when_asked(monkeypatch):
     made = []
-    monkeypatch.setattr(claims, "simulate", lambda scenario: made.append(scenario) or scenario)
+    monkeypatch.setattr(ledger, "simulate", lambda scenario: made.append(scenario) or scenario)
     runs = ledger.Runs()
     assert not made
     runs.free()
