@@ -10,7 +10,9 @@ import hapticclay as hc
 
 PACKAGE = Path(hc.__file__).parent
 FIELD = "    dead_band: Annotated[float, Bound(0.0, 10.0, 'N.m')] = 0.0\n"
-TRAIT = '            ("dead band", lambda x: x.dead_band > 0.0, LEFT_OUT, {}),\n'
+TRAIT = """    ("dead band", lambda x: x.dead_band > 0.0, LEFT_OUT, {},
+     lambda x: told_values("dead band {}", (x.dead_band,), "N.m")),
+"""
 PART = "    band = float(io.dead_band) if io.dead_band > 0.0 else None\n"
 FUNCTION = '''
 def without_small(band, x):
@@ -23,7 +25,7 @@ CONVERTED = "hardware.converted(part, clipped(tau, limits))"
 EDITS = {  # a dead band, below which motors hold no torque: by file, what stands, and what then
     "model/hardware.py": [
         ("    friction: Annotated[", FIELD + "    friction: Annotated["),
-        ('            ("joint friction",', TRAIT + '            ("joint friction",'),
+        ('    ("joint friction",', TRAIT + '    ("joint friction",'),
     ],
     "stepping/parts.py": [
         ("    friction: Any\n    passivity", "    band: Any\n    friction: Any\n    passivity")
@@ -55,7 +57,7 @@ assert plain.p.tobytes() == runs[0].p.tobytes()
 tau = np.abs(runs[1].tau)
 assert (np.abs(plain.tau) < 0.02).any() and ((tau == 0.0) | (tau >= 0.02)).all()
 assert not np.array_equal(plain.tau, runs[1].tau)
-assert "| dead band |" in support.page()
+assert "| dead band |" in support.page() and "dead band 0.02 N.m" in repr(runs[1].scenario)
 try:
     dataclasses.replace(hc.constant_cut(), hardware=hc.Hardware(dead_band=0.02))
 except hc.ParameterError as error:
