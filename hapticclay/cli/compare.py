@@ -25,7 +25,7 @@ class CompareCommand:
         figures: Formats and style of the figure files; those on the page are for a screen.
     """
 
-    source: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    source: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     axis: Literal["x", "y"] = "x"
     out: Path = Path("out/compare")
     figures: console.FigureOptions = console.FigureOptions()

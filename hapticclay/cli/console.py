@@ -297,7 +297,7 @@ def save_json(data: Any, file: Path) -> None:
     """Writes data as JSON, whole or not at all; null stands for NaN and infinity.
 
     Args:
-        data: dictionaries, sequences, numbers and texts.
+        data: dictionaries, sequences, arrays, numbers and texts.
         file: where to.
 
     Raises:
@@ -308,6 +308,8 @@ def save_json(data: Any, file: Path) -> None:
 
 
 def _json_ready(x: Any) -> Any:
+    if hasattr(x, "tolist"):  # an array or a number of NumPy, which is not imported here
+        x = x.tolist()
     if isinstance(x, dict):
         return {k: _json_ready(v) for k, v in x.items()}
     if isinstance(x, list | tuple):

@@ -468,7 +468,16 @@ def carry(like, blocks, e, runs):
 
 
 def advance_all(like, state, place, x, which, ahead):
-    """vector.advance."""
+    """Advances runs of one kind, see `vector.advance`.
+
+    Args:
+        like: parts of the same kind.
+        state: of the same kind.
+        place: where steps are made.
+        x: the runs.
+        which: indices of the runs that advance.
+        ahead: vector.STEPS, TRY or BOTH.
+    """
     vector.advance(like, state, place, x, which, ahead)
 
 

@@ -11,10 +11,11 @@ All but the first, second and last are stepped: plain numbers and tuples, as eve
 
 The fast method and the physical clay of sampled control take `load` in their kicks, the accurate
 method and motors that render the clay `force`. The fast method stays of second order where `load`
-is, at the sample. The accurate one moves the state from the start of a step to each of its stages:
-it stays of fourth order where `moved` is exact for a path with the handle `at` its end, as of a
-state that follows from the place or the time, and is else of the order of `moved`. It does not
-divide its steps by the stiffness of a law.
+is, at the sample: `at.v` is from before the kick, so behind it a force that is not linear in the
+velocity u is its tangent at v, as c |u| u = c (2 |v| u - |v| v). The accurate one moves the state
+from the start of a step to each of its stages: it stays of fourth order where `moved` is exact for
+a path with the handle `at` its end, as of a state that follows from the place or the time, and is
+else of the order of `moved`. It does not divide its steps by the stiffness of a law.
 """
 
 from __future__ import annotations

@@ -11,12 +11,14 @@ from __future__ import annotations
 import itertools
 import operator
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..model import controller, regions
 from ..model.cells import Profile
+from ..model.hardware import Hardware
 from ..model.operator import NO_HAND, mobility_with
 from ..scene.scenario import Scenario
 from . import begin, energy, laws, monitor, path, rows, scene, viscous
@@ -32,12 +34,8 @@ SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
 LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so does Ctrl-C
 FEWEST = 4  # runs of a kind that repay its pattern
 PATTERNS = 64  # kinds that are kept
-SHARED = (
-    "jitter", "dropout_probability", "encoder", "velocity", "velocity_window", "velocity_filter",
-    "adc_bits", "adc_range",
-    "force_noise", "force_filter", "filter_order", "dac_bits", "dac_range", "friction", "passivity",
-    "coupling",
-)  # fmt: skip  # of the hardware, all but its delay; without noise its seed has no effect
+# of the hardware, all but its delay; without noise its seed has no effect
+SHARED = tuple(x.name for x in fields(Hardware) if x.name not in ("delay", "seed"))
 _scene = operator.attrgetter(
     "control", "inertia_shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
 )

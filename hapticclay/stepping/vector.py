@@ -78,7 +78,14 @@ class Vector(NamedTuple):
 
 
 def parts_at(like, numbers, arrays, k):
-    """The parts of run k, of the types of `like`; compiled only."""
+    """The parts of run k, with the types of `like`; compiled only.
+
+    Args:
+        like: parts of the same kind.
+        numbers: of the parts of each run, shape (runs, m).
+        arrays: addresses and lengths of the arrays of each run, shape (runs, 2 m).
+        k: index of the run.
+    """
     raise NotImplementedError
 
 
@@ -88,12 +95,22 @@ def put_state(s, states, k):
 
 
 def copied(to, source, n):
-    """Copies n bytes from address to address; compiled only."""
+    """Copies bytes; compiled only.
+
+    Args:
+        to: address that they are written to.
+        source: address that they are read from.
+        n: number of bytes.
+    """
     raise NotImplementedError
 
 
 def table_at(address):
-    """The rows at an address, shape (CHUNK, rows.ROW), alone in a tuple; compiled only."""
+    """The rows at an address, shape (CHUNK, rows.ROW), alone in a tuple; compiled only.
+
+    Args:
+        address: of the first row.
+    """
     raise NotImplementedError
 
 
@@ -115,7 +132,14 @@ def readied(parts, s, e, limits):
 
 
 def swap_written(written, k, scratch, back):
-    """Copies the arrays that steps write into aside, or back."""
+    """Copies the arrays that steps write into aside, or back.
+
+    Args:
+        written: addresses and numbers of bytes of these arrays, shape (runs, 2 m).
+        k: index of the run.
+        scratch: room for the copy, bytes.
+        back: whether the copy is written back.
+    """
     at = scratch.ctypes.data
     for j in range(written.shape[1] // 2):
         address, n = written[k, 2 * j], written[k, 2 * j + 1]

@@ -78,6 +78,8 @@ STUDY = {  # a question, its figure and its command, a module each
 
 from dataclasses import dataclass
 
+import numpy as np
+
 import hapticclay as hc
 
 
@@ -99,7 +101,7 @@ class Reach(hc.Result):
         return f"up to {max(self.reach):.3g} m"
 
     def tables(self):
-        return {"reach": {"force [N]": self.force, "reach [m]": self.reach}}
+        return {"reach": {"force [N]": self.force, "reach [m]": np.array(self.reach)}}
 
 
 def reach(forces):

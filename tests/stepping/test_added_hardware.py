@@ -46,6 +46,7 @@ import dataclasses
 import numpy as np
 import hapticclay as hc
 from hapticclay.model import support
+from hapticclay.stepping.many import kind_key
 
 s = hc.constant_cut(control="sampled", t_max=0.05)
 plain = hc.simulate(s, engine="python")
@@ -62,6 +63,9 @@ try:
     dataclasses.replace(hc.constant_cut(), hardware=hc.Hardware(dead_band=0.02))
 except hc.ParameterError as error:
     print(error)
+both = [hc.Hardware(dead_band=band) for band in (0.01, 0.02)]
+kinds = {kind_key(dataclasses.replace(s, hardware=x)) for x in both}
+assert len(kinds) == 2 and None not in kinds  # a batch does not make them of one pattern
 with_name = hc.with_fields(s, {"hardware": True, "hardware.dead_band": "20 mN.m"})
 assert with_name.hardware.dead_band == 0.02
 """
