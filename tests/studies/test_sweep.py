@@ -178,7 +178,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     for text, said in (
         ('scenario = "none.toml"', "No such file"),
         ("scenario = 3", "path of a scenario file"),
-        ('scenario = "mine.toml"\nexperiment = "free"', "without an experiment"),
+        ('scenario = "mine.toml"\nexperiment = "free"', "remove the experiment"),
     ):
         spec.write_text(f"{text}\n[vary]\narm.l2 = [1, 2]\n")
         with pytest.raises(ParameterError, match=said):
