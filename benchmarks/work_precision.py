@@ -209,7 +209,7 @@ def who_leads(found: list[dict[str, Any]]) -> str:
         + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s")
         for s in spans
     ]
-    return "Fastest, by requested error:  " + "; ".join(told) + "."
+    return "Fastest, by requested error: " + "; ".join(told) + "."
 
 
 def table_of_leaders(found: list[dict[str, Any]]) -> str:

@@ -83,6 +83,11 @@ def good(tmp_path_factory):
         "parse_grid": {"text": "b=1:9:2"},
         "run_sweep": {"sweep": swept}, "compare_files": {"paths": files},
         "Trials": {"base": wall, "vary": {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}},
+        "run_staircase": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
+        "staircase_mean": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
+        "lab": {"name": "jnd"},
+        "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
+        "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function
@@ -133,7 +138,7 @@ def test_junk_is_refused_at_the_door(good, monkeypatch, tmp_path):
     """Junk for each argument in turn gives ParameterError or an answer: no other exception."""
     monkeypatch.setitem(sys.modules, "numba", None)  # nothing is compiled
     for module in pkgutil.walk_packages(hc.__path__, "hapticclay."):  # none while calls are counted
-        if not re.search(r"views|compiled|cache|own_law|__main__", module.name):
+        if not re.search(r"views|compiled|cache|own_law|stable_baselines|__main__", module.name):
             importlib.import_module(module.name)
     monkeypatch.chdir(tmp_path)
     wrong, tried, refused = [], 0, 0

@@ -90,10 +90,8 @@ def blocks_of(s: Scenario) -> list[tuple[float, float, float, float]]:
     Args:
         s: the scene.
     """
-    if s.clay is None or s.clay.groove is None:
-        return []
-    (x0, x1), (y0, y1) = s.clay.groove.x, s.clay.groove.y
-    return [(x0, y0, x1 - x0, y1 - y0)]
+    blocks = [] if s.clay is None else s.clay.blocks
+    return [(b.x[0], b.y[0], b.x[1] - b.x[0], b.y[1] - b.y[0]) for b in blocks]
 
 
 def view_of(nodes: np.ndarray | None, p: np.ndarray) -> tuple[float, float, float]:

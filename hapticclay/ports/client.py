@@ -73,6 +73,7 @@ class DeviceSample(NamedTuple):
     buttons: frozenset[str]
 
 
+@named
 class DeviceClient:
     """A connection to an Inverse service, one exchange at a time.
 
@@ -95,6 +96,9 @@ class DeviceClient:
         Raises:
             ParameterError: there is no service, or no Inverse3, or websockets is not installed.
         """
+        if not isinstance(url, str):
+            bound = "must be the address of a service, such as ws://127.0.0.1:10001"
+            raise ParameterError("url", url, bound)
         with needing("a device", "websockets", "device"):
             from websockets.exceptions import WebSocketException
             from websockets.sync.client import connect

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..arguments import named
+from ..errors import ParameterError, integer
 from ..files import atomic
 from .commands import AXES, Vector
 from .rows import MOST_ROWS, Rows
@@ -71,6 +72,7 @@ class Timing(NamedTuple):
         }
 
 
+@named
 class ClientLog:
     """Keeps the newest exchanges.
 
@@ -82,10 +84,13 @@ class ClientLog:
         """Begins empty.
 
         Args:
-            most: rows to keep, the newest.
+            most: rows to keep, the newest, 1 to 10^9.
+
+        Raises:
+            ParameterError: most is out of its bounds.
         """
         self.missed = 0
-        self._rows = Rows(12, most)  # numbers of an Exchanged
+        self._rows = Rows(12, integer("most", most, 1, 10**9))  # numbers of an Exchanged
 
     def __len__(self) -> int:
         return len(self._rows)

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, integer
+from ..errors import Bound, ParameterError, check_fields, integer, number
 from ..results import Result
 
 NORMAL = NormalDist()
@@ -163,7 +163,8 @@ def run_staircase(
         stimulus: difference that reaches the observer, of the one that is set; None for the same.
 
     Raises:
-        ParameterError: it does not turn often enough within 100000 trials.
+        ParameterError: it does not turn often enough within 100000 trials, or stimulus returns no
+            difference.
     """
     rng = np.random.default_rng(integer("seed", seed, 0, 2**32 - 1))
     s, level, row, direction = staircase, staircase.start, 0, 0
@@ -174,8 +175,8 @@ def run_staircase(
         if len(levels) == MOST_TRIALS:
             bound = f"must turn {s.reversals} times within {MOST_TRIALS} trials"
             raise ParameterError("staircase.reversals", len(turns), bound)
-        felt = level if stimulus is None else stimulus(level)
-        seen = bool(rng.random() < observer.notices(felt))
+        given = level if stimulus is None else number("stimulus", stimulus(level), 0.0, MOST_LEVEL)
+        seen = bool(rng.random() < observer.notices(given))
         levels.append(level)
         noticed.append(seen)
         row = row + 1 if seen else 0

@@ -122,7 +122,7 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
         for ax, r in zip(panels, records, strict=True):
             where = r.t if over == "time" else 100.0 * r.p[:, i]
             clay = r.scenario.clay
-            turned = clay is not None and clay.isotropic
+            turned = clay is not None and clay.along_motion
             part = functools.partial(_along, r, i, turned)
             hand = BLUE
             if clay is not None:

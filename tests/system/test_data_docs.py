@@ -39,8 +39,9 @@ def test_snippet_prints_what_it_says(tmp_path):
 
 def test_sweep_snippet_runs_on_a_sweep(tmp_path, monkeypatch, capsys):
     text = (DOCS / "sweep.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    code, columns = re.findall(r"```python\n(.*?)```", text, re.S)
     monkeypatch.chdir(tmp_path)
+    assert ran(columns, tmp_path).endswith("['time limit']\n")  # no run is unstable
     grid = ["--grid", "b=20:50:2log gain.x=0.5,1", "--fixed", "t_max=1 dt=0.002"]
     assert app.main(["sweep", *grid, "--out", "out/map", "--workers", "1"]) == 0
     out = ran(code, tmp_path).splitlines()
