@@ -1,4 +1,4 @@
-"""What a run says of its own error."""
+"""The error of a run: requested and estimated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..arguments import named
 @named
 @dataclass(frozen=True)
 class Accuracy:
-    """How far a run is from the exact solution, and how far it was allowed to be.
+    """Requested and estimated error of a run.
 
     Attributes:
         asked: the requested error [unit].
@@ -18,11 +18,11 @@ class Accuracy:
             position at the samples.
         estimate: the error of the record [unit]; None where nothing bounds it.
         reached: whether the estimate is at most the requested error.
-        integrator: that was chosen.
+        integrator: the one chosen.
         dt: step of the record [s].
         order: observed over the last three steps; None where it cannot be determined.
-        runs: made to choose and to verify.
-        wall_time: of all of them [s].
+        runs: number of runs made to choose and to verify.
+        wall_time: of all these runs [s].
         note: why there is no estimate, or why it exceeds the requested error; else "".
     """
 

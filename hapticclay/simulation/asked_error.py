@@ -1,7 +1,7 @@
-"""Runs to an asked error: choose integrator and step, run, verify at other steps, refine.
+"""Runs to a requested error: choose integrator and step, run, verify at other steps, refine.
 
-Each choice is run at steps 4h, 2h and h, whose differences tell the error (Richardson): that of the
-border times at h, or that of the positions at 4h. Only a run that asks for an error loads this.
+Each choice is run at steps 4h, 2h and h. Their differences give the error (Richardson): that of the
+border times at h, or that of the positions at 4h. Only runs with a requested error load this.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .record import Record
 from .step_comparison import Comparison, Trace, compare_positions, compare_times, hides_events
 
 UNITS = ("s", "m")
-ROUNDING = 1e-11  # [s], [m] the finest error that can be asked for; runs keep some 1e-12 at best
-SMALLEST = 1e-6  # [s] step, the least of Scenario.dt
+ROUNDING = 1e-11  # [s], [m] finest error that can be requested; runs keep some 1e-12 at best
+SMALLEST = 1e-6  # [s] shortest step, the lower bound of Scenario.dt
 LARGEST = 1e-3  # [s] finest step of three; RATIO times as long, poles of 30 1/s are still resolved
-RATIO = 4  # of the coarsest step of a comparison to the finest
+RATIO = 4  # coarsest step of a comparison over the finest
 ROUNDS = 9  # comparisons at most, each at a step at least two times finer
-MARGIN = 0.75  # of the asked error, taken as reached: estimates fall short by so much in 2 %
+MARGIN = 0.75  # share of the requested error to keep: in 2 %, estimates are low by this much
 DOUBTS = 4  # comparisons that may fail to confirm the order before a plain bound is taken
 LEAST_SAMPLES = 2000  # of a run to t_max at which positions are compared, however few are kept
 
@@ -49,8 +49,8 @@ class IntegratorFacts(NamedTuple):
     cost: float
 
 
-# Measured on 120 cuts and hits like those of tests/simulation/test_accuracy.py, beside their exact
-# solutions: medians, and run times compiled. A scene may have 100 times as much, and is refined.
+# Medians over 120 cuts and hits like those of tests/simulation/test_accuracy.py, against their
+# exact solutions; run times compiled. A scene may have 100 times the error, and is then refined.
 METHODS = {
     "fast": IntegratorFacts(2, {"s": 0.35, "m": 0.5}, 1.0),
     "accurate": IntegratorFacts(4, {"s": 50.0, "m": 100.0}, 5.0),
@@ -58,7 +58,7 @@ METHODS = {
 
 
 def parse_error(error: object) -> tuple[float, str]:
-    """Reads an asked error.
+    """Parses a requested error.
 
     Args:
         error: seconds, or a text of a number and a unit: "1e-6 s", "1e-7 m".
@@ -67,7 +67,7 @@ def parse_error(error: object) -> tuple[float, str]:
         The number, and its unit, "s" or "m".
 
     Raises:
-        ParameterError: no such number or unit, or less than rounding leaves room for.
+        ParameterError: no such number or unit, or an error too small beside rounding.
     """
     value, unit = error, "s"
     if isinstance(error, str):
@@ -91,22 +91,23 @@ def simulate_within(
     progress: Callable[[float, float], bool | None] | None = None,
     engine: str = "auto",
 ) -> Record:
-    """Runs a scenario with the integrator and the step that keep an asked error.
+    """Runs a scenario with the integrator and the step that keep a requested error.
 
     Args:
-        scenario: what to run; its integrator and dt are replaced. Sampled control keeps Ts (dt
-            where it is None), and steps divide it.
+        scenario: what to run; its integrator and dt are replaced. Sampled control keeps Ts (or dt
+            where Ts is None), and steps divide it.
         error: as in parse_error.
         every: keep each every-th sample, and the last.
-        progress: as in simulate, from 0 s on for each of the runs.
+        progress: as in simulate; each run starts at 0 s.
         engine: as in simulate.
 
     Returns:
-        The record with Record.error: of the finest run for an error in s; for one in m of a run at
-        four times its step, at whose samples positions are compared, if that keeps the error.
+        The record with Record.error. For an error in s it is that of the finest run. For an error
+        in m it is that of a run at four times this step, where positions are compared, if that run
+        keeps the error.
 
     Raises:
-        ParameterError: as simulate; or the scene has no border, so that seconds mean nothing.
+        ParameterError: as simulate; or an error in seconds in a scene without a border.
     """
     asked, unit = parse_error(error)
     if unit == "s" and not _has_border(scenario):
@@ -123,7 +124,7 @@ def simulate_within(
     order, most, doubts = METHODS[trial.scenario.integrator].order, MARGIN * asked, 0
     for rounds in range(1, ROUNDS + 1):
         doubts += not found.confirmed
-        # an order that is not seen at so many steps will not be; the estimate then is a bound
+        # an order not observed at so many steps will not appear; the estimate then is a bound
         sure = found.confirmed or doubts > DOUBTS
         if found.final or (sure and found.estimate is not None and found.estimate <= most):
             break
@@ -134,7 +135,7 @@ def simulate_within(
         try:
             dt = _finer(dt, found, most, order)
             record, found = trial.compare(dt)
-        except ParameterError as refusal:  # of memory: what is there is kept
+        except ParameterError as refusal:  # memory is short: keep the results so far
             found = found._replace(note=f"the next step was refused, {refusal}")
             break
     if found.finest is not None and found.estimate is not None and found.estimate > asked:
@@ -161,7 +162,7 @@ def _has_border(scenario: Scenario) -> bool:
 
 
 def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
-    """The next step: where the estimate says that its error is as small as it may be."""
+    """The next step: its predicted error is the largest allowed one."""
     halvings = 2
     if found.estimate is not None:
         wanted = math.ceil(math.log2(max(found.estimate / most, 1.0)) / order)
@@ -171,15 +172,15 @@ def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
 
 
 def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, float]]:
-    """Integrators for an asked error, the cheapest by METHODS first, and steps of a finest run.
+    """Integrators for a requested error, cheapest by METHODS first, and steps of a finest run.
 
     Args:
         scenario: what to run; Ts is a number where control is sampled.
-        asked: error [unit].
+        asked: requested error [unit].
         unit: "s" or "m".
 
     Returns:
-        Pairs of "fast" or "accurate" and a step [s]; the last is of "fast", which takes all scenes.
+        Pairs of "fast" or "accurate" and a step [s]; the last is "fast", which accepts all scenes.
 
     Raises:
         ParameterError: Ts is too short to be divided.
@@ -192,7 +193,7 @@ def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, floa
     if scenario.control == "sampled":
         return [("fast", _divided(scenario.Ts or scenario.dt, steps["fast"]))]
     fast = "fast", steps["fast"]
-    if not has_numba():  # the accurate run in Python takes too long to pay
+    if not has_numba():  # the accurate method is too slow in Python
         return [fast]
     # beyond, the explicit method divides its steps, and other steps are no other runs
     steps["accurate"] = min(
@@ -205,7 +206,7 @@ def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, floa
 
 
 def _is_taken(scenario: Scenario, integrator: str, dt: float) -> bool:
-    """Whether an integrator takes a scene at the coarsest step of a comparison."""
+    """Whether an integrator accepts a scene at the coarsest step of a comparison."""
     try:
         s = dataclasses.replace(scenario, integrator=integrator, dt=RATIO * dt)
         if integrator == "accurate":
@@ -230,7 +231,7 @@ def _divided(Ts: float, dt: float) -> float:
 
 
 class Trial:
-    """Runs of one scenario at several steps, and what they say of each other.
+    """Runs of one scenario at several steps, and their comparison.
 
     Args:
         scenario: what to run, at any step.
@@ -240,8 +241,8 @@ class Trial:
     Attributes:
         progress: as in simulate.
         engine: as in simulate.
-        runs: made so far.
-        wall: run time of all [s].
+        runs: number of runs so far.
+        wall: total run time [s].
     """
 
     def __init__(self, scenario: Scenario, unit: str, every: int = 1):
@@ -252,13 +253,13 @@ class Trial:
         self.traces: dict[float, Trace] = {}
 
     def compare(self, dt: float) -> tuple[Record, Comparison]:
-        """Runs at 4 dt, 2 dt and dt, unless it has, and compares.
+        """Runs at 4 dt, 2 dt and dt, unless done already, and compares.
 
         Args:
             dt: step of the finest run [s].
 
         Returns:
-            The record, of the finest run for an error in s, of the coarsest for one in m, and the
+            The record (of the finest run for an error in s, of the coarsest for one in m) and the
             comparison; if a run was interrupted, its record.
         """
         traces: dict[float, Trace] = {}
@@ -279,7 +280,7 @@ class Trial:
         if self.unit == "s":
             return record, compare_times(*traces.values(), order=order)
         compared = compare_positions(*traces.values(), order=order)
-        # decays that no step resolves leave their error in one sample, which may not show it
+        # a decay that no step resolves leaves its error in one sample, where it may not show
         if fastest_rate(self.scenario) * dt > STABLE_STEP and hides_events(*traces.values()):
             compared = compared._replace(confirmed=False)
         return self._thinned(record), compared
@@ -289,7 +290,7 @@ class Trial:
 
         Args:
             dt: step of the finest run [s].
-            found: of the comparison.
+            found: the comparison.
         """
         r = self._run(dt, dt)
         if r.outcome.code == "interrupted":
@@ -301,7 +302,7 @@ class Trial:
         if self.unit == "m":
             every = self._compared(kept) * round(kept / dt)
         else:
-            every = self.every if dt == kept else 1_000_000  # crossings alone are compared
+            every = self.every if dt == kept else 1_000_000  # only crossings are compared
         scenario = dataclasses.replace(self.scenario, dt=dt)
         r = run_once(scenario, every, self.engine, self.progress)
         self.runs, self.wall = self.runs + 1, self.wall + r.wall_time
@@ -313,7 +314,7 @@ class Trial:
         return next(k for k in range(min(most, self.every), 0, -1) if self.every % k == 0)
 
     def _thinned(self, r: Record) -> Record:
-        """The record with the samples asked for."""
+        """The record with the requested samples."""
         ratio = self.every // self._compared(r.scenario.dt) if self.unit == "m" else 1
         if ratio == 1:
             return r

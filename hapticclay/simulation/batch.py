@@ -1,4 +1,4 @@
-"""Many runs in parallel on all cores, each with the same result as by itself."""
+"""Many runs in parallel on all cores, each with the same result as alone."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from .engines import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_
 from .simulate import simulate
 
 KEEP = ("records", "summaries")
-MANY = 32  # runs of a batch from which on those of one kind are made together
-PART_STEPS = 20_000.0  # of a part of such a batch: 50 ms, after which Ctrl-C is heard
+MANY = 32  # batches of so many runs or more make the runs of one kind together
+PART_STEPS = 20_000.0  # steps in a part of such a batch: 50 ms, after which Ctrl-C takes effect
 WORKS = (
     "muscle",
     "motors",
@@ -66,10 +66,10 @@ SUMMARY = np.dtype(
         *((name, "f8") for name in WORKS),  # record.Record.energy [J]
     ]
 )
-KNOWN = 100_000  # runs of a sequence that are counted before the first; more repay anything
-ALONE = 1e-3  # time that a run takes Python beside its steps, alone, measured [s]
-LAST_ONLY = 1_000_000_000  # keep each so-many-th sample, and the last: the last alone
-WARNED = 200  # kinds of scene of a batch that are looked at for values that are hardly meant
+KNOWN = 100_000  # runs of a sequence counted before the first; more repay any compilation
+ALONE = 1e-3  # time that a run takes Python in addition to its steps, alone, measured [s]
+LAST_ONLY = 1_000_000_000  # value of `every` that keeps only the last sample
+WARNED = 200  # kinds of scene per batch that are checked for implausible values
 
 
 @checked
@@ -82,15 +82,15 @@ def simulate_batch(
 ) -> Any:
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
-    The number of threads and the order do not matter. Machine code is compiled for each kind of
-    scene whose runs repay it; others run in Python. Without numba, scenes run one after the other.
-    A record takes 160 bytes a sample, a summary 500 bytes. Scenarios may come from a
-    generator: they are taken as they are run, and those of summaries are not held.
+    Results do not depend on the number of threads or the order. Machine code is compiled for each
+    kind of scene whose runs repay it; others run in Python. Without numba, scenes run one after the
+    other. A record takes 160 bytes per sample, a summary 500 bytes. Scenarios may come from a
+    generator: they are read as they are run, and summaries do not keep them.
 
     Args:
-        scenarios: what to run; they may differ in anything. Many short runs, of up to 10 000 steps,
-            that differ in numbers alone take 1.2 times the bare engine's time, sampled 1.9 times.
-        threads: number of parallel runs; None for one a core.
+        scenarios: what to run; they may differ in anything. Short runs, of up to 10 000 steps, that
+            differ only in numbers take 1.2 times the time of the bare engine, sampled 1.9 times.
+        threads: number of parallel runs; None for one per core.
         every: keep each every-th sample, and the last.
         keep: "records", or "summaries" without samples.
 
@@ -104,7 +104,7 @@ def simulate_batch(
     every = integer("every", every, 1, 1_000_000)
     summaries = choice("keep", keep, KEEP) == "summaries"
     seen: set[Any] = set()
-    if isinstance(scenarios, Sequence):  # refused before the first run, if they can be
+    if isinstance(scenarios, Sequence):  # refuse before the first run where possible
         for _ in checked_scenarios(scenarios, seen):
             pass
     todo = checked_scenarios(scenarios, seen)
@@ -141,8 +141,8 @@ class Job(NamedTuple):
 
     Attributes:
         scenario: what to run.
-        key: from many.kind_key where it is made together with others; else None.
-        kernel: how its steps are made where it is made alone.
+        key: from many.kind_key for a run made together with others; else None.
+        kernel: how the steps of a run made alone are made.
     """
 
     scenario: Scenario
@@ -151,13 +151,13 @@ class Job(NamedTuple):
 
 
 class BatchPool:
-    """What each thread of a batch has of its own: engines, and what runs of one kind share.
+    """What each thread of a batch owns: engines, and what runs of one kind share.
 
     Args:
         every: keep each every-th sample, and the last.
 
     Attributes:
-        stop: set where the batch is over before its end, so that no run begins.
+        stop: set when the batch ends early, so that no run begins.
     """
 
     def __init__(self, every: int):
@@ -179,7 +179,7 @@ class BatchPool:
         return self.own.store
 
     def lane(self) -> Lane:
-        """What makes runs of one kind together in this thread."""
+        """The lane of this thread, which makes runs of one kind together."""
         if not hasattr(self.own, "lane"):
             from ..stepping.compiled import CARRY, KERNEL, RESET  # where it pays
 
@@ -230,7 +230,7 @@ class BatchPool:
 class Plan:
     """Chooses how each run of a batch is made: compiled where the runs of its kind repay it.
 
-    Those are all of the batch where they are known, else those taken so far.
+    All runs of the batch count where they are known beforehand, else those taken so far.
 
     Args:
         pool: makes the runs.
@@ -242,10 +242,10 @@ class Plan:
         self.pool, self.together, self.known = pool, together, bool(known)
         self.lock = threading.Lock()
         self.kernels: dict[Any, Kernel] = {}  # by traits of a scene
-        # steps of runs alone, by traits of their scene
+        # steps of runs made alone, by traits of their scene
         self.expected: defaultdict[Any, float] = defaultdict(float)
         self.patterns = Patterns()
-        self.carried: dict[Any, bool] = {}  # kinds of run made together: whether compiled by now
+        self.carried: dict[Any, bool] = {}  # kinds of run made together: whether compiled yet
         kinds: dict[Any, list[Scenario]] = {}
         for s in known:
             key = kind_key(s) if together else None
@@ -262,7 +262,7 @@ class Plan:
                 self.expected[scene.traits(jobs[0])] += sum(s.t_max / s.dt for s in jobs)
 
     def jobs(self, scenarios: list[Scenario]) -> list[Job]:
-        """Runs of the batch, for one thread; what they need is compiled.
+        """Jobs of the batch for one thread; compiles what they need.
 
         Args:
             scenarios: of the runs.
@@ -285,7 +285,7 @@ class Plan:
         return load_compiled()
 
     def takes(self, key: Any, like: Scenario, n: int) -> bool:
-        """Whether many runs of a kind, which has no other, are made together; compiled then.
+        """Whether n runs, all of their kind, are made together; if so, compiles what they need.
 
         Args:
             key: of the kind.
@@ -295,7 +295,7 @@ class Plan:
         return self._carries(key, [like] * min(n, KNOWN))
 
     def _carries(self, key: Any, jobs: list[Scenario]) -> bool:
-        """Whether runs of a kind are made together; compiled then."""
+        """Whether runs of a kind are made together; if so, compiles what they need."""
         if key not in self.carried:
             if self.known:
                 return False
@@ -313,7 +313,7 @@ class Plan:
         return True
 
     def _count(self, key: Any, jobs: list[Scenario]) -> None:
-        """Adds the time that would be saved if runs of a kind were made together."""
+        """Adds the time that making runs of a kind together would save."""
         if len(jobs) < FEWEST:
             return
         pattern = self.patterns.of(key, jobs[0])
@@ -323,7 +323,7 @@ class Plan:
         saved[pattern.kind] = saved.get(pattern.kind, 0.0) + time
 
     def _repay(self, key: Any, jobs: list[Scenario]) -> bool:
-        """Whether runs of a kind, with those counted so far, repay what makes them together."""
+        """Whether runs of a kind, with those counted so far, repay code to make them together."""
         if len(jobs) < FEWEST:
             return False
         pattern = self.patterns.of(key, jobs[0])
@@ -333,7 +333,7 @@ class Plan:
         return time >= LOADING and (is_kept(pattern.kind) or time >= compile_time(pattern.kind))
 
     def kernel(self, s: Scenario) -> Kernel:
-        """How the steps of a run are made that is made alone; compiled then.
+        """How the steps of a run made alone are made; compiles them if needed.
 
         Args:
             s: what to run.
@@ -353,7 +353,7 @@ class Plan:
             return self.kernels[traits]
 
 
-carried: set[Any] = set()  # kinds of which many runs are compiled in this process, or loaded
+carried: set[Any] = set()  # kinds whose code for many runs is compiled or loaded in this process
 saved: dict[Any, float] = {}  # time that this would have saved so far, by kind [s]
 
 
@@ -374,11 +374,11 @@ class _Records:
         self.found: list[Any] = []
 
     def put(self, first: int, results: Sequence[Any]) -> None:
-        """Takes the results of some runs that follow each other.
+        """Stores the results of consecutive runs.
 
         Args:
-            first: place of the first.
-            results: of them.
+            first: index of the first run.
+            results: of these runs.
         """
         end = first + len(results)
         self.found += [None] * (end - len(self.found))
@@ -390,17 +390,17 @@ class _Records:
 
 
 class Summaries:
-    """The same, an array of SUMMARY that grows in place."""
+    """The same as an array of SUMMARY, which grows in place."""
 
     def __init__(self):
         self.found, self.n = np.zeros(0, SUMMARY), 0
 
     def put(self, first: int, results: Any) -> None:
-        """Takes the results of some runs that follow each other.
+        """Stores the results of consecutive runs.
 
         Args:
-            first: place of the first.
-            results: of them.
+            first: index of the first run.
+            results: of these runs.
         """
         end = first + len(results)
         self.n = max(self.n, end)
@@ -415,14 +415,14 @@ class Summaries:
 
 
 def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
-    """The scenarios; a `Warning` names what is hardly meant in the first WARNED kinds of scene.
+    """The scenarios; a `Warning` names implausible values in the first WARNED kinds of scene.
 
     Args:
-        scenarios: to be looked at.
-        seen: kinds of scene looked at so far.
+        scenarios: to check.
+        seen: kinds of scene checked so far.
 
     Raises:
-        ParameterError: one is no Scenario.
+        ParameterError: one is not a Scenario.
     """
     for i, s in enumerate(scenarios):
         if not isinstance(s, Scenario):
@@ -439,7 +439,7 @@ def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scen
 
 
 def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Scenario]]:
-    """Scenarios that a thread takes at once: one, or as many as have about PART_STEPS together."""
+    """Scenarios for one thread at a time: one, or as many as have about PART_STEPS together."""
     part, steps = [], 0.0
     for s in scenarios:
         part.append(s)
@@ -485,15 +485,15 @@ def on_threads(
 ) -> None:
     """Makes parts of a batch on several threads; the first exception ends all and is raised.
 
-    This thread takes the scenarios and keeps the results, so that a generator runs where it was
-    made, Ctrl-C reaches it, and no more than two parts a thread are held.
+    The calling thread reads the scenarios and stores the results. So a generator runs where it was
+    made, Ctrl-C reaches it, and at most two parts per thread are held.
 
     Args:
         parts: of the batch.
         make: results of a part.
-        put: takes the place of the first run of a part, and the results.
+        put: receives the index of the first run of a part, and the results.
         threads: their number.
-        stop: set where the batch is over before its end.
+        stop: set when the batch ends early.
     """
     at = 0
     working: dict[Future[Any], int] = {}
@@ -526,7 +526,7 @@ def summary_entry(
     """Entry of a run among summaries.
 
     Args:
-        o: how it ended.
+        o: the outcome.
         steps: of the engine.
         crossings: of borders.
         last: p, v, fh, fe, b at the last good sample, (x, y) each.

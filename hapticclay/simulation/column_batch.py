@@ -1,4 +1,4 @@
-"""Many runs that differ in columns of numbers: no scenario is made for each."""
+"""Many runs that differ in columns of numbers, without a scenario for each."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..stepping.many import FEWEST, Draws, Pattern, draws_of, kind_key
 from . import batch
 from .engines import has_numba
 
-PART = 100_000.0  # steps that a thread takes at once: a quarter of a second
+PART = 100_000.0  # steps of one part of the work of a thread: a quarter of a second
 PAIRS = {
     "gain": "gain",
     "force": "force",
@@ -36,8 +36,8 @@ def simulate_columns(
     """Runs a scenario with columns of numbers in place of some of its fields.
 
     The results are those of `simulate_batch([with_fields(base, row) ...], keep="summaries")`, bit
-    for bit. Where gain, force, velocity, the operator's arm, the damping of clay or the delay vary,
-    no scenario is made for a run; other fields vary as well, at the cost of a scenario each.
+    for bit. Columns of gain, force, velocity, the operator's arm, the damping of clay or the delay
+    need no scenario per run; any other column costs a scenario per run.
 
         hands = {"operator.mass": mass, "operator.damper": damper}  # arrays, shape (n,)
         steady = hc.simulate_columns(hc.constant_cut(operator=hc.Operator()), hands)["v"]
@@ -45,14 +45,14 @@ def simulate_columns(
     Args:
         base: what the runs have in common.
         columns: values by dotted name, as of `with_fields`, shape (n,) each.
-        threads: number of parallel runs; None for one a core.
+        threads: number of parallel runs; None for one per core.
 
     Returns:
         An array of SUMMARY, shape (n,).
 
     Raises:
-        ParameterError: there is no such field, a column is of another length, or a value of it was
-            refused: the error names column and row.
+        ParameterError: there is no such field, a column has another length, or a value was
+            refused; the error names column and row.
     """
     threads = integer("threads", batch.cores() if threads is None else threads, 1, 1024)
     drawn = Columns(base, columns)
@@ -71,7 +71,7 @@ class Columns:
 
     Attributes:
         like: the first scenario.
-        is_plain: whether the numbers of all are known without their scenarios.
+        is_plain: whether the numbers of all runs are known without their scenarios.
     """
 
     def __init__(self, base: Scenario, columns: Mapping[str, Any]):
@@ -90,20 +90,20 @@ class Columns:
         self.key = kind_key(self.like)
         self.places = [places_of(name, self.like) for name in self.columns]
         self.is_plain = self.key is not None and all(self.places)
-        if "hardware.delay" in self.columns:  # whose bound depends on the sample: the longest tells
+        if "hardware.delay" in self.columns:  # its bound depends on the sample: check the longest
             self.scenario(int(self.columns["hardware.delay"].argmax()))
 
     def __len__(self) -> int:
         return self.n
 
     def scenario(self, k: int) -> Scenario:
-        """One of them.
+        """One of the scenarios.
 
         Args:
             k: its row.
 
         Raises:
-            ParameterError: it was refused.
+            ParameterError: the scenario was refused.
         """
         try:
             return with_fields(self.base, {n: float(x[k]) for n, x in self.columns.items()})
@@ -111,15 +111,15 @@ class Columns:
             raise ParameterError(f"{error.field}[{k}]", error.value, error.bound) from None
 
     def scenarios(self) -> Iterator[Scenario]:
-        """All of them."""
+        """All scenarios."""
         return map(self.scenario, range(self.n))
 
     def draws(self, first: int, end: int) -> Draws:
-        """What those of some rows differ in.
+        """Differences between the scenarios of some rows.
 
         Args:
-            first: row.
-            end: behind the last row.
+            first: the first row.
+            end: the row after the last.
         """
         n, one = end - first, draws_of([self.like])
         values = one.values and [np.repeat(x, n, axis=0) for x in one.values]
@@ -138,7 +138,7 @@ class Columns:
         )  # fmt: skip
 
     def of_kind(self, d: Draws) -> np.ndarray:
-        """Which draws are of the kind of the first one: as it delayed, with clay as stiff.
+        """Which draws are of the kind of the first: equally delayed, with equally stiff clay.
 
         Args:
             d: the draws.
@@ -159,10 +159,10 @@ class Columns:
 
 
 def places_of(name: str, base: Scenario) -> list[Place]:
-    """Where draws have a field: names and indices; none for a field that needs a scenario.
+    """Where draws hold a field: names and indices; none for a field that needs a scenario.
 
     Args:
-        name: its dotted name.
+        name: dotted name of the field.
         base: a scenario that has it.
     """
     head, *rest = name.split(".")
@@ -190,13 +190,13 @@ def _column(name: str, given: Any) -> np.ndarray:
 
 
 def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
-    """Refuses an unknown field, and a number out of its bounds, with its row."""
+    """Refuses an unknown field, and a number out of bounds, with its row."""
     (head, *rest), known = name.split("."), field_types(Scenario)
     bounds = bounds_at(*known[head], rest) if head in known else []
     if not bounds:
         with_fields(base, {name: float(column[0])})
     told = [float(x.low) for x in bounds if not isinstance(x.low, str)]
-    low = min(told) if len(told) == len(bounds) > 0 else -np.inf  # else the scenario asks
+    low = min(told) if len(told) == len(bounds) > 0 else -np.inf  # else the scenario checks
     high = max((x.high for x in bounds), default=np.inf)
     above = bool(bounds) and all(x.above for x in bounds)
     bad = ~(np.isfinite(column) & (column >= low) & (column <= high))
@@ -206,7 +206,7 @@ def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
 
 
 class _Lanes:
-    """Makes such runs by compiled code, on threads.
+    """Makes these runs by compiled code, on threads.
 
     Args:
         drawn: the runs.
@@ -218,11 +218,11 @@ class _Lanes:
         self.pattern: Pattern = self.plan.patterns.of(drawn.key, drawn.like)
 
     def repay(self) -> bool:
-        """Whether compiled code repays itself, which is then compiled."""
+        """Whether compiled code repays itself; if so, compiles it."""
         return self.plan.takes(self.drawn.key, self.drawn.like, len(self.drawn))
 
     def run(self, threads: int) -> np.ndarray:
-        """Makes all of them.
+        """Makes all runs.
 
         Args:
             threads: number of threads.
@@ -236,10 +236,10 @@ class _Lanes:
         return out.all()
 
     def part(self, rows: range) -> np.ndarray:
-        """Summaries of some of them.
+        """Summaries of some runs.
 
         Args:
-            rows: which.
+            rows: their rows.
         """
         drawn, lane = self.drawn, self.pool.lane()
         d, out = drawn.draws(rows.start, rows.stop), np.zeros(len(rows), batch.SUMMARY)

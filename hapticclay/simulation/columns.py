@@ -1,4 +1,4 @@
-"""The arrays of a record by name, and what tables and files ask of one."""
+"""The arrays of a record by name, and the interface for tables and files."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SCALAR = (
     "t",
     "removed",
     "removal_rate",
-)  # arrays of one figure a sample; the others have one an axis
+)  # arrays of one number per sample; the others have one per axis
 
 
 class Recorded(Protocol):
-    """A record, as tables and files see it: its arrays by name, and the following."""
+    """A record as tables and files use it: its arrays by name, and these members."""
 
     @property
     def t(self) -> np.ndarray: ...

@@ -1,4 +1,4 @@
-"""Which engine makes the steps of a run: CPython, machine code, or the one and then the other."""
+"""The engine that makes the steps of a run: CPython, machine code, or one after the other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
 LOADING = 0.8
-TRIED = 128  # rows made in CPython between two looks at whether machine code repays itself
+TRIED = 128  # rows made in CPython between two checks whether machine code repays itself
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 
 
@@ -42,12 +42,13 @@ def kernel_for(scenario: Scenario, engine: str) -> Kernel:
 
 
 def time_ahead(scenario: Scenario, i: int) -> float:
-    """Time that machine code may save in the rest of a run [s]: half of it, as runs tend to end
-    before t_max.
+    """Time that machine code may save in the rest of a run [s].
+
+    Half of the rest counts, as runs tend to end before t_max.
 
     Args:
         scenario: what to run.
-        i: index of the sample at which the run is.
+        i: index of the present sample.
     """
     return 0.5 * saved_in_a_step(scenario) * max(scenario.t_max / scenario.dt - i, 0.0)
 
@@ -68,12 +69,13 @@ def repays(kind: Any, time: float) -> bool:
 
 
 def pays(scenario: Scenario, steps: float) -> bool:
-    """Whether machine code repays loading or compiling it: for what this process has run of a kind
-    of scene so far, and is about to run.
+    """Whether machine code repays loading or compiling it.
+
+    All steps of a kind of scene count that this process has made so far and is about to make.
 
     Args:
         scenario: what to run.
-        steps: how many steps of its kind are about to be made.
+        steps: number of steps of its kind that are about to be made.
     """
     kind = kind_of(scene.parts_of(scenario))
     saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(scenario) * steps
@@ -81,11 +83,11 @@ def pays(scenario: Scenario, steps: float) -> bool:
 
 
 def as_it_pays(run: Run, room: int) -> None:
-    """Makes steps in CPython, and from where machine code repays itself, compiled.
+    """Makes steps in CPython, and compiled once machine code repays itself.
 
     Args:
         run: the run.
-        room: rows that it may have.
+        room: largest number of rows.
     """
     kind, s = run.kind, run.scenario
     while True:
@@ -99,7 +101,7 @@ def as_it_pays(run: Run, room: int) -> None:
         plainly(run, min(room, made.rows + TRIED))
         steps = run.state.filled.steps - made.steps
         saved[kind] = saved.get(kind, 0.0) + saved_in_a_step(s) * steps
-        if run.state.filled.rows < made.rows + TRIED:  # it is over, or has no room
+        if run.state.filled.rows < made.rows + TRIED:  # the run is over, or has no room
             return
 
 
@@ -119,7 +121,7 @@ def saved_in_a_step(scenario: Scenario) -> float:
 
 
 def load_compiled() -> Any:
-    """Imports the compiled steps; prints a line that says why, where this fails.
+    """Imports the compiled steps; prints a line with the cause if this fails.
 
     Returns:
         The module stepping.compiled; None where it fails.

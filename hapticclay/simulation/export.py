@@ -1,4 +1,4 @@
-"""A record as a file that other programs open: netCDF, Parquet, CSV, MCAP, Rerun, MATLAB."""
+"""A record as a file for other programs: netCDF, Parquet, CSV, MCAP, Rerun, MATLAB."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .stored import check_times
 
 TOPIC = "/hapticclay"  # of MCAP
 RECORDING = "hapticclay"  # application of a Rerun recording
-ROWS = 4096  # of a text that are written at once
+ROWS = 4096  # lines of a text file that are written at once
 
 
 def export_record(record: Recorded, path: str | os.PathLike[str], kind: str | None = None) -> Path:
@@ -29,7 +29,7 @@ def export_record(record: Recorded, path: str | os.PathLike[str], kind: str | No
     Args:
         record: the record.
         path: the file.
-        kind: a name in EXPORTS; None for the one that the file's name ends with.
+        kind: a name in EXPORTS; None takes it from the ending of the file's name.
 
     Returns:
         The file.
@@ -76,7 +76,7 @@ def _csv(record: Recorded, file: IO[bytes]) -> None:
     head = [*(f"# {line}" for line in told), ",".join(columns)]
     file.write(("\n".join(head) + "\n").encode())
     values = np.column_stack(list(columns.values()))
-    for i in range(0, len(values), ROWS):  # repr gives back the same float
+    for i in range(0, len(values), ROWS):  # repr preserves the float exactly
         rows = values[i : i + ROWS].tolist()
         file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
 
@@ -130,10 +130,10 @@ def _rerun(record: Recorded, file: IO[bytes]) -> None:
         import rerun as rr
     told = tables.told_of(record)
     recording = rr.RecordingStream(RECORDING)
-    memory = recording.memory_recording()  # a file of its own would not tell of a full disk
+    memory = recording.memory_recording()  # a file written by Rerun itself would hide a full disk
     for name, text in told.items():
         recording.log(f"about/{name}", rr.TextDocument(str(text)), static=True)
-    whole = np.rint(1e9 * record.t).astype("timedelta64[ns]")  # of floats it cuts the rest off
+    whole = np.rint(1e9 * record.t).astype("timedelta64[ns]")  # floats would be truncated
     time = rr.TimeColumn("t", duration=whole)
     for name, x in tables.recorded_arrays(record).items():
         if name == "t":

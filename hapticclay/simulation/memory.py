@@ -1,4 +1,4 @@
-"""How much memory a run may still take."""
+"""Memory that a run may still use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GROUPS = (  # limit and use of a control group (of containers), version 2 and ve
 
 
 def memory_left(root: Path = Path("/")) -> float:
-    """Bytes that this process may still take, by machine, container and ulimit; inf if unknown.
+    """Bytes that this process may still use, by machine, container and ulimit; inf if unknown.
 
     Args:
         root: root of the file system.
@@ -32,7 +32,7 @@ def _machine(root: Path) -> float:
         return 1024.0 * int(next(x for x in lines if x.startswith("MemAvailable:")).split()[1])
     with contextlib.suppress(
         AttributeError, OSError, ValueError
-    ):  # not Linux: all there is, if that is said
+    ):  # not Linux: total memory, if known
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return math.inf
 
@@ -42,7 +42,7 @@ def _group(most: Path, taken: Path) -> float:
         cache = 0
         for line in most.with_name("memory.stat").read_text().splitlines():
             name, _, value = line.partition(" ")
-            if name in ("inactive_file", "total_inactive_file"):  # given back when asked for
+            if name in ("inactive_file", "total_inactive_file"):  # reclaimable
                 cache = int(value)
         return float(int(most.read_text()) - int(taken.read_text()) + cache)
     return math.inf

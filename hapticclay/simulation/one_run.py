@@ -1,4 +1,4 @@
-"""One run as the scenario says, without a search for the step that keeps an error."""
+"""One run as the scenario defines it, without a search for the step of a requested error."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .engines import ENGINES, kernel_for
 from .memory import memory_left
 from .record import Record
 
-SAMPLE = 430  # bytes that a run needs at its end for each sample kept, measured
-SMALL_MEMORY = 2.0**28  # [bytes] runs that need less need not ask what there is
+SAMPLE = 430  # bytes per kept sample at the end of a run, measured
+SMALL_MEMORY = 2.0**28  # [bytes] smaller runs skip the check of memory
 
 
 def run_once(
@@ -48,10 +48,10 @@ def check_memory(scenario: Scenario, every: int) -> None:
 
     Args:
         scenario: what to run.
-        every: it keeps each every-th sample.
+        every: the run keeps each every-th sample.
 
     Raises:
-        ParameterError: it would not.
+        ParameterError: the record would not fit.
     """
     steps = scenario.t_max / scenario.dt
     samples = math.floor(steps / every) + 2

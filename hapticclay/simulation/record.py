@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-VIEWS = "hapticclay.views.record_plots"  # draws; looked up when a figure is asked for
+VIEWS = "hapticclay.views.record_plots"  # draws the figures; imported on demand
 RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
@@ -48,7 +48,7 @@ STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 @named
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Arrays of one run, all over the same n samples; axes ordered (x, y).
+    """Arrays of one run over the same n samples; axes ordered (x, y).
 
     Attributes:
         t: time [s], shape (n,); in steps of dt, the last one shorter if the run ended between two.
@@ -62,22 +62,22 @@ class Record:
         tau: motor torques [N.m], shape (n, 2).
         delta: compensator output [m], shape (n, 2).
         scenario: what was run.
-        outcome: how it ended.
+        outcome: how the run ended.
         crossings: of borders, in order.
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
             damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
-            what is left over (residual) and what went through (throughput) [J]; of clay that
-            springs back, what its springs hold of the clay's share and have lost (springs_stored,
-            springs_dissipated).
-        steps: engine steps made.
+            imbalance (residual) and sum of all magnitudes (throughput) [J]; for clay that springs
+            back, the part of the clay's share that its springs store and have dissipated
+            (springs_stored, springs_dissipated).
+        steps: number of engine steps.
         wall_time: run time [s].
         versions: of the packages used.
-        extra: further arrays by name: removed clay and its rate, shape (n,); of sessions, the
+        extra: further arrays by name: removed clay and its rate, shape (n,); in sessions, the
             target of the hand and the gain K, shape (n, 2).
-        notes: of sessions, how well they kept real time.
-        stops: where clay that yields held the handle still, in order.
-        error: of a run with a requested error: request and estimate; else None.
-        ground: of clay that stays cut, height of what is left of each cell at the end [m], shape
+        notes: in sessions, how well they kept real time.
+        stops: intervals in which yielding clay held the handle still, in order.
+        error: for a run with a requested error, request and estimate; else None.
+        ground: for clay that stays cut, remaining height of each cell at the end [m], shape
             (n, m), between the `edges` of its Groove; else None.
     """
 
@@ -106,7 +106,7 @@ class Record:
 
     @classmethod
     def of(cls, run: Run, wall: float) -> Record:
-        """The record of a run that is over.
+        """The record of a finished run.
 
         Args:
             run: the run.
@@ -163,7 +163,7 @@ class Record:
         return importlib.import_module(VIEWS).RecordPlots(self)
 
     def to_frame(self) -> DataFrame:
-        """The arrays as a pandas DataFrame, a row a sample.
+        """The arrays as a pandas DataFrame, one row per sample.
 
         Its index is t [s]; columns are p_x, p_y, v_x, ..., q_shoulder, q_elbow, ..., with those of
         `extra`. Its attrs have units, by column; title, source, status, outcome, end_time [s]; and
@@ -180,7 +180,7 @@ class Record:
         """The arrays as an xarray Dataset over time [s], axis (x, y) and joint (shoulder, elbow).
 
         Variables have units and long_name; the attributes are those of `to_frame`, without units.
-        What is left of clay that stays cut is over cell_x and cell_y [m].
+        The remaining height of clay that stays cut is over cell_x and cell_y [m].
 
         Raises:
             ParameterError: xarray is not installed.
@@ -194,8 +194,8 @@ class Record:
 
         Args:
             path: the file; an older one is replaced.
-            format: "nc", "parquet", "csv", "mcap", "rrd" or "mat"; None for what the file's name
-                ends with.
+            format: "nc", "parquet", "csv", "mcap", "rrd" or "mat"; None takes it from the ending
+                of the file's name.
 
         Returns:
             The file.
@@ -233,7 +233,7 @@ class Record:
         return count[high] == count[low]
 
     def stretches(self, axis: str | None = None) -> list[np.ndarray]:
-        """Indices of the samples, split wherever the handle entered another clay.
+        """Indices of the samples, split wherever the handle entered different clay.
 
         Args:
             axis: "x" or "y" for the clay of that axis; None for both.
@@ -254,16 +254,16 @@ class Record:
     def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
         """Means over each of the `stretches`, in order of time.
 
-        For each axis: fe/v against b over the stretch (mean and deviation); where the speed is
-        steady, the speed, fe/v and fh/v, beside `expected_speed`. Also the other quantities of the
-        clay (`Clay.columns`) in the middle of the stretch; and of clay that can hold the handle, fe
-        where the speed is steady, and the share of the time for which it did.
+        Each axis has fe/v against b over the stretch (mean and deviation). At steady speed it also
+        has the speed, fe/v and fh/v, beside `expected_speed`. The other quantities of the clay
+        (`Clay.columns`) are those in the middle of the stretch. Clay that can hold the handle adds
+        fe at steady speed, and the share of time in which it held the handle.
 
         Args:
             axis: "x" or "y" for that axis and its stretches alone; None for both.
 
         Returns:
-            One dictionary a stretch.
+            One dictionary per stretch.
         """
         if not len(self.t):
             return []
@@ -339,7 +339,7 @@ class Record:
         return float(v[axes.index(i)])
 
     def held(self) -> np.ndarray:
-        """Samples at which clay that yields held the handle, along each axis, shape (n, 2)."""
+        """Samples at which yielding clay held the handle, along each axis, shape (n, 2)."""
         out = np.zeros(self.v.shape, dtype=bool)
         for stop in self.stops:
             end = math.inf if stop.end is None else stop.end
@@ -349,7 +349,7 @@ class Record:
         return out
 
     def summary(self) -> dict[str, Any]:
-        """Everything about the run but its arrays, ready for JSON."""
+        """All data of the run except its arrays, ready for JSON."""
         end = float(self.t[-1]) if len(self.t) else 0.0
         left_out: list[str] = []
         scenario = plain_data(self.scenario, left_out=left_out)
@@ -403,7 +403,7 @@ class Record:
             np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
             f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
-        if "left_out" in head.get("notes", {}):  # a function is no file, and an older one misleads
+        if "left_out" in head.get("notes", {}):  # a function has no file; an older one misleads
             (folder / "scenario.toml").unlink(missing_ok=True)
         else:
             self.scenario.save(folder / "scenario.toml")
@@ -416,8 +416,8 @@ class Record:
         Args:
             path: the folder, or its record.npz.
 
-        The law of a controller is its name, which is imported when a run starts. A function that
-        was no data is left out of the scenario; notes tell.
+        The law of a controller is stored by name and imported when a run starts. A function that
+        could not be stored is left out of the scenario; notes say so.
 
         Raises:
             ParameterError: there is no record, or it has another schema.
@@ -425,7 +425,7 @@ class Record:
         file = Path(path)
         file = file / "record.npz" if file.is_dir() else file
         try:
-            if file.exists() and not file.is_file():  # a pipe would be waited for
+            if file.exists() and not file.is_file():  # reading a pipe would block
                 raise ValueError("it is not a regular file")
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
@@ -486,7 +486,7 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
 
 
 def _check_ground(ground: np.ndarray | None, scenario: Scenario) -> None:
-    """Raises ValueError unless there is a height a cell of clay that stays cut, if there is any."""
+    """Raises ValueError unless each cell of clay that stays cut, if any, has a height."""
     block = scenario.clay and scenario.clay.ground
     shape, got = block.shape if block else None, None if ground is None else ground.shape
     if shape != got or (ground is not None and not np.isfinite(ground).all()):
@@ -502,7 +502,7 @@ def _flow_at(clay: Clay | None, i: int, place: np.ndarray) -> tuple[float, float
 
 
 def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
-    """A scenario of its plain data, and what is left out: a controller whose law has no name."""
+    """A scenario from its plain data, and what is left out: a controller whose law has no name."""
     try:
         return make_part(Scenario, data), []
     except ParameterError as error:

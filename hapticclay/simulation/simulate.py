@@ -31,25 +31,25 @@ def simulate(
         engine: "python"; "native", compiled (needs hapticclay[fast]); or "auto", compiled where
             numba is installed and the machine code is loaded already or the run is long enough to
             repay loading it. All give the same record, bit for bit.
-        error: largest error to allow: seconds at the border crossings (1e-6, "1e-6 s"), or metres
-            of position ("1e-7 m"), 1e-11 or more. Integrator and dt of the scenario are then
-            chosen, finer until runs at other steps confirm the error; record.error says what was
-            reached, and progress goes from 0 s on in each run. None to run the scenario as it is.
+        error: largest allowed error: seconds at the border crossings (1e-6, "1e-6 s"), or metres
+            of position ("1e-7 m"), 1e-11 or more. Integrator and dt are then chosen, and refined
+            until runs at other steps confirm the error. record.error holds the error reached;
+            progress starts at 0 s in each run. None runs the scenario as it is.
 
     Returns:
-        The record. Instability and its like are outcomes (record.status), not exceptions.
+        The record. Instability and similar ends are outcomes (record.status), not exceptions.
 
     Raises:
         ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
             stiff for its integrator, the record may not fit into memory, the law of its controller
             is not found, or an error in seconds is requested without a border to cross.
-        RuntimeError: the law of its controller raised an exception (`LawFailed`). What is no error,
-            as Ctrl-C, is raised as it is.
+        RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
+            such as Ctrl-C are raised unchanged.
     """
     every = integer("every", every, 1, 1_000_000)
     warn_of(scenario)
     if error is not None:
-        from .asked_error import simulate_within  # only a run that asks for an error pays for it
+        from .asked_error import simulate_within  # imported only if an error is requested
 
         return simulate_within(scenario, error, every=every, progress=progress, engine=engine)
     return run_once(scenario, every, engine, progress)

@@ -1,4 +1,4 @@
-"""Many runs step by step, for learning environments and Monte Carlo loops of one's own."""
+"""Many runs step by step, for learning environments and your own Monte Carlo loops."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from .vectored import VectoredRuns
 
 @checked
 class SimulationBatch:
-    """Many runs that make steps when they are told to, each to the numbers of `Simulation`.
+    """Many runs that advance on request, each with the numbers of `Simulation`.
 
         with hc.SimulationBatch([scenario] * 64) as sims:
             while not sims.ended.all():
                 sims.advance(55, force=policy(sims.p, sims.v))
                 sims.reset(sims.ended)
 
-    Runs may differ in anything. Compiled, all runs of one kind advance in one call on all cores;
-    numbers that a loop reads are arrays over runs, copies each time. No record is kept: a run holds
-    its last 4095 samples at most, for the monitor, half a megabyte.
+    Runs may differ in anything. Compiled, all runs of one kind advance in one call on all cores.
+    Results are arrays over runs, copied at each access. No record is kept: a run holds at most its
+    last 4095 samples, for the monitor, half a megabyte.
 
     A run that has ended stays at its last good sample until `reset`.
 
     Args:
-        scenarios: what to run, one a run.
-        engine: as in `simulate`; "auto" compiles once the steps asked for repay it.
-        workers: threads of compiled steps; None for one a core.
+        scenarios: what to run, one per run.
+        engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
+        workers: threads of compiled steps; None for one per core.
 
     Raises:
         ParameterError: there is no scenario, one is of another type, or is refused as by
@@ -84,7 +84,7 @@ class SimulationBatch:
         return len(self._runs.runs)
 
     def close(self) -> None:
-        """Ends the batch, after which no step can be made."""
+        """Closes the batch; no further step can be made."""
         self._closed = True
         self._runs.close()
 
@@ -95,17 +95,17 @@ class SimulationBatch:
         force: Any = None,
         mask: Any = None,
     ) -> None:
-        """Makes n steps of each run, fewer where it ends; none where it has ended.
+        """Makes n steps of each run, fewer if it ends; none if it has ended.
 
         Args:
             n: number of steps, at least 1.
             force: muscle force uh on each handle from this sample on [N], in place of the
                 scenario's constant force, shape (N, 2); None for those in effect.
-            mask: which runs to advance, shape (N,); None for all. The forces of the others are not
-                looked at.
+            mask: which runs to advance, shape (N,); None for all. Forces of the other runs are
+                ignored.
 
         Raises:
-            ParameterError: a value is no finite number within 1e6, or an array of another shape.
+            ParameterError: a value is no finite number within 1e6, or an array has another shape.
             RuntimeError: the batch is closed, or another thread uses it.
         """
         n = integer("n", n, 1, 1_000_000_000)
@@ -121,14 +121,14 @@ class SimulationBatch:
         runs: Any = None,
         scenario: Scenario | Sequence[Scenario] | None = None,
     ) -> None:
-        """Begins runs anew.
+        """Restarts runs.
 
         Args:
             runs: index of one, indices, or a mask, shape (N,); None for all.
             scenario: what to run, one for all of these or one each; None for the same as before.
 
         Raises:
-            ParameterError: there is no such run, or another number of scenarios.
+            ParameterError: there is no such run, or the number of scenarios does not match.
         """
         which = self._indices("runs", runs)
         given: list[Scenario | None] = [None] * len(which)
@@ -148,17 +148,17 @@ class SimulationBatch:
         operator: Operator | tuple[Operator | None, Operator | None] | Sequence[Any] | None = None,
         b: Any = None,
     ) -> None:
-        """Goes on with other numbers from this sample on, in runs that have not ended.
+        """Changes numbers from this sample on, in runs that have not ended.
 
         Args:
             runs: index of one, indices, or a mask, shape (N,); None for all.
             gain: K of x and y [1/kg], one pair for all of these runs or shape (n, 2).
-            operator: the operator's arm, as of a Scenario, or a list of one each. A run without one
-                cannot take one.
+            operator: the operator's arm, as in a Scenario, or a list with one per run. A run
+                without an operator cannot get one.
             b: as in `Simulation.set`, one for all of these runs or shape (n,).
 
         Raises:
-            ParameterError: a value is out of its bounds, or an operator is to come or to go.
+            ParameterError: a value is out of its bounds, or an operator would be added or removed.
         """
         which = self._indices("runs", runs)
         n = len(which)
@@ -183,7 +183,7 @@ class SimulationBatch:
             changes["operator"] = operator
         return changes
 
-    # ---- what is told
+    # ---- results
 
     def _shown(self, name: str) -> np.ndarray:
         with self._alone() as runs:
@@ -247,21 +247,21 @@ class SimulationBatch:
 
     @property
     def outcomes(self) -> list[Outcome | None]:
-        """How each run ended; None while it goes on."""
+        """How each run ended; None while it is running."""
         return self._runs.outcomes
 
     @property
     def diverging(self) -> np.ndarray:
         """Which motions so far are unstable by the rules of the monitor, shape (N,).
 
-        Asked anew each 20 ms of simulated time, as `Simulation.diverging`; the runs go on.
+        Evaluated every 20 ms of simulated time, as `Simulation.diverging`; the runs continue.
         """
         with self._alone() as runs:
             return runs.look()
 
     @property
     def scenarios(self) -> list[Scenario]:
-        """What is run, with the forces, gains, operators and clay now in effect."""
+        """The scenarios, with the forces, gains, operators and clay now in effect."""
         with self._alone() as runs:
             return [runs.scenario(k) for k in range(len(self))]
 
@@ -294,7 +294,7 @@ class SimulationBatch:
 
 
 def _each(field: str, value: Any, n: int, several: bool) -> Sequence[Any]:
-    """One value a run: those given, or one for all.
+    """One value per run: those given, or one for all.
 
     Args:
         field: name for the error.

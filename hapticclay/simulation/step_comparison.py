@@ -1,4 +1,4 @@
-"""Runs at three steps compared: the error of the finest, in border times or in positions."""
+"""Comparison of runs at three steps: error of the finest, in border times or in positions."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from ..stepping.run import Crossing
 
-ORDER_GAP = 0.5  # from the order of the integrator, up to which an observed order confirms it
+ORDER_GAP = 0.5  # largest deviation of an observed order that confirms that of the integrator
 CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order
-ROUNDING_LEFT = 1e-12  # [s], [m] that is left of rounding at any step
+ROUNDING_LEFT = 1e-12  # [s], [m] rounding that remains at any step
 FINEST_GAP = (
     1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
 )
-TOLD_APART = 1e-13  # [m] a border is passed when the handle is so far beyond it
+TOLD_APART = 1e-13  # [m] distance beyond a border at which it counts as passed
 
 
 class Trace(NamedTuple):
-    """What is compared of a run.
+    """The data of a run that are compared.
 
     Attributes:
         dt: its step [s].
@@ -37,15 +37,15 @@ class Trace(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What three runs say of the finest one.
+    """Error of the finest of three runs, from their comparison.
 
     Attributes:
-        estimate: of its error; None where they have nothing to compare.
-        order: observed; None where it cannot be told.
+        estimate: of its error; None where there is nothing to compare.
+        order: observed; None where it cannot be determined.
         confirmed: whether the order is that of the integrator, so that the estimate is sharp.
         note: what is wrong, "" for nothing.
-        final: whether finer steps would not mend it.
-        finest: of the error of the finest run, where the estimate is of a coarser one.
+        final: whether finer steps would not help.
+        finest: error of the finest run, where the estimate is that of a coarser one.
     """
 
     estimate: float | None
@@ -64,7 +64,7 @@ AT_ROUNDING = "rounding: no step does better"
 def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
     """The error of the crossing times of the finest of three runs [s].
 
-    Where the differences shrink as the order says, it is the last one over 2^order - 1.
+    Where the differences shrink with the order, it is the last one over 2^order - 1.
 
     Args:
         coarse: at step 4h.
@@ -79,7 +79,7 @@ def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> C
         return Comparison(None, None, False, DIFFERENT)
     if not fine.crossings:
         return Comparison(None, None, False, "no border was crossed: ask for an error in m", True)
-    # a slow handle is long within the rounding of a border
+    # a slow handle stays within the rounding of a border for long
     slowest = max(min(abs(c.speed) for c in fine.crossings), TOLD_APART)
     floor = ROUNDING_LEFT + TOLD_APART / slowest
     sharp = second / (2.0**order - 1.0)
@@ -95,9 +95,9 @@ def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> C
 def compare_positions(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> Comparison:
     """The error of the positions of the coarsest of three runs at its samples [m].
 
-    The first sample behind a hit errs by more than others, and by how much depends on where in a
-    step the border lies: differences do not shrink evenly. The finest run has all samples of the
-    coarsest, and 4^-order of its error.
+    The first sample after a hit has a larger error than others. Its size depends on where in a
+    step the border lies, so the differences do not shrink evenly. The finest run has all samples of
+    the coarsest, and 4^-order of its error.
 
     Args:
         coarse: at step 4h.
@@ -126,7 +126,7 @@ def _unstable(a: Trace, b: Trace) -> bool:
 
 
 def _bounces(trace: Trace) -> bool:
-    """Whether a border is crossed again within a step, of which the step says little."""
+    """Whether a border is crossed again within a step, which the step hardly resolves."""
     last: dict[tuple[str, float], float] = {}
     found = False
     for c in trace.crossings:
@@ -157,7 +157,7 @@ def _time_gap(a: Trace, b: Trace) -> float | None:
 
 
 def _position_gap(a: Trace, b: Trace) -> float | None:
-    """Largest distance at the samples that both have [m]; None for other ends."""
+    """Largest distance at the common samples [m]; None if the ends differ."""
     n = min(len(a.t), len(b.t))
     both = np.abs(a.t[:n] - b.t[:n]) <= 1e-12 * (1.0 + a.t[:n])  # the last sample may be short
     away = np.linalg.norm(a.p[:n] - b.p[:n], axis=1)[both]

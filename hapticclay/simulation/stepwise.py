@@ -27,8 +27,8 @@ from .engines import ENGINES, kernel_for
 from .vectored import repay
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
-LOOK = 0.02  # [s] of simulated time between two looks at whether the run diverges
-TOLD = 1000  # steps after which to ask anew whether machine code pays
+LOOK = 0.02  # [s] of simulated time between two checks for divergence
+TOLD = 1000  # steps after which to check again whether machine code pays
 COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
 
 
@@ -77,8 +77,8 @@ class Simulation:
     As in `simulate` the samples are judged 4095 at a time: a verdict of instability is late by at
     most so many steps, and the record ends where it was due. `diverging` detects it sooner.
 
-    A simulation belongs to one thread at a time. It can be pickled and copied; a copy goes on by
-    itself.
+    A simulation belongs to one thread at a time. It can be pickled and copied; a copy continues
+    independently.
 
     Args:
         scenario: what to run.
@@ -99,7 +99,7 @@ class Simulation:
 
     def _begin(self, scenario: Scenario) -> None:
         place = scenario.clay, scenario.origin, scenario.arm, scenario.operators
-        if place != self._warned:  # of clay out of reach and the like, once
+        if place != self._warned:  # warn of clay out of reach and the like once
             warn_of(scenario)
             self._warned = place
         kernel = PLAIN
@@ -111,7 +111,7 @@ class Simulation:
         self._forget()
 
     def _forget(self) -> None:
-        """Forgets what was told of the run, which has changed."""
+        """Discards cached results of the run, which has changed."""
         self._state: Sample | None = None
         self._record: record.Record | None = None
         self._looked, self._diverging = -math.inf, False
@@ -139,7 +139,7 @@ class Simulation:
         self._wall = kept["_wall"]
 
     def close(self) -> None:
-        """Ends the simulation, after which no step can be made."""
+        """Closes the simulation; no further step can be made."""
         if not self._closed and (self._run.filled or self._run.looked):
             self.record()
         self._closed = True
@@ -163,8 +163,8 @@ class Simulation:
     def state(self) -> Sample:
         """The present sample, under the force and torques now in effect.
 
-        What belongs to a sample (velocity, forces, torques) also depends on what acts after it, so
-        it is what a step from here on would record.
+        Velocity, forces and torques of a sample also depend on what acts after it. They are those
+        that a step from here would record.
         """
         if self._state is None:
             if self._run.outcome is None:
@@ -208,7 +208,7 @@ class Simulation:
                 effect.
 
         Raises:
-            ParameterError: a value is no finite number within 1e6, or torques come too late, or
+            ParameterError: a value is not a finite number within 1e6, or torques begin too late or
                 without control="sampled".
             RuntimeError: the simulation is closed, or another thread uses it.
         """
@@ -221,7 +221,7 @@ class Simulation:
         force: Sequence[float] | None = None,
         torque: Sequence[float] | None = None,
     ) -> None:
-        """Makes n steps under the same action; fewer where the run ends.
+        """Makes n steps under the same action; fewer if the run ends.
 
         Args:
             n: number of steps, at least 1.
@@ -250,7 +250,7 @@ class Simulation:
             self._wall += time.perf_counter() - begin
 
     def _choose(self, n: int) -> None:
-        """Takes machine code for the steps from now on, where it pays."""
+        """Switches to machine code for the steps from now on, where it pays."""
         run = self._run
         self._untold += n
         if self._engine == "auto" and run.kernel is PLAIN and self._untold >= TOLD:
@@ -259,7 +259,7 @@ class Simulation:
             self._untold = 0
 
     def reset(self, scenario: Scenario | None = None) -> None:
-        """Starts again.
+        """Restarts the run.
 
         Args:
             scenario: what to run; None for the same.
@@ -275,7 +275,7 @@ class Simulation:
             return run.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Goes back to a snapshot, with the record as it was.
+        """Returns to a snapshot, with the record as it was.
 
         Args:
             snapshot: of this simulation, or of another one of the same scenario.
@@ -291,16 +291,16 @@ class Simulation:
         operator: Operator | tuple[Operator | None, Operator | None] | None = None,
         b: float | None = None,
     ) -> None:
-        """Goes on with other numbers from this sample on.
+        """Changes numbers from this sample on.
 
         Args:
             gain: K of x and y [1/kg]; None keeps it.
-            operator: the operator's arm; None keeps it. A run without one cannot take one.
+            operator: the operator's arm; None keeps it. A run without one cannot get one.
             b: damping, yield force, consistency and pressure of all clay as a multiple of those
                 of the scenario that the run began with; None keeps them.
 
         Raises:
-            ParameterError: a value is out of its bounds, or an operator is to come or to go.
+            ParameterError: a value is out of its bounds, or an operator would be added or removed.
         """
         with self._alone() as run:
             changes: dict[str, Any] = {} if gain is None else {"gain": gain}
@@ -316,7 +316,7 @@ class Simulation:
     def record(self) -> record.Record:
         """The record up to the last sample stepped from; from then on the simulation has ended.
 
-        That of a run which had not ended has the outcome "interrupted".
+        A run that had not ended gets the outcome "interrupted".
 
         Raises:
             RuntimeError: no step has been made.
@@ -349,7 +349,7 @@ class Simulation:
 
 
 class _Alone:
-    """The run of a simulation for one thread, for a `with`: a generator would take a step's time.
+    """Access of one thread to a run, for `with`; a generator would cost the time of a step.
 
     Args:
         sim: the simulation.
@@ -372,11 +372,11 @@ class _Alone:
 
 
 def sample_of(t: float, row: np.ndarray) -> Sample:
-    """A sample of its row.
+    """A sample from its row.
 
     Args:
         t: its time [s].
-        row: as from Run.ahead.
+        row: from Run.ahead.
     """
     return Sample(t, *[row[place] for place in PLACES])
 
@@ -385,7 +385,7 @@ def stepwise_kernel(kernel: Kernel) -> Kernel:
     """The kernel for a run that is advanced often, a few steps at a time.
 
     Args:
-        kernel: that for one which is not.
+        kernel: that of an ordinary run.
     """
     if kernel is PLAIN:
         return kernel
@@ -399,10 +399,10 @@ def started_with_operator(scenario: Scenario, operator: object) -> None:
 
     Args:
         scenario: of the run.
-        operator: to be given, for the error.
+        operator: the one given, for the error.
 
     Raises:
-        ParameterError: the scenario has none.
+        ParameterError: the scenario has no operator.
     """
     if not any(scenario.operators):
         bound = "must be given from the start on: this run has no operator"

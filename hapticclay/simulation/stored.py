@@ -1,4 +1,4 @@
-"""Checks of what a file claims to be a record, before and after it is read."""
+"""Checks of a file that claims to be a record, before and after it is read."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LATEST = 9e9  # [s] the latest time that formats of whole nanoseconds hold
 
 
 def check_headers(archive: zipfile.ZipFile) -> None:
-    """Checks what the arrays of an .npz file are said to be, without reading them.
+    """Checks the headers of the arrays of an .npz file, without reading the arrays.
 
     Args:
         archive: the file.
@@ -96,7 +96,7 @@ TABLES: dict[str, Check] = {"energy": _is_number, "versions": _is_text}  # names
 
 
 def check_head(head: dict[str, Any]) -> None:
-    """Checks the types of what the summary of a record holds beside the scenario.
+    """Checks the types of all entries in the summary of a record but the scenario.
 
     Args:
         head: the summary.

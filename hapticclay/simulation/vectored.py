@@ -18,9 +18,9 @@ from ..stepping.vector import BOTH, STEPS, TRY, Common, RunVector, is_vectored, 
 from . import engines
 from .engines import has_numba, load_compiled
 
-PART = 200_000  # steps of a thread between two looks at the runs, and for Ctrl-C: half a second
-VECTORS = 16  # kinds from which on those that no run has are let go
-LOOK = 0.02  # [s] of simulated time between two looks at whether a run diverges
+PART = 200_000  # steps of a thread between two checks of the runs, and for Ctrl-C: half a second
+VECTORS = 16  # kinds above which those without a run are dropped
+LOOK = 0.02  # [s] of simulated time between two checks for divergence
 
 
 class VectoredRuns:
@@ -49,7 +49,7 @@ class VectoredRuns:
         self.looked_at, self.diverging = np.full(n, -np.inf), np.zeros(n, bool)
         self.vectors: dict[Any, RunVector] = {}
         self.of: list[RunVector | None] = [None] * n
-        self.asked = 0  # steps since the last question whether machine code pays
+        self.asked = 0  # steps since the last check whether machine code pays
         self.pool: ThreadPoolExecutor | None = None
         self.is_shown = self.is_tried = self.is_asked = False
         stores = [EngineStore(self.engines) for _ in scenarios]
@@ -87,7 +87,7 @@ class VectoredRuns:
         if is_vectored(run):
             key = kind_key(run)
             if key not in self.vectors:
-                if len(self.vectors) >= VECTORS:  # those of kinds that no run has any more
+                if len(self.vectors) >= VECTORS:  # drop kinds without a run
                     kept = [(x, v) for x, v in self.vectors.items() if any(v is y for y in self.of)]
                     self.vectors = dict(kept)
                 self.vectors[key] = RunVector(run, self.common, self.compiled.KERNEL)
@@ -101,12 +101,12 @@ class VectoredRuns:
         v.push(np.array([k]), self.steady[[k]])
 
     def _prepare(self, v: RunVector) -> None:
-        """Compiles what a kind needs, or takes it from the disk."""
+        """Compiles what a kind needs, or loads it from disk."""
         none = np.empty(0, np.int64)
         v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
 
     def _sync(self, k: int) -> Run:
-        """The run, with its state and force as they are now."""
+        """The run, with its present state and force."""
         run, v = self.runs[k], self.of[k]
         if v is not None:
             v.give(k, run)
@@ -124,7 +124,7 @@ class VectoredRuns:
         return self._sync(k).scenario
 
     def restart(self, k: int, scenario: Scenario | None) -> None:
-        """Begins a run anew.
+        """Restarts a run.
 
         Args:
             k: its index.
@@ -143,7 +143,7 @@ class VectoredRuns:
         self._begin(k)
 
     def change(self, k: int, change: Callable[[Scenario], Scenario]) -> None:
-        """Goes on with other numbers, unless the run has ended.
+        """Continues with other numbers, unless the run has ended.
 
         Args:
             k: index of the run.
@@ -197,7 +197,7 @@ class VectoredRuns:
 
         Args:
             which: their indices.
-            n: how many.
+            n: number of steps.
         """
         if not len(which):
             return
@@ -206,7 +206,7 @@ class VectoredRuns:
         for v, ks in self._groups(which):
             if v is not None:
                 self._draw(v, ks, n)
-        # whoever has asked for samples will ask for the next
+        # a caller that reads samples will read the next
         both = self.is_asked and len(which) == len(self.over) - self.over.sum()
         goal, left = self.common.marks[:, 0] + n, which
         while len(left):
@@ -221,7 +221,7 @@ class VectoredRuns:
         self.is_tried, self.is_asked = both, False
 
     def _unshow(self) -> None:
-        """Notes that a run has changed, and with it its sample."""
+        """Discards the sample of a run that has changed."""
         self.is_shown = self.is_tried = False
 
     def _draw(self, v: RunVector, which: np.ndarray, n: int) -> None:
@@ -271,7 +271,7 @@ class VectoredRuns:
                 x.result()
 
     def _one(self, k: int, ahead: int) -> None:
-        """Moves a run that is advanced alone."""
+        """Advances a run that is advanced alone."""
         run, c = self.runs[k], self.common
         run.resume()
         if ahead != TRY:
@@ -296,7 +296,7 @@ class VectoredRuns:
             self._end(k, run)
 
     def _end(self, k: int, run: Run) -> None:
-        """Keeps the last sample of a run that has ended."""
+        """Stores the last sample of a run that has ended."""
         c = self.common
         self.over[k] = True
         at = run.end_time if run.end_time is not None else (run.looked - 1) * run.scenario.dt
@@ -306,7 +306,7 @@ class VectoredRuns:
         c.times[k], c.shown[k, :ROW] = at, run.last_row
         c.shown[k, ROW:] = run.last_force()
 
-    # ---- what is told
+    # ---- results
 
     def show(self) -> np.ndarray:
         """The present samples, shape (n, SHOWN)."""
@@ -323,7 +323,7 @@ class VectoredRuns:
         return self.common.shown
 
     def look(self) -> np.ndarray:
-        """Whether the motion of each run is unstable by now, asked anew after LOOK."""
+        """Whether the motion of each run is unstable by now, evaluated again after LOOK."""
         due = ~self.over & (self.common.times >= self.looked_at + LOOK)
         self.looked_at[due] = self.common.times[due]
         self.diverging[due] = False
@@ -343,7 +343,7 @@ class VectoredRuns:
     # ---- machine code
 
     def _choose(self, which: np.ndarray, n: int) -> None:
-        """Takes machine code for the runs whose steps repay it."""
+        """Switches to machine code for the runs whose steps repay it."""
         if self.engine != "auto" or not has_numba():
             return
         self.asked += n * len(which)
@@ -374,7 +374,7 @@ def repay(run: Run, steps: float) -> bool:
 
     Args:
         run: one of them.
-        steps: how many steps of its kind are about to be made.
+        steps: number of steps of its kind that are about to be made.
     """
     if not is_vectored(run):
         return engines.pays(run.scenario, steps)

@@ -1,16 +1,16 @@
 """How a run advances: parts of a scene in, values of a kick out.
 
-`parts` and `state` name everything that is stepped; an argument named as one of their fields is
-that field. The other names mean the same in every module here:
+`parts` and `state` define all data of a step; an argument named like one of their fields is that
+field. The other names have one meaning in every module here:
 
 Names:
     parts: the Parts of a scene.
-    part: that which the function is about; None where the scene lacks it.
+    part: the part that the function handles; None where the scene lacks it.
     state: of a part or of a law.
     states: of several of them.
     s: the State of a run, or in `scene` the Scenario.
     e: the Engine, with the arrays that a run fills.
-    probe: the Engine, where the accurate method works out its steps; None for the fast method.
+    probe: the Engine, where the accurate method evaluates its steps; None for the fast method.
     k: the value of a Kick, or the Stride of the accurate method.
     acting: what acts in a kick, an Acting.
     now: an Instant, or what holds now.
@@ -34,7 +34,7 @@ Names:
     before: length of the step before a sample [s], or the state before.
     target: time of the next stop [s].
     on_grid: whether now is a sample.
-    shows: whether the record has a row of what begins now.
+    shows: whether the step that begins now has a row in the record.
     room: rows that may be filled.
     q: joint angles [rad].
     w: joint rates [rad/s].

@@ -1,4 +1,4 @@
-"""The start of a run: the arm at its place, the clay around it, the controller beside both."""
+"""The start of a run: arm at its place, clay around it, and controller."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def arm_at(parts, e, p, v):
 
 
 def axis_at(servo, p, v):
-    """Compensator and reference model of an axis that has long moved with v."""
+    """Compensator and reference model of an axis in steady motion at v."""
     return Axis((p + servo.damping / servo.stiffness * v) / servo.ratio, v / servo.ratio, p, v)
 
 
 def loop_at(form, loop, servo, p, v):
-    """The controller of a handle at p that has long moved with v; `loop` has the states of form."""
+    """The controller of a handle at p in steady motion at v; `loop` has the states of form."""
     x, y = axis_at(servo[0], p[0], v[0]), axis_at(servo[1], p[1], v[1])
     if form is None:
         return Loop(x, y, loop.form)
@@ -61,7 +61,7 @@ def loop_at(form, loop, servo, p, v):
 
 
 def clay_at(parts, blocks, body, p):
-    """The clay around a handle at p; `blocks` are those of its laws before it has been anywhere."""
+    """The clay around a handle at p; `blocks` are those of its laws before any motion."""
     index = regions.region_of(parts.table, p)
     clay = Clay(
         Region(index, NONE, NONE),
@@ -80,7 +80,7 @@ def clay_at(parts, blocks, body, p):
 
 
 def cut_at(special, clay, at):
-    """The clay behind the first cut of the tool, and before the first sample."""
+    """The clay after the first cut of the tool, before the first sample."""
     if special is None:
         return clay
     x = clay.laws
@@ -126,7 +126,7 @@ def with_loop(s, loop):
 
 
 def on_course(accurate, modal, s):
-    """The state of a run at its start, by the accurate method where it is that."""
+    """The state at the start of a run, by the accurate method where the scene uses it."""
     if accurate is None:
         return s
     x = s.loop
@@ -141,7 +141,7 @@ def first_modes(modal):
 
 
 def machine_at(part, parts, s, p):
-    """Controller and hardware at the start; the past of the sensors goes into their rings."""
+    """Controller and hardware at the start; fills past samples into the rings of the sensors."""
     loop, nothing = s.loop, hardware.nothing(part.passivity)
     x, y = reference_of(part.own, loop)
     return Machine(
@@ -178,7 +178,7 @@ def first_rates(part, sampler, body):
     if part is None:
         return part
     ring, n, q, w = part.ring, part.velocity_window, body.q, body.w
-    for i in range(n):  # before the start the joints have turned so for long
+    for i in range(n):  # before the start the joints have long turned at this rate
         j = i - n
         q1, q2 = q[0] + j * sampler.Ts * w[0], q[1] + j * sampler.Ts * w[1]
         q1, q2 = hardware.encoded(sampler.encoder, (q1, q2))
@@ -216,9 +216,9 @@ def first_queue(delay):
 
 
 def changed(parts, blocks, s, before):
-    """The state that goes on in a scene that has changed between the same borders; in CPython only.
+    """The state in a changed scene with the same borders; in CPython only.
 
-    Laws of the clay that stay keep their state, new ones begin.
+    Laws of the clay in both scenes keep their state; new laws begin.
 
     Args:
         parts: the scene.
@@ -243,7 +243,7 @@ def changed(parts, blocks, s, before):
 
 
 def kept_blocks(fresh, before):
-    """Blocks of a new scene, which go on as before where they did.
+    """Blocks of a new scene; those that continue keep their state.
 
     Args:
         fresh: those of the new scene.

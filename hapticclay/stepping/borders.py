@@ -20,7 +20,7 @@ def sides(r, p):
 
 
 def stood_on(r, p, sx, sy):
-    """The border that a place lies on or beyond, of those on the sides (sx, sy): coordinate, side.
+    """The border on or beyond which a place lies, of those on the sides (sx, sy): coordinate, side.
 
     Args:
         r: the region.
@@ -69,7 +69,7 @@ def hit_in(part, hit, struck):
 
 
 def clay_in(parts, clay, index, t, p, crossed, struck):
-    """The clay of a region that the handle comes into.
+    """The clay of a region that the handle enters.
 
     Args:
         parts: the scene.
@@ -78,7 +78,7 @@ def clay_in(parts, clay, index, t, p, crossed, struck):
         t: now [s].
         p: place of the handle [m].
         crossed: coordinate of the border crossed, -1 for none.
-        struck: 1.0 where other clay lies behind it.
+        struck: 1.0 where different clay lies behind it.
     """
     low, high, b, rate = regions.enter_region(parts.table, index[0], index[1], t)
     growth = grown_in(parts.clay, clay.growth, rate)
@@ -127,7 +127,7 @@ def moved_on(parts, s, p, i, up, struck):
 
 
 def passed_alike(parts, s, here, p):
-    """The state in the last region on the way to a place before clay that differs."""
+    """The state in the last region before different clay, on the way to a place."""
     while True:
         sx, sy = sides(s.clay.region, p)
         i, up = (1, sy) if sx == 0 else (0, sx)
@@ -140,7 +140,7 @@ def passed_alike(parts, s, here, p):
 
 
 def first_border(probe, parts, s, after, p, sx, sy):
-    """The step that ends on the first border in its way: its length [s], coordinate, side.
+    """The step that ends on the first border ahead: its length [s], coordinate, side.
 
     Args:
         sx: side of x that the step would pass, 0 for none.

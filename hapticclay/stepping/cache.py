@@ -1,9 +1,10 @@
 """Machine code on disk, each function in a file of its own that is verified before it is loaded.
 
-The linker takes what it is given: half a file ends the process. So a file begins with the digest of
-the rest, and one that fails is deleted and compiled again. Its name has the types of the arguments,
-the processor and the versions in it; it is written whole by a rename, so processes may share a
-folder. Where nothing can be written, functions are compiled for this process alone.
+The linker does not check its input: a truncated file crashes the process. So a file begins with the
+digest of the rest; a file that fails the check is deleted and compiled again. Its name encodes the
+types of the arguments, the processor and the versions. It is written whole by a rename, so
+processes may share a folder. Where nothing can be written, functions are compiled for this process
+alone.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class FileCache(_Cache):
 
     Args:
         function: the function, as Python has it.
-        folder: of the files, named by all that machine code depends on but types and processor.
+        folder: of the files, named by all that the code depends on except types and processor.
     """
 
     def __init__(self, function: Any, folder: Path):
@@ -50,7 +51,7 @@ class FileCache(_Cache):
         return str(self.folder)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The function for some types; None if there is none, or what is there is damaged.
+        """Loads the function for some types; None if it is missing or damaged.
 
         Args:
             sig: the types.
@@ -76,15 +77,15 @@ class FileCache(_Cache):
                 stored, payload = pickle.loads(data[DIGEST:])
                 if stored == key:
                     return CompileResult._rebuild(target_context, *payload)
-        except Exception:  # written whole, but by what this process cannot read
+        except Exception:  # complete, but not readable by this process
             pass
-        for stale in (file, *self.folder.glob("*" + MARK)):  # the marks would promise what is gone
+        for stale in (file, *self.folder.glob("*" + MARK)):  # the marks would refer to deleted code
             with contextlib.suppress(OSError):
                 stale.unlink()
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keeps the function for some types, if there is room for it; a line says if not.
+        """Stores the function for some types, if there is room; otherwise prints a line.
 
         Args:
             sig: the types.
@@ -102,11 +103,11 @@ class FileCache(_Cache):
             unkept(self.folder, error)
 
     def enable(self) -> None:
-        """From now on, functions are loaded and kept."""
+        """Loads and stores functions from now on."""
         self.on = True
 
     def disable(self) -> None:
-        """From now on, functions are neither loaded nor kept."""
+        """Neither loads nor stores functions from now on."""
         self.on = False
 
     def flush(self) -> None:
@@ -161,7 +162,7 @@ def write(file: Path, data: bytes) -> None:
     """Writes a file, whole or not at all.
 
     Args:
-        file: the file; its folder is made.
+        file: the file; its folder is created.
         data: its content.
 
     Raises:
@@ -180,11 +181,11 @@ def write(file: Path, data: bytes) -> None:
 
 
 def unkept(folder: Path, error: OSError) -> None:
-    """Says once that machine code is not kept.
+    """Reports once that machine code cannot be stored.
 
     Args:
-        folder: where it was to be.
-        error: why it is not.
+        folder: where it was to be stored.
+        error: the reason.
     """
     if folder not in lost:
         lost.add(folder)

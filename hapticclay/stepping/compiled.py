@@ -1,7 +1,7 @@
-"""Compiled runs: numba compiles the functions that CPython runs, of the parts that a scene has.
+"""Compiled runs: numba compiles the functions that CPython runs, for the parts of a scene.
 
-They call the engine's own functions and hold no lock, so runs go on in parallel threads. The
-machine code is kept on disk under the types of its parts, in a folder named by the sources.
+They call the engine's own functions and hold no lock, so threads run in parallel. The machine code
+is stored on disk by the types of its parts, in a folder named by the sources.
 """
 
 from __future__ import annotations
@@ -170,14 +170,14 @@ def array_at(context: Any, builder: Any, kind: Any, address: Any, shape: Sequenc
 def filled_with(
     context: Any, builder: Any, kind: Any, value: Any, leaf: Callable[[Any, Any], Any]
 ) -> Any:
-    """A value of nested tuples, each of its leaves replaced.
+    """A value of nested tuples with each leaf replaced.
 
     Args:
         context: of what numba compiles.
         builder: of LLVM.
         kind: its type.
         value: the value.
-        leaf: a leaf in place of one of a type.
+        leaf: returns the new leaf for a leaf of some type.
     """
     if not isinstance(kind, types.BaseTuple):
         return leaf(kind, value)
@@ -191,7 +191,7 @@ def filled_with(
 
 @intrinsic
 def fill(context, like, row):  # noqa: ARG001
-    """The tuple `like`, its numbers replaced by those at an address, one after the other.
+    """The tuple `like`, with its numbers replaced by those at an address, in order.
 
     Args:
         context: of what numba compiles.
@@ -214,13 +214,13 @@ def fill(context, like, row):  # noqa: ARG001
 
 @intrinsic
 def fill_all(context, like, row, places):  # noqa: ARG001
-    """As `fill`, and its arrays replaced by others.
+    """As `fill`, with its arrays replaced as well.
 
     Args:
         context: of what numba compiles.
         like: the tuple.
         row: address of the numbers.
-        places: of the arrays, one after the other: address, number of rows and columns.
+        places: of the arrays, in order: address, number of rows and columns.
     """
 
     def generate(context, builder, signature, arguments):
@@ -246,7 +246,7 @@ def fill_all(context, like, row, places):  # noqa: ARG001
 
 @intrinsic
 def keep(context, value, row):  # noqa: ARG001
-    """Writes the numbers of a tuple to an address, one after the other: what `fill` reads.
+    """Writes the numbers of a tuple to an address, in order; `fill` reads them.
 
     Args:
         context: of what numba compiles.
@@ -329,7 +329,7 @@ def load_pair(context, address):  # noqa: ARG001
 
 @functools.cache
 def shape_of(kind: Any) -> lacking.Shape:
-    """What the type of an argument tells of the parts that it has.
+    """The parts that an argument has, by its type.
 
     Args:
         kind: of numba.
@@ -343,7 +343,7 @@ def shape_of(kind: Any) -> lacking.Shape:
 
 
 def choice(f: FunctionType) -> Callable[..., Any]:
-    """What numba asks for the source of a function, which depends on the parts that are None.
+    """Callback that gives numba the source of a function, by which parts are None.
 
     Args:
         f: the function.
@@ -377,7 +377,7 @@ stepped: set[FunctionType] = set()  # functions whose source numba finds
 
 
 def choice_of_law(name: str) -> Callable[..., Any]:
-    """What numba asks for the source of a function of a law, by the type of its part.
+    """Callback that gives numba the source of a function of a law, by the type of its part.
 
     Args:
         name: of the function.
@@ -410,7 +410,7 @@ def register(modules: tuple[ModuleType, ...]) -> None:
 
 
 def register_atoms() -> None:
-    """Lets numba find what machine code does in other ways than CPython."""
+    """Lets numba find the functions that machine code implements differently from CPython."""
     for name, f in OF_LAW.items():
         overload(f, jit_options=LAW, strict=False)(choice_of_law(name))
     overload(engine_step.put, inline="always")(
@@ -482,13 +482,13 @@ def advance_all(like, state, place, x, which, ahead):
 
 
 def entry(f: Any) -> Any:
-    """A function that is compiled when it is first called with its types, or taken from the disk.
+    """A function that is compiled at its first call with its types, or loaded from disk.
 
     Args:
         f: the function.
     """
     made = numba.njit(**ENTRY)(f)
-    with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep it
+    with contextlib.suppress(OSError, RuntimeError):  # no place to store it
         made._cache = cache.FileCache(made.py_func, cache_folder())
     return made
 
@@ -521,17 +521,17 @@ STEP, FORWARD, RESET = map(function, ("mj_step", "mj_forward", "mj_resetData"))
 # ---- kernels -------------------------------------------------------------------------------------
 
 QUIET = entry(monitor.is_quiet)
-ready: set[Any] = set()  # kinds of scene whose whole steps are compiled in this process, or loaded
+ready: set[Any] = set()  # kinds of scene whose whole steps are compiled or loaded in this process
 complete: set[Any] = set()  # those whose careful steps are, too
 met: dict[Any, int] = {}  # careful steps that CPython has made, by kind of scene
 
 
 def natively(r: run.Run, room: int) -> None:
-    """Makes steps: whole ones compiled, the others too once they are many.
+    """Makes steps: whole ones compiled, the others compiled once they are numerous.
 
     Args:
         r: the run.
-        room: rows that it may have.
+        room: largest number of rows.
     """
     kind, parts = r.kind, own_law.called(r.parts)
     while r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room):
@@ -547,7 +547,7 @@ def natively(r: run.Run, room: int) -> None:
 
 
 def row_of(r: run.Run) -> vector.Row:
-    """The row of a run as it is now; compiled what it needs.
+    """The row of a run in its present state; compiles what it needs.
 
     Args:
         r: the run.
@@ -563,7 +563,7 @@ def row_of(r: run.Run) -> vector.Row:
 
 
 def advancing(kind: Any, *arguments: Any) -> Callable[..., None]:
-    """vector.advance for the types of some arguments, compiled, without a look at them.
+    """vector.advance for the types of some arguments, compiled, without type checks at a call.
 
     Args:
         kind: of the runs.
@@ -581,7 +581,7 @@ def by_rows(r: run.Run, room: int) -> None:
 
     Args:
         r: the run.
-        room: rows that it may have.
+        room: largest number of rows.
     """
     if not vector.is_vectored(r):
         natively(r, room)
@@ -590,7 +590,7 @@ def by_rows(r: run.Run, room: int) -> None:
 
 
 def try_step(r: run.Run) -> np.ndarray | None:
-    """Tries the next step of a run: the row that it would write, see run.Kernel.
+    """Tries the next step of a run: returns the row that it would write, see run.Kernel.
 
     Args:
         r: the run.
@@ -614,10 +614,10 @@ def enough(kind: Any) -> float:
 
 @contextlib.contextmanager
 def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
-    """A first call, which compiles or takes from the disk; signals wait for the end of it.
+    """A first call, which compiles or loads from disk; signals wait until it ends.
 
     Args:
-        kinds: that are ready; this one is, in the end.
+        kinds: that are ready; this kind is added at the end.
         kind: of the scene.
         what: is compiled, in words.
     """
@@ -646,10 +646,10 @@ def first_call(kinds: set[Any], kind: Any, what: str) -> contextlib.AbstractCont
 
 @contextlib.contextmanager
 def signals_held() -> Iterator[None]:
-    """Signals that are handled in Python wait for the end of this block.
+    """Delays signals that Python handles until the end of this block.
 
-    A handler that raises, as that of Ctrl-C, would do so while the values that machine code returns
-    are made into Python's, which numba takes for granted to succeed.
+    A handler that raises, such as that of Ctrl-C, could interrupt the conversion of machine code's
+    return values to Python objects; numba assumes that this conversion succeeds.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -668,18 +668,18 @@ def signals_held() -> Iterator[None]:
 
 
 def keep_mark(kind: Any) -> None:
-    """Notes on the disk that machine code of a kind is kept.
+    """Marks on disk that machine code of a kind is stored.
 
     Args:
         kind: of the scene.
     """
-    with contextlib.suppress(OSError, RuntimeError):  # nowhere to keep it
+    with contextlib.suppress(OSError, RuntimeError):  # no place to store it
         if cache_folder() not in cache.lost:
             mark(kind).touch()
 
 
 def warm(scenario: Scenario) -> None:
-    """Compiles what steps of a scene need, or takes it from the disk, before the first run.
+    """Compiles what steps of a scene need, or loads it from disk, before the first run.
 
     Args:
         scenario: the scene.

@@ -10,7 +10,7 @@ NONE = (0.0, 0.0)
 
 
 def pushed(sampler, parts, clock, step, at, w, clay, hold):
-    """The kick under what the motors hold, with joint rates w before it."""
+    """The kick under the actuator output, with joint rates w before it."""
     special = sampler.special
     a = acting(parts, sampler.clay, special, clock, step, at, w, clay)
     slip = friction.torques(sampler.friction, special, parts, clay, a, w, hold.tau)
@@ -21,7 +21,7 @@ def pushed(sampler, parts, clock, step, at, w, clay, hold):
 
 
 def sampled_kick(sampler, parts, clock, body, loop, clay, after):
-    """The kick that leads on: from an event where there is one, else across the sample."""
+    """The next kick: from an event if there is one, else across the sample."""
     e = loop.event
     if e.on > 0.0 and after > 0.0:
         step, hold = step_around(0.0, after), e.machine.hold
@@ -33,7 +33,7 @@ def sampled_kick(sampler, parts, clock, body, loop, clay, after):
 
 
 def behind(special, clay, reaction):
-    """The clay behind a kick that led to an event."""
+    """The clay after a kick that led to an event."""
     if special is None:
         return clay
     c = clay

@@ -1,4 +1,4 @@
-"""Where modes of clay that yields begin and end: the accurate method ends a step there."""
+"""Where modes of yielding clay begin and end: the accurate method ends a step there."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def moving(modal, part, body, v):
 
 
 def evaluate_contact(parts, s, body, modes):
-    """What clay that yields does now, in these modes."""
+    """What yielding clay does now, in these modes."""
     when = moment(parts.accurate.ahead, s.clock.t, 0.0, -1)
     return instant(parts, when, point_of(body, s.loop), s.clay, modes).grip
 
@@ -43,8 +43,9 @@ def law_of(table, index):
 
 
 def acted(modal, parts, s, after):
-    """The state with the modes of the next step, and the length that they allow it [s]; the handle
-    is put to rest where it nearly is.
+    """The state with the modes of the next step, and the step length that they allow [s].
+
+    A handle that is nearly at rest is put to rest.
     """
     if modal is None:
         return s, after
@@ -59,7 +60,7 @@ def acted(modal, parts, s, after):
 
 
 def first_mode(m, i, v):
-    """Mode of an axis at its velocity, and whether it has none, so that its mode is open."""
+    """Mode of an axis at its velocity, and whether it is at rest, so that the mode is open."""
     mode, ended = m.mode[i], abs(m.ended[i])
     if not m_.is_active(m.law, i):
         return 1.0, False
@@ -69,7 +70,7 @@ def first_mode(m, i, v):
 
 
 def tried_mode(k, rests, ended, mode):
-    """The k-th mode to be tried: the present one unless the axis rests; the first is rest."""
+    """The k-th mode to try: the present one, unless the axis rests; the first is rest."""
     if not rests:
         return mode
     if abs(ended) == FREE:
@@ -78,14 +79,14 @@ def tried_mode(k, rests, ended, mode):
 
 
 def chosen(along, parts, s, m):
-    """The arm, the modes in which the clay acts from now on, and what it does in them."""
+    """The arm, the modes in which the clay acts from now on, and its action in them."""
     if along is None:
         return chosen_axes(parts, s, m)
     return chosen_way(parts, s, m)
 
 
 def chosen_axes(parts, s, m):
-    """The same of clay whose axes yield each by itself."""
+    """The same for clay whose axes yield separately."""
     modal, body = parts.modal, s.body
     v = m_.velocity(modal, parts.arm, body.q, body.w)
     (x, restx), (y, resty) = first_mode(m, 0, v[0]), first_mode(m, 1, v[1])
@@ -111,8 +112,9 @@ def rests_now(modal, law, grip, i, rests):
 
 
 def fitting(parts, s, body, m, restx, resty):
-    """Of the nine pairs of modes, those that agree with their own accelerations, and what the clay
-    does in them.
+    """The consistent ones of the nine pairs of modes, and what the clay does in them.
+
+    A consistent pair agrees with its own accelerations.
 
     Args:
         restx: whether x has no velocity.
@@ -140,7 +142,7 @@ def fitting(parts, s, body, m, restx, resty):
 
 
 def chosen_way(parts, s, m):
-    """The same of clay that resists along the motion; a slow handle keeps to its push."""
+    """The same for clay that resists along the motion; a slow handle follows its push."""
     modal, body, ended = parts.modal, s.body, m.ended[0]
     v, active = m_.velocity(modal, parts.arm, body.q, body.w), m_.is_active(m.law, 0)
     rests = active and (m.mode[0] == 0.0 or ended != 0.0 or (v[0] == 0.0 and v[1] == 0.0))
@@ -172,7 +174,7 @@ def chosen_way(parts, s, m):
 
 
 def leaves_mode(modal, part, m, k):
-    """Whether a step along the motion turns back, or leaves the speeds of its mode."""
+    """Whether a step along the motion reverses, or leaves the speed range of its mode."""
     v, mode = m_.velocity(modal, part, k.end.q, k.end.w), m.mode[0]
     along = v[0] * m.way[0] + v[1] * m.way[1]
     if mode == SLIDING:
@@ -193,7 +195,7 @@ def ending(modal, s, ends):
 
 
 def met(modal, probe, parts, s, k, after):
-    """A step shortened to where a mode first ends, which its end tells.
+    """A step shortened to where a mode first ends, as detected at its end.
 
     Args:
         modal: the part.
@@ -231,7 +233,7 @@ def met(modal, probe, parts, s, k, after):
 
 
 def end_of_mode(along, m, grip, i):
-    """What ends the mode of an axis, which the clay at the end of a longer step tells."""
+    """What ends the mode of an axis, by the clay at the end of a longer step."""
     if m.mode[i] != 0.0:
         return RESTS
     if axis_of(along) > 0.0 or grip.f[i] > 0.0:
@@ -240,7 +242,7 @@ def end_of_mode(along, m, grip, i):
 
 
 def strays_along(along, modal, part, m, k):
-    """The same of any clay; elsewhere the handle has no way to keep to."""
+    """The same for any clay; other clay gives the handle no direction to keep."""
     if along is None:
         return False
     return m_.is_active(m.law, 0) and leaves_mode(modal, part, m, k)

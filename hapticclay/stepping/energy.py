@@ -12,7 +12,7 @@ from .state import State
 
 
 def stored(parts: Parts, state: State) -> tuple[float, float]:
-    """Energy of the arm, and of mass and spring of the operator's arm, behind the last kick [J].
+    """Energy of the arm, and of mass and spring of the operator's arm, after the last kick [J].
 
     Args:
         parts: the scene.
@@ -29,7 +29,7 @@ def stored(parts: Parts, state: State) -> tuple[float, float]:
 
 
 def lead(accurate, before):
-    """Time that the place of a state is ahead of its rates [s]."""
+    """Time by which the place of a state leads its rates [s]."""
     if accurate is None:
         return before
     return 0.0

@@ -1,6 +1,6 @@
 """MuJoCo, and the model of a scenario.
 
-MuJoCo is imported whatever MUJOCO_GL says: a run draws nothing, and views report their own errors.
+MuJoCo is imported for any MUJOCO_GL: a run draws nothing, and views report their own errors.
 """
 
 import copy
@@ -42,7 +42,7 @@ def mjcf_folder() -> Path:
 
 
 class warnings_caught:
-    """Collects the engine's warnings instead of letting it write MUJOCO_LOG.TXT, for a `with`."""
+    """Collects the engine's warnings instead of writing MUJOCO_LOG.TXT, for a `with`."""
 
     def __enter__(self) -> list[str]:
         caught: list[str] = []
@@ -77,11 +77,11 @@ def build(scenario: Scenario) -> mujoco.MjModel:
 
 
 def rotate_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
-    """Turns the engine's dampers, which act along the axes of a site, with the clay.
+    """Rotates the engine's dampers, which act along the axes of a site, with the clay.
 
     Args:
         model: as from `build`.
-        scenario: whose clay.
+        scenario: the scenario with the clay.
     """
     if scenario.clay is not None:
         half, site = 0.5 * scenario.clay.angle, model.site("clay").id
@@ -91,7 +91,7 @@ def rotate_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
 
 @functools.lru_cache(maxsize=32)
 def _compiled_model(dampers: bool, folder: Path, arm: Arm) -> mujoco.MjModel:
-    """The model, to be copied: composing and compiling it takes as long as a thousand steps."""
+    """The model, to be copied; composing and compiling it takes as long as a thousand steps."""
     with warnings_caught() as caught:
         model = compose_spec(["arm.xml"] + ["clay.xml"] * dampers, arm).compile()
     return checked_model(model, caught)
@@ -119,14 +119,14 @@ def compose_spec(parts: list[str], arm: Arm) -> mujoco.MjSpec:
 
 
 def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
-    """The model, refused if the engine warned while compiling it.
+    """The model; raises if the engine warned while compiling it.
 
     Args:
         model: the model.
         caught: warnings of the engine.
 
     Raises:
-        RuntimeError: there are some.
+        RuntimeError: there are warnings.
     """
     if caught:
         raise RuntimeError(f"mjcf: {'; '.join(caught)}")

@@ -8,7 +8,7 @@ from ..model import arm
 
 
 class Probe(NamedTuple):
-    """What the accurate method has of the engine.
+    """The engine as the accurate method uses it.
 
     Attributes:
         forward: mj_forward.
@@ -45,12 +45,12 @@ class Engine(NamedTuple):
         timestep: length of a step [s].
         rows: of the record, rows.ROW numbers each.
         crossings: coordinate, border [m], time [s], speed along it [m/s] of each.
-        stops: where yielding clay stops the handle or lets it go: coordinate, or 2.0 for both; 1.0
+        stops: where yielding clay stops the handle or releases it: coordinate, or 2.0 for both; 1.0
             for a stop, 0.0 for the end of one; time [s].
-        rendered: force of the clay [N] where b v does not tell it, and volume removed [m^3], a line
-            a row.
-        most_crossings: from which on they are full.
-        most_stops: from which on they are full.
+        rendered: force of the clay [N] where b v does not give it, and volume removed [m^3], one
+            line per row.
+        most_crossings: number of crossings at which their array is full.
+        most_stops: number of stops at which their array is full.
         probe: for the accurate method.
     """
 
@@ -72,7 +72,7 @@ class Engine(NamedTuple):
 
 
 def put(array, i, values):
-    """Writes numbers into an array from i on; compiled, `array` is its address.
+    """Writes numbers into an array from i on; in compiled code, `array` is its address.
 
     Args:
         array: of floats.
@@ -84,7 +84,7 @@ def put(array, i, values):
 
 
 def numbers_at(like, array, i):
-    """As many numbers of an array as a tuple has, from i on; compiled, `array` is its address.
+    """As many numbers as a tuple has, of an array from i on; compiled, `array` is its address.
 
     Args:
         like: the tuple.
@@ -110,7 +110,7 @@ def with_dampers(clay, e, b):
 
 
 def step_engine(e, clay, tau, push, b, h):
-    """Lets the engine step; returns joint angles and rates."""
+    """Makes the engine step; returns joint angles and rates."""
     put(e.ctrl, 0, tau)
     with_dampers(clay, e, b)
     put(e.push, 0, push)

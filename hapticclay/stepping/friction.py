@@ -21,10 +21,10 @@ def on_joints(slip, tau):
 
 
 def torques(limit, special, parts, clay, a, w, tau):
-    """Torques of the friction in a kick [N.m], None without any.
+    """Friction torques in a kick [N.m], None without friction.
 
     Args:
-        limit: of them [N.m].
+        limit: of the torques [N.m].
         special: laws of the clay that acts.
         parts: the scene.
         clay: its state.
@@ -61,7 +61,7 @@ def linear(limit, special, parts, clay, a, w, tau):
     n1, n2 = rates(special, parts, clay, a, w, tau)
     x1, x2 = rates(special, parts, clay, a, w, (tau[0] + 1.0, tau[1]))
     y1, y2 = rates(special, parts, clay, a, w, (tau[0], tau[1] + 1.0))
-    mixed = 0.5 * (x2 - n2 + y1 - n1)  # equal but for rounding
+    mixed = 0.5 * (x2 - n2 + y1 - n1)  # equal except for rounding
     return hardware.coulomb_friction((n1, n2), x1 - n1, mixed, y2 - n2, limit)
 
 

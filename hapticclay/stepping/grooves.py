@@ -9,7 +9,7 @@ from .state import Cut
 
 
 def cut(groove, at, p):
-    """Takes away the clay between the place of the last cut and here."""
+    """Removes the clay between the place of the last cut and here."""
     (ax, ay), (x, y), grid = at, p, groove.numbers
     if x == ax and y == ay:
         return
@@ -26,7 +26,7 @@ def cut(groove, at, p):
 
 
 def met_anew(groove, p):
-    """Works out what touches the tool at rest, in clay whose numbers have changed."""
+    """Finds what touches the tool at rest, in clay whose numbers have changed."""
     if groove is not None:
         cut(groove, (math.nan, math.nan), p)
 
@@ -50,7 +50,7 @@ def dragged(drag, groove, tool, clay, p, v):
 
 
 def entered(groove, tool, b):
-    """Clay and tool where the handle comes into a region with clay b."""
+    """Clay and tool when the handle enters a region with clay b."""
     if groove is None:
         return b, tool
     return (b[0] + tool.drag, b[1] + tool.drag), Cut(tool.at, b, tool.bare_before, tool.drag)
@@ -63,7 +63,7 @@ def law_along(groove, x, y):
 
 
 def law_in_kick(groove, stuck, B, v, u):
-    """The same in a kick: in the direction of the motion, of the push at rest."""
+    """The same in a kick: along the motion, or along the push at rest."""
     x, y = v
     if (stuck[0] > 0.0 and stuck[1] > 0.0) or (x == 0.0 and y == 0.0):
         xx, xy, yx, yy = B

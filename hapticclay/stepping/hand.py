@@ -18,8 +18,8 @@ def with_hand(hand, load, step, at):
 def resisting(part, step, p, v, c):
     """Resisting force of one axis without the velocity after the kick, and its part per unit.
 
-    Mass and damping as for the handle. The spring acts by the place at the sample; a quarter of
-    k h^2 added to the mass makes its energy exact in even steps.
+    Mass and damping act as those of the handle. The spring acts at the place of the sample; a
+    quarter of k h^2 added to the mass makes its energy exact in even steps.
     """
     h = span(part.longer, step)
     mass = part.mass + 0.25 * part.spring * h * h

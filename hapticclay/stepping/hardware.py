@@ -1,6 +1,6 @@
-"""The hardware between computer and arm in a sample: one function an imperfection.
+"""The hardware between computer and arm in a sample: one function per imperfection.
 
-Each takes its part and its own state and returns values; where the part is None, what it was given.
+Each takes its part and its state and returns values; if the part is None, it returns its input.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def noise(chance, k, f):
 
 
 def filtered(part, x, f):
-    """The force behind its filter, (x, y) [N], and the filter's states at the next sample."""
+    """The force after its filter, (x, y) [N], and the filter's states at the next sample."""
     if part is None:
         return f, x
     a, b = law.filter_step(part, x[0], x[1], f[0])
@@ -51,7 +51,7 @@ def filtered(part, x, f):
 
 
 def converted(part, x):
-    """Two numbers behind their converter."""
+    """Two numbers after their converter."""
     if part is None:
         return x
     span = part.span
@@ -69,7 +69,7 @@ def encoded(encoder, q):
 
 
 def differenced(part, x, k, Ts, q, w):
-    """Joint rates as they are measured at sample k [rad/s], and their state behind it."""
+    """Joint rates as measured at sample k [rad/s], and their state after it."""
     if part is None:
         return w, x
     ring, row, k = part.ring, 3 * x.oldest, float(k)
@@ -87,7 +87,7 @@ def smoothed(cutoff, old, w, span):
 
 
 def handle_seen(encoder, difference, arm, at, q, w):
-    """The handle as it is measured."""
+    """The handle as measured."""
     if encoder is None:
         return handle_turning(difference, at, w)
     return handle_at(arm, Body(q, w, NONE), 0.0)
@@ -100,7 +100,7 @@ def handle_turning(difference, at, w):
 
 
 def note_angles(part, machine, q):
-    """Notes the angles of the sample that is next [rad]."""
+    """Stores the angles of the next sample [rad]."""
     if part is None:
         return
     ring, row = part.ring, 3 * machine.rates.oldest
@@ -125,7 +125,7 @@ def no_pull(part):
 
 
 def coupled(part, special, state, tool, at, b, f, Ts):
-    """Force of the clay by way of the coupling [N]; the pull; the tool behind the sample."""
+    """Force of the clay through the coupling [N]; the pull; the tool after the sample."""
     if part is None:
         return f, part, tool
     return coupled_in_clay(special, part, state, tool, at, b, Ts)
@@ -150,7 +150,7 @@ def coupled_in_flow(flow, part, state, tool, at, b, Ts):
 
 
 def guarded(part, x, at, f, Ts):
-    """The force of the clay that the passivity controller lets by [N]; what it adds; its state."""
+    """Force of the clay after the passivity controller [N]; the part it adds; its state."""
     if part is None:
         return f, part, x
     n, p, W, share = part.whole + 2, at.p, at.W, part.share
@@ -167,7 +167,7 @@ def guarded(part, x, at, f, Ts):
 
 
 def note_force(part, machine, f):
-    """Notes the force that a sample asks for [N]; `machine` is that behind it."""
+    """Stores the force that a sample requests [N]; `machine` is the one after it."""
     if part is None:
         return
     row = 2 * machine.guard.newest
@@ -178,20 +178,20 @@ def note_force(part, machine, f):
 
 
 def is_due(part, queue, t):
-    """Whether torques come by t."""
+    """Whether torques are due by t."""
     if part is None:
         return False
     return queue.due <= t
 
 
 def queued(part, machine, after, shown, now):
-    """The machine behind an event, with the queue moved on and what the motors then hold.
+    """The machine after an event, with the queue advanced and the actuator output then in effect.
 
     Args:
         part: the delay.
         machine: before the event.
-        after: behind it without the delay.
-        shown: 1.0 where a sample asks for torques.
+        after: after the event, without the delay.
+        shown: 1.0 where a sample requests torques.
         now: [s].
     """
     if part is None:
@@ -224,7 +224,7 @@ def entry(part, first, n, i, shown, time):
 
 
 def hold_of(part, like, row):
-    """What the motors hold by an entry of the queue."""
+    """Actuator output of an entry of the queue."""
     x, i = part.ring, QUEUED * (row % part.rows)
     return Hold(
         two(x, i + 1), two(x, i + 3), guard_of(like.guard, x, i + 5), pull_of(like.pull, x, i + 7)
@@ -248,13 +248,13 @@ def pull_of(like, x, i):
 
 
 def note_hold(part, before, machine, asked):
-    """Writes what a sample asks for into the queue, where it comes later.
+    """Writes the output that a sample requests into the queue, where it comes later.
 
     Args:
         part: the delay.
         before: the machine before the event.
-        machine: that behind it.
-        asked: what it asks for.
+        machine: after the event.
+        asked: the requested output.
     """
     if part is None:
         return

@@ -1,4 +1,4 @@
-"""A hit that drives motors into their limits: no mean over a long step."""
+"""Hits that drive motors into their limits, where a mean over a long step fails."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from .kick import is_limited
 from .parts import INF
 from .state import Body, Clay, Clock, Hit, State
 
-HIT_GROWTH = 1.01  # of each step of a hit over the one before
+HIT_GROWTH = 1.01  # growth of each step of a hit over the one before
 
 
 def longest(part, hit, after):
-    """The longest step on the way from a hit [s]."""
+    """The longest step after a hit [s]."""
     if part is None:
         return after
     return min(after, hit.fine)
 
 
 def is_over(part, hit):
-    """Whether no hit asks for short steps."""
+    """Whether no hit requires short steps."""
     if part is None:
         return True
     return hit.fine == INF and hit.struck == 0.0
 
 
 def struck(part, parts, s, after):
-    """State and length of the first step in clay that the handle has come into.
+    """State and length of the first step in clay that the handle has entered.
 
     Its first step is short, and the step that led here ends with its half of the kick.
     """
@@ -55,7 +55,7 @@ def with_hit(s, hit):
 
 
 def halted(parts, s):
-    """The state behind half a kick that leads to the sample; the next kick starts at rest there."""
+    """The state after half a kick that leads to the sample; the next kick starts at rest there."""
     k, c = kick(parts, s.clock, s.body, s.loop, s.clay, 0.0), s.clay
     body, clock = Body(s.body.q, k.w, k.g), Clock(s.clock.t, s.clock.i, 0.0)
     clay = Clay(c.region, c.b, c.old, c.growth, c.hit, k.motion.reaction, c.laws)
@@ -64,7 +64,7 @@ def halted(parts, s):
 
 
 def after_kick(part, parts, hit, k):
-    """The longest next step on the way from a hit."""
+    """The longest next step after a hit."""
     if part is None:
         return hit
     if hit.fine < INF:

@@ -1,6 +1,6 @@
 """The loop at an instant: forces, the servo's law and the limits of the torques.
 
-It is a kick of one second from rest, in which the velocity after it is the acceleration.
+It is computed as a kick of one second from rest: the velocity after it is the acceleration.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SIDES = (0.0, 1.0, -1.0)  # a motor free, or at either limit
 
 
 def wanted(links, at, x):
-    """Torques that make an answer [N.m]."""
+    """Torques that produce a response [N.m]."""
     return link_torques(links, at.u, arm.joint_velocity(x.g[0], x.g[1], at.u, 1.0), x.f)
 
 
@@ -64,7 +64,7 @@ def row_at(signal, i):
 
 
 def commanded(signal, z, when):
-    """A point with the change of the command since t = 0 in the output of the compensators."""
+    """A point with the change of the command since t = 0 added to the compensator outputs."""
     if signal is None:
         return z
     if when.row >= 0:
@@ -139,7 +139,7 @@ def instant(parts, when, z, clay, modes):
 
 
 def held_torques(modes, parts, law, load, at, tau):
-    """Torques that the servo asks for, with the force of clay that holds an axis [N.m]."""
+    """Torques that the servo requests, with the force of clay that holds an axis [N.m]."""
     if modes is None:
         return tau
     if m_.has_mode(modes, 1):
@@ -148,7 +148,7 @@ def held_torques(modes, parts, law, load, at, tau):
 
 
 def by_shaping(shaping, parts, modes, law, load, at, tau):
-    """The same: they depend on that force where inertia is shaped or C passes it on."""
+    """The same; they depend on that force where inertia is shaped or C has feedthrough."""
     if shaping is None:
         return by_form(parts.form, parts, modes, law, load, at, tau)
     return torques_that_hold(parts, modes, law, load, at)
@@ -163,8 +163,8 @@ def by_form(form, parts, modes, law, load, at, tau):
 def torques_that_hold(parts, modes, law, load, at):
     """Torques of motors at their limits while clay holds an axis [N.m].
 
-    The servo answers the force of the clay, and that depends on the torques. Of the nine cases,
-    each motor free or at either limit, one agrees with itself.
+    The servo responds to the force of the clay, which depends on the torques. Each motor is free
+    or at either limit; of these nine cases, one is consistent.
     """
     limit1, limit2 = parts.limits
     b1, b2 = wanted_under(parts, modes, law, load, at, (0.0, 0.0))
@@ -183,7 +183,7 @@ def torques_that_hold(parts, modes, law, load, at):
         elif side2 == 0.0:
             t2 = (b2 + yx * t1) / (1.0 - yy)
         w1, w2 = b1 + xx * t1 + xy * t2, b2 + yx * t1 + yy * t2
-        # how far a free motor is beyond its limit, or one at its limit is asked for less
+        # excess of a free motor over its limit, or shortfall of the request at a limit
         wrong1 = limit1 - side1 * w1 if side1 != 0.0 else abs(t1) - limit1
         wrong2 = limit2 - side2 * w2 if side2 != 0.0 else abs(t2) - limit2
         wrong = max(wrong1 / limit1, wrong2 / limit2)
@@ -193,7 +193,7 @@ def torques_that_hold(parts, modes, law, load, at):
 
 
 def wanted_under(parts, modes, law, load, at, tau):
-    """Torques that the servo asks for where clay holds an axis under other torques [N.m]."""
+    """Torques that the servo requests where clay holds an axis under other torques [N.m]."""
     links = parts.arm.links
     r = m_.answer(parts.modal, modes, under_torques(links, at, tau), load, at).r
     load = Load((load.f[0] - r[0], load.f[1] - r[1]), load.d)

@@ -1,7 +1,7 @@
 """A kick: the velocity step from the middle of the step before a sample to that of the step after.
 
-It has no effect: the run takes the value or drops it. Each row of the table in docs/equations.md,
-section 4, is a function here or in the module of its part.
+It has no side effects: the run uses the value or discards it. Each row of the table in
+docs/equations.md, section 4, is a function here or in the module of its part.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def at_rates(at, w):
 
 
 def steady_force(push, t):
-    """Muscle force but for its signal, (x, y) [N]."""
+    """Muscle force without its signal, (x, y) [N]."""
     since, x, y, rx, ry = push.steady
     return x + (t - since) * rx, y + (t - since) * ry
 
@@ -74,7 +74,7 @@ def with_signal(signal, f, dt, clock, step):
 
 
 def signal_in_half(halves, signal, dt, clock, step):
-    """Mean of a muscle force over a kick that is none of whole steps, (x, y) [N]."""
+    """Mean of a muscle force over a kick that is not of whole steps, (x, y) [N]."""
     if halves is None:
         return signal_in_kick(signal, clock, step)
     if clock.t == clock.i * dt:
@@ -108,7 +108,7 @@ def with_signal_now(signal, f, dt, clock):
 
 
 def is_whole(dt, clock, step):
-    """Whether whole steps lie around a sample."""
+    """Whether the steps around a sample are whole."""
     return step.before == dt and step.after == dt and clock.t == clock.i * dt
 
 
@@ -119,7 +119,7 @@ def row_ahead(signal, i):
 
 
 def commanded(signal, loop, dt, clock, step):
-    """The loop with the change of the command over the step after a kick in its output."""
+    """The loop, with the change of the command over the step after a kick added to its output."""
     if signal is None:
         return loop
     if is_whole(dt, clock, step):
@@ -149,7 +149,7 @@ def command_change(table, t0, t1, h):
 
 
 def moved(special, parts, clay, a, law):
-    """The handle in a kick, driven by a law."""
+    """Motion of the handle in a kick, driven by a law."""
     if special is None:
         u = servo.solve(law, a.load)
         return Motion(u, servo.net(a.load, u, NONE), NONE, NONE, clay.reaction)
@@ -170,21 +170,21 @@ def moved(special, parts, clay, a, law):
 
 
 def stopped_handle(special, split, step, at, w):
-    """The handle in a kick of clay that stops it."""
+    """Motion of the handle in a kick of clay that stops it."""
     if special is None:
         return at
     return yielding.at_rest(special.flow, w, stiff.behind_sample(special.stiff, split, step, at))
 
 
 def rests(special, motion):
-    """Whether clay holds the handle behind a kick."""
+    """Whether clay holds the handle after a kick."""
     if special is None:
         return False
     return yielding.is_still(special.flow, motion.reaction.contact)
 
 
 def link_torques(links, u, g, f):
-    """Motor torques that, beside a force on the handle, give link accelerations [N.m]."""
+    """Motor torques that give link accelerations together with a force on the handle [N.m]."""
     t2 = links[3] * g[1] - u[2] * f[0] - u[3] * f[1]
     return links[2] * g[0] - u[0] * f[0] - u[1] * f[1] + t2, t2
 

@@ -1,13 +1,13 @@
 """Functions without the parts that a scene lacks, for machine code.
 
-A function that takes a part asks for it first: `if part is None: return ...`. For machine code the
-question is answered by the types of the arguments: where the part is None, the function ends there;
-where it is not, the question and its answer are left out. A call of a function of which no more
-than one returned expression is left is replaced by that expression. So what a scene lacks is not
-compiled, not even as a function that returns at once, and both answers may be of different types.
+A function that takes a part checks it first: `if part is None: return ...`. For machine code the
+types of the arguments decide this check: where the part is None, the function ends there; where it
+is not, the check is removed. Where only one returned expression is left of a function, it replaces
+the call. So missing parts are not compiled, not even as a function that returns at once, and both
+branches may return different types.
 
-What is known of an argument is its shape: None for what is lacking, for a tuple a dictionary with
-the shapes of its fields and items, else GIVEN.
+The shape of an argument is what is known of it: None for a missing part, for a tuple a dictionary
+with the shapes of its fields and items, else GIVEN.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ def tree_of(f: FunctionType) -> ast.FunctionDef:
 
 
 def asked(statement: ast.stmt) -> tuple[str, ast.stmt | None] | None:
-    """What a statement `if name is None: ... return ...` asks for; None for any other statement.
+    """The check in a statement `if name is None: ... return ...`; None for any other statement.
 
     Args:
         statement: of a function.
 
     Returns:
-        Name of the argument; what is left of the statement where it is not None: nothing, or the
+        Name of the argument; what remains of the statement where it is not None: nothing, or the
         rest of `if name is None or ...`.
     """
     match statement:
@@ -71,11 +71,11 @@ def asked(statement: ast.stmt) -> tuple[str, ast.stmt | None] | None:
 
 
 def answered(tree: ast.FunctionDef, shapes: Mapping[str, Any]) -> list[ast.stmt]:
-    """The statements of a function that are left once it is known which arguments are None.
+    """The statements of a function that remain once it is known which arguments are None.
 
     Args:
         tree: of the function.
-        shapes: of its arguments; what is left out is not known.
+        shapes: of its arguments; those left out are unknown.
     """
     body: list[ast.stmt] = []
     for statement in tree.body:
@@ -91,7 +91,7 @@ def answered(tree: ast.FunctionDef, shapes: Mapping[str, Any]) -> list[ast.stmt]
 
 
 def returned(f: FunctionType, shapes: Mapping[str, Any]) -> ast.expr | None:
-    """What a function returns, if nothing else is left of it.
+    """The expression that a function returns, if nothing else remains of it.
 
     Args:
         f: the function.
@@ -152,10 +152,10 @@ def shape_at(node: ast.expr, known: Mapping[str, Any]) -> Any:
 
 
 class Folding(ast.NodeTransformer):
-    """Puts what functions return in the place of their calls.
+    """Replaces calls by the expressions that the functions return.
 
     Args:
-        scope: names outside of the function.
+        scope: names outside the function.
         known: shapes of the names in it.
         foldable: whether a function may be folded.
     """
@@ -183,7 +183,7 @@ class Folding(ast.NodeTransformer):
         return None
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """A call, or what it returns.
+        """A call, or the expression that it returns.
 
         Args:
             node: the call.
@@ -206,11 +206,11 @@ class Folding(ast.NodeTransformer):
 
 
 def fits(value: ast.expr, given: Mapping[str, ast.expr]) -> bool:
-    """Whether each argument that takes some working out is worked out once.
+    """Whether each argument that needs computation is computed once.
 
     Args:
         value: an expression of the arguments.
-        given: what stands for them.
+        given: the expressions in place of the arguments.
     """
     used = Counter(x.id for x in ast.walk(value) if isinstance(x, ast.Name))
     return all(used[name] == 1 or is_plain(x) for name, x in given.items())
@@ -230,19 +230,19 @@ def is_plain(node: ast.expr) -> bool:
 
 
 class Placing(ast.NodeTransformer):
-    """Puts arguments in the place of their names, and gives names outside of the function others.
+    """Replaces argument names by expressions, and renames names from outside the function.
 
     Args:
         f: the function.
-        given: what stands for its arguments.
-        scope: gets the names.
+        given: the expressions in place of its arguments.
+        scope: receives the new names.
     """
 
     def __init__(self, f: FunctionType, given: Mapping[str, ast.expr], scope: dict[str, Any]):
         self.f, self.given, self.scope = f, given, scope
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """What stands for a name.
+        """The expression in place of a name.
 
         Args:
             node: the name.
@@ -260,7 +260,7 @@ class Placing(ast.NodeTransformer):
 def without(
     f: FunctionType, shapes: Mapping[str, Any], foldable: Callable[[FunctionType], bool]
 ) -> FunctionType:
-    """A function as it is where some of its arguments are None.
+    """A function reduced to the case where some of its arguments are None.
 
     Args:
         f: the function.

@@ -1,6 +1,6 @@
 """Laws of the clay that are modules of their own, each a line in TABLE.
 
-A law resists beside viscous damping. Its module has, of a named tuple `Part` in the same module:
+A law resists in addition to viscous damping. Its module has a named tuple `Part`, and these:
     part(scenario)                    the numbers of the law, a Part; None where the scene lacks it
     start(part, p)                    its state with the handle at p, a named tuple or None
     load(part, state, load, step, at) the load on the handle in a kick with that of the law

@@ -26,7 +26,7 @@ COMPILING_PART = {
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
 STEPWISE = "many runs made step by step"
 TIMES = {CARRY: 3.0, COMPLETE: 2.0, STEPWISE: 2.5}
-MARK = ".kind"  # ends the name of a file that says of which kind of scene machine code is kept
+MARK = ".kind"  # ending of a file that names a kind of scene with stored machine code
 
 
 @functools.cache
@@ -57,7 +57,7 @@ def _processor() -> str:
 
 
 def kind_of(part: Any) -> Any:
-    """What scenes have in common whose steps are made by the same machine code.
+    """Key of scenes whose steps share the same machine code.
 
     Args:
         part: the parts of a scene.
@@ -68,19 +68,19 @@ def kind_of(part: Any) -> Any:
 
 
 def mark(kind: Any) -> Path:
-    """A file that says that machine code of a kind is kept.
+    """File that marks stored machine code of a kind.
 
     Args:
         kind: from `kind_of`.
 
     Raises:
-        OSError, RuntimeError: there is no home, so that nothing is kept.
+        OSError, RuntimeError: there is no home folder, so nothing is stored.
     """
     return cache_folder() / (hashlib.sha256(repr(kind).encode()).hexdigest()[:16] + MARK)
 
 
 def is_kept(kind: Any) -> bool:
-    """Whether machine code of a kind is kept.
+    """Whether machine code of a kind is stored.
 
     Args:
         kind: from `kind_of`.
@@ -91,7 +91,7 @@ def is_kept(kind: Any) -> bool:
 
 
 def compile_time(kind: Any) -> float:
-    """Time that it takes to compile the steps of a kind, measured [s].
+    """Time to compile the steps of a kind, measured [s].
 
     Args:
         kind: from `kind_of`, for whole steps; (CARRY or COMPLETE, kind, ...) for more.

@@ -1,9 +1,9 @@
 """Many short runs in one call of compiled code: what runs share is set up once.
 
-A run of a hundred steps takes the engine 0.3 ms, and Python as long to set it up. Runs of one kind
-(see `kind_key`) have the same parts and differ in numbers alone. Each is a row of the numbers of
-its parts, put column by column; `carry` fills them in, begins the run, makes its steps and keeps
-its end. What it cannot judge, as an unstable run, is made again by `run`.
+A run of a hundred steps takes the engine 0.3 ms, and Python as long to set up. Runs of one kind
+(see `kind_key`) have the same parts and differ only in numbers. Each run is a row of the numbers of
+its parts, written column by column. `carry` reads a row, makes the steps of its run and stores its
+end. Runs that it cannot judge, such as unstable ones, are repeated by `run`.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from .run import EngineStore, Kernel
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
 WORKS = 10  # numbers of Runs.work
-SUMMARY_CROSSINGS = 8  # crossings that a summary has room for
-LONGEST = 10_000  # steps of a run that is worth while: a call ends soon, and so does Ctrl-C
+SUMMARY_CROSSINGS = 8  # crossings per summary
+LONGEST = 10_000  # most steps of such a run: a call ends soon, so Ctrl-C takes effect soon
 FEWEST = 4  # runs of a kind that repay its pattern
 PATTERNS = 64  # kinds that are kept
 # of the hardware, all but its delay; without noise its seed has no effect
@@ -46,7 +46,7 @@ _shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass",
 
 
 class Runs(NamedTuple):
-    """Runs that `carry` makes, and what it keeps of each.
+    """Runs that `carry` makes, and their results.
 
     Attributes:
         numbers: of their parts, see `numbers_of`, shape (n, m).
@@ -55,12 +55,12 @@ class Runs(NamedTuple):
         starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
         limits: of the engine's motors, shape (2, 2).
         reset: mj_resetData.
-        rows: of the record, one more than are filled before a look at them, shape (m, rows.ROW).
+        rows: of the record, one more than are filled between checks, shape (m, rows.ROW).
         crossings: noted by steps, shape (m, 4).
-        rendered: force of the clay [N] where b v does not tell it, shape (m, 3).
+        rendered: force of the clay [N] where b v does not give it, shape (m, 3).
         good: 1 for a run that has nothing for the monitor, else 0, shape (n,).
         last: its last row, shape (n, rows.ROW).
-        force: of the clay there [N], where b v does not tell it, shape (n, 2).
+        force: of the clay there [N], where b v does not give it, shape (n, 2).
         crossed: the first ones: coordinate, time [s], speed [m/s], shape (n, SUMMARY_CROSSINGS, 3).
         counts: number of all crossings, engine steps, last sample, code, shape (n, 4).
         times: end of the run [s], shape (n,).
@@ -96,7 +96,7 @@ def filled(like, numbers, k):
 
 
 def readied(parts, e, runs, k):
-    """Readies the engine, the clay and the workspace for run k."""
+    """Prepares the engine, the clay and the workspace for run k."""
     for j in range(len(parts.table)):
         parts.table[j] = runs.tables[k, j]
     for j in range(2):
@@ -109,7 +109,7 @@ def readied(parts, e, runs, k):
 
 
 def remember(sampler, runs, k):
-    """Readies the compensators of sampled control for run k."""
+    """Prepares the compensators of sampled control for run k."""
     if sampler is None:
         return
     for j in range(len(sampler.memory)):
@@ -117,7 +117,7 @@ def remember(sampler, runs, k):
 
 
 def noted(runs, k, n):
-    """Keeps the crossings of the steps just made."""
+    """Stores the crossings of the steps just made."""
     for j in range(n):
         i = runs.counts[k, 0]
         if i < SUMMARY_CROSSINGS:
@@ -128,7 +128,7 @@ def noted(runs, k, n):
 
 
 def judged(parts, runs, k, s):
-    """Judges the rows made; whether the run may go on without the monitor."""
+    """Judges the rows made; returns whether the run may continue without the monitor."""
     n, limit = s.filled.rows, parts.limits
     if s.status.code == NOT_FINITE or s.status.code == UNRESOLVED:
         return False
@@ -144,7 +144,7 @@ def judged(parts, runs, k, s):
 
 
 def ended(parts, runs, k, s, first):
-    """Keeps the end of a run."""
+    """Stores the end of a run."""
     last, w, out = energy.stored(parts, s), s.work, runs.work[k]
     out[0], out[1], out[2], out[3], out[4] = w.muscle, w.motors, w.clay, w.hand, w.through
     out[5], out[6], out[7], out[8] = first[0], first[1], last[0], last[1]
@@ -164,8 +164,8 @@ def carry(like, blocks, e, runs):
     """Makes runs one after the other.
 
     Args:
-        like: parts of their kind; the table and whatever else steps write into is used by all, and
-            its rings are long enough for each.
+        like: parts of their kind. All runs use its table and all other arrays that steps fill;
+            its rings are long enough for each run.
         blocks: from scene.blocks.
         e: the engine.
         runs: what to run.
@@ -193,9 +193,9 @@ def carry(like, blocks, e, runs):
 
 
 def kind_key(s: Scenario) -> tuple[Any, ...] | None:
-    """What runs of one kind have in common; None for a run that `carry` does not make.
+    """Key of runs of one kind; None for a run that `carry` does not make.
 
-    Beside that they differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
+    Runs of one kind differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
     and delay.
 
     Args:
@@ -226,12 +226,12 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
             return None
         parts = _shared(wires), wires.delay > 0.0
     held = hand is not None and (not isinstance(hand, tuple) or any(hand))
-    # parts whose equality would cost more than it is worth are told by their identity
+    # parts that are expensive to compare are distinguished by identity
     return *_scene(s), held, law, parts, id(s.arm), id(s.compensator)
 
 
 def is_plain(law: Any) -> bool:
-    """Whether clay of an axis damps alone, by the place along one coordinate.
+    """Whether the clay of an axis damps only, as a function of one coordinate.
 
     Args:
         law: of the axis.
@@ -251,7 +251,7 @@ def numbers_of(part: Any) -> list[float]:
 
 
 def places(part: Any, count: Iterator[int] | None = None) -> Any:
-    """Parts whose numbers are their places in `numbers_of`; all else is None.
+    """Parts with the index in `numbers_of` in place of each number; all else is None.
 
     Args:
         part: the parts of a scene.
@@ -265,7 +265,7 @@ def places(part: Any, count: Iterator[int] | None = None) -> Any:
 
 
 class Pattern:
-    """A scene whose parts are those of all runs of its kind, but for some numbers.
+    """A scene whose parts are those of all runs of its kind, except some numbers.
 
     Args:
         scenario: the scene.
@@ -319,7 +319,7 @@ class Pattern:
         return out
 
     def _put_hands(self, out: np.ndarray, hands: np.ndarray) -> None:
-        """Puts the operators' arms into numbers, and the mobility with them."""
+        """Writes the operators' arms into numbers, and the mobility with them."""
         for i, x in enumerate(self.at.hand):
             out[:, [x.mass, x.damper, x.spring]] = hands[:, i]
         mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
@@ -329,7 +329,7 @@ class Pattern:
                 out[:, special.stiff.mobility] = mobility_with(trace, mass)
 
     def _put_delays(self, out: np.ndarray, delays: Sequence[float]) -> None:
-        """Puts delays of the torques into numbers."""
+        """Writes delays of the torques into numbers."""
         at, Ts = self.at.sampler, self.parts.sampler.Ts
         whole, share = np.array([delay_in_samples(x, Ts) for x in delays]).T
         out[:, at.delay.delay], out[:, at.delay.rows] = delays, whole + scene.QUEUE
@@ -372,7 +372,7 @@ class Pattern:
 
 
 class Draws(NamedTuple):
-    """What runs of one kind differ in, as columns over n runs.
+    """Differences between runs of one kind, as columns over n runs.
 
     Attributes:
         gain: of x and y [1/kg], shape (n, 2).
@@ -397,7 +397,7 @@ class Draws(NamedTuple):
 
 
 def draws_of(jobs: Sequence[Scenario]) -> Draws:
-    """What scenarios of one kind differ in.
+    """Differences between scenarios of one kind.
 
     Args:
         jobs: the scenarios.
@@ -422,7 +422,7 @@ def draws_of(jobs: Sequence[Scenario]) -> Draws:
 
 
 class Patterns:
-    """The patterns of the last kinds of run."""
+    """The patterns of the most recent kinds of run."""
 
     def __init__(self):
         self.known: dict[Any, Pattern] = {}
@@ -442,7 +442,7 @@ class Patterns:
 
 
 class Lane:
-    """Makes many runs; of one thread.
+    """Makes many runs in one thread.
 
     Args:
         kernel: how the steps are made, compiled.
@@ -465,8 +465,8 @@ class Lane:
             keys: of each, from `kind_key`; None for one that is not to be made.
 
         Returns:
-            Groups of runs: their places among jobs, and the fields of a summary, arrays over them;
-            and the places of all others.
+            Groups of runs: their indices in jobs, and the fields of a summary, arrays over them;
+            and the indices of all other runs.
         """
         kinds: dict[Any, list[int]] = {}
         for i, key in enumerate(keys):

@@ -1,7 +1,7 @@
 """A step of the accurate method: the classic Runge-Kutta, fourth order.
 
 The engine gives the acceleration of the arm at each stage; arm, controller and ledger are
-integrated here. A step has no effect beside the engine's scratch; the run takes it or drops it.
+integrated here. A step changes only the engine's scratch; the run uses or discards it.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from .yielding import note
 
 GROWTH_BLOCK = 64  # samples for which the steps of clay that grows are chosen at once
 TOUCH = 1e-13  # [m] a border is crossed when the handle is so far beyond it: hundreds of roundings
-NEAR = 1e-6  # of a step: so close to its end is at its end
-EVEN = 1e-4  # of the slack of signals: so close to a time worked out ahead is at it
+NEAR = 1e-6  # share of a step: a time so close to its end counts as its end
+EVEN = 1e-4  # share of the slack of signals: a time so close to a prepared one counts as that one
 
 
 # ---- how a sample is divided ---------------------------------------------------------------------
 
 
 def substeps(blocks, n, i):
-    """Engine steps a sample."""
+    """Engine steps per sample."""
     if blocks is None:
         return n
     return int(blocks[i // GROWTH_BLOCK])
 
 
 def paced(accurate, modal, s, target, after, on_grid):
-    """The state, and the length of the next step towards a sample, `after` away [s]."""
+    """The state, and the length of the next step towards a sample that is `after` away [s]."""
     if accurate is None:
         return s, after
     target, after = before_break(accurate.ahead, s.clock.t, target, after)
@@ -84,7 +84,7 @@ def next_break(ahead, t):
 
 
 def before_break(ahead, t, target, after):
-    """The next stop of the steps, and the length up to it [s]: where a signal jumps before it."""
+    """The next stop of the steps, and the time to it [s]: the next jump of a signal, if earlier."""
     if ahead is None:
         return target, after
     stop = next_break(ahead, t)
@@ -113,7 +113,7 @@ def row_of(ahead, t, h):
 
 
 def anywhere(modal, rest, n, after):
-    """Length of the next of n steps a sample; those of clay that yields end anywhere."""
+    """Length of the next of n steps per sample; steps in yielding clay end anywhere."""
     if modal is None:
         return after
     count = math.ceil(rest / modal.dt * n - NEAR)
@@ -199,7 +199,7 @@ def end_of(start, sums, h):
 
 
 def with_works(a, p, h):
-    """The ledger behind a step."""
+    """The ledger after a step."""
     k = h / 6.0
     return Work(
         a.muscle + k * p[0], a.motors + k * p[1], a.clay + k * p[2], a.hand + k * p[3],
@@ -212,7 +212,7 @@ def point_of(body, loop):
 
 
 def march(probe, parts, s, h):
-    """The step of length h; of length 0 its start alone."""
+    """The step of length h; for length 0, only its start."""
     t, clay, modes, start = s.clock.t, s.clay, s.loop.modes, point_of(s.body, s.loop)
     z, sums, still = start, no_sums(start.form), m_.has_mode(modes, 2)
     ahead = parts.accurate.ahead
@@ -225,7 +225,7 @@ def march(probe, parts, s, h):
             if h == 0.0:
                 break
         a = accelerations(probe, parts.clay, z, now)
-        if still:  # but for the engine's rounding
+        if still:  # except for the engine's rounding
             a = 0.0, 0.0
         sums = with_stage(sums, i, now, a)
         z = moved(start, z, now, a, AHEAD[i] * h)
@@ -264,21 +264,21 @@ def worked(probe, parts, s, after):
 
 
 def place_behind(probe, part, q, k, after):
-    """Position of the handle at its end, (x, y) [m]; q are the joint angles at its start."""
+    """Handle position at the end of a step, (x, y) [m]; q are the joint angles at its start."""
     if probe is None:
         return place_after(part, q, k, after)
     return place(part, k.end.q)
 
 
 def is_sound(probe, k):
-    """Whether it ends with finite rates."""
+    """Whether a step ends with finite rates."""
     if probe is None:
         return is_finite(k)
     return is_finite_point(k.end)
 
 
 def is_calm(modal, part, r, modes, k, h):
-    """Whether a step ends within its region r, and with its modes."""
+    """Whether a step ends within its region r and keeps its modes."""
     if not is_finite_point(k.end):
         return False
     p = place(part, k.end.q)
@@ -313,7 +313,7 @@ def write_shown(parts, e, i, body, x):
 
 
 def write_force(modal, special, e, i, fe):
-    """Writes the force of the clay where b v does not tell it."""
+    """Writes the force of the clay where b v does not give it."""
     if modal is None:
         return write_more(special, e, i, fe)
     put(e.rendered, 3 * i, fe)
@@ -332,7 +332,7 @@ def write_own(more, e, i, fe):
 
 
 def course_behind(x, k):
-    """The controller behind a step."""
+    """The controller after a step."""
     z = k.end
     return Course(z.x, z.y, z.form, x.left - 1, x.share, modes_behind(x.modes))
 
@@ -345,7 +345,7 @@ def modes_behind(m):
 
 
 def noted(modal, e, before, modes, t, n):
-    """Notes where clay that yields stops the handle or lets it go; how many are then noted."""
+    """Notes where yielding clay stops or releases the handle; returns the number then noted."""
     if modal is None:
         return n
     if modes.stuck[0] != before.stuck[0]:

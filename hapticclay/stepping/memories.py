@@ -58,7 +58,7 @@ def held_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndar
 
 
 def delay_in_samples(delay: float, Ts: float) -> tuple[int, float]:
-    """A delay as whole samples, and what remains of one.
+    """A delay in whole samples, and the remaining share of a sample.
 
     Args:
         delay: the delay [s].

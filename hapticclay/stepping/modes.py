@@ -1,11 +1,11 @@
-"""How clay that yields holds or resists the handle within a step of the accurate method.
+"""How yielding clay holds or resists the handle within a step of the accurate method.
 
-In a step each axis of the clay keeps its mode: it slides with a fixed sign of its velocity, or it
-rests, and the clay's force is whatever keeps it there. Clay that resists along the motion lets the
-handle slide or rest as a whole. Where a mode ends, a step ends (`ends`).
+Within a step each axis of the clay keeps its mode. It slides with a fixed sign of its velocity, or
+it rests under the force that keeps it there. Clay that resists along the motion lets the handle
+slide or rest as a whole. Where a mode ends, a step ends (`ends`).
 
-Beside rest the law has no derivative: the direction of the force turns, or K v^n grows steep. Steps
-there are shares of the speed (GRADE), so that a stop takes some hundred of them, however steep.
+Near rest the law has no derivative: the direction of the force turns, or K v^n becomes steep. Steps
+there are shares of the speed (GRADE), so that a stop takes some hundred steps, however steep.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .state import Grip, Handle, Modes, Point, Response
 from .yielding import rotated_matrix
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
-SUBSTEPS = 1000  # most of them for one sample
+SUBSTEPS = 1000  # most substeps of one sample
 GRADE = 0.1  # of the speed: its most change in a step where the law has no derivative at rest
 TURN = 0.25  # rate at which the clay turns the velocity, times step
 REST = 1e-9  # of dt: time that an axis would still take to come to rest, and rests; shortest step
@@ -95,10 +95,10 @@ def with_way(m, x, way):
 
 
 def has_mode(modes, rests):
-    """Whether some axis, or each, rests.
+    """Whether an axis, or each axis, rests.
 
     Args:
-        rests: 2 asks for each, another number for some axis.
+        rests: 2 tests for each axis, another number for any axis.
     """
     if modes is None:
         return False
@@ -107,7 +107,7 @@ def has_mode(modes, rests):
 
 
 def without_rest(modes, modal, at):
-    """The handle without velocity along an axis that rests."""
+    """The handle with zero velocity along an axis that rests."""
     if modes is None:
         return at
     (sx, sy), (x, y) = modes.mode, viscous.along(modal.grain, at.v[0], at.v[1])
@@ -116,7 +116,7 @@ def without_rest(modes, modal, at):
 
 
 def plain_answer(law, load):
-    """How the handle answers a load, by a law at an instant, where nothing yields."""
+    """Response of the handle to a load, by a law at an instant, where nothing yields."""
     g = solve(law, load)
     return Response(g, net(load, g, NONE), NONE, None)
 
@@ -139,19 +139,19 @@ def answer(modal, modes, law, load, at):
 
 
 def holding(B, a):
-    """The force that takes all of an acceleration, (x, y) [N]."""
+    """The force that cancels an acceleration, (x, y) [N]."""
     xx, xy, yx, yy = B
     det = xx * yy - xy * yx
     return (yy * a[0] - xy * a[1]) / det, (xx * a[1] - yx * a[0]) / det
 
 
 def left_of(a, B, f):
-    """What a force leaves of an acceleration, (x, y) [m/s^2]."""
+    """The acceleration that remains under a force, (x, y) [m/s^2]."""
     return a[0] - B[0] * f[0] - B[1] * f[1], a[1] - B[2] * f[0] - B[3] * f[1]
 
 
 def resisting(along, modes, B, v, a):
-    """Force of clay in which the handle slides [N], and the acceleration that it leaves [m/s^2]."""
+    """Force of clay in which the handle slides [N], and the remaining acceleration [m/s^2]."""
     if along is None:
         return resisting_axes(modes, B, v, a)
     return resisting_along(modes, B, v, a)
@@ -178,14 +178,14 @@ def resisting_along(modes, B, v, a):
     g = left_of(a, B, f)
     if slides:
         return f, g
-    side = (ex * g[1] - ey * g[0]) / across(B, (ex, ey))  # a force across keeps it on its way
+    side = (ex * g[1] - ey * g[0]) / across(B, (ex, ey))  # a transverse force keeps it on its path
     x, y = left_of(g, B, (-side * ey, side * ex))
     size = x * ex + y * ey
     return (f[0] - side * ey, f[1] + side * ex), (size * ex, size * ey)
 
 
 def way_of(modes, v):
-    """Speed along the motion [m/s], and its direction: the way of the modes where it is at rest."""
+    """Speed along the motion [m/s], and its direction; at rest, the way of the modes."""
     m = math.sqrt(v[0] * v[0] + v[1] * v[1])
     if m > 0.0:
         return m, (v[0] / m, v[1] / m)
@@ -232,7 +232,7 @@ def stopped(modes, i):
 
 
 def back_to_rest(modes, modal, part, z):
-    """A point with an axis that rests back where it does: one step of Newton's method."""
+    """A point with a resting axis moved back to its place: one step of Newton's method."""
     if modes is None:
         return z
     (sx, sy), anchor, q = modes.mode, modes.anchor, z.q
@@ -250,7 +250,7 @@ def back_to_rest(modes, modal, part, z):
 
 
 def shortest_step(dt, t):
-    """The shortest step that clay that yields asks for [s]."""
+    """The shortest step that yielding clay requests [s]."""
     return max(REST * dt, 4e-16 * t)  # some roundings of the time
 
 
@@ -260,7 +260,7 @@ def share_of_speed(share, m, rate):
 
 
 def longest_step(along, modes, x, v):
-    """The longest step that clay that yields allows, from its grip, at a velocity v [s]."""
+    """The longest step that yielding clay allows, by its grip, at a velocity v [s]."""
     if along is None:
         return min(longest_of_axis(modes, x, v, 0), longest_of_axis(modes, x, v, 1))
     return longest_along(modes, x, v)
@@ -291,7 +291,7 @@ def longest_along(modes, x, v):
 
 
 def goes_on(modal, modes, h, v, begin, x):
-    """Whether a step keeps its modes to its end, and the next one may be as long: a cheap look.
+    """Whether a step keeps its modes to its end, and the next may be as long: a cheap test.
 
     Args:
         modal: the part.
@@ -328,7 +328,7 @@ def axis_stays(modal, modes, v, begin, f, i):
 
 
 def gap(along, modal, modes, x, i):
-    """What is left until a mode ends, negative beyond; i: the axis, 0 along the motion."""
+    """Margin until a mode ends, negative beyond; i: the axis, 0 along the motion."""
     if along is None:
         v, f = modes.mode[i] * x.v[i], abs(x.f[i])
         return gap_of_hold(holding_force(modal, modes.law, i), f) if modes.mode[i] == 0.0 else v
@@ -339,7 +339,7 @@ def gap(along, modal, modes, x, i):
 
 
 def gap_of_hold(most, f):
-    """What is left of the force that holds, as `gap`.
+    """Margin of the force that holds, as `gap`.
 
     Args:
         most: the largest force that the clay bears [N].
@@ -351,7 +351,7 @@ def gap_of_hold(most, f):
 
 
 def misfit(modal, modes, x, i):
-    """How far an axis without velocity is from what its mode demands, 0 or less where it is not."""
+    """How far an axis without velocity violates its mode, 0 or less where it does not."""
     s, law = modes.mode[i], modes.law
     if s == 0.0:
         f = holding_force(modal, law, i)
@@ -374,7 +374,7 @@ def is_nearly_at_rest(along, modal, law, x, i):
 
 
 def nearly_rests(modal, law, i, m, forward, size, need):
-    """The same of a speed.
+    """The same for a speed.
 
     Args:
         modal: the part.

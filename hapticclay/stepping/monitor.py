@@ -1,4 +1,4 @@
-"""Judges a run while it goes on: whether it is still good, whether an axis is unstable."""
+"""Judges a run in progress: whether it is still good, and whether an axis is unstable."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SWINGS = 6  # consecutive swings that a verdict of growth needs
 SWING_SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border
 TRANSFER = 3.0  # swing over that of the other axis whose energy it takes: > sqrt(Lambda_y/Lambda_x)
 CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
-MEMORY = 200  # swings that are remembered
+MEMORY = 200  # swings stored
 STILL = 1e-5  # [m/s] a handle slower than this ...
 WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
-QUIET = 9 + SWINGS + 1  # numbers of an axis that `is_quiet` goes on with
-MOST_CLAYS = 33  # whose gain limits are worked out, of each axis; of more, the nearest of so many
+QUIET = 9 + SWINGS + 1  # numbers per axis that `is_quiet` carries from one call to the next
+MOST_CLAYS = 33  # clays per axis whose gain limits are computed; of more, the nearest of so many
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -40,7 +40,7 @@ class StabilityMonitor:
     An axis is unstable if the swings of its velocity (from one turning point to the next) grow one
     by one, SWINGS of them at least and by SWING_GROWTH together; or if CYCLE of them in a row drive
     a motor into its torque limit without decay; or if the handle swings out of reach while its gain
-    is above the limit of its loop in some clay that it has been in. Under a muscle force or a
+    is above the limit of its loop in some clay that it has visited. Under a muscle force or a
     command that varies, growth counts only above that limit: the handle may swing as it is driven.
     Below the limit, the axis must grow beyond what the other axis may have passed to it.
 
@@ -61,7 +61,7 @@ class StabilityMonitor:
         self.unbound = -1  # last sample with no motor at its limit
         self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
         self.often = 0  # samples with a motor in its limit
-        self.onset: Outcome | None = None  # of an instability through which the run went on
+        self.onset: Outcome | None = None  # of an instability that did not end the run
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
         self.largest = [0.0, 0.0]  # swing so far [m/s]
@@ -80,7 +80,7 @@ class StabilityMonitor:
         dt = self.scenario.dt
         v, q2 = rows[4:6], rows[1]
         good = rows.shape[1]
-        # first the question that costs little: is anything amiss at all?
+        # first a cheap test: is anything wrong at all?
         bend = np.abs(np.sin(q2))
         if good and not (
             np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD
@@ -272,7 +272,7 @@ class StabilityMonitor:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
     def _limit(self, i: int, values: list[float]) -> tuple[float, float]:
-        """The clay with the least gain limit of the linear loop of axis i, and this limit."""
+        """The clay with the lowest gain limit of the linear loop of axis i, and this limit."""
         for b in values:
             if (i, b) not in self._limits:
                 self._limits[i, b] = gain_limits.continuous_limit(self.scenario, AXES[i], b)
@@ -281,8 +281,8 @@ class StabilityMonitor:
     def _dampings(self, i: int, visited: bool) -> list[float]:
         """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited.
 
-        Of more than MOST_CLAYS in all, the nearest of so many between least and most: where the
-        handle has been grows with each look, and must not bring new ones for ever.
+        Of more than MOST_CLAYS in all, the nearest of so many between least and most are used: the
+        visited range grows with each check, and must not add new values for ever.
         """
         clay = self.scenario.clay
         if clay is None:
@@ -338,7 +338,7 @@ def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
         dt: length of a sample [s].
 
     Returns:
-        Whether motors stay at their limits; whether it has long not moved.
+        Whether motors stay at their limits; whether the handle has been still for long.
     """
     recent = np.maximum(1, np.minimum(seen, round(WHILE / dt)))
     return seen - 1 - unbound >= recent, seen - 1 - moved >= recent
@@ -347,8 +347,8 @@ def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
 def is_quiet(rows, n, limit1, limit2, swings, seen):
     """Whether the monitor can have nothing to report on the next n rows: a cheaper test.
 
-    False where a row is no longer good, or where swings in a row have grown together, or have
-    driven a motor into its limit, by as much as an unstable run takes.
+    False where a row is no longer good, or where consecutive swings have grown, or have driven a
+    motor into its limit, as much as in an unstable run.
 
     Args:
         rows: shape (m, 14), m >= n.
@@ -392,7 +392,7 @@ def is_quiet(rows, n, limit1, limit2, swings, seen):
                 s[9 + int(grown) % (SWINGS + 1)] = s[8]
                 slow = s[8] - s[9 + (int(grown) + 1) % (SWINGS + 1)] + 2.0 >= SWING_SPACING * SWINGS
                 s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
-                # but for rounding of the product
+                # except for rounding of the product
                 if grown >= SWINGS and slow and s[6] > 0.999 * SWING_GROWTH:
                     return False
                 if s[7] >= CYCLE:

@@ -1,4 +1,4 @@
-"""What is said on stderr of a compilation: how long it takes, that it lives, how long it took."""
+"""Messages on stderr about a compilation: its expected time, its progress, its final time."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import threading
 import time
 from typing import Any
 
-TICK, EVERY = 1.0, 10.0  # between two signs of life, on a terminal and elsewhere [s]
+TICK, EVERY = 1.0, 10.0  # between two messages, on a terminal and elsewhere [s]
 
 
 class Notice:
-    """Says that something is compiled, from `begin` to the end of its block, and then the time.
+    """Reports a compilation, from `begin` to the end of its block, and then the time.
 
-    On a terminal one line counts the seconds. Elsewhere, as in a file or a notebook, each sign of
-    life is a line. Without `begin` nothing is said.
+    On a terminal one line counts the seconds. Elsewhere, as in a file or a notebook, each message
+    is a line of its own. Without `begin` nothing is printed.
 
     Args:
-        what: is compiled.
+        what: what is compiled.
         expected: time that it takes, measured [s].
     """
 
@@ -30,7 +30,7 @@ class Notice:
         self.since: float | None = None
 
     def begin(self) -> None:
-        """Says how long it takes, once."""
+        """Prints the expected time, once."""
         if self.since is not None or sys.stderr is None:
             return
         self.since, self.stream, self.terminal = time.monotonic(), sys.stderr, _on_terminal()
@@ -59,18 +59,18 @@ class Notice:
         self._write("\r" + text[: self._width()] if self.terminal else f"{text}\n")
 
     def _width(self) -> int:
-        """Columns that can be overwritten: a longer line would wrap, and each sign with it."""
+        """Columns that can be overwritten; a longer line would wrap at every message."""
         with contextlib.suppress(OSError, ValueError):
             return (os.get_terminal_size(self.stream.fileno()).columns or 80) - 1
         return 79
 
     def _write(self, text: str) -> None:
-        with contextlib.suppress(OSError, ValueError):  # who listened has gone
+        with contextlib.suppress(OSError, ValueError):  # the reader has gone
             self.stream.write(text)
             self.stream.flush()
 
 
 def _on_terminal() -> bool:
-    """Whether stderr can overwrite a line; a notebook's cannot, whatever it says."""
+    """Whether stderr can overwrite a line; a notebook cannot, whatever it reports."""
     notebook = type(sys.stderr).__module__.startswith("ipykernel")
     return not notebook and sys.stderr.isatty()

@@ -21,11 +21,11 @@ from ..model.sampled_controller import BUFFER, TORQUE, LawCaller
 from .parts import Parts
 
 CALL = ctypes.CFUNCTYPE(None, ctypes.c_size_t)
-LET: set[Any] = set()  # functions that compiled code has been let call
+LET: set[Any] = set()  # functions that compiled code may call
 
 
 def called(parts: Parts) -> Parts:
-    """The parts as compiled steps take them: with the user's own law as a C function.
+    """The parts for compiled steps, with the user's own law as a C function.
 
     Args:
         parts: a scene.
@@ -39,7 +39,7 @@ def called(parts: Parts) -> Parts:
 
 
 def c_function(caller: LawCaller) -> Any:
-    """The law of a controller, compiled if it can be; else Python runs it when it is called.
+    """The law of a controller, compiled if possible, else run by Python at each call.
 
     Args:
         caller: of the law.
@@ -57,8 +57,10 @@ def c_function(caller: LawCaller) -> Any:
 
 @functools.lru_cache(maxsize=64)
 def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
-    """A C function that reads the buffer, calls the law and writes what it returns; None if numba
-    cannot compile it, and a line says so. What is `outside` the law is a constant in it.
+    """A C function that reads the buffer, calls the law and writes what it returns.
+
+    None if numba cannot compile it; a line reports this. Variables `outside` of the law are
+    frozen when it is compiled.
     """
     names = [f"buffer[{j}]" for j in range(BUFFER + 2 * n + m)]
     state, after, params = (
@@ -94,7 +96,7 @@ def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
         kind = types.void(types.CPointer(types.float64))
         return numba.cfunc(kind, **options)(scope["call"])
     except (numba.core.errors.NumbaError, TypeError, ValueError, AssertionError) as error:
-        said = re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()  # without its colours
+        said = re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()  # without colour codes
         said = [x.strip() for x in said if x.strip()]
         reason = next((x for x in said if not x.startswith("Failed in nopython mode")), "no reason")
         name = getattr(law, "__qualname__", repr(law))
@@ -103,7 +105,7 @@ def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
 
 
 def _outside(law: Any) -> tuple[Any, ...]:
-    """Values of the numbers, words and arrays that a law names and that lie outside of it."""
+    """Values of the numbers, words and arrays that a law uses from outside itself."""
     function = getattr(law, "py_func", law)
     code, scope = getattr(function, "__code__", None), getattr(function, "__globals__", {})
     if code is None:
@@ -124,7 +126,7 @@ def _changed_outside(law: Any) -> str:
 
 
 def _let_call(law: Any) -> None:
-    """Lets compiled code call the plain functions that a law names, as Python does."""
+    """Lets compiled code call the plain functions that a law uses, as Python does."""
     code, scope = getattr(law, "__code__", None), getattr(law, "__globals__", {})
     for name in code.co_names if code else ():
         found = scope.get(name)

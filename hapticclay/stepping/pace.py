@@ -1,4 +1,4 @@
-"""How finely a scene has to be stepped, by its fastest rates."""
+"""How finely a scene must be stepped, from its fastest rates."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ SPRING_STEPS = 10_000  # parts of a step that springs may need; at most a second
 def spring_step(scenario: Scenario) -> float:
     """Longest step that resolves the springs of the clay, inf without any [s].
 
-    The force of a spring enters a kick from the place before it, so a step must resolve the fastest
-    motion that the spring can drive. Where control is continuous, that is one of the whole loop:
-    the compensator may pass a force on at once, and the servo may impose a lighter handle.
+    A kick uses the force of a spring at the place before it, so a step must resolve the fastest
+    motion that the spring can drive. In continuous control this is a motion of the whole loop: the
+    compensator may have direct feedthrough, and the servo may impose a lighter handle.
 
     Args:
         scenario: the run.
@@ -94,13 +94,13 @@ def largest_lightness(scenario: Scenario) -> float:
     for servo, shape, K in zip(scenario.servo, scenario.compensators, scenario.gain, strict=True):
         if scenario.inertia_shaping:
             W = max(W, servo.S.gain)
-        if len(shape.num) == len(shape.den):  # C passes a force on at once
+        if len(shape.num) == len(shape.den):  # C has direct feedthrough
             through = max(through, K * servo.G.gain * abs(shape.num[0]))
     return W + through
 
 
 def creep_limit(scenario: Scenario) -> float:
-    """Speed below which clay of n < 1 counts as at rest, as its steps would be too many [m/s].
+    """Speed below which clay of n < 1 counts as at rest: it would need too many steps [m/s].
 
     Args:
         scenario: the scene.
@@ -124,7 +124,7 @@ def own_rate(scenario: Scenario) -> float:
 
 
 def parts_of_sample(scenario: Scenario, i: int) -> int:
-    """Engine steps a sample, the same for all samples of a block.
+    """Engine steps per sample, the same for all samples of a block.
 
     Args:
         scenario: the scene.

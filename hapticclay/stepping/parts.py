@@ -1,7 +1,7 @@
 """The parts of a scene, as plain numbers; a part that the scene lacks is None.
 
-A function that takes a part asks for None first: numba prunes that branch, so what a scene lacks is
-neither compiled nor run. Machine code is cached under the types of the parts.
+A function that takes a part checks for None first: numba prunes that branch, so missing parts are
+neither compiled nor run. Machine code is cached by the types of the parts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ INF = float("inf")
 
 
 class Time(NamedTuple):
-    """When samples lie.
+    """Times of the samples.
 
     Attributes:
         dt: step [s].
@@ -106,17 +106,17 @@ class Hand(NamedTuple):
 
 
 class Signal(NamedTuple):
-    """A signal over the steps that come next.
+    """A signal over the next steps.
 
     Attributes:
         table: of it, see model.pieces.
-        ahead: of whole steps, a row a sample: its mean around the sample of a muscle force [N], its
-            change to the next sample of a command [m], to the next control sample where control is
-            sampled; of the accurate method a row a time of Ahead: its value there, of a command its
-            change since t = 0; (x, y).
+        ahead: for whole steps, one row per sample: the mean of a muscle force around it [N], or the
+            change of a command to the next sample [m], to the next control sample where control is
+            sampled. For the accurate method, one row per time of Ahead: the value there, or the
+            change of a command since t = 0; (x, y).
         first: sample of the first row.
-        halves: of a muscle force in sampled control, a row a sample: its mean over half a step
-            before it, and behind it, its value at it [N]; (x, y) each.
+        halves: for a muscle force in sampled control, one row per sample: its mean over half a step
+            before and after the sample, its value there [N]; (x, y) each.
     """
 
     table: Any
@@ -148,7 +148,7 @@ class Clay(NamedTuple):
 
 
 class Special(NamedTuple):
-    """Laws of the clay beside plain viscous damping.
+    """Laws of the clay in addition to plain viscous damping.
 
     Attributes:
         smooth: which axes have smooth clay.
@@ -191,7 +191,7 @@ class Flow(NamedTuple):
     """Clay that yields.
 
     Attributes:
-        along: None where each axis yields by itself, 1 along the motion.
+        along: None where the axes yield separately, 1 along the motion.
     """
 
     along: Any
@@ -215,7 +215,7 @@ class Groove(NamedTuple):
     Attributes:
         numbers: groove.Groove.numbers.
         drag: damping per cross-section [N.s/m^3]; None for none.
-        ground: share of each cell that is left.
+        ground: remaining share of each cell.
         relief: height of the cells before any cut [m].
         rim: the clay in front of the tool, see groove.cut.
         removed: volume removed, see groove.add [m^3].
@@ -236,7 +236,7 @@ class Sampler(NamedTuple):
         ratio: steps in a control sample.
         Ts: control sample [s].
         clay: the clay that acts on the handle; None where the motors render it.
-        special: its laws beside plain viscous damping.
+        special: its laws in addition to plain viscous damping.
         rendered: 1 where the force that the motors hold is recorded.
         memory: rows (A, B) of controller.held_compensator of x, then of y.
         state_space: compensators of another shape.
@@ -293,7 +293,7 @@ class Own(NamedTuple):
 
 
 class Chance(NamedTuple):
-    """Random effects on the samples that come next.
+    """Random effects on the next samples.
 
     Attributes:
         numbers: four a sample, see hardware.SampleNoise.
@@ -349,7 +349,7 @@ class Passivity(NamedTuple):
 
     Attributes:
         whole: whole samples of the delay.
-        share: the rest of it, of a sample.
+        share: the remaining share of a sample.
         ring: forces at past samples, two numbers each.
     """
 
@@ -371,12 +371,12 @@ class Coupling(NamedTuple):
 
 
 class Modal(NamedTuple):
-    """Clay that yields, in the accurate method.
+    """Yielding clay in the accurate method.
 
     Attributes:
-        along: None where each axis yields by itself, 1 along the motion.
+        along: None where the axes yield separately, 1 along the motion.
         grain: as Parts.grain; None along the motion.
-        mobility: largest acceleration per unit of force, by way of C too [1/kg].
+        mobility: largest acceleration per unit of force, including the path through C [1/kg].
         dt: length of a sample [s].
     """
 
@@ -390,9 +390,9 @@ class Ahead(NamedTuple):
     """Times of the accurate method where signals drive a run.
 
     Attributes:
-        times: starts and middles of the steps that come next, ascending [s].
+        times: starts and middles of the next steps, ascending [s].
         breaks: times at which a step must end, ascending; the last is INF [s].
-        slack: a time so close to another one is that [s].
+        slack: times that differ by no more count as equal [s].
     """
 
     times: Any
@@ -404,7 +404,7 @@ class Accurate(NamedTuple):
     """The accurate method.
 
     Attributes:
-        substeps: engine steps a sample.
+        substeps: engine steps per sample.
         blocks: the same by block of samples, where the clay grows.
         ahead: times where signals drive the run.
     """
@@ -432,7 +432,7 @@ class Parts(NamedTuple):
         clay: the clay.
         grain: cosine and sine of the angle between its axes and x, y.
         hits: clay in which a hit may saturate the motors within a step.
-        special: laws of the clay beside plain viscous damping that every step resolves.
+        special: laws of the clay, in addition to plain viscous damping, that every step resolves.
         sampler: sampled control.
         accurate: the accurate method.
         modal: clay that yields in it; special has no flow then.

@@ -1,7 +1,7 @@
 """The path of a run: samples, borders of the clay and the end, for every method.
 
-A step ends on the next sample, or on the first border before it. A kick is a value, so that the
-search for a border works out as many as it likes; the run takes the last.
+A step ends on the next sample, or on the first border before it. A kick is a value: the search for
+a border evaluates as many as it needs, and the run uses the last.
 """
 
 from __future__ import annotations
@@ -37,13 +37,14 @@ MOST_STEPS = 20_000  # from one sample to the next; a run that needs more ends a
 
 
 def grid_after(time, i):
-    """Time of the sample behind sample i [s]."""
+    """Time of the sample after sample i [s]."""
     return (i + 1) * time.dt if i < time.last else time.t_max
 
 
 def next_sample(time, t, i):
-    """The next sample of a run: its time, the length of the step to it (0 at the end) [s]; whether
-    now is a sample.
+    """The next sample of a run: its time and the length of the step to it [s]; whether now is one.
+
+    The length is 0 at the end.
     """
     dt = time.dt
     on_grid = t == i * dt
@@ -65,7 +66,7 @@ def next_stop(parts, s):
 
 
 def begun(x, region, after, on_grid):
-    """Status where a step begins that is looked at."""
+    """Status at the beginning of a step with event detection."""
     closing = TIME_LIMIT if x.closing == OPEN and after == 0.0 else x.closing
     if on_grid:
         ix, iy = region.index
@@ -83,7 +84,7 @@ def with_filled(s, x):
 
 
 def ended(s, code):
-    """The state of a run that is over."""
+    """The state of a run that has ended."""
     x = s.status
     return with_status(s, Status(code, x.closing, x.careful, x.landings, x.seen))
 
@@ -98,14 +99,14 @@ def closed(s):
 
 
 def noted(special, e, before, after, t, n):
-    """Notes stops of the handle in a kick; how many are then noted."""
+    """Notes stops of the handle in a kick; returns the number then noted."""
     if special is None:
         return n
     return yielding.noted(special.flow, e, after.contact, before.contact, t, n)
 
 
 def held_arm(special, e, reaction, w):
-    """Joint rates; none of an arm that clay holds, which the engine's rounding would let creep."""
+    """Joint rates; zero for an arm that clay holds, which the engine's rounding would let creep."""
     if special is None:
         return w
     if yielding.is_still(special.flow, reaction.contact):
@@ -115,13 +116,13 @@ def held_arm(special, e, reaction, w):
 
 
 def clay_behind(part, parts, clay, hit, reaction, body, h):
-    """The clay behind a step of length h, which led the arm there.
+    """The clay after a step of length h, which led the arm there.
 
     Args:
         part: the clay.
         parts: the scene.
         clay: before it.
-        hit: a hit, behind it.
+        hit: a hit, after it.
         reaction: of its kick.
         body: the arm.
         h: its length [s].
@@ -147,7 +148,7 @@ def laws_behind(special, parts, c, body, h):
 
 
 def kicked(parts, s, e, k, after, work, filled):
-    """The state behind a kick and the step after it, but for the clock; the engine makes it."""
+    """The state after a kick and the following step, except the clock; the engine makes it."""
     special, clock, x, reaction = parts.special, s.clock, s.filled, k.motion.reaction
     q, w = sampled.stepped_arm(parts.sampler, parts, e, s, k, after)
     body = Body(q, held_arm(special, e, reaction, w), k.g)
@@ -188,7 +189,7 @@ def stepped(parts, s, e, k, after, target, work, filled):
 
 
 def kept(accurate, parts, s, e, k, after, shows):
-    """The state with what is kept of a step: its row, if now is a sample, and its works."""
+    """The state with the results of a step: its row, if now is a sample, and its works."""
     if accurate is None:
         return kick_kept(parts, s, e, k, after, shows)
     x = s.filled
@@ -210,7 +211,7 @@ def kick_kept(parts, s, e, k, after, shows):
 
 
 def write_row(parts, s, e, k, after):
-    """Writes the row of a kick, and the force of the clay where b v does not tell it."""
+    """Writes the row of a kick, and the force of the clay where b v does not give it."""
     i, sampler = s.filled.rows, parts.sampler
     special = sampled.acting_laws(sampler, parts.special)
     v, f = velocity(special, parts.grain, k), rows.yield_force(special, k)
@@ -249,8 +250,10 @@ def slow_arrival(special, parts, s, v, f):
 
 
 def stiff_arrival(stiff, special, parts, s, v, f):
-    """As `slow_arrival`: half a kick has led here; in stiff clay that half holds too little of the
-    clay, and velocity and force are those of a whole kick, with the step before it repeated.
+    """As `slow_arrival`, in stiff clay.
+
+    Half a kick has led here and holds too little of stiff clay. Velocity and force are those of a
+    whole kick, with the step before it repeated.
     """
     if stiff is None or s.clock.before == 0.0:
         return v, f
@@ -286,21 +289,21 @@ def shortened(special, laws_, after):
 
 
 def towards(probe, parts, s, after, over, first):
-    """The step that leads on, shortened to the first border in its way.
+    """The next step, shortened to the first border ahead.
 
     Args:
         probe: of the engine, for the accurate method.
         parts: the scene.
         s: the state.
-        after: length that the step may have [s].
-        over: sides of the borders stepped over without a step, (x, y): there is no way back over
-            them, which must not hold the run.
-        first: whether other clay has been met since the last look.
+        after: longest length of the step [s].
+        over: sides of the borders crossed without a step, (x, y). They cannot be crossed back, so
+            that the run cannot stall there.
+        first: whether different clay has been entered since the last check.
 
     Returns:
-        The state, in the region of the step; the step, by its kick; length of the step [s];
-        coordinate of the border that it ends on, or that is to be crossed without a step, -1 for
-        none; its side; whether without a step.
+        The state, in the region of the step; the kick of the step; length of the step [s];
+        coordinate of the border that it ends on or that is crossed without a step, -1 for none;
+        side of this border; whether it is crossed without a step.
     """
     axis, up, special = -1, 0, parts.special
     here = place(parts.arm, s.body.q)
@@ -343,7 +346,7 @@ def towards(probe, parts, s, after, over, first):
 
 
 def step_to_event(parts, s, e):
-    """The state after one step with a look at its end, on a border if one is in the way."""
+    """The state after one step with event detection, which ends on a border if one is ahead."""
     target, most, on_grid = next_stop(parts, s)
     s = with_status(s, begun(s.status, s.clay.region, most, on_grid))
     s, most = march.paced(parts.accurate, parts.modal, s, target, most, on_grid)
@@ -368,7 +371,7 @@ def step_to_event(parts, s, e):
         return ended(halted_arm(parts.accurate, s, k), closing)
     if not march.is_sound(e.probe, k):
         return ended(s, NOT_FINITE)
-    put(e.w, 0, s.body.w)  # after a hit it starts from the velocity behind half a kick
+    put(e.w, 0, s.body.w)  # after a hit it starts from the velocity after half a kick
     s = stepped(parts, s, e, k, after, target, s.work, s.filled.rows)
     if axis >= 0:
         s = crossed(parts, s, e, axis, up)
@@ -376,7 +379,7 @@ def step_to_event(parts, s, e):
 
 
 def halted_arm(accurate, s, k):
-    """The state behind its last kick, at its sample."""
+    """The state after its last kick, at its sample."""
     if accurate is None:
         body, c = Body(s.body.q, k.w, k.g), s.clock
         return State(Clock(c.t, c.i, 0.0), body, s.loop, s.clay, s.work, s.status, s.filled)
@@ -384,14 +387,14 @@ def halted_arm(accurate, s, k):
 
 
 def is_calm(special, laws_):
-    """Whether the springs of the clay ask for no short steps."""
+    """Whether the springs of the clay require no short steps."""
     if special is None:
         return True
     return springs.is_calm(special.springs, laws_.elastic)
 
 
 def may_follow(parts, s):
-    """Whether a step may follow without a look at more than its end."""
+    """Whether the next step needs no check but that of its end."""
     x = s.status
     calm = hits.is_over(parts.hits, s.clay.hit) and is_calm(parts.special, s.clay.laws)
     follows = sampled.may_follow(parts.sampler, parts.time, s.clock)
@@ -406,7 +409,7 @@ def has_room(time, s, e, room):
 
 
 def whole_step(parts, s, e):
-    """A step within one region: whether it could be made, and the state after it."""
+    """A step within one region: whether it was possible, and the state after it."""
     target, after, on_grid = next_stop(parts, s)
     if after < parts.time.dt:
         s = with_status(s, begun(s.status, s.clay.region, after, on_grid))
@@ -425,7 +428,7 @@ def whole_step(parts, s, e):
 
 
 def run_whole_steps(parts, s, e, room):
-    """Whole steps within one region, up to one that `step_to_event` has to look at."""
+    """Whole steps within one region, up to one that `step_to_event` must handle."""
     return whole_steps_of(parts.accurate, parts, s, e, room)
 
 

@@ -31,12 +31,12 @@ def write(rows, i, q, k, v, b, fh, delta):
 
 
 def tells(special):
-    """Whether the clay has a force that b v does not tell."""
+    """Whether the clay has a force that b v does not give."""
     return not (special.flow is None and special.springs is None and special.more is None)
 
 
 def write_force(special, grain, e, i, k, states, seen):
-    """Writes the force of the clay where b v does not tell it.
+    """Writes the force of the clay where b v does not give it.
 
     Args:
         special: laws of the clay.

@@ -1,4 +1,4 @@
-"""A run from start to end: it advances, keeps the record and asks the monitor."""
+"""A run from start to end: it advances, stores the record and calls the monitor."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from .machine_code import kind_of
 from .parts import Chance, Parts
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 
-CHUNK = 4096  # rows between two looks at the run (progress, Ctrl-C, outcome); fits the cache
-STORED = 8  # that one store keeps: two of an arm, with clay and without
-CROSSINGS, STOPS = 64, 4 * CHUNK  # between two looks: an axis stops and goes on in each step
+CHUNK = 4096  # rows between two checks of the run (progress, Ctrl-C, outcome); fits the cache
+STORED = 8  # engines per store: two of an arm, with clay and without
+CROSSINGS, STOPS = 64, 4 * CHUNK  # between two checks: an axis stops and restarts in each step
 NONE_MADE = Filled(0, 0, 0, 0)
 RECORDED = (  # of a run
     "steps", "watch", "looked", "kept", "rendered_kept", "last_rendered", "crossings", "stops",
@@ -38,7 +38,7 @@ RECORDED = (  # of a run
 @named
 @dataclass(frozen=True)
 class Crossing:
-    """The handle crossed a border.
+    """A crossing of a border by the handle.
 
     Attributes:
         axis: coordinate of the border, "x" or "y".
@@ -55,7 +55,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Stop:
-    """The clay held the handle still.
+    """An interval in which the clay held the handle still.
 
     Attributes:
         axis: "x" or "y" where that axis alone was held by its own law, "xy" for the handle as a
@@ -76,10 +76,10 @@ class Kernel(NamedTuple):
         advance: makes steps, called with (run, room).
         calls: mj_step, mj_forward, model and data as these steps call them.
         place: an array as they write into it: a memoryview, or its address.
-        quiet: monitor.is_quiet, compiled; None asks the monitor itself.
-        ahead: tries the next step of a run, called with the run: the row that it would write, and
-            the force of the clay where b v does not tell it; None if it cannot. Without it the run
-            makes the step and goes back.
+        quiet: monitor.is_quiet, compiled; None calls the monitor itself.
+        ahead: tries the next step of a run, called with the run. Returns the row that it would
+            write, and the force of the clay where b v does not give it; None if it cannot. Without
+            this function the run makes the step and returns to its state.
     """
 
     advance: Callable[[Run, int], None]
@@ -90,7 +90,7 @@ class Kernel(NamedTuple):
 
 
 def one_plainly(run: Run, step: Callable[..., State]) -> None:
-    """Makes a step in CPython, where that of an arm which is exactly straight raises.
+    """Makes a step in CPython, where the step of an exactly straight arm raises.
 
     Args:
         run: the run.
@@ -111,7 +111,7 @@ def plainly(run: Run, room: int) -> None:
 
     Args:
         run: the run.
-        room: rows that it may have.
+        room: largest number of rows.
     """
     while run.state.status.code == OPEN and path.has_room(run.parts.time, run.state, run.e, room):
         one_plainly(run, path.step)
@@ -142,10 +142,10 @@ class NeedsMonitor(Exception):
 
 
 class EngineStore:
-    """Engines and arrays that run after run uses: engines with clay and without.
+    """Engines and arrays that successive runs reuse: engines with clay and without.
 
     Args:
-        engines: those of another store, which then makes no steps meanwhile; None for its own.
+        engines: those of another store, which makes no steps meanwhile; None for its own.
     """
 
     def __init__(self, engines: dict[Any, tuple[Any, Any]] | None = None):
@@ -163,14 +163,14 @@ class EngineStore:
         key = s.clay is not None, s.arm
         if key not in self.engines:
             if len(self.engines) >= STORED:
-                del self.engines[next(iter(self.engines))]  # the one longest there
+                del self.engines[next(iter(self.engines))]  # the oldest one
             model = engine.build(s)
             self.engines[key] = model, mujoco.MjData(model)
         at_rest(*self.engines[key], s)
         return self.engines[key]
 
     def room_for(self, parts: Parts) -> None:
-        """Makes the arrays for what a scene shows beside its rows.
+        """Allocates the arrays for what a scene records in addition to its rows.
 
         Args:
             parts: the scene.
@@ -209,7 +209,7 @@ _idle: list[EngineStore] = []  # engines that no run uses
 
 @contextlib.contextmanager
 def borrowed_store() -> Iterator[EngineStore]:
-    """Engines for one run, made anew only while others are in use."""
+    """Engines for one run, made new only while others are in use."""
     try:
         store = _idle.pop()
     except IndexError:
@@ -236,8 +236,8 @@ class Snapshot(NamedTuple):
     Attributes:
         scenario: of the run.
         saved: the run, Saved.
-        before: the run at the last look of the monitor, Saved.
-        rows: that have not been judged yet.
+        before: the run at the last check of the monitor, Saved.
+        rows: not judged yet.
         rendered: force of the clay in them [N].
         record: what the run keeps of those judged.
     """
@@ -259,10 +259,10 @@ class Run:
         kernel: how the steps are made.
         store: engines to use; None for its own.
         brief: keep no samples, for `brief` alone.
-        watched: let the monitor look at all rows; else NeedsMonitor is raised where it has to look
-            at rows that are not kept.
-        recorded: whether it keeps what the monitor has judged; else its rows since then alone, and
-            after its end `last_row`.
+        watched: let the monitor check all rows; else NeedsMonitor is raised where it must check
+            rows that are not kept.
+        recorded: whether judged rows are kept; else only the rows since then and, after the end,
+            `last_row`.
 
     Raises:
         ParameterError: a control callback is installed in the engine, which would interfere.
@@ -310,7 +310,7 @@ class Run:
         self.end_time: float | None = None
         self.without_samples, self.recorded = brief, recorded
         self.last_row: Any = None
-        # nothing to report so far; later the monitor may want all rows once more
+        # nothing to report so far; later the monitor may need all rows again
         self.calm = kernel.quiet is not None and scenario.stop_when_unstable and not watched
         self.swings, self.seen = np.zeros((2, monitor.QUIET)), np.array([0, -1, -1, 0])
         self.first = energy.stored(self.parts, self.state)
@@ -318,7 +318,7 @@ class Run:
 
     @property
     def state(self) -> State:
-        """Between two steps."""
+        """The state between two steps."""
         if self.leads:
             self._state = self.row.given()
         return self._state
@@ -331,12 +331,12 @@ class Run:
 
     @property
     def leads(self) -> bool:
-        """Whether its row has the state, and `_state` an old one."""
+        """Whether the row holds the state, and `_state` is outdated."""
         return self.row is not None and self.row.leads
 
     @property
     def t(self) -> float:
-        """Now [s]."""
+        """Present time [s]."""
         return self.row.t if self.leads else self._state.clock.t
 
     @property
@@ -346,23 +346,23 @@ class Run:
 
     @property
     def filled(self) -> int:
-        """Samples that have not been judged yet."""
+        """Number of samples not judged yet."""
         return self.row.marks[1] if self.leads else self._state.filled.rows
 
     @property
     def code(self) -> int:
-        """How it stands: OPEN and so on."""
+        """Status code of the run: OPEN and so on."""
         return self.row.marks[2] if self.leads else self._state.status.code
 
     @property
     def views(self) -> Parts:
-        """Its parts, for CPython."""
+        """The parts of the run, for CPython."""
         if self._views is None:
             self._views = scene.viewed(self.parts)
         return self._views
 
     def b(self) -> tuple[float, float]:
-        """Clay of the present region, (x, y) [N.s/m]."""
+        """Damping of the clay in the present region, (x, y) [N.s/m]."""
         return viscous.now(self.parts.clay, self.state.clay, False, self.t)
 
     # ---- steps
@@ -429,10 +429,10 @@ class Run:
         self.take(self.parts._replace(sampler=self.parts.sampler._replace(chance=chance)))
 
     def take_over(self, controller: Controller) -> None:
-        """Lets a controller of the user's own act, before the first step of a sampled run.
+        """Lets the user's own controller act, before the first step of a sampled run.
 
         Args:
-            controller: that one.
+            controller: the user's own.
         """
         self._controller = controller
         self._equip(scene.parts_of(self.scenario, controller))
@@ -441,10 +441,10 @@ class Run:
         self._saved = self.saved()
 
     def take(self, parts: Parts) -> None:
-        """Goes on with other numbers in the same parts.
+        """Continues with other numbers in the same parts.
 
         Args:
-            parts: these.
+            parts: the parts with these numbers.
         """
         self.parts: Parts = parts
         self._views: Any = None
@@ -452,7 +452,7 @@ class Run:
 
     @property
     def kind(self) -> Any:
-        """What scenes have in common whose steps the same machine code makes."""
+        """Key of scenes whose steps share the same machine code."""
         if self._kind is None:
             self._kind = kind_of(self.parts)
         return self._kind
@@ -465,7 +465,7 @@ class Run:
         return self._native
 
     def _note_events(self, crossings: int, stops: int) -> None:
-        """Takes the crossings and stops of the steps just made."""
+        """Stores the crossings and stops of the steps just made."""
         for axis, *crossing in self.store.crossings[:crossings].tolist():
             self.crossings.append(Crossing(AXES[int(axis)], *crossing))
         for axis, begins, t in self.store.stops[:stops].tolist():
@@ -501,7 +501,7 @@ class Run:
         self.data.qpos[:], self.data.qvel[:] = self.state.body.q, self.state.body.w
 
     def restart(self) -> None:
-        """Begins anew, without a record; not after `change`, or where it takes signals ahead."""
+        """Restarts without a record; not after `change`, or where signals are prepared ahead."""
         self.restore(self._saved)
         self.steps = self.looked = 0
         self.watch = monitor.StabilityMonitor(self.scenario)
@@ -533,10 +533,10 @@ class Run:
             setattr(self, name, value)
 
     def change(self, scenario: Scenario) -> None:
-        """Goes on with another gain, operator, force or clay between the same borders.
+        """Continues with another gain, operator, force or clay between the same borders.
 
         Args:
-            scenario: with these.
+            scenario: the scenario with these.
         """
         before = self.parts
         parts = scene.parts_of(scenario, self._controller)
@@ -570,7 +570,7 @@ class Run:
         self.flush()
 
     def change_force(self, force: tuple[float, float]) -> None:
-        """Goes on under another constant muscle force.
+        """Continues under another constant muscle force.
 
         Args:
             force: (x, y) [N].
@@ -580,7 +580,7 @@ class Run:
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
-        """Goes on under a muscle force that changes evenly.
+        """Continues under a muscle force that changes evenly.
 
         Args:
             steady: as Push.steady.
@@ -614,7 +614,7 @@ class Run:
         self.outcome = self.outcome or outcome
 
     def give_up(self, most: int = path.MOST_STEPS) -> None:
-        """Ends the run at its last sample: the steps behind it become too short.
+        """Ends the run at its last sample, because the steps after it become too short.
 
         Args:
             most: steps that one sample may take.
@@ -630,7 +630,7 @@ class Run:
     def ahead(self) -> np.ndarray:
         """The row that a step would write now, and the force of the clay in it [N].
 
-        The run stays where it is.
+        The run does not advance.
 
         Returns:
             rows.ROW numbers, and two.
@@ -650,12 +650,12 @@ class Run:
             self.steps, self.crossings, self.stops = events
 
     def _row_and_force(self, n: int) -> np.ndarray:
-        """Row n of those since the last look, and the force of the clay in it [N]."""
+        """Row n of those since the last check, and the force of the clay in it [N]."""
         told = self.store.rendered[n, :2] if self.rendered else (0.0, 0.0)
         return self._with_force(np.concatenate((self.store.rows[n], told)))
 
     def _with_force(self, row: np.ndarray) -> np.ndarray:
-        """A row with the force of the clay behind it, which is there where b v does not tell it."""
+        """A row with the force of the clay appended; already there if b v does not give it."""
         if not self.rendered:
             vx, vy, bx, by = *row[4:6].tolist(), *row[12:14].tolist()
             row[rows.ROW], row[rows.ROW + 1] = self._force(bx, by, vx, vy)
@@ -671,7 +671,7 @@ class Run:
     # ---- the record
 
     def flush(self) -> None:
-        """Judges the rows since the last look."""
+        """Judges the rows since the last check."""
         n = self.filled
         self.state = path.with_filled(self.state, NONE_MADE)
         if n and self.rendered and self.recorded:
@@ -698,7 +698,7 @@ class Run:
             self.steps, self.crossings, self.stops = made, crossings, stops
 
     def _keep_last(self, good: int) -> None:
-        """Keeps the last of the rows since the last look that are good."""
+        """Stores the last good row since the last check."""
         if good:
             self.last_row = self.store.rows[good - 1].tolist()
             if self.rendered:
@@ -731,7 +731,7 @@ class Run:
         return True
 
     def judge(self, made: np.ndarray) -> int:
-        """Takes samples into the record, up to the end of the good part of the run.
+        """Adds samples to the record, up to the end of the good part of the run.
 
         Args:
             made: rows of the record, shape (n, rows.ROW).
@@ -761,7 +761,7 @@ class Run:
         return good
 
     def _cut_events(self, t: float) -> None:
-        """Leaves out what came after the end of the record."""
+        """Removes events after the end of the record."""
         self.crossings = [c for c in self.crossings if c.time <= t]
         self.stops = [
             replace(x, end=None) if x.end is not None and x.end > t else x
@@ -828,7 +828,7 @@ class Run:
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
-        """What the hardware takes; of it friction is no part of the motors."""
+        """Energy that the hardware takes; friction is not part of the motors' share."""
         x, io = self.state.work.hardware, self.scenario.hardware
         if x is None or io is None:
             return {}
@@ -842,7 +842,7 @@ def _drives(scenario: Scenario) -> Any:
     """The signals of a run; None where none varies."""
     if not scenario.driven:
         return None
-    from .signal_ahead import Drives  # only a run that has one pays for it
+    from .signal_ahead import Drives  # imported only if a signal varies
 
     return Drives(scenario)
 
@@ -860,7 +860,7 @@ def completed(
     progress: Callable[[float, float], bool | None] | None = None,
     brief: bool = False,
 ) -> tuple[Run, float]:
-    """Makes a run; a second time if the monitor has to look at rows that are not kept.
+    """Makes a run; repeats it if the monitor must check rows that are not kept.
 
     Args:
         scenario: what to run.
@@ -874,7 +874,7 @@ def completed(
         The run, and the seconds it took.
     """
     brief = brief and scenario.stop_when_unstable
-    watched = every > 1 and progress is not None  # which must not begin anew
+    watched = every > 1 and progress is not None  # progress must not start again
     while True:
         run = Run(scenario, every, kernel, store, brief, watched)
         begin = time.perf_counter()

@@ -1,7 +1,8 @@
 """Sampled control: a machine around the kick. It senses, computes, queues and holds.
 
-At an event, a control sample or a change of the torques, the kick falls into two: one under the old
-torques, which brings the velocity to the sample, where it is measured, and one under the new.
+At an event (a control sample or a change of the torques) the kick is split in two. The first, under
+the old torques, brings the velocity to the sample, where it is measured. The second is under the
+new torques.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ from .state import (
     Step,
 )
 
-SLACK = 1e-9  # of dt: events so close are one
+SLACK = 1e-9  # share of dt: events so close count as one
 NONE = (0.0, 0.0)
-REACTION = 1e-9  # [s] so long after a sample a force is that at it
+REACTION = 1e-9  # [s] a force within this time after a sample counts as that at it
 FORM_MEMORY = 48  # rows (z, y, y', start, f) of z, y and y' at the next sample, of one axis
 
 
@@ -93,14 +94,14 @@ def elastic_before(springs, state):
 def reaction(special, sampler, parts, s, before, at, tau, uh):
     """Force of physical clay that yields at an instant, (x, y) [N].
 
-    Where clay holds the handle it is what keeps it from accelerating.
+    Where clay holds the handle, this is the force that prevents acceleration.
 
     Args:
         special: laws of the clay that acts.
         sampler: the machine.
         parts: the scene.
         s: the state.
-        before: reaction of the clay behind the kick that leads to the instant.
+        before: reaction of the clay after the kick that leads to the instant.
         at: the handle.
         tau: torques on the joints [N.m].
         uh: muscle force [N].
@@ -160,15 +161,17 @@ def on_sensor(hand, sampler, parts, s, at, tau, uh, pull):
 
 
 def soft_velocity(special, sampler, parts, s, at, u):
-    """Velocity at a sample [m/s]: u, behind the kick that leads to it, but in stiff clay."""
+    """Velocity at a sample [m/s]: u, after the kick that leads to it, except in stiff clay."""
     if special is None:
         return u
     return stiff_velocity(special.stiff, sampler, parts, s, at, u)
 
 
 def stiff_velocity(part, sampler, parts, s, at, u):
-    """As `soft_velocity`: half a kick holds too little of stiff clay; the velocity is that of a
-    whole kick, with the step before it repeated.
+    """As `soft_velocity`, in stiff clay.
+
+    Half a kick holds too little of stiff clay; the velocity is that of a whole kick, with the step
+    before it repeated.
     """
     if part is None:
         return u
@@ -189,7 +192,7 @@ def stiff_velocity(part, sampler, parts, s, at, u):
 
 
 def rendered_clay(part, special, sampler, parts, s, at, b, pull):
-    """Force of clay with damping b as the controller takes it [N]; pull is that of yielding."""
+    """Force of clay with damping b as the controller evaluates it [N]; pull is that of yielding."""
     if part is None:
         return NONE
     x, y = viscous.force(parts.grain, b, at.v)
@@ -213,9 +216,9 @@ def flowing_force(flow, clay, special, parts, state, v, pull):
 
 
 def force_in_motion(clay, flow, groove, grain, state, v, pull):
-    """Force of clay that yields, beside b v, on a handle in motion; none at rest.
+    """Force of yielding clay, in addition to b v, on a moving handle; none at rest.
 
-    Where the clay acts itself, it is what holds it.
+    For physical clay, this is the force that holds the handle.
     """
     if clay is None:
         law = law_now(groove, state, v)
@@ -247,7 +250,7 @@ def sprung_force(rendered, sampler, elastic, p):
 def measured_pull(encoder, x, p):
     """Force of the springs that the motors render, at a place as an encoder reads it, (x, y) [N].
 
-    What gave way and what relaxed since goes by the true place.
+    What gave way and relaxed since then follows the true place.
     """
     if encoder is None:
         return x.force
@@ -277,7 +280,7 @@ def outputs(state_space, form, m, f):
 
 
 def form_feed(form, i):
-    """What each unit of force adds to the output of a compensator at once [m/N]."""
+    """Direct feedthrough of a compensator, per unit of force [m/N]."""
     return form.gain[i] * form.numbers[compensator.FORM * i + 24]
 
 
@@ -285,7 +288,7 @@ def shown_axis(form, i, z, out):
     """Output of a compensator of another shape [m].
 
     Args:
-        out: the part of it that is no state's [m].
+        out: the part of it that comes from no state [m].
     """
     c, o = form.numbers, compensator.FORM * i + 20
     for j in range(compensator.ORDER):
@@ -304,7 +307,7 @@ def servo_torques(parts, m, at, delta, f):
 
 
 def held_torques(clay, at, tau, fe):
-    """Torques that render the clay too, where it is not there [N.m]."""
+    """Torques that render the clay as well, where it is not physical [N.m]."""
     if clay is None:
         x, y = arm.joint_torques(fe[0], fe[1], at.u)
         return tau[0] - x, tau[1] - y
@@ -312,12 +315,12 @@ def held_torques(clay, at, tau, fe):
 
 
 def driven_torques(part, limits, tau):
-    """Torques of the motors, within their limits and behind the converter [N.m]."""
+    """Torques of the motors, within their limits and after the converter [N.m]."""
     return hardware.converted(part, clipped(tau, limits))
 
 
 def answer(chance, sampler, parts, s, at, w, f, pull):
-    """What the controller makes of a sample.
+    """Response of the controller to a sample.
 
     Args:
         chance: random effects.
@@ -326,7 +329,7 @@ def answer(chance, sampler, parts, s, at, w, f, pull):
         s: the state.
         at: the handle.
         w: joint rates [rad/s].
-        f: force of the operator as the sensor tells it [N].
+        f: force of the operator as the sensor measures it [N].
         pull: force of physical clay that yields [N].
     """
     if chance is None:
@@ -339,7 +342,7 @@ def answer(chance, sampler, parts, s, at, w, f, pull):
 
 
 def heard(own, sampler, parts, s, at, w, f, pull):
-    """The same of a sample that is not lost: of the paper's controller, or the user's own."""
+    """The same for a sample that is not lost: of the paper's controller, or the user's own."""
     m = s.loop.machine
     q = hardware.encoded(sampler.encoder, s.body.q)
     w, rates = hardware.differenced(sampler.difference, m.rates, m.samples.k, sampler.Ts, q, w)
@@ -355,7 +358,7 @@ def heard(own, sampler, parts, s, at, w, f, pull):
 
 
 def computed(sampler, parts, s, at, f, pull, rates):
-    """What compensator and servo make of a sample."""
+    """Response of compensator and servo to a sample."""
     m, state, Ts = s.loop.machine, s.clay.laws, sampler.Ts
     b = viscous.now(parts.clay, s.clay, False, s.clock.t)
     fe = rendered_clay(parts.clay, parts.special, sampler, parts, s, at, b, pull)
@@ -444,7 +447,7 @@ def samples_from(sampler, dt, k):
 
 
 def acted(sampler, parts, s):
-    """The state with what the controller does at the beginning of a step; as it was elsewhere."""
+    """The state with the controller's action at the beginning of a step; otherwise unchanged."""
     if sampler is None:
         return s
     m, dt = s.loop.machine, parts.time.dt
@@ -459,8 +462,9 @@ def acted(sampler, parts, s):
 
 
 def unless_refused(own, s, e):
-    """The state; of a run that is over where the user's own controller asks for torques that are
-    not finite: limits would hide it, and a delay put it off.
+    """The state; that of an ended run if the user's own controller requests non-finite torques.
+
+    Limits would hide such torques, and a delay would postpone the failure.
     """
     if own is None:
         return s
@@ -477,14 +481,14 @@ def with_event(s, e):
 
 
 def past(e):
-    """An event that is over."""
+    """A past event."""
     return Event(
         0.0, e.at, e.w, e.reaction, e.fh, e.work, e.delta, e.shown, e.asked, e.machine
     )  # fmt: skip
 
 
 def event(sampler, parts, s, acts, t):
-    """An event: the kick that leads to it, what is measured, and what the motors then hold.
+    """An event: the kick that leads to it, the measurement, and the actuator output after it.
 
     Args:
         acts: whether the controller takes a sample.
@@ -519,7 +523,7 @@ def seen_handle(at, w, u, v):
 
 
 def sampled(sampler, parts, s, at, w, special, tau):
-    """Controller and hardware behind a sample, without delay; and its answer.
+    """Controller and hardware after a sample, without delay; and the controller's response.
 
     Args:
         sampler: the machine.
@@ -527,7 +531,7 @@ def sampled(sampler, parts, s, at, w, special, tau):
         s: the state.
         at: the handle.
         w: joint rates [rad/s].
-        special: laws of the clay behind the kick that leads to the sample.
+        special: laws of the clay after the kick that leads to the sample.
         tau: torques on the joints in it [N.m].
     """
     m, dt = s.loop.machine, parts.time.dt
@@ -557,8 +561,10 @@ def before_event(sampler, dt, s, target, after):
 
 
 def may_follow(sampler, time, c):
-    """Whether a step may follow that needs no look at more than its end: a whole one between whole
-    ones; where events lie between the samples, any but the first and the last.
+    """Whether a step may follow that needs no check but that of its end.
+
+    This is a whole step between whole steps; where events lie between the samples, any step but
+    the first and the last.
     """
     if sampler is None:
         return c.before == time.dt and c.t == c.i * time.dt and c.i < time.last
@@ -604,7 +610,7 @@ def acting_laws(sampler, special):
 
 
 def without_event(sampler, s):
-    """The state as it is for a kick that no event begins."""
+    """The state for a kick that no event begins."""
     if sampler is None:
         return s
     return with_event(s, past(s.loop.event))
@@ -616,8 +622,9 @@ def is_early(s, after):
 
 
 def shown(sampler, parts, s, k, after, v, f):
-    """What a row shows beside the kick: force of the hand [N], compensator output [m], force of
-    clay that yields at velocity v [N].
+    """What a row shows in addition to the kick.
+
+    Force of the hand [N], compensator output [m], force of clay that yields at velocity v [N].
     """
     if sampler is None:
         return rows.hand_force(parts.hand, k), k.delta, f
@@ -659,7 +666,7 @@ def write_rendered(rendered, e, i, k):
 
 
 def ledger(sampler, s, after):
-    """The ledger before the kick that leads on, and the joint rates there [rad/s]."""
+    """The ledger before the next kick, and the joint rates there [rad/s]."""
     if sampler is None:
         return s.work, s.body.w
     if is_early(s, after):
@@ -668,7 +675,7 @@ def ledger(sampler, s, after):
 
 
 def noted_early(sampler, e, s, n):
-    """Special laws of the clay before the kick that leads on; stops noted in that to an event."""
+    """Special laws of the clay before the next kick; stops noted in the kick to an event."""
     if sampler is None:
         return s.clay.reaction, n
     return noted_in(sampler.special, e, s, n)
@@ -698,7 +705,7 @@ def stepped_arm(sampler, parts, e, s, k, after):
 
 
 def taken(sampler, parts, s, k):
-    """The loop behind a step that is taken."""
+    """The loop after an accepted step."""
     if sampler is None:
         return k.loop
     loop, e = s.loop, s.loop.event
@@ -710,7 +717,7 @@ def taken(sampler, parts, s, k):
 
 
 def note(sampler, q, machine, e):
-    """Notes a sample in the rings of the hardware."""
+    """Stores a sample in the rings of the hardware."""
     hardware.note_angles(sampler.difference, machine, hardware.encoded(sampler.encoder, q))
     hardware.note_force(sampler.passivity, e.machine, e.asked.force)
     hardware.note_hold(sampler.delay, machine, e.machine, e.asked)

@@ -1,4 +1,4 @@
-"""A scene compiled of the parts that it has, and the state at its start."""
+"""A scene compiled from its parts, and the state at its start."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .modes import SUBSTEPS
 from .parts import INF
 
 NONE = (0.0, 0.0)
-QUEUE = 4  # rows of the queue of torques beyond the whole samples that they come late
+QUEUE = 4  # rows of the queue of torques in addition to the whole samples of their delay
 STIFF, HITTING = 1.0, 0.02  # see `hardness`
 NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
 
@@ -140,7 +140,7 @@ def parts_of(s: Scenario, controller: Controller | None = None):
 
     Args:
         s: the scene.
-        controller: that of the user's own, in place of the scene's.
+        controller: the user's own, in place of the scene's.
     """
     lag, form = compensators(s)
     clay = clay_part(s)
@@ -246,7 +246,7 @@ def guard(whole: int, share: float):
 
 
 def for_delays(parts, longest: float):
-    """The parts of a scene with rings for torques that come later than its own.
+    """The parts of a scene with rings for a longer delay of the torques.
 
     Args:
         parts: of the scene.
@@ -262,7 +262,7 @@ def for_delays(parts, longest: float):
 
 
 def first_reaction(special):
-    """What clay left to the first kick."""
+    """Reaction of the clay before the first kick."""
     if special is None:
         return None
     contact = s_.Contact(NONE, NONE, NONE, NONE, (math.nan, math.nan), 0.0, NONE)
@@ -271,7 +271,7 @@ def first_reaction(special):
 
 
 def first_laws(special, p):
-    """State of the laws before the handle has been anywhere."""
+    """State of the laws before any motion of the handle."""
     if special is None:
         return None
     law, none = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0), (0.0,) * 6
@@ -285,7 +285,7 @@ def first_laws(special, p):
 
 
 def first_form(parts, s):
-    """States of compensators of another shape, of a handle that has long moved evenly."""
+    """States of compensators of another shape, of a handle in steady motion."""
     if parts.form is None:
         return None
     both = zip(s.compensators, parts.servo, s.velocity, strict=True)
@@ -293,7 +293,7 @@ def first_form(parts, s):
 
 
 def blocks(parts, s: Scenario):
-    """A state with the blocks of all parts, before the handle has been anywhere."""
+    """A state with the blocks of all parts, before any motion of the handle."""
     axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
     growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
     hit = s_.Hit(INF, 0.0) if parts.hits else None
@@ -316,7 +316,7 @@ def start(parts, s: Scenario, e):
 
 
 def traits(s: Scenario) -> tuple[Any, ...]:
-    """What decides which parts a scene has: scenes alike in this share machine code.
+    """What decides which parts a scene has; scenes with equal traits share machine code.
 
     Args:
         s: the scenario.
@@ -379,7 +379,7 @@ def own_law(parts):
 
 
 def cause_of_end(parts):
-    """Why no step can go on."""
+    """Why no further step is possible."""
     law = own_law(parts)
     if law is not None and not law.finite():
         return "the torques of the controller are not finite"
@@ -387,7 +387,7 @@ def cause_of_end(parts):
 
 
 def viewed(part):
-    """Parts with memoryviews in place of arrays: CPython reads plain floats from them, and sooner.
+    """Parts with memoryviews in place of arrays: CPython reads plain floats from them, and faster.
 
     Args:
         part: the parts of a scene.
@@ -401,6 +401,6 @@ def viewed(part):
 
 
 def tells(parts):
-    """Whether the force of the clay is recorded: b v does not tell it."""
+    """Whether the force of the clay is recorded, because b v does not give it."""
     own = parts.modal is not None or (parts.special is not None and rows.tells(parts.special))
     return own or (parts.sampler is not None and parts.sampler.rendered is not None)

@@ -1,4 +1,4 @@
-"""The length at which a step first does what it should not: passes a border, or outlasts a mode."""
+"""The length at which a step first passes a border, or outlasts a mode."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def missed(modal, probe, parts, s, k, h, what, border):
 
 
 def felt_behind(parts, s, k, h):
-    """What clay that yields does at the end of a step of length h, in its modes."""
+    """What yielding clay does at the end of a step of length h, in its modes."""
     when = moment(parts.accurate.ahead, s.clock.t, h, -1)
     return instant(parts, when, k.end, s.clay, s.loop.modes).grip
 

@@ -171,7 +171,7 @@ def servo_mobility(shaping, servo, W):
 
 
 def with_feed(form, W, x, y):
-    """The mobility with what the force of the kick adds by way of the compensator."""
+    """The mobility with the direct feedthrough of the compensator."""
     if form is None:
         return W
     return W[0] + x, W[1], W[2] + y

@@ -1,4 +1,4 @@
-"""What drives a run, the muscle force and the command, made ready for the loops part by part."""
+"""Prepares the signals of a run, the muscle force and the command, part by part."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from . import march
 from . import parts as p_
 
 COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the accurate method
-NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step is at its end
+NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step counts as at its end
 
 
 class Drives:
@@ -37,11 +37,11 @@ class Drives:
 
         Args:
             parts: the scene.
-            i: the sample that the run is at, or behind.
+            i: the sample at or before the present time.
             n: number of whole steps.
 
         Returns:
-            The parts; for how many whole steps they are ready.
+            The parts; number of whole steps for which they are ready.
         """
         dt, further, tables = parts.time.dt, 2, self.signals.values()
         if parts.accurate is not None:
@@ -128,7 +128,7 @@ def stage_times(accurate: p_.Accurate, dt: float, i: int, n: int) -> np.ndarray:
 
 
 class Drive:
-    """A signal, and its pieces over the part of a run that comes next.
+    """A signal, and its pieces over the next part of a run.
 
     Args:
         signal: the signal.
@@ -155,7 +155,7 @@ class Drive:
                 self._first = pieces.pieces_value(self._pieces, now, now + self._slack)[0]
 
     def prepare(self, begin: float, end: float) -> None:
-        """Makes the pieces of the part of a run that comes next, and with them the table.
+        """Makes the pieces of the next part of a run, and from them the table.
 
         Args:
             begin: of the part, a whole multiple of dt [s].

@@ -1,4 +1,4 @@
-"""Clay that springs back: its force in a kick, and its state behind a step."""
+"""Clay that springs back: its force in a kick, and its state after a step."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def longest(springs, elastic, after):
 
 
 def is_calm(springs, elastic):
-    """Whether springs ask for no short steps."""
+    """Whether springs require no short steps."""
     if springs is None:
         return True
     return elastic.resolved == INF
@@ -75,7 +75,7 @@ def moved_axis(n, rest, stretch, at, p, h):
 
 
 def dent(table, i, index, way, before, now):
-    """Notes what gave way in a surface."""
+    """Notes the dent of a surface."""
     if way != 0.0 and now != before:
         table[dent_place(table, i, index)] = now
 
@@ -85,7 +85,7 @@ def dent_place(table, i, index):
 
 
 def entered(springs, s, region, table, p, crossed):
-    """The springs of a region that the handle comes into; those left behind lose theirs.
+    """The springs of a region that the handle enters; those left behind lose their energy.
 
     Args:
         springs: the part.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # how a run stands
+OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # status of a run
 
 
 class Axis(NamedTuple):
     """Compensator and reference model of one axis.
 
     Attributes:
-        delta: compensator output [m]; of another shape, start and command alone.
+        delta: compensator output [m]; for another shape, only start and command.
         rate: its rate [m/s].
         y: reference position [m].
         yrate: reference rate [m/s].
@@ -50,15 +50,15 @@ class Sampled(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """The controller in sampled time, and its hardware; what a scene lacks is None.
+    """The controller in sampled time, and its hardware; missing parts are None.
 
     Attributes:
         x: compensator and reference model of x at the next sample.
         y: those of y.
         form: states of compensators of another shape.
         own: state of the user's own controller.
-        hold: what the motors hold.
-        samples: when the next samples come.
+        hold: actuator output.
+        samples: times of the next samples.
         force: net force last given to the compensators, (x, y) [N].
         rates: joint rates as measured by difference.
         filtered: states of the filters of the force, two of x, two of y.
@@ -96,12 +96,12 @@ class Formed(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """What the motors hold.
+    """Actuator output, held between samples.
 
     Attributes:
         tau: their torques [N.m].
         force: of the clay, as rendered [N].
-        guard: of it that of the passivity controller [N].
+        guard: the part of it that comes from the passivity controller [N].
         pull: the virtual coupling.
     """
 
@@ -127,7 +127,7 @@ class Held(NamedTuple):
     """What acts on the joints in a kick.
 
     Attributes:
-        hold: what the motors hold.
+        hold: actuator output.
         slip: torques of friction [N.m].
     """
 
@@ -136,7 +136,7 @@ class Held(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """When control samples come.
+    """Times of control samples.
 
     Attributes:
         k: index of the next.
@@ -153,7 +153,7 @@ class Rates(NamedTuple):
     """Joint rates as measured by difference.
 
     Attributes:
-        w: behind their filter [rad/s].
+        w: after their filter [rad/s].
         oldest: row of the ring of past samples.
     """
 
@@ -192,11 +192,11 @@ class Queue(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the controller makes of a sample.
+    """Response of the controller to a sample.
 
     Attributes:
         shown: 1.0, 0.0 where the sample is lost.
-        hold: what the motors are to hold.
+        hold: requested actuator output.
         force: net force for the compensators [N].
         delta: their output at the sample [m].
         own: as Machine.own; and so on.
@@ -220,15 +220,15 @@ class Event(NamedTuple):
 
     Attributes:
         on: whether there is one, 1.0 or 0.0.
-        at: the handle behind the kick that leads to it.
+        at: the handle after the kick that leads to it.
         w: joint rates there [rad/s].
         reaction: of the clay there.
         fh: force of the hand in that kick [N].
         work: the ledger with it.
         delta: compensator output at the sample [m].
-        shown: 1.0 where a sample asks for torques.
-        asked: those.
-        machine: controller and hardware behind the event.
+        shown: 1.0 where a sample requests torques.
+        asked: the requested output.
+        machine: controller and hardware after the event.
     """
 
     on: float
@@ -244,7 +244,7 @@ class Event(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """Where in time a run is.
+    """Present time of a run.
 
     Attributes:
         t: now [s].
@@ -272,7 +272,7 @@ class Body(NamedTuple):
 
 
 class Region(NamedTuple):
-    """Where all laws of the clay keep their value.
+    """Region in which all laws of the clay are constant.
 
     Attributes:
         index: along x and along y.
@@ -302,7 +302,7 @@ class Clay(NamedTuple):
 
     Attributes:
         region: where the handle is.
-        b: damping now, at t = 0 where it grows [N.s/m].
+        b: present damping; that at t = 0 where it grows [N.s/m].
         old: that of the clay before the sample.
         growth: clay that grows.
         hit: a hit that drives motors into their limits.
@@ -320,7 +320,7 @@ class Clay(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """What clay beside plain viscous damping did in a kick, and leaves to the next one.
+    """What clay beyond plain viscous damping did in a kick, and leaves to the next one.
 
     Attributes:
         owed: impulse owed by stiff clay [N.s].
@@ -334,7 +334,7 @@ class Reaction(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Laws of the clay with a state that steps move on.
+    """Laws of the clay whose state changes with each step.
 
     Attributes:
         flow: clay that yields.
@@ -367,8 +367,8 @@ class Hit(NamedTuple):
     """A hit that drives motors into their limits.
 
     Attributes:
-        fine: longest step on the way from it [s].
-        struck: whether the handle has just come into this clay, 1.0 or 0.0.
+        fine: longest step after it [s].
+        struck: whether the handle has just entered this clay, 1.0 or 0.0.
     """
 
     fine: float
@@ -394,7 +394,7 @@ class Contact(NamedTuple):
         mean: force [N].
         v: velocity at the sample [m/s].
         f: force there [N].
-        stuck: whether x and y rest behind it, 1.0 or 0.0.
+        stuck: whether x and y rest after it, 1.0 or 0.0.
         anchor: where an axis came to rest beside one that slides [m], NaN elsewhere.
         still: whether both rest, 1.0 or 0.0.
         times: when they came to rest after the sample [s].
@@ -472,7 +472,7 @@ class Work(NamedTuple):
 
 
 class HardwareWork(NamedTuple):
-    """What the hardware between computer and arm takes [J]; the last two are part of motors.
+    """Energy that hardware between computer and arm takes [J]; the last two are part of motors.
 
     Attributes:
         friction: of the joints.
@@ -486,13 +486,13 @@ class HardwareWork(NamedTuple):
 
 
 class Status(NamedTuple):
-    """How a run stands.
+    """Status of a run.
 
     Attributes:
-        code: OPEN while it goes on.
+        code: OPEN while it is running.
         closing: why the next row is the last, OPEN where it is not.
-        careful: steps with a look at their end since the last sample.
-        landings: times that the handle has come back to a region since the last sample.
+        careful: steps with event detection since the last sample.
+        landings: returns of the handle to a region since the last sample.
         seen: regions since then: least and most index along x, then along y.
     """
 
@@ -504,7 +504,7 @@ class Status(NamedTuple):
 
 
 class Filled(NamedTuple):
-    """What a run has made since the last look.
+    """What a run has made since the last check.
 
     Attributes:
         steps: engine steps.
@@ -528,7 +528,7 @@ class State(NamedTuple):
         loop: the controller.
         clay: the clay.
         work: the ledger.
-        status: how it stands.
+        status: status of the run.
         filled: what it has made.
     """
 
@@ -698,13 +698,13 @@ class Kick(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """How clay that yields acts in a step; along the motion the first of each pair counts.
+    """How yielding clay acts in a step; along the motion, the first of each pair counts.
 
     Attributes:
         law: Fy, K, n of x, then of y.
         mode: of each axis, 0.0 where it rests, or the sign of its velocity; along the motion see
             modes.REST_MODE.
-        way: along which a handle slides that is slow or begins, (x, y).
+        way: direction of a handle that slides slowly or begins to slide, (x, y).
         anchor: where an axis that rests came to rest [m].
         ended: what ended the step before, see modes.RESTS.
         ends: what ends this one.
@@ -729,7 +729,7 @@ class Course(NamedTuple):
         x: loop of x; its command is not in delta.
         y: loop of y.
         form: states of compensators of another shape, of x and of y.
-        left: steps to the next sample; 0 where they are to be counted anew.
+        left: steps to the next sample; 0 where they must be recounted.
         share: length of each but the last [s].
         modes: of clay that yields.
     """
@@ -743,11 +743,11 @@ class Course(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """When a stage of a step is.
+    """Time of a stage of a step.
 
     Attributes:
         t: time [s].
-        near: a time beside it within the step, where signals count as they are there [s].
+        near: a nearby time within the step, at which signals are evaluated [s].
         row: of the signals ahead; -1 where they have none.
         since: time since the start of the step [s].
     """
@@ -759,7 +759,7 @@ class Moment(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Where a stage of a step is.
+    """State at a stage of a step.
 
     Attributes:
         q: joint angles [rad].
@@ -777,11 +777,11 @@ class Point(NamedTuple):
 
 
 class Grip(NamedTuple):
-    """What clay that yields does at an instant; along its axes where each yields by itself.
+    """What yielding clay does at an instant; along its axes where they yield separately.
 
     Attributes:
         a: acceleration of the handle without its force [m/s^2].
-        B: acceleration that each unit of it takes (xx, xy, yx, yy) [1/kg].
+        B: acceleration removed per unit of it (xx, xy, yx, yy) [1/kg].
         v: velocity [m/s].
         f: its force [N].
     """
@@ -793,7 +793,7 @@ class Grip(NamedTuple):
 
 
 class Response(NamedTuple):
-    """How the handle answers forces.
+    """Response of the handle to forces.
 
     Attributes:
         g: its acceleration and centripetal acceleration [m/s^2].
@@ -859,7 +859,7 @@ class Sums(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What a record has of an instant, as Instant.
+    """Quantities of an instant in a record, as Instant.
 
     Attributes:
         p: position [m].

@@ -12,7 +12,7 @@ NONE = (0.0, 0.0)
 
 
 def behind_sample(stiff, split, step, at):
-    """The handle in a kick: behind the sample it stands where clay is stiff."""
+    """The handle in a kick; after the sample it is at rest along axes of stiff clay."""
     if stiff is None or split.over == 0.0:
         return at
     v, c, share = at.v, at.c, split.share

@@ -1,8 +1,8 @@
-"""Runs of one kind that one call of compiled code advances, for a loop of the user's around it.
+"""Runs of one kind that advance in one call of compiled code, inside a loop of the user's.
 
 Between calls a run is a row: the numbers of its parts, the addresses of their arrays, and its
-state. `advance` fills them in, makes steps, asks the quick test of the monitor, and puts the state
-back. `run` does the rest of it, seldom: the monitor itself, the end of a run, other numbers.
+state. `advance` reads the row, makes steps, runs the quick test of the monitor, and writes the
+state back. `run` handles the rare cases: the monitor itself, the end of a run, other numbers.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the
 
 
 class Place(NamedTuple):
-    """Where one thread makes steps.
+    """Workspace in which one thread makes steps.
 
     Attributes:
         engine: the engine; rows of the record and force of the clay lie with each run.
@@ -41,7 +41,7 @@ class Place(NamedTuple):
 
 
 class Vector(NamedTuple):
-    """Runs of one kind, or of several: a row each.
+    """Runs of one kind, or of several: one row each.
 
     Attributes:
         numbers: of their parts, see many.numbers_of, shape (n, m).
@@ -49,7 +49,7 @@ class Vector(NamedTuple):
         states: numbers of their states, shape (n, l).
         written: of the arrays that steps write into: address and bytes, shape (n, w).
         kept: addresses of their rows that have not been judged, and of the force of the clay in
-            them; 1 where b v does not tell that force, 1 where crossings and stops are noted, else
+            them; 1 where b v does not give that force, 1 where crossings and stops are noted, else
             0; shape (n, 4).
         until: samples to pause at, shape (n,).
         looked: samples judged so far, shape (n,).
@@ -90,7 +90,7 @@ def parts_at(like, numbers, arrays, k):
 
 
 def put_state(s, states, k):
-    """Keeps the state of run k; compiled only."""
+    """Stores the state of run k; compiled only."""
     raise NotImplementedError
 
 
@@ -123,7 +123,7 @@ def engine_of(e, x, k):
 
 
 def readied(parts, s, e, limits):
-    """Readies the engine for a run."""
+    """Prepares the engine for a run."""
     put(e.timestep, 0, (parts.time.dt,))
     put(e.q, 0, s.body.q)
     put(e.w, 0, s.body.w)
@@ -151,7 +151,7 @@ def swap_written(written, k, scratch, back):
 
 
 def judged(parts, x, k, table, first, n):
-    """Asks the quick test of the monitor about the rows made."""
+    """Runs the quick test of the monitor on the rows made."""
     limit = parts.limits
     if x.quiet[k] and n > first:
         made, swings, seen = table[first:n], x.swings[k], x.seen[k]
@@ -160,7 +160,7 @@ def judged(parts, x, k, table, first, n):
 
 
 def show(e, x, k, table, n):
-    """Keeps row n as the present sample, and the force of the clay where b v does not tell it."""
+    """Stores row n as the present sample, and the force of the clay where b v does not give it."""
     for j in range(rows.ROW):
         x.shown[k, j] = table[n, j]
     if x.kept[k, 2]:
@@ -179,7 +179,7 @@ def moved(like, state, place, x, k, ahead):
     readied(parts, s, e, place.limits)
     while s.status.code == OPEN and path.has_room(parts.time, s, e, room):
         s = path.advance(parts, s, e, room)
-        if x.kept[k, 3] == 0:  # no one asks for crossings: there is room for more
+        if x.kept[k, 3] == 0:  # nobody reads crossings: make room for more
             s = path.with_filled(s, Filled(0, s.filled.rows, 0, 0))
     if ahead:
         swap_written(x.written, k, place.scratch, True)
@@ -194,7 +194,7 @@ def moved(like, state, place, x, k, ahead):
 
 
 def has_events(x, k):
-    """Whether crossings or stops of the last call wait to be read: to try a step spoils them."""
+    """Whether crossings or stops of the last call are unread: trying a step overwrites them."""
     return x.kept[k, 3] == 1 and x.marks[k, 4] + x.marks[k, 5] > 0
 
 
@@ -232,7 +232,7 @@ def arrays_in(part: Any) -> Iterator[np.ndarray]:
 
 
 def is_vectored(run: Run) -> bool:
-    """Whether `advance` makes the steps of a run: not under signals, nor with a law of the user's.
+    """Whether `advance` makes the steps of a run: not with signals, nor with the user's own law.
 
     Args:
         run: the run.
@@ -241,7 +241,7 @@ def is_vectored(run: Run) -> bool:
 
 
 def kind_key(run: Run) -> tuple[Any, ...]:
-    """What runs have in common that advance together.
+    """Key of runs that advance together.
 
     Args:
         run: one of them.
@@ -266,7 +266,7 @@ def unpacked(like: Any, numbers: Iterator[float]) -> Any:
 
 
 class Common:
-    """What runs of all kinds have rows of: the arrays of Vector that do not depend on the kind.
+    """Rows of runs of all kinds: the arrays of Vector that do not depend on the kind.
 
     Args:
         n: number of runs.
@@ -396,7 +396,7 @@ class RunVector:
 
 
 class Row:
-    """A run that is a row by itself, for a Simulation.
+    """A run as a single row, for a Simulation.
 
     Args:
         run: the run.
@@ -404,7 +404,7 @@ class Row:
 
     Attributes:
         parts: of the run, as the row has them.
-        leads: whether the row has the state, and the run an old one.
+        leads: whether the row holds the state, and that of the run is outdated.
         shows: whether the present sample is known.
         marks: see Vector.marks.
         t: now [s].
@@ -423,7 +423,7 @@ class Row:
         self.advance: Any = None  # vector.advance for these arguments, compiled
 
     def take(self, run: Run) -> None:
-        """Takes over what the run has anew: its parts, its state.
+        """Takes over what has changed in the run: its parts, its state.
 
         Args:
             run: the run.
@@ -443,7 +443,7 @@ class Row:
         """Takes over another muscle force.
 
         Args:
-            parts: with it, the same else.
+            parts: with this force, otherwise the same.
         """
         at = self.vector.put.push.steady
         self.vector.x.numbers[0, list(at)] = parts.push.steady
@@ -453,11 +453,11 @@ class Row:
         """Makes steps.
 
         Args:
-            room: rows that the run may have.
+            room: largest number of rows.
         """
         x = self.common
         x.until[0], x.looked[0] = room, 0
-        self.shows = self.asked  # whoever has asked for a sample will ask for the next
+        self.shows = self.asked  # a caller that reads one sample will read the next
         self.asked = False
         self.advance(*self.arguments, BOTH if self.shows else STEPS)
         self.marks, self.t, self.leads = x.marks[0].tolist(), float(x.times[0]), True

@@ -111,7 +111,7 @@ def smooth_damping(smooth, table, b, p):
 
 
 def same_growth(part, growth):
-    """Growth behind a step: the clay before the sample is that of now."""
+    """Growth after a step: the clay before the sample is the present one."""
     if part is None:
         return growth
     return Growth(growth.rate, growth.rate)

@@ -48,7 +48,7 @@ def resist_by(along, B, v, end, law, L):
 
 
 def back(stuck, anchor, place, on):
-    """Velocity that leads an axis that rests beside one that slides back to its place [m/s]."""
+    """Velocity that returns an axis at rest beside one that slides to its place [m/s]."""
     if on > 0.0 and stuck > 0.0 and anchor == anchor:
         return 0.5 * (anchor - place) / on
     return 0.0
@@ -219,14 +219,14 @@ def over_stiff(stiff, split, v, slow):
 
 
 def behind(part, state):
-    """The state after a step: the clay before the sample is that of now."""
+    """The state after a step: the clay before the sample is the present one."""
     if part is None:
         return state
     return Flow(state.law, state.law)
 
 
 def noted(part, e, contact, before, t, n):
-    """Notes where clay that yields stops the handle or lets it go; how many are then noted."""
+    """Notes where yielding clay stops or releases the handle; returns the number then noted."""
     if part is None:
         return n
     now, was, times = contact.stuck, before.stuck, contact.times
@@ -239,7 +239,7 @@ def noted(part, e, contact, before, t, n):
 
 
 def note(stops, n, axis, starts, t):
-    """Notes a stop; how many are then noted.
+    """Notes a stop; returns the number then noted.
 
     Args:
         axis: 0.0 for x, 1.0 for y.
